@@ -25,4 +25,7 @@ def ax(request):
         found = panel.get_title(loc="left") or panel.get_title(), panel.get_xlabel(), panel.get_ylabel()
         assert found == TITLE_AND_AXES.get(f"{request.path.parent.name} {request.node.name}", ("", "", ""))
     figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
+    panel = figure.axes[0]
+    if panel.axison and panel.xaxis.label.get_fontsize() == style.TEXT:  # not after `clear`, which loses the style
+        assert style.defects(figure, placed=False) == []
     plt.close("all")

@@ -44,7 +44,7 @@ pictured = pytest.mark.mpl_image_compare(
 
 # The colours of the book, written out: observed errors, valid bounds, refuted formulas, references, other series.
 BLUE, GREEN, ORANGE, GREY, BLACK = "#0072B2", "#007D5F", "#C44E00", "#6B6B6B", "#000000"
-PURPLE, PINK, NAVY, SKY = "#7B3FA0", "#B8478C", "#1F2F6B", "#3E93C8"
+PURPLE, PINK, NAVY, VIOLET = "#7B3FA0", "#B8478C", "#1F2F6B", "#5468CF"
 
 
 def look(artist: Any) -> tuple[str, str, str]:

@@ -149,7 +149,7 @@ def test_budget():
 
 def test_the_year():
     runs = {run.case: run for run in year.load()}
-    base = year.Case(year.MODELS[0], 2, 24, Rounding.NEAREST, Form.HUNG)
+    base = year.YearCase(year.MODELS[0], 2, 24, Rounding.NEAREST, Form.HUNG)
     end = {t: float(np.abs(runs[base._replace(precision=t)].rate[-1]).max()) for t in (18, 24, 32, 40, 53)}
     assert round(end[18], -3) == 26_000
     assert 0.8 < end[32] < 1

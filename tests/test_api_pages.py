@@ -7,6 +7,8 @@ import importlib.util
 from itertools import pairwise
 from pathlib import Path
 
+from gpbnb.names import HOMES, NAMED_FORMATS
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -23,6 +25,12 @@ def test_each_public_module_has_its_page_and_its_docstring():
     pages = {path.stem: path.read_text(encoding="utf-8") for path in found.PAGES.glob("*.md")}
     assert pages == {module: found.page(module) for module in modules}, "run scripts/write_api_pages.py"
     assert [module for module, summary in modules.items() if not summary] == []
+
+
+def test_the_page_for_engineers_lists_every_public_name():
+    text = (ROOT / "book" / "api.md").read_text(encoding="utf-8")
+    names = {*HOMES, "NAMED_FORMATS"} - set(NAMED_FORMATS)
+    assert [name for name in sorted(names) if f"`{name} <" not in text] == []
 
 
 def test_no_docstring_of_a_constant_is_read_as_a_type():

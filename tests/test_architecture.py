@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+import re
 from functools import cache
 from pathlib import Path
 
@@ -13,14 +14,14 @@ import gpbnb
 ROOT = Path(gpbnb.__file__).parent
 LONGEST_FILE = 800
 TOPICS = ("rounding", "inversion", "kalman", "guarantees", "rolling", "integration", "budget", "geometry", "processors")
-LIBRARY = (("clock",), ("caching",), ("arithmetic",), ("sweeps",), ("filters",), ("bounds",), ("wordlength",))
+LIBRARY = (("clock", "names"), ("caching",), ("arithmetic",), ("sweeps",), ("filters",), ("bounds",), ("wordlength",))
 REPORT = (
     ("display", "measurement", "confidence"),
     TOPICS,
     ("gravity_probe_b",),  # its answers are compared with the bounds of the report of 1984
-    ("wordlengths", "calculators", "ledger", "stored"),
+    ("wordlengths", "calculators", "pictures", "ledger", "ledger_options", "stored", "evidence"),
 )
-LAYERS = (*LIBRARY, *(tuple(f"report.{name}" for name in names) for names in REPORT), ("ledger",))
+LAYERS = (*LIBRARY, ("warm",), *(tuple(f"report.{name}" for name in names) for names in REPORT), ("ledger",))
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 FILES = {".".join(path.relative_to(ROOT.parent).with_suffix("").parts): path for path in sorted(ROOT.rglob("*.py"))}
 
@@ -33,8 +34,8 @@ def room(module):
 
 @pytest.fixture(scope="module")
 def imports():
-    """The modules that each module imports, at its top or within its functions; imports for types alone left out."""
-    graph = grimp.build_graph("gpbnb", exclude_type_checking_imports=True, cache_dir=None)
+    """The modules that each module imports, at its top, within its functions, or for types alone."""
+    graph = grimp.build_graph("gpbnb", cache_dir=None)
     return {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
 
 
@@ -79,6 +80,14 @@ def test_no_module_imports_itself_over_others(imports):
         graphlib.TopologicalSorter(imports).prepare()
     except graphlib.CycleError as error:
         pytest.fail(f"import cycle: {' <- '.join(error.args[1])}")
+
+
+def test_no_import_is_for_types_alone():
+    """Types come from the modules below, or from protocols; what depends on what is then the same for every tool."""
+    assert [module for module, nodes in syntax().items() if "TYPE_CHECKING" in names_used(nodes)] == []
+    assert not any(
+        isinstance(node, ast.Name) and node.id == "TYPE_CHECKING" for each in syntax().values() for node in each
+    )
 
 
 def test_theory_does_not_know_the_experiment(imports):
@@ -152,3 +161,61 @@ def test_nothing_is_imported_by_string():
 def test_files_are_as_long_as_their_subject():
     lengths = {module: len(path.read_text(encoding="utf-8").splitlines()) for module, path in FILES.items()}
     assert {module: length for module, length in lengths.items() if length > LONGEST_FILE} == {}
+
+
+def test_the_map_of_the_house_names_every_room_and_only_files_that_exist():
+    text = (
+        (ROOT.parent / "CONTRIBUTING.md")
+        .read_text(encoding="utf-8")
+        .partition("## Structure")[2]
+        .partition("## Style")[0]
+    )
+    rooms = {name.removeprefix("report.") for name in LEVEL} - {"ledger_options"}
+    assert rooms - set(re.findall(r"\w+", text.partition("### ")[0])) - set(TOPICS) == set()
+    paths = [name for name in re.findall(r"`([\w/.]+)`", text) if "/" in name and not name.startswith("tests")]
+    assert len(paths) > 20
+    bases = (ROOT.parent, ROOT)
+    assert [name for name in paths if not any((base / name).exists() for base in bases)] == []
+
+
+def test_each_class_has_a_name_of_its_own():
+    """A reader who meets a name in a message or in a signature finds one class of this name."""
+    homes = {}
+    for module, nodes in syntax().items():
+        for node in nodes:
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(module)
+    assert {name: found for name, found in homes.items() if len(found) > 1 and not name.startswith("_")} == {}
+
+
+LONGEST_FUNCTION, MOST_PARAMETERS = 80, 10
+WIDE = {
+    "gpbnb.filters.model.__init__": "public: the matrices of a model, and what may be added to them",
+    "gpbnb.filters.nonlinear.__init__": "public: the functions and noises of a model, each a keyword",
+    "gpbnb.wordlength.blocks.required_block_precisions": "public: each is a keyword that a user may name",
+    "gpbnb.wordlength.precision.required_precision": "public: each is a keyword that a user may name",
+    "gpbnb.wordlength.precision.survey": "public: each is a keyword that a user may name",
+    "gpbnb.wordlength.records.survey_records": "public: each is a keyword that a user may name",
+}
+"""Functions of more than ten parameters, and the reason. All are public: scripts and the book name these keywords."""
+
+
+def functions():
+    """The name of each function, its lines without docstring, and the number of its parameters without self and cls."""
+    for module, nodes in syntax().items():
+        for node in nodes:
+            if isinstance(node, ast.FunctionDef):
+                given, first = node.args, min([node.lineno, *(each.lineno for each in node.decorator_list)])
+                named = [each.arg for each in (*given.posonlyargs, *given.args)]
+                count = len(named) - (named[:1] in (["self"], ["cls"])) + len(given.kwonlyargs)
+                count += (given.vararg is not None) + (given.kwarg is not None)
+                text = node.body[0].end_lineno - node.body[0].lineno + 1 if ast.get_docstring(node) else 0
+                yield f"{module}.{node.name}", node.end_lineno - first + 1 - text, count
+
+
+def test_functions_are_short():
+    assert {name: lines for name, lines, _ in functions() if lines > LONGEST_FUNCTION} == {}
+
+
+def test_functions_have_few_parameters():
+    assert {name for name, _, count in functions() if count > MOST_PARAMETERS} == set(WIDE)

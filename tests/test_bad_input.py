@@ -16,6 +16,7 @@ from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding,
 from gpbnb.bounds.guarantee import guarantee
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.named import form_named, rounding_named, whole_number
+from gpbnb.filters.run import Sums
 from gpbnb.filters.simulation import Simulation
 from gpbnb.report.budget import theory as budget
 from gpbnb.report.rounding import theory
@@ -219,13 +220,13 @@ def test_too_many_steps_are_refused_before_they_are_simulated():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: emulate(MODEL, Z, 24), "got the format 24; needed a FloatFormat or a FixedFormat"),
+        (lambda: emulate(MODEL, Z, 24), "got the format 24; needed a FloatFormat, a FixedFormat or BlockFormats"),
         (lambda: emulate(None, Z, FMT), "got a model NoneType; needed a LinearModel"),
         (lambda: emulate(MODEL, Z[:0], FMT), "got no measurements; needed at least one step"),
         (lambda: emulate(MODEL, Z, FMT, checkpoint_steps=[2.5]), "needed whole numbers"),
         (lambda: emulate(MODEL, Z, FMT, checkpoint_steps=[True]), "needed whole numbers"),
-        (lambda: emulate(MODEL, Z, FMT, sums=24), "sums: got 24; needed a FloatFormat or a FixedFormat"),
-        (lambda: emulate(MODEL, Z, FMT, fused="no"), "fused: got 'no'; needed True or False"),
+        (lambda: emulate(MODEL, Z, FMT, sums=Sums(fmt=24)), "sums: got 24; needed a FloatFormat or a FixedFormat"),
+        (lambda: emulate(MODEL, Z, FMT, sums=Sums(fused="no")), "fused: got 'no'; needed True or False"),
         (lambda: linalg.dot(FMT.array([1]), FMT.array([1]), sums=24), "sums: got 24; needed a FloatFormat"),
         (lambda: linalg.dot(FMT.array([1]), FMT.array([1]), fused="yes"), "fused: got 'yes'; needed True or False"),
         (lambda: required_precision(MODEL, 3, 0.1, within=3), "got within=3; needed the result of limits"),

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import re
+import time
 from concurrent.futures import Future
 from enum import Enum
 from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from docutils import nodes
 from docutils.utils import new_document
+from PIL import Image
 from sphinx.application import Sphinx
 from sphinx.errors import ConfigError
 from sphinx.util.docutils import docutils_namespace
@@ -30,9 +35,10 @@ def load(name):
 
 
 book, ledger, metadata = load("gpbnb_book"), load("gpbnb_ledger"), load("gpbnb_metadata")
+search, weight = load("gpbnb_search"), load("gpbnb_weight")
 
 
-# -- docstrings, labels, first page, MathJax -----------------------------------------------------------
+# -- docstrings, labels, first page --------------------------------------------------------------------
 
 
 def unfolded(*lines):
@@ -76,6 +82,30 @@ def test_an_entry_is_labelled_with_its_key():
     assert book.ShortNames.default_label_style is book.KeyLabels
 
 
+def test_figures_have_one_numbering_through_the_book():
+    env = SimpleNamespace(
+        toctree_includes={"index": ["first", "last"], "first": ["below"]},
+        toc_fignumbers={
+            "last": {"figure": {"c": (2, 1)}},
+            "index": {"figure": {"a": (1,)}, "table": {"t": (1,)}},
+            "first": {"figure": {"y": (1, 2), "x": (1, 1), "z": (1, 10)}},
+            "below": {"table": {"u": (1, 1)}},
+        },
+    )
+    of = SimpleNamespace(config=SimpleNamespace(root_doc="index"))
+    given = {page: {kind: dict(each) for kind, each in kinds.items()} for page, kinds in env.toc_fignumbers.items()}
+    assert book.number_figures(of, env) == []
+    assert {page: kinds.get("figure") for page, kinds in env.toc_fignumbers.items()} == {
+        "index": {"a": (1,)},
+        "first": {"x": (2,), "y": (3,), "z": (4,)},
+        "last": {"c": (5,)},
+        "below": None,
+    }
+    assert env.toc_fignumbers["index"]["table"] == {"t": (1,)}
+    book.keep_chapter_numbers(of, env)  # as Sphinx left them, or it would write every page anew
+    assert env.toc_fignumbers == given
+
+
 def app(folder, builder="html"):
     return SimpleNamespace(
         outdir=str(folder),
@@ -92,21 +122,137 @@ def test_the_first_page_leads_to_the_root(tmp_path):
     assert text.count("The title") == 2
 
 
-def test_mathjax_comes_along_whole_and_no_more(tmp_path):
-    book.copy_mathjax(app(tmp_path), None)
-    target = tmp_path / "_static" / "mathjax"
-    for part in book.MATHJAX_PARTS:
-        assert (target / part).is_file() == part.endswith((".js", ".json")), part
-        assert (target / part).exists(), part
-    assert any((target / "output/chtml/fonts").rglob("*.woff*"))
-    assert {path.name for path in (target / "sre/mathmaps").iterdir()} == {"base.json", "en.json"}
-    assert not (target / "tex-svg.js").exists()
+RELATIONS = {
+    "book/a": (None, None, "book/b"),
+    "book/b": (None, "book/a", "book/api"),
+    "book/api": (None, "book/b", "book/api/x"),
+    "book/api/x": ("book/api", "book/api", "book/c"),
+    "book/c": (None, "book/api/x", None),
+}
+
+
+@pytest.mark.parametrize(
+    ("page", "before", "after"),
+    [("book/a", None, "b"), ("book/b", "a", "c"), ("book/c", "b", None), ("book/api", None, None)],
+)
+def test_links_to_the_next_page_pass_over_the_reference(page, before, after):
+    builder = SimpleNamespace(
+        relations=RELATIONS,
+        get_relative_uri=lambda page, target: target.removeprefix("book/"),
+        render_partial=lambda title: {"title": title},
+    )
+    made = SimpleNamespace(builder=builder, env=SimpleNamespace(titles={name: name for name in RELATIONS}))
+    context = {"prev": {"link": "old"}, "next": {"link": "old"}}
+    book.skip_reference(made, page, "page.html", context, None)
+    assert [context[way] and context[way]["link"] for way in ("prev", "next")] == [before, after]
 
 
 def test_a_failed_build_is_left_alone(tmp_path):
     book.write_first_page(app(tmp_path), ValueError("failed"))
-    book.copy_mathjax(app(tmp_path), ValueError("failed"))
+    weight.lighten(app(tmp_path), ValueError("failed"))
     assert list(tmp_path.iterdir()) == []
+
+
+# -- search, and what is shipped ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("3,153,600 steps", ["3153600", "steps"]),
+        (r"k = 3{,}153{,}600", ["k", "3153600"]),
+        ("6,606.1 and 39.2", ["6606", "1", "and", "39", "2"]),
+        ("(1,2,3456) 1,23", ["1", "2", "3456", "1", "23"]),
+    ],
+)
+def test_a_number_is_one_word_of_the_search(text, words):
+    assert search.Numbers({}).split(text) == words
+
+
+def test_mathjax_comes_along_whole_and_no_more(tmp_path):
+    weight.copy_mathjax(tmp_path)
+    target = tmp_path / "_static" / "mathjax"
+    for part in weight.MATHJAX_PARTS:
+        assert (target / part).is_file() == part.endswith(".js"), part
+        assert (target / part).exists(), part
+    assert any((target / "output/chtml/fonts").rglob("*.woff*"))
+    assert not (target / "tex-svg.js").exists()
+
+
+def test_mathjax_loads_the_parts_that_come_along():
+    settings = (FOLDER.parents[1] / "_config.yml").read_text(encoding="utf-8")
+    listed = re.search(r"^        load: \[(.*)\]$", settings, re.MULTILINE)[1].replace('"', "").split(", ")
+    files = {f"{part.replace('[tex]', 'input/tex/extensions')}.js" for part in listed}
+    assert files | {"startup.js", "output/chtml/fonts"} == set(weight.MATHJAX_PARTS)
+
+
+def test_listings_older_than_a_template_are_written_anew(tmp_path):
+    old, new, template = (tmp_path / name for name in ("_modules/a.html", "_modules/b.html", "templates/x/layout.html"))
+    for age, path in ((30, old), (20, template), (10, new)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+        os.utime(path, (time.time() - age,) * 2)
+    config = SimpleNamespace(templates_path=["templates"])
+    weight.renew_listings(SimpleNamespace(config=config, srcdir=tmp_path, outdir=tmp_path))
+    assert not old.exists()
+    assert new.exists()
+
+
+@pytest.mark.parametrize(("equations", "kept"), [({"book/a": True}, 3), ({"book/b": True}, 1), ({}, 1)])
+def test_mathjax_is_left_out_where_a_page_has_no_formula(equations, kept):
+    """Sphinx asks the pages below a page, too."""
+    domain = SimpleNamespace(data={"has_equations": equations})
+    made = SimpleNamespace(builder=SimpleNamespace(name="html"), env=SimpleNamespace(get_domain=lambda name: domain))
+    scripts = [
+        SimpleNamespace(filename="mathjax/startup.js", attributes={}),
+        SimpleNamespace(filename=None, attributes={"body": "window.MathJax = {}"}),
+        SimpleNamespace(filename="gpbnb.js", attributes={}),
+    ]
+    context = {"script_files": scripts}
+    weight.leave_out_mathjax(made, "book/a", "page.html", context, None)
+    assert len(context["script_files"]) == kept
+    assert scripts[2] in context["script_files"]
+
+
+STYLES = """@import "a;b{c";
+.used { color: red } /* .used{ */ .unused, .used > p:not(.unused) { content: "}" } .unused{}
+:is(.used, .unused), .w-50\\% { margin: 0 } a[href=".x"] {b:c}
+@media print { .unused { d: e } .used { f: g } } @media screen { .unused { h: i } }
+@font-face { font-family: "x" }"""
+
+
+def test_rules_stay_that_fit_a_class_of_a_page_or_no_class():
+    kept = [
+        '@import "a;b{c";',
+        ".used{ color: red }",
+        ' .used > p:not(.unused){ content: "}" }',
+        ":is(.used, .unused){ margin: 0 }",
+        'a[href=".x"]{b:c}',
+        "@media print{.used{ f: g }}",
+        '@font-face{ font-family: "x" }',
+    ]
+    assert weight.applying(STYLES, {"used"}) == "".join(kept)
+
+
+def test_braces_that_do_not_match_are_refused():
+    with pytest.raises(ValueError, match="balanced"):
+        weight.applying("a { b: c", set())
+
+
+def test_a_picture_keeps_its_colours_in_a_palette(tmp_path):
+    picture = tmp_path / "figure.png"
+    given = Image.new("RGBA", (300, 200), (0, 0, 0, 0))
+    for k, colour in enumerate([(0, 114, 178, 255), (213, 94, 0, 255), (0, 158, 115, 128)]):
+        given.paste(colour, (100 * k, 50, 100 * k + 60, 150))
+    given.save(picture)
+    weight.write_palette(picture)
+    with Image.open(picture) as made:
+        assert made.mode == "P"
+        after = np.asarray(made.convert("RGBA"), dtype=int)
+    assert np.abs(after - np.asarray(given, dtype=int)).max() <= 4  # a level of 64, of which the octree takes the mean
+    size = picture.stat().st_size
+    weight.write_palette(picture)
+    assert picture.stat().st_size == size
 
 
 # -- the ledger's rows as labels, its formulas and links -----------------------------------------------
@@ -296,10 +442,23 @@ def test_the_description_is_made_of_whole_sentences_without_formulas():
     long = "This sentence is long enough to end the description, " * 4 + "as it should."
     short = "How far is the computed angle from the true one? Two\nmiles."
     assert metadata.description(page_with(f"{short} [Hung, 1984] {long}")) == " ".join(short.split())
-    question = "Which of the nine misalignments change the drift"
-    found = metadata.description(page_with(r"With \beta it fails.", "Too short.", f"{question} in a year:"))
-    assert found == f"{question} in a year"
+    question = "Which of the nine misalignments change the drift in a year?"
+    assert metadata.description(page_with(r"With \beta it fails.", "Too short.", f"{question} These do:")) == question
     assert metadata.description(new_document("empty")) == ""
+
+
+def test_a_work_that_a_description_names_keeps_its_year():
+    text = "This page lists every statement of Hung [1984] with its verdict"
+    assert metadata.description(page_with(f"{text} [Savage, 2016].")) == f"{text.replace('[1984]', '(1984)')}."
+
+
+def test_a_chapter_is_described_by_its_question():
+    """Its first paragraph may begin an argument that only the page explains."""
+    document = page_with("The figure shows one run in detail, with all of its errors.")
+    box = nodes.admonition()
+    box += nodes.paragraph("", "The question. How far can rounding move the estimate of a filter in a year?")
+    document[0] += box
+    assert metadata.description(document) == "How far can rounding move the estimate of a filter in a year?"
 
 
 def test_addresses_are_full_if_the_address_of_the_book_is_known():

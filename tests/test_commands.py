@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
 
 import pytest
 from forks import answering
 
 import gpbnb
+from gpbnb.report.gravity_probe_b.year import YearSweep
+from gpbnb.report.stored import SWEEPS, main
+from gpbnb.sweeps import Sweep
 
 PACKAGE = Path(gpbnb.__file__).parent
 COMMANDS = sorted(
@@ -48,17 +50,15 @@ def helped():
 
 def test_the_commands_are_found():
     assert {
-        "gpbnb.report.rolling",
-        "gpbnb.report.inversion",
+        "gpbnb.wordlength",
         "gpbnb.ledger",
         "gpbnb.report.stored",
-        "gpbnb.report.gravity_probe_b.year",
     } <= set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_only_helps(command, helped):
-    """Asked for help, `gpbnb.report.rolling` computed for 40 s and wrote its table into the package."""
+    """Asked for help, a command once computed for 40 s and wrote its table into the package."""
     before = stored()
     status, printed, errors = helped(command)
     assert status == 0, errors
@@ -66,32 +66,13 @@ def test_help_only_helps(command, helped):
     assert stored() == before
 
 
-@pytest.mark.parametrize(
-    "module",
-    [
-        "gpbnb.report.rolling.__main__",
-        "gpbnb.report.inversion.__main__",
-        "gpbnb.report.gravity_probe_b.threshold",
-        "gpbnb.report.gravity_probe_b.mission",
-    ],
-)
-def test_long_commands_write_to_the_given_folder(module, monkeypatch, tmp_path):
-    """With the computation replaced: each file goes to the folder, and the package stays as it is."""
-    command = importlib.import_module(module)
-    written = []
+def test_tables_are_written_below_the_working_directory_by_default(monkeypatch, tmp_path, capsys):
+    """With the computation replaced: each file goes to the folder for caches, and the package stays as it is."""
+    before, written = stored(), []
     monkeypatch.chdir(tmp_path)
-    for name in ("run", "finished"):
-        monkeypatch.setattr("gpbnb.sweeps.sweep.Sweep." + name, lambda *args, **kwargs: [])
-    monkeypatch.setattr(
-        "gpbnb.sweeps.sweep.Sweep.store",
-        lambda self, results, seconds=None, file=None: written.append(Path(file or self.file)),
-    )
-    monkeypatch.setattr("gpbnb.sweeps.sweep.Sweep.load", lambda self, file: _Loaded())
-    assert command.main([]) == 0
-    assert written
-    assert all(PACKAGE not in file.resolve().parents for file in written)
-
-
-class _Loaded:
-    def records(self):
-        return [{"trials": "0"}]
+    for each in (Sweep, YearSweep):
+        monkeypatch.setattr(each, "recompute", lambda self, folder, *_, **__: written.append(folder) or self.file)
+    assert main(["recompute", *(sweep.name for sweep in SWEEPS)]) == 0
+    assert written == [Path(".cache/sweeps")] * len(SWEEPS)
+    assert stored() == before
+    assert len(capsys.readouterr().out.splitlines()) == len(SWEEPS)

@@ -53,7 +53,8 @@ def asked_for(name: str) -> dict[str, set[str]]:
 
 
 def requirements(name: str) -> dict[str, list[Requirement]]:
-    groups = {"": PROJECT["project"]["dependencies"], **PROJECT["dependency-groups"]}
+    own = PROJECT["project"]["dependencies"] + PROJECT["project"]["optional-dependencies"]["report"]
+    groups = {"": own, **PROJECT["dependency-groups"]}
     return {group: [Requirement(text) for text in texts] for group, texts in groups.items() if group in LOCKS[name]}
 
 
@@ -92,6 +93,11 @@ def test_the_locks_agree():
 def test_the_build_backend_is_in_the_lock():
     for requirement in map(Requirement, PROJECT["build-system"]["requires"]):
         assert requirement in requirements("environment.txt")["dev"]
+
+
+def test_make_compiles_every_extra():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert set(re.findall(r"--extra (\w+)", makefile)) == set(PROJECT["project"]["optional-dependencies"])
 
 
 def test_make_compiles_every_group():

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import nbformat
@@ -16,33 +15,68 @@ from gpbnb import caching
 
 ROOT = Path(__file__).resolve().parents[1]
 CODE = {
-    "kernels": "from gpbnb.arithmetic.kernels import doubledouble\n\nprint(doubledouble.__name__)",
-    "data": "from gpbnb.report.budget import theory\n\nprint(theory.__name__)",
+    "clock": "from gpbnb import clock\n\nprint(clock.__name__)",
+    "data": "from gpbnb.report.budget import theory\n\n"
+    'print(theory.__name__)\nprint(open("../tests/count.txt").read())',
 }
 
 
 @pytest.fixture
-def copy(tmp_path):
-    """A checkout with two small notebooks; `copy(*options)` runs the script and returns what it wrote."""
+def script():
+    """The script as a module."""
+    sys.path.insert(0, str(ROOT / "scripts"))
+    try:
+        import execute_notebooks
+    finally:
+        sys.path.pop(0)
+    return execute_notebooks
+
+
+@pytest.fixture
+def copy(tmp_path, monkeypatch, script, capsys):
+    """A checkout with two small notebooks; `copy(*options)` runs the script and returns what it wrote.
+
+    `copy.keys()` gives the keys of the notebooks, which change with all that their outputs depend on.
+    """
     ignored = shutil.ignore_patterns("__pycache__")
     for name in ("gpbnb", "scripts"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=ignored)
-    (tmp_path / "book").mkdir()
+    for name in ("book", "tests"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "tests" / "count.txt").write_text("41", encoding="utf-8")
     for name, code in CODE.items():
         cells = [nbformat.v4.new_markdown_cell("Prose.", id="a"), nbformat.v4.new_code_cell(code, id="b")]
         nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "book" / f"{name}.ipynb")
-    environment = os.environ | {"PYTHONPATH": str(tmp_path), "GPBNB_CACHE_DIR": str(tmp_path / "cache")}
-    environment["XDG_CACHE_HOME"] = str(tmp_path / "other")
-    paths = [str(tmp_path / "book" / f"{name}.ipynb") for name in CODE]
+    for name, value in {
+        "PYTHONPATH": tmp_path,
+        "GPBNB_CACHE_DIR": tmp_path / "cache",
+        "XDG_CACHE_HOME": tmp_path / "other",
+    }.items():
+        monkeypatch.setenv(name, str(value))
+    # What the script computes in this process is about the copy, as in the processes that it starts.
+    monkeypatch.setattr(script, "ROOT", tmp_path)
+    monkeypatch.setattr(script, "BOOK", tmp_path / "book")
+    monkeypatch.setattr(script, "__file__", str(tmp_path / "scripts" / "execute_notebooks.py"))
+    monkeypatch.setattr(caching, "PACKAGE", tmp_path / "gpbnb")
+    paths = {name: tmp_path / "book" / f"{name}.ipynb" for name in CODE}
 
-    def run(*options: str, status: int = 0) -> str:
-        command = [sys.executable, "scripts/execute_notebooks.py", *options, *paths]
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
-        assert done.returncode == status, done.stdout + done.stderr
-        return done.stdout + done.stderr
+    def fresh() -> None:
+        caching.forget()
+        caching._named.cache_clear()
 
-    run.root = tmp_path
-    return run
+    def run(*options: str, status: int = 0, names: Iterable[str] = CODE) -> str:
+        fresh()
+        capsys.readouterr()
+        assert script.main([*options, *(str(paths[name]) for name in names)]) == status
+        return "".join(capsys.readouterr())
+
+    def keys() -> dict[str, str]:
+        fresh()
+        return {name: script.key_of(nbformat.read(path, as_version=4)) for name, path in paths.items()}
+
+    run.root, run.keys = tmp_path, keys
+    yield run
+    fresh()
 
 
 def executed(text: str) -> set[str]:
@@ -56,13 +90,36 @@ def change(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new), encoding="utf-8")
 
 
-def test_exactly_the_notebooks_that_depend_on_a_change_are_executed_again(copy):
+def test_exactly_the_notebooks_that_depend_on_a_change_have_another_key(copy):
     book, package = copy.root / "book", copy.root / "gpbnb"
+
+    def changed_by(change):
+        before = copy.keys()
+        change()
+        after = copy.keys()
+        return {name for name in CODE if before[name] != after[name]}
+
+    def append(path, text):
+        with path.open("a", encoding="utf-8") as file:
+            file.write(text)
+
+    assert changed_by(lambda: change(book / "data.ipynb", "Prose.", "Other prose.")) == set()
+    # A file outside the package counts if the code of a notebook names it.
+    assert changed_by(lambda: change(copy.root / "tests" / "count.txt", "41", "43")) == {"data"}
+    assert changed_by(lambda: append(package / "clock.py", "# \n")) == {"clock"}
+    assert changed_by(lambda: append(next((package / "report" / "budget").glob("*.csv")), "\n")) == {"data"}
+    assert changed_by(lambda: append(package / "report" / "budget" / "theory.py", "# \n")) == {"data"}
+    assert changed_by(lambda: change(book / "clock.ipynb", "print(", "print(1, ")) == {"clock"}
+    assert changed_by(lambda: append(package / "report" / "rolling" / "theory.py", "# \n")) == set()
+
+
+def test_notebooks_are_executed_if_their_key_is_new_or_their_outputs_cannot_be_trusted(copy):
+    book = copy.root / "book"
     # A notebook that fails stays as it is, and the message says where it failed; the other's outputs are kept.
     change(book / "data.ipynb", "print(theory.__name__)", "print(1 / 0)")
     before = [path.read_bytes() for path in sorted(book.iterdir())]
     failed = copy(status=1)
-    assert executed(failed) == {"kernels", "data"}
+    assert executed(failed) == {"clock", "data"}
     assert "2 of 2 notebooks to execute" in failed
     assert "data: FAILED" in failed
     assert "ZeroDivisionError" in failed
@@ -72,39 +129,35 @@ def test_exactly_the_notebooks_that_depend_on_a_change_are_executed_again(copy):
     first = copy()
     assert executed(first) == {"data"}
     assert "1 of 2 notebooks to execute" in first
-    assert first.endswith("2 notebooks changed: kernels, data\n")
+    assert first.endswith("2 notebooks changed: clock, data\n")
     assert copy("--check") == "2 notebooks compared with their stored outputs: 0 cells differ\n"
     change(book / "data.ipynb", "Prose.", "Other prose.")
     assert copy() == "0 notebooks changed\n"
     assert "Other prose." in (book / "data.ipynb").read_text()
-    with (package / "arithmetic" / "kernels" / "doubledouble.py").open("a") as source:
-        source.write("__name__ = 'another kernel'\n")
+    # A file outside the package and a source change the outputs; stored ones are compared with them, and replaced.
+    change(copy.root / "tests" / "count.txt", "41", "43")
+    with (copy.root / "gpbnb" / "clock.py").open("a") as source:
+        source.write("__name__ = 'another module'\n")
     wrong = copy("--check", status=1)
-    assert executed(wrong) == {"kernels"}
-    assert "kernels.ipynb, cell 1:" in wrong
-    assert "+stdout: another kernel" in wrong
-    # One notebook depends on the new data, the other has new code.
-    with next((package / "report" / "budget").glob("*.csv")).open("a") as data:
-        data.write("\n")
-    change(book / "kernels.ipynb", "print(doubledouble.__name__)", "print(6 * 7)")
-    assert executed(copy()) == {"kernels", "data"}
-    assert '"42\\n"' in (book / "kernels.ipynb").read_text()
-    # Neither damaged outputs are believed, nor any that another user could have written.
-    for path in (copy.root / "cache" / "notebooks").glob("kernels.*.json"):
-        path.write_bytes(path.read_bytes().replace(b"42", b"43"))
-    assert executed(copy("--check")) == {"kernels"}
+    assert executed(wrong) == {"clock", "data"}
+    assert "\n+43\n" in wrong
+    assert "clock.ipynb, cell 1:" in wrong
+    assert "+stdout: another module" in wrong
+    assert copy().endswith("2 notebooks changed: clock, data\n")
+    assert '"another module\\n"' in (book / "clock.ipynb").read_text()
+    # Damaged outputs are not believed.
+    for path in (copy.root / "cache" / "notebooks").glob("clock.*.json"):
+        path.write_bytes(path.read_bytes().replace(b"another", b"a wrong"))
+    assert executed(copy("--check", names=["clock"])) == {"clock"}
+    # Neither are those that another user could have written.
+    assert executed(copy("--check", names=["clock"])) == set()
     (copy.root / "cache").chmod(0o777)
-    told = copy("--check")
-    assert executed(told) == {"kernels", "data"}
+    told = copy("--check", names=["clock"])
+    assert executed(told) == {"clock"}
     assert f"but others can write to {copy.root / 'cache'}; needed a folder that only you can write" in told
 
 
-def test_the_longest_are_named_and_start_first():
-    sys.path.insert(0, str(ROOT / "scripts"))
-    try:
-        import execute_notebooks as script
-    finally:
-        sys.path.pop(0)
+def test_the_longest_are_named_and_start_first(script):
     paths = sorted((ROOT / "book").glob("*.ipynb"))
     assert {path.stem for path in paths} >= set(script.LONGEST)
     assert [path.stem for path in script._longest_first(paths)][: len(script.LONGEST)] == list(script.LONGEST)

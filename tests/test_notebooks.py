@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import csv
 import json
 import re
@@ -153,3 +154,68 @@ def test_every_exact_number_is_still_there():
 @each_notebook
 def test_values_are_glued_by_the_helper_that_rounds_them(path):
     assert [text for text in texts(path) if "from myst_nb" in text] == []
+
+
+def tags(cell: dict) -> set[str]:
+    return set(cell["metadata"].get("tags", []))
+
+
+def names(source: str) -> tuple[set[str], set[str]]:
+    """The names that a cell reads, and those that it defines."""
+    nodes = list(ast.walk(ast.parse(source)))
+    read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+    defined = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    defined |= {node.arg for node in nodes if isinstance(node, ast.arg)}
+    defined |= {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
+    defined |= {node.name for node in nodes if isinstance(node, ast.ExceptHandler) and node.name}
+    for node in nodes:
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            defined |= {alias.asname or alias.name.split(".")[0] for alias in node.names}
+    return read, defined
+
+
+def unseen(cells: list[dict]) -> list[str]:
+    """Names in cells that are shown, which no cell defines that a reader can see or unfold."""
+    known, missing = set(dir(builtins)), []
+    for cell in cells:
+        if not tags(cell) & {"remove-cell", "remove-input"}:
+            read, defined = names("".join(cell["source"]))
+            if "hide-input" not in tags(cell):
+                missing += sorted(read - defined - known)
+            known |= defined
+    return missing
+
+
+def test_a_name_from_a_removed_cell_is_unseen():
+    def cell(source: str, *given: str) -> dict:
+        return {"source": [source], "metadata": {"tags": [*given]}}
+
+    assert unseen([cell("import math", "remove-cell"), cell("print(math.pi)")]) == ["math"]
+    assert unseen([cell("import math", "hide-input"), cell("print(math.pi, [x for x in range(3)])")]) == []
+    assert unseen([cell("print(math.pi)", "hide-input")]) == []
+
+
+@each_notebook
+def test_a_reader_finds_every_name_of_a_visible_cell(path):
+    assert unseen(code_cells(path)) == []
+
+
+@each_notebook
+def test_imports_may_be_folded_but_never_removed(path):
+    removed = ["".join(cell["source"]) for cell in code_cells(path) if "remove-cell" in tags(cell)]
+    assert [source for source in removed if re.search(r"^(?:import|from) ", source, re.MULTILINE)] == []
+
+
+# A form, a rounding or a basis as the code calls it; a letter of a formula may be called chop.
+BASIS = r"\((?:emulation|bound|guarantee|probable), \d+ steps?\)"
+CODE_NAME = re.compile(rf"(?<!text\{{)\b(?:hung|hung_second_gain|chop|ud)\b|{BASIS}|aim / reached")
+
+
+@each_notebook
+def test_no_output_shows_a_name_of_the_code(path):
+    """Forms and roundings have words for readers: Hung (1984), chopped, UD."""
+    shown = [output for cell in code_cells(path) if "remove-cell" not in tags(cell) for output in cell["outputs"]]
+    texts = ["".join(output.get("text", [])) for output in shown]
+    kinds = ("text/markdown", "text/plain")
+    texts += ["".join(output.get("data", {}).get(kind, "")) for output in shown for kind in kinds]
+    assert [match[0] for text in texts for match in CODE_NAME.finditer(text)] == []

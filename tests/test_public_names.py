@@ -14,13 +14,28 @@ HOMES = {
     "arithmetic.fixed": "FixedFormat",
     "arithmetic.array": "FloatArray",
     "arithmetic.exits": "peek",
-    "arithmetic.named": "BINARY16 BINARY32 BINARY64 BINARY128 BFLOAT16 TF32 FP8_E4M3 FP8_E5M2 DECIMAL32 DECIMAL64 "
-    "DECIMAL128 IBM_HEX32 IBM_HEX64 IBM_704",
+    "arithmetic.traced": "TracedFunction",
+    "arithmetic.flags": "flags",
+    "arithmetic.microscaling": "MicroscalingFormat microscaling_dot",
+    "arithmetic.complex_array": "ComplexArray fft",
+    "arithmetic.named": "BINARY16 BINARY32 BINARY64 BINARY128 BFLOAT16 TF32 FP8_E4M3 FP8_E5M2 FP6_E3M2 FP6_E2M3 "
+    "FP4_E2M1 DECIMAL32 DECIMAL64 DECIMAL128 IBM_HEX32 IBM_HEX64 IBM_704",
     "filters.model": "LinearModel",
-    "wordlength.system": "LinearSystem",
+    "filters.emulation": "emulate",
+    "filters.blocks": "BlockFormats",
+    "filters.forms": "Form",
+    "filters.nonlinear": "NonlinearModel",
+    "filters.smoothing": "FixedIntervalSmoother",
+    "filters.words": "WordFormats",
+    "bounds.guarantee": "guarantee limits",
+    "bounds.limit_cycles": "limit_cycles",
+    "wordlength.blocks": "required_block_precisions",
+    "wordlength.fixed_point": "required_fraction_bits",
+    "filters.system": "LinearSystem",
     "wordlength.precision": "required_precision",
     "wordlength.models": "read_model",
     "wordlength.records": "survey_records",
+    "wordlength.code": "write_code",
 }
 
 

@@ -1,85 +1,32 @@
-"""Replaced words do not come back: in identifiers, and in the text that people read."""
+"""The warnings of replaced words, which ``make lint`` shows."""
 
-import ast
-import csv
-import io
-import json
-import re
-import tokenize
+import importlib.util
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[1]
-REPLACED = list(csv.DictReader((ROOT / "tests" / "replaced_words.csv").read_text(encoding="utf-8").splitlines()))
-CODE = sorted([*(ROOT / "gpbnb").rglob("*.py"), *(ROOT / "benchmarks").glob("*.py"), *(ROOT / "scripts").glob("*.py")])
-TEXT = sorted([*(ROOT / "book").glob("*.md"), *(ROOT / "book").glob("*.ipynb"), *ROOT.glob("*.md")])
-NOT_PROSE = re.compile(r"```.*?```|\$\$.*?\$\$|\$[^$]*\$|`[^`]*`|\]\([^)]*\)", re.DOTALL)
+KINDS = ("prose", "identifiers")
 
 
-def identifiers(path):
-    """Names that a file defines: functions, classes, arguments, variables and attributes."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            yield node.name
-        elif isinstance(node, ast.arg):
-            yield node.arg
-        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            yield node.id
-
-
-def words_of(name):
-    """The words of an identifier in lower case: ``BoundStatistics`` has bound and statistics."""
-    return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)}
-
-
-def prose(path):
-    """What people read of a file: Markdown, captions and alternative texts; docstrings and comments of code."""
-    text = path.read_text(encoding="utf-8")
-    if path.suffix == ".md":
-        return NOT_PROSE.sub(" ", text)
-    if path.suffix == ".ipynb":
-        parts = []
-        for cell in json.loads(text)["cells"]:
-            figure = cell["metadata"].get("mystnb", {})
-            parts += [figure.get("figure", {}).get("caption", ""), figure.get("image", {}).get("alt", "")]
-            if cell["cell_type"] == "markdown":
-                parts.append("".join(cell["source"]))
-        return NOT_PROSE.sub(" ", "\n\n".join(parts))
-    tree = ast.parse(text)
-    documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
-    docstrings = [ast.get_docstring(node) or "" for node in ast.walk(tree) if isinstance(node, documented)]
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    comments = [token.string.lstrip("# ") for token in tokens if token.type == tokenize.COMMENT]
-    return NOT_PROSE.sub(" ", "\n\n".join([*docstrings, *comments]))
-
-
-def replaced(where):
-    return [row for row in REPLACED if row["where"] in (where, "both")]
-
-
-@pytest.mark.parametrize("path", CODE, ids=lambda path: str(path.relative_to(ROOT)))
-def test_identifiers_use_the_terms_of_the_field(path):
-    old = {row["word"]: row["use"] for row in replaced("identifiers")}
-    found = {name: old[word] for name in identifiers(path) for word in words_of(name) & set(old)}
-    assert found == {}, "use these words instead"
-
-
-@pytest.mark.parametrize("path", [*CODE, *TEXT], ids=lambda path: str(path.relative_to(ROOT)))
-def test_prose_uses_plain_english(path):
-    text = " ".join(prose(path).split())
-    found = {
-        match[0]: row["use"]
-        for row in replaced("prose")
-        for match in re.finditer(rf"\b(?:{row['word']})\b", text, re.IGNORECASE)
-    }
-    assert found == {}, "use these words instead"
+def script():
+    spec = importlib.util.spec_from_file_location("vocabulary", ROOT / "scripts" / "vocabulary.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def test_each_replaced_word_has_its_replacement():
-    assert all(row["use"] and row["where"] in ("identifiers", "prose", "both") for row in REPLACED)
-    assert len({(row["word"], row["where"]) for row in REPLACED}) == len(REPLACED)
+    assert all(row["use"] and row["where"] in ("identifiers", "prose", "both") for row in script().REPLACED)
+    assert len({(row["word"], row["where"]) for row in script().REPLACED}) == len(script().REPLACED)
 
 
 def test_the_words_of_an_identifier():
-    assert words_of("_BoundStatistics2_of") == {"bound", "statistics", "of"}
+    assert script().words_of("_BoundStatistics2_of") == {"bound", "statistics", "of"}
+
+
+def test_a_replaced_word_is_found_in_text_and_in_identifiers(tmp_path):
+    found = script()
+    spoken, named = (next(row for row in found.replaced(where) if row["word"].isalpha()) for where in KINDS)
+    file = tmp_path / "some.py"
+    file.write_text(f'"""It has a {spoken["word"]}."""\n\n{named["word"]}_of = 1\n', encoding="utf-8")
+    assert found.old_words(file) == {spoken["word"]: spoken["use"]}
+    assert found.old_identifiers(file) == {f"{named['word']}_of": named["use"]}

@@ -7,8 +7,9 @@ import pytest
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.bounds.linear import state_space
-from gpbnb.filters.run import Run
+from gpbnb.bounds.linear import filter_schedule
+from gpbnb.filters.run import Run, Sums
+from gpbnb.filters.system import state_space
 
 REFUSED = [
     (FloatFormat(2, 53, "even"), "got 53 digits of base 2, rounded even; needed at most 52 "),
@@ -33,10 +34,10 @@ def test_the_setting_that_prevents_compiled_loops_is_named(fmt, message):
         fmt.check_compiled()
     model = LinearModel([["0.9"]], [[1]], [[1]], [[1]], [0], [[1]])
     for call in (
-        lambda: state_space([["0.9"]], [["0.1"]]).schedule(fmt),
+        lambda: filter_schedule(state_space([["0.9"]], [["0.1"]]), fmt),
         lambda: LinearSystem([["0.9"]], [["0.1"]]).outputs([[1]], fmt),
         lambda: Run(model, fmt, "innovation", (1,)),
-        lambda: Run(model, fmt, "innovation", (1,), order="pairwise"),
+        lambda: Run(model, fmt, "innovation", (1,), Sums(order="pairwise")),
     ):
         with pytest.raises(ValueError, match=message) as caught:
             call()
@@ -83,4 +84,4 @@ def reason(fmt):
 def test_other_sums_in_53_bits_name_the_digits(options):
     model = LinearModel([["0.9"]], [[1]], [[1]], [[1]], [0], [[1]])
     with pytest.raises(ValueError, match=r"in 53 digits of base 2; needed base 2 up to 52 digits, or 16 up to 13"):
-        Run(model, FloatFormat(2, 53), "innovation", (1,), **options)
+        Run(model, FloatFormat(2, 53), "innovation", (1,), Sums(**options))

@@ -18,8 +18,7 @@ import pytest
 from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.fixed import FixedFormat, scaling
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled, Exact
-from gpbnb.arithmetic.kernels.limited_backends import LimitedFloats, LimitedPairs
+from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs
 from gpbnb.arithmetic.rounding import Rounding
 
 TRUEDIV = operator.truediv
@@ -375,7 +374,7 @@ def test_overflow_names_the_operation_and_the_entry() -> None:
     with pytest.raises(OverflowError, match=r"entry \[1\]: got a result"):
         named.FP8_E4M3.array([448, 465])
     assert named.FP8_E4M3.round(464) == 448
-    assert isinstance((x[0] + x[0]).backend, LimitedFloats)
+    assert isinstance((x[0] + x[0]).backend, Floats)
 
 
 @pytest.mark.parametrize("mode", Rounding)
@@ -599,7 +598,16 @@ def test_the_largest_number_has_the_largest_exponent() -> None:
 
 def test_compiled_where_it_can_be() -> None:
     for fmt in (named.BINARY16, named.BFLOAT16, named.TF32, named.FP8_E4M3, named.IBM_HEX32, named.IBM_704):
-        assert isinstance(fmt.backend, LimitedFloats)
-    assert isinstance(named.DECIMAL64.backend, LimitedPairs)
+        assert isinstance(fmt.backend, Floats)
+    assert isinstance(named.DECIMAL64.backend, Pairs)
     assert isinstance(FixedFormat(0, 15).backend, Compiled)
     assert isinstance(FixedFormat(0, 15, overflow="wrap").backend, Exact)
+
+
+@pytest.mark.parametrize("overflow", ["raise", "saturate", "wrap"])
+def test_every_fixed_point_number_but_the_lowest_has_its_opposite_on_either_backend(overflow: str) -> None:
+    fmt = FixedFormat(2, 3, overflow=overflow)
+    values = [Fraction(k, 8) for k in range(-31, 32)]
+    for x in (fmt.array(values), fmt.array(values).on_exact_backend()):
+        assert (-x).to_fractions().tolist() == [-value for value in values]
+        assert abs(x).to_fractions().tolist() == [abs(value) for value in values]

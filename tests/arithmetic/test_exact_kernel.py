@@ -11,8 +11,10 @@ import pytest
 from oracles import as_pair
 
 from gpbnb.arithmetic.kernels.exact import kernel
+from gpbnb.arithmetic.rounding import Rounding, Rules
 
 SMALL = [(2, 1), (2, 2), (2, 3), (3, 1), (3, 2), (3, 3), (10, 1), (10, 2)]
+ROUNDING = {True: Rounding.NEAREST, False: Rounding.CHOP}
 E = -5  # exponent of the second operand: not zero, lest an exponent be forgotten
 
 pytestmark = pytest.mark.parametrize("nearest", [True, False], ids=["nearest", "chop"])
@@ -41,7 +43,7 @@ def telling(base: int, precision: int) -> list[int]:
 class TestSmallFormats:
     def test_sums_and_differences(self, base: int, precision: int, nearest: bool) -> None:
         # The shortcut for far-apart operands begins at the gap t + 2.
-        k = kernel(base, precision, nearest)
+        k = kernel(Rules(base, precision, ROUNDING[nearest]))
         # All 90 two-digit numbers: in test_exact_kernel_decimal.py each of 900 with such a choice.
         numbers = second = telling(base, precision)
         gaps = [*range(precision + 6), precision + 12]
@@ -63,7 +65,7 @@ class TestSmallFormats:
         assert count == 3 * (precision + 7) * len(second) ** 2
 
     def test_products_and_quotients(self, base: int, precision: int, nearest: bool) -> None:
-        k = kernel(base, precision, nearest)
+        k = kernel(Rules(base, precision, ROUNDING[nearest]))
 
         @cache
         def expected(p: int, q: int, e: int) -> tuple[int, int]:
@@ -85,7 +87,7 @@ class TestSmallFormats:
         assert count == 3 * (n + 1) * (2 * len(second) - 1)
 
     def test_roots(self, base: int, precision: int, nearest: bool) -> None:
-        k = kernel(base, precision, nearest)
+        k = kernel(Rules(base, precision, ROUNDING[nearest]))
         assert k.sqrt(0, 0) == (0, 0)
         count = 0
         for m in significands(base, precision):
@@ -96,7 +98,7 @@ class TestSmallFormats:
         assert count == 13 * (base - 1) * base ** (precision - 1)
 
     def test_order(self, base: int, precision: int, nearest: bool) -> None:
-        k = kernel(base, precision, nearest)
+        k = kernel(Rules(base, precision, ROUNDING[nearest]))
         numbers = signed(base, precision)
         for gap in (-3, -1, 0, 1, 3):
             for m1 in numbers:
@@ -107,7 +109,7 @@ class TestSmallFormats:
 
 
 def test_a_value_too_long_to_write_out_is_refused(nearest: bool) -> None:
-    k = kernel(10, 4, nearest)
+    k = kernel(Rules(10, 4, ROUNDING[nearest]))
     for e in (-3_010_300, 3_010_300, -(10**8), 10**8):  # ten million bits are 3010299 digits
         with pytest.raises(OverflowError, match="to write it as a Fraction"):
             k.to_fraction(1234, e)
@@ -120,7 +122,7 @@ def lowest(p: int, q: int) -> tuple[int, int]:
 
 def test_every_power_is_right_beyond_the_table(nearest: bool) -> None:
     # Long significands need powers of the base that are not kept.
-    k = kernel(10, 700, nearest)
+    k = kernel(Rules(10, 700, ROUNDING[nearest]))
     m1, m2 = 10**699 + 7, 3 * 10**699 + 1
     x1, x2 = Fraction(m1), m2 * Fraction(10) ** -650
     assert k.add(m1, 0, m2, -650) == as_pair(oracles.rounded(x1 + x2, 10, 700, nearest), 10, 700)

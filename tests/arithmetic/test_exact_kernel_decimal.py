@@ -11,7 +11,9 @@ import pytest
 from oracles import as_pair
 
 from gpbnb.arithmetic.kernels.exact import ExactKernel, kernel
+from gpbnb.arithmetic.rounding import Rounding, Rules
 
+ROUNDING = {True: Rounding.NEAREST, False: Rounding.CHOP}
 E = -5  # exponent of the second operand: not zero, lest an exponent be forgotten
 
 pytestmark = pytest.mark.parametrize("nearest", [True, False], ids=["nearest", "chop"])
@@ -33,7 +35,7 @@ class TestThreeDecimalDigits:
         count = 0
         for sign in (1, -1):
             n = self.M[:, np.newaxis] * 10**gap + sign * self.TELLING
-            m, e = self.added(kernel(10, 3, nearest), gap, sign * self.TELLING)
+            m, e = self.added(kernel(Rules(10, 3, ROUNDING[nearest])), gap, sign * self.TELLING)
             self.check_integers(n, m, e, nearest)
             count += n.size
         assert count == 2 * 900 * 30
@@ -47,7 +49,7 @@ class TestThreeDecimalDigits:
     def test_products(self, nearest: bool) -> None:
         n = self.M[:, np.newaxis] * self.TELLING
         m1, m2 = self.M.astype(object), self.TELLING.astype(object)
-        m, e = np.frompyfunc(kernel(10, 3, nearest).multiply, 4, 2)(m1[:, np.newaxis], 2 * E, m2, -E)
+        m, e = np.frompyfunc(kernel(Rules(10, 3, ROUNDING[nearest])).multiply, 4, 2)(m1[:, np.newaxis], 2 * E, m2, -E)
         self.check_integers(n, m.astype(np.int64), e.astype(np.int64), nearest)
         assert n.size == 900 * 30
 
@@ -73,15 +75,15 @@ class TestThreeDecimalDigits:
             below = (m1 - 1, E + gap) if m1 > 100 else (999, E + gap - 1)
             for m2 in self.TELLING.tolist():
                 towards = (m1, E + gap) if nearest else below
-                assert kernel(10, 3, nearest).add(m1, E + gap, m2, E) == (m1, E + gap)
-                assert kernel(10, 3, nearest).add(m2, E, m1, E + gap) == (m1, E + gap)
-                assert kernel(10, 3, nearest).add(m1, E + gap, -m2, E) == towards
-                assert kernel(10, 3, nearest).add(-m1, E + gap, m2, E) == (-towards[0], towards[1])
+                assert kernel(Rules(10, 3, ROUNDING[nearest])).add(m1, E + gap, m2, E) == (m1, E + gap)
+                assert kernel(Rules(10, 3, ROUNDING[nearest])).add(m2, E, m1, E + gap) == (m1, E + gap)
+                assert kernel(Rules(10, 3, ROUNDING[nearest])).add(m1, E + gap, -m2, E) == towards
+                assert kernel(Rules(10, 3, ROUNDING[nearest])).add(-m1, E + gap, m2, E) == (-towards[0], towards[1])
 
     def test_quotients(self, nearest: bool) -> None:
         one, other = (each.ravel() for each in np.meshgrid(self.M, self.TELLING, indexing="ij"))
         p, q = np.concatenate([one, other]), np.concatenate([other, one])
-        k = kernel(10, 3, nearest)
+        k = kernel(Rules(10, 3, ROUNDING[nearest]))
         m, e = np.frompyfunc(k.divide, 4, 2)(p.astype(object), 2 * E, q.astype(object), E)
         assert m.size == 2 * 900 * 30
         # Equal fractions have equal quotients: the oracle rounds each fraction in lowest terms once.
@@ -112,4 +114,4 @@ class TestThreeDecimalDigits:
         for m in self.M.tolist():
             for e in (-4, 7):
                 value = oracles.square_root(m * Fraction(10) ** e, 10, 3, nearest)
-                assert kernel(10, 3, nearest).sqrt(m, e) == as_pair(value, 10, 3)
+                assert kernel(Rules(10, 3, ROUNDING[nearest])).sqrt(m, e) == as_pair(value, 10, 3)

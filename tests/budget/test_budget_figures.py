@@ -49,11 +49,14 @@ def test_shares(ax):
 def test_distribution(ax):
     draws = experiment.draw(BUDGET, 2000, np.random.default_rng(1))
     artists = figures.distribution(draws, ax)
-    lines = {line[0, 0] for each in artists[60:] if isinstance(each, LineCollection) for line in each.get_segments()}
+    lines = {line[0, 0] for each in artists[61:] if isinstance(each, LineCollection) for line in each.get_segments()}
     expected = (BUDGET.total, theory.GOAL, BUDGET.worst_case)
     assert lines == {sign * value for value in expected for sign in (1, -1)}
-    assert sum(bar.get_height() * bar.get_width() for bar in artists[:60]) == pytest.approx(1)
+    assert sum(bar.get_height() * bar.get_width() for bar in artists[:61]) == pytest.approx(1)
     assert "mas" in ax.get_xlabel()
+    low, high = ax.get_xlim()
+    assert low == -high < draws.errors.min()
+    assert draws.errors.max() < high
 
 
 def test_table_of_sources():

@@ -30,7 +30,7 @@ NAMES = {
     },
     "forgotten": {
         "sum of $f^{k-i}$: one more step": "(1 - f**(k + 1))/(1 - f)",
-        "$a_0$ is not below $a_i$, $i = j+1$": (
+        "$a_0$ is at least $a_i$, with $i = j+1$": (
             "(k - j - 1)*(6*n + 3*m + 5) + 4*n + 3*m + 4 + (k*(k - 1)/2 - j*(j - 1)/2)*(3*n + m + 2)"
         ),
     },

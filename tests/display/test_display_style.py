@@ -35,7 +35,7 @@ def test_panels_one_below_the_other():
 def test_text_can_be_read_on_a_phone():
     """A phone 390 pixels wide shows a figure 342 pixels wide."""
     fig, (ax,) = style.figure()
-    style.label(ax, "x (no unit)", "y (no unit)", "a title")
+    style.label(ax, "x", "y (no unit)", "a title")
     ax.plot([1, 2], label="a line")
     style.legend(ax)
     named = style.name(ax, "a line", (1, 1), style.OBSERVED)
@@ -81,7 +81,7 @@ def test_names_at_the_right_edge_do_not_collide():
     fig, (ax,) = style.figure()
     style.loglog(ax)
     ax.plot([1, 10], [1, 1000])
-    style.label(ax, "x (no unit)", "y (no unit)")
+    style.label(ax, "x", "y (no unit)")
     ends = {"low": (1.0, style.VALID), "same": (30.0, style.REFUTED), "also\nsame": (30.0, style.OBSERVED)}
     names = style.name_ends(ax, ends)
     fig.canvas.draw()

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import html
+import json
 import re
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, IBM_HEX32
+from gpbnb.arithmetic.named import BINARY32, IBM_HEX32, arithmetic, digits
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.display.tables import Table, arithmetic, digits, one_line, scientific, short
+from gpbnb.report.display.tables import MOST_ROWS, Table, one_line, scientific, short, with_uncertainty
 
 
 def cells(line):
@@ -22,7 +25,7 @@ def cells(line):
 def test_a_table_has_a_header_a_rule_and_its_rows():
     table = Table("two", ("a", "b"), (("1", "2"), ("3", "4")))
     assert table.markdown() == "| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 | 4 |"
-    assert table._repr_markdown_() == table.markdown()
+    assert table._repr_markdown_() == table.page() == table.markdown()
     assert repr(table) == "<two>"
 
 
@@ -102,3 +105,102 @@ def test_an_arithmetic_is_named_by_its_digits_and_by_chopping():
     saturated = FixedFormat(2, 13, Rounding.DOWN, "saturate")
     assert arithmetic(saturated) == "fixed point of 16 bits, 13 of them fraction, rounded down, saturated"
     assert len({arithmetic(FloatFormat(2, 8, mode)) for mode in Rounding}) == len(Rounding)
+
+
+def column(*given, header="h", quoted=()):
+    """The cells of a column as a page shows them, beside a column of names; spaces as wide as a digit are `_`."""
+    body = tuple((f"row {chr(65 + i)}", cell) for i, cell in enumerate(given))
+    text = html.unescape(Table("t", ("name", header), body, quoted).page())
+    return [line.split(" | ")[1][:-2].replace("\u2007", "_").replace("\u2008", ",") for line in text.splitlines()[2:]]
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        # decimal points one below the other
+        (("9", "12.5", "0.03"), ["_9", "12.5", "_0.03"]),
+        (("-1.5", "2", "+10"), ["_−1.5", "__2", "+10"]),
+        (("3.6 %", "26.1 %"), ["_3.6 %", "26.1 %"]),
+        (("0 of 100", "99 of 100"), ["_0 of 100", "99 of 100"]),
+        (("8 bits, chopped", "24 bits"), ["_8 bits, chopped", "24 bits"]),
+        (("0.24 ± 0.01", "60 ± 3"), ["_0.24 ± 0.01", "60 ± 3"]),
+        # commas in all numbers of a column, if one has five digits or more
+        (("13,036", "4", "5272"), ["13,036", "__,__4", "_5,272"]),
+        (("2000", "999"), ["2000", "_999"]),
+        # one notation
+        (("675", "7.46e+03", "1.22e+12"), ["6.75e+02", "7.46e+03", "1.22e+12"]),
+        (("2e+04", "300", "0.25"), ["20,000", "__,300", "__,__0.25"]),
+        (("3.28e+04", "5"), ["32,800", "__,__5"]),
+        ((r"$1.25\times10^{-3}$", "0.5"), ["0.00125", "0.5"]),
+        ((r"$1.0\times10^{-9}$", "0", "-3"), ["_1.0e-09", "_0", "−3.0"]),
+        (("0.5", r"$-2.5\times10^{-8}$"), ["_5.0e-01", "−2.5e-08"]),
+        # other units are other columns' business
+        (("3e-09 s", "12 m"), ["_3e-09 s", "12 m"]),
+        # words, and what is no number, stay
+        (("none", "7", "10", "–", ""), ["none", "_7", "10", "–", ""]),
+        (("1, 2", "30"), ["1, 2", "30"]),
+        (("2/3", "1"), ["2/3", "1"]),
+        (("5.6, -11", "a-1", "16-bit"), ["5.6, −11", "a-1", "16-bit"]),
+        (("-12 -11; -17 83", "5"), ["−12 −11; −17 83", "5"]),
+    ],
+)
+def test_a_page_aligns_the_numbers_of_a_column_in_one_notation(given, shown):
+    found = column(*given)
+    assert [cell.replace(",", "") for cell in found] == [cell.replace(",", "") for cell in shown]
+    assert found == shown
+
+
+def test_numbers_quoted_from_a_document_stay_as_printed():
+    given = (".3775e-8", "9", "$1.2949\\times10^{16}$")
+    assert column(*given, header="printed", quoted=("printed",)) == list(given)
+
+
+def test_a_column_that_is_the_same_in_each_row_stands_below_the_table():
+    body = (("a", "100", "1", "-2"), ("b", "100", "2", "-2"))
+    table = Table("t", ("name", "trials", "found", "$x_1$"), body)
+    assert table.page() == (
+        "| name | found |\n| --- | --- |\n| a | 1 |\n| b | 2 |\n\nIn each row, trials: 100; $x_1$: −2."
+    )
+    assert table.markdown().count("100") == 2
+    assert "In each row" not in Table("t", ("name", "trials"), (("a", "100"), ("b", "100"))).page()
+    assert "In each row" not in Table("t", table.header, body[:1]).page()
+
+
+def test_a_table_of_more_than_twelve_rows_is_folded():
+    rows = tuple((f"row {k}", str(k)) for k in range(13))
+    text = Table("counts & sizes", ("name", "k"), rows).page()
+    assert text.startswith(
+        '<details class="long-table"><summary>counts &amp; sizes, 13 rows</summary>\n\n| name | k |\n'
+    )
+    assert text.endswith(" |\n\n</details>")
+    assert "<details" not in Table("counts", ("name", "k"), rows[:12]).page()
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "text"),
+    [
+        (0.836, 0.0414, "0.84 ± 0.04"),
+        (59.5, 3.1, "60 ± 3"),
+        (0.0832, 0.00399, "0.083 ± 0.004"),
+        (5.04, 0.096, "5.0 ± 0.1"),
+        (123.4, 25.0, "123 ± 25"),
+    ],
+)
+def test_a_number_is_as_exact_as_its_uncertainty(value, uncertainty, text):
+    assert with_uncertainty(value, uncertainty) == text
+
+
+def test_every_table_of_the_book_is_one_of_this_class():
+    """No package writes the pipes of a table itself, and the stored tables are those of a page."""
+    root = Path(__file__).resolve().parents[2]
+    writers = [path.name for path in (root / "gpbnb").rglob("*.py") if '"---"' in path.read_text(encoding="utf-8")]
+    assert writers == ["tables.py"]
+    long = []
+    for path in sorted((root / "book").glob("*.ipynb")):
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+            for output in cell.get("outputs", ()):
+                text = "".join(output.get("data", {}).get("text/markdown", ""))
+                if (rows := text.count("\n| ") - 1) > MOST_ROWS and "| --- |" in text:
+                    long.append((path.stem, rows, "<details" in text))
+    assert len(long) >= 9
+    assert all(folded for *_, folded in long)

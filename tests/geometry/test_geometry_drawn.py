@@ -7,7 +7,23 @@ from types import SimpleNamespace
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from drawn import BLACK, BLUE, GREEN, GREY, NAVY, ORANGE, PINK, PURPLE, SKY, at, look, named, near, pictured, points_of
+from drawn import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    NAVY,
+    ORANGE,
+    PINK,
+    PURPLE,
+    VIOLET,
+    at,
+    look,
+    named,
+    near,
+    pictured,
+    points_of,
+)
 from matplotlib.colors import to_hex
 from matplotlib.text import Annotation
 
@@ -68,7 +84,7 @@ def test_triads(solid):
 @pictured
 def test_colours_and_names_of_all_frames(solid):
     artists = figures.triads(dict.fromkeys("trg", np.eye(3)), solid)
-    assert [paint for _, _, paint in arrows(artists)[::3]] == [PINK, NAVY, SKY]
+    assert [paint for _, _, paint in arrows(artists)[::3]] == [PINK, NAVY, VIOLET]
     assert "telescope, readout, gyro" in texts(artists)
     (ring,) = [each for each in figures.triads({"r": np.eye(3)}, solid, ring="r") if hasattr(each, "get_data_3d")]
     x, y, z = np.array(ring.get_data_3d())
@@ -94,7 +110,7 @@ FRAMES = {
     "φ": ("$\\varphi$\nroll", BLUE),
     "t": ("$t$\ntelescope", PINK),
     "r": ("$r$\nreadout", NAVY),
-    "g": ("$g$\ngyro", SKY),
+    "g": ("$g$\ngyro", VIOLET),
 }
 
 
@@ -146,7 +162,7 @@ def test_deroll_of_a_roll(ax, printed):
     true = np.array([-15.0, -8.0])  # −α3 and α2, arcseconds
     c, s = np.cos(phase), np.sin(phase)
     readings = np.stack([c * true[0] + s * true[1], -s * true[0] + c * true[1]], axis=1) * ARCSEC
-    third, line3, name3, second, line2, name2 = figures.deroll_of_a_roll(readings, phase, ax, printed)
+    third, line3, second, line2, name3, name2 = figures.deroll_of_a_roll(readings, phase, ax, printed)
     assert [x for x, _ in points_of(third)] == pytest.approx([0, 0.25, 0.5, 0.75, 1])
     assert (line3.get_ydata()[0], line2.get_ydata()[0]) == pytest.approx((15, -8))
     assert [look(each)[0] for each in (line3, line2)] == [BLACK, BLACK]
@@ -158,8 +174,8 @@ def test_deroll_of_a_roll(ax, printed):
         assert [y for _, y in points_of(second)] == pytest.approx([-8] * 5)
     assert (name3.get_text(), name2.get_text()) == (r"true $\alpha_3$", r"true $\alpha_2$")
     names = named(ax)
-    assert near(names[r"true $\alpha_3$"], BLACK, (1.03, 15))
-    assert near(names[r"true $\alpha_2$"], BLACK, (1.03, -8))
+    assert near(names[r"true $\alpha_3$"], BLACK, (1, 15))
+    assert near(names[r"true $\alpha_2$"], BLACK, (1, -8))
     assert ax.get_ylim() == pytest.approx((-1.2 * 17, 1.35 * 17))  # of the first reading, 17 arcseconds long
     equation = "(8)" if printed else "(5)"
     assert ax.get_title(loc="left") == rf"equation {equation}: circles $\hat\alpha_3$, squares $\hat\alpha_2$"
@@ -174,7 +190,7 @@ def test_losses(ax):
         "alpha2": (sizes / 2, np.array([5.0, 7.0]) * MAS),
         "beta3": (sizes * 2, np.array([11.0, 13.0]) * MAS),
     }
-    *drawn, goal, _ = figures.losses(curves, ax)
+    *drawn, tolerance, _ = figures.losses(curves, ax)[:8]
     names = named(ax)
     for i, (angle, marker, scale, text) in enumerate(
         (
@@ -183,15 +199,15 @@ def test_losses(ax):
             ("beta3", "D", 2, r"$\beta_3$"),
         )
     ):
-        points, line, _ = drawn[3 * i : 3 * i + 3]
+        points, line = drawn[2 * i : 2 * i + 2]
         errors = curves[angle][1] / MAS
         assert at(points, (10 * scale, errors[0]), (100 * scale, errors[1]))
         assert (look(points), look(line)[:2]) == ((BLUE, "", marker), (GREEN, "-"))
         expected = theory.small_angle_loss(angle, sizes * scale) / MAS
         assert at(line, (10 * scale, expected[0]), (100 * scale, expected[1]))
-        assert near(names.pop(text), GREEN, (100 * scale, expected[1]))
-    assert (set(goal.get_ydata()), look(goal)[:2]) == ({1}, (GREY, ":"))
-    assert near(names.pop("goal, 1 mas"), GREY, (5, 1))
+        assert near(names.pop(text), GREEN, (1, expected[1]))
+    assert (set(tolerance.get_ydata()), look(tolerance)[:2]) == ({1}, (GREY, ":"))
+    assert near(names.pop("tolerance, 1 mas"), GREY, (5, 1))
     assert not names
     return ax.figure
 
@@ -213,12 +229,12 @@ def test_first_rolls(ax):
     assert [look(each) for each in (samples, means, without)] == [
         (PURPLE, "-", "."),
         (BLUE, "", "D"),
-        (BLACK, "--", ""),
+        (PINK, "-", ""),
     ]
     names = named(ax)
-    assert near(names.pop("rolling"), BLUE, (10, 15))
-    assert near(names.pop("mean over\na roll"), BLUE, (10, 40))
-    assert near(names.pop("no roll"), BLACK, (10, 65))
+    assert near(names.pop("rolling"), PURPLE, (1, 15))
+    assert near(names.pop("mean over\na roll"), BLUE, (1, 40))
+    assert near(names.pop("no roll"), PINK, (1, 65))
     assert not names
     return ax.figure
 
@@ -229,14 +245,14 @@ def test_year_errors(ax, component):
     time = np.linspace(0.02, 0.98, 25)
     results = {}
     for i, roll_period in enumerate((None, 77.5, 77.5)):
-        case = theory.Case().with_angle("gamma1", (20 + i) * ARCSEC).with_angle("gamma2", 10 * ARCSEC)
+        case = theory.Misalignments().with_angle("gamma1", (20 + i) * ARCSEC).with_angle("gamma2", 10 * ARCSEC)
         error = MAS * (100 * (i + 1) + np.stack([time, 10 * time], axis=1))
         phi = np.array(case.drift) * time[:, None] + error
         results[f"case {i}"] = SimpleNamespace(case=case, roll_period=roll_period, time=time, phi=phi)
     artists = figures.year_errors(results, ax, component)
     names = named(ax)
-    for i, (paint, marker) in enumerate(((BLUE, "o"), (PINK, "s"), (SKY, "D"))):
-        points, line, _ = artists[3 * i : 3 * i + 3]
+    for i, (paint, marker) in enumerate(((BLUE, "o"), (PINK, "s"), (NAVY, "D"))):
+        points, line = artists[2 * i : 2 * i + 2]
         assert np.array(points_of(points))[:, 1] == pytest.approx(
             100 * (i + 1) + (1, 10)[component] * time[::2], abs=1e-4
         )
@@ -244,7 +260,7 @@ def test_year_errors(ax, component):
         expected = theory.measured(results[f"case {i}"].case, i > 0, time[::2])[:, component] / MAS
         assert [y for _, y in points_of(line)] == pytest.approx(list(expected))
         assert (look(points), look(line)[:2]) == ((paint, "", marker), (GREEN, "-"))
-        assert near(names.pop(f"case {i}"), paint, (time[-1], expected[-1]))
+        assert near(names.pop(f"case {i}"), paint, (1, expected[-1]))
     assert not names
     assert set(ax.lines[-1].get_ydata()) == {0}
     return ax.figure

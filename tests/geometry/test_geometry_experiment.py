@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gpbnb.report.geometry import experiment, theory
-from gpbnb.report.geometry.theory import Case
+from gpbnb.report.geometry.theory import Misalignments
 from gpbnb.report.measurement import ARCSEC, MAS, deroll, rotation, spin_in_readout, star_in_telescope, theta_of
 
 SEEDED = settings(derandomize=True, deadline=None, database=None)
@@ -30,7 +30,7 @@ def third_order(case):
 def test_the_difference_is_that_of_the_chains_with_theta():
     rng = np.random.default_rng(8)
     alpha, beta, gamma = rng.uniform(-0.2, 0.2, (3, 3))
-    case = Case(tuple(alpha), tuple(beta), tuple(gamma), drift=(0.1, -0.2))
+    case = Misalignments(tuple(alpha), tuple(beta), tuple(gamma), drift=(0.1, -0.2))
     phase = np.linspace(0, 6, 7)
     theta = theta_of([0, 0.1, -0.2], alpha)
     gap = spin_in_readout(theta, beta, gamma, phase) - star_in_telescope(alpha, beta, phase)
@@ -40,7 +40,7 @@ def test_the_difference_is_that_of_the_chains_with_theta():
 
 
 def test_the_spin_axis_is_the_first_column_of_the_matrix_of_phi():
-    case = Case(drift=(0.3, 0.5))
+    case = Misalignments(drift=(0.3, 0.5))
     assert np.allclose(experiment.spin_axis(case, 1.0), rotation([0, 0.3, 0.5])[:, 0], atol=1e-16)
 
 
@@ -64,14 +64,14 @@ def test_a_year_agrees_with_the_analysis(name, period):
 @given(st.lists(st.floats(-1, 1), min_size=9, max_size=9))
 def test_any_misalignments(parts):
     values = np.array(parts) * 1e-4
-    case = Case(tuple(values[:3]), tuple(values[3:6]), tuple(values[6:]))
+    case = Misalignments(tuple(values[:3]), tuple(values[3:6]), tuple(values[6:]))
     result = experiment.year(case, PERIOD, STEP).error
     assert np.hypot(*np.subtract(result.drift, theory.effect(case, True).drift)) <= 30 * 1e-12 + 1e-15
     assert np.hypot(*np.subtract(result.angle, theory.effect(case, True).angle)) <= 30 * 1e-12 + 1e-15
 
 
 def test_the_line_fit_to_samples_keeps_what_the_fit_to_means_drops():
-    case = Case().with_angle("gamma3", SIZE)
+    case = Misalignments().with_angle("gamma3", SIZE)
     result = experiment.year(case, PERIOD, STEP)
     rolls = result.block * len(result.time) * STEP / PERIOD
     leak = theory.line_fit_leak(SIZE, rolls, 5) / (rolls * PERIOD / theory.YEAR)
@@ -81,7 +81,7 @@ def test_the_line_fit_to_samples_keeps_what_the_fit_to_means_drops():
 
 
 def test_rolls_that_are_no_whole_number_of_samples(capsys):
-    result = experiment.year(Case().with_angle("gamma2", SIZE), 77.5 * 100, 1000.0)
+    result = experiment.year(Misalignments().with_angle("gamma2", SIZE), 77.5 * 100, 1000.0)
     assert capsys.readouterr().err == ""  # no progress unless it is asked for
     assert result.block == 31
     assert len(result.first) == 6 * 31
@@ -93,7 +93,7 @@ def test_rolls_that_are_no_whole_number_of_samples(capsys):
 @given(st.lists(st.floats(-1, 1), min_size=9, max_size=9), st.sampled_from([3, 24, 25]))
 def test_parts_of_a_roll_are_those_of_the_analysis(values, samples):
     alpha, beta, gamma = (tuple(1e-4 * v for v in values[k : k + 3]) for k in (0, 3, 6))
-    case = Case(alpha, beta, gamma)
+    case = Misalignments(alpha, beta, gamma)
     found = experiment.parts(case, 1.0, samples)
     left = third_order(case)
     # to second order β1 turns the mean of the telescope; β1 and γ1 that of the gyro; the difference is `measured`
@@ -138,13 +138,16 @@ def test_small_angle_errors_are_the_loss(name):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: experiment.year(Case(), 0), "got a roll period of 0 s"),
-        (lambda: experiment.year(Case(), 600, -1), "a step of -1 s; needed both above 0"),
-        (lambda: experiment.year(Case(), 600, math.nan), "needed both above 0"),
-        (lambda: experiment.year(Case(), 600, 1e6), "needed at least a hundred samples per year"),
-        (lambda: experiment.year(Case(), 600.05), "needed multiples of 0.1 s"),
-        (lambda: experiment.parts(Case(), samples=2), "got 2 samples in a roll; needed 3 or more"),
-        (lambda: experiment.year(Case(), 600, 300.0), "got 2 samples in whole rolls of 600 s; needed 3 or more"),
+        (lambda: experiment.year(Misalignments(), 0), "got a roll period of 0 s"),
+        (lambda: experiment.year(Misalignments(), 600, -1), "a step of -1 s; needed both above 0"),
+        (lambda: experiment.year(Misalignments(), 600, math.nan), "needed both above 0"),
+        (lambda: experiment.year(Misalignments(), 600, 1e6), "needed at least a hundred samples per year"),
+        (lambda: experiment.year(Misalignments(), 600.05), "needed multiples of 0.1 s"),
+        (lambda: experiment.parts(Misalignments(), samples=2), "got 2 samples in a roll; needed 3 or more"),
+        (
+            lambda: experiment.year(Misalignments(), 600, 300.0),
+            "got 2 samples in whole rolls of 600 s; needed 3 or more",
+        ),
     ],
 )
 def test_bad_input_is_refused(call, message):

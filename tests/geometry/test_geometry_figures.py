@@ -13,7 +13,7 @@ from gpbnb.report.display import style
 from gpbnb.report.geometry import experiment, figures, tables, theory
 from gpbnb.report.measurement import ARCSEC, MAS, deroll, spin_in_readout, theta_of
 
-CASE = theory.Case().with_angle("gamma1", 20 * ARCSEC).with_angle("gamma2", 10 * ARCSEC)
+CASE = theory.Misalignments().with_angle("gamma1", 20 * ARCSEC).with_angle("gamma2", 10 * ARCSEC)
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def test_chain_names_every_frame_and_angle(axes):
 def test_deroll_of_a_roll(axes, printed):
     phase = np.linspace(0, 2 * np.pi, 9)
     readings = deroll(np.broadcast_to(np.array([-15.0, -8.0]) * ARCSEC, (9, 2)), -phase)
-    third, line3, _, second, line2, _ = figures.deroll_of_a_roll(readings, phase, axes[0], printed)
+    third, line3, second, line2, *_ = figures.deroll_of_a_roll(readings, phase, axes[0], printed)
     assert line3.get_ydata()[0] == pytest.approx(15)
     assert line2.get_ydata()[0] == pytest.approx(-8)
     assert third.get_color() == (style.REFUTED if printed else style.VALID)
@@ -79,7 +79,7 @@ def test_deroll_of_a_roll(axes, printed):
 def test_losses(axes):
     sizes = np.array([10, 100]) * ARCSEC
     curves = {"gamma1": (sizes, np.array([2.0, 3.0]) * MAS)}
-    points, line, _, goal, _ = figures.losses(curves, axes[0])
+    points, line, goal, *_ = figures.losses(curves, axes[0])
     assert np.allclose(points.get_xdata(), [10, 100])
     assert np.allclose(points.get_ydata(), [2, 3])
     assert np.allclose(line.get_ydata(), theory.small_angle_loss("gamma1", sizes) / MAS)
@@ -138,7 +138,7 @@ def test_each_effect_of_a_misalignment_has_its_column(both):
     still, rolled = both
     moved = replace(rolled, drift=rolled.drift + np.array([1, 2]) * MAS)
     table = tables.misalignments({"gamma1 and gamma2": (still, moved)})
-    assert table.title == "1 cases, errors of $\\varphi_2, \\varphi_3$ in milliarcseconds"
+    assert table.title == "errors due to misalignments, in milliarcseconds"
     (line,) = by_header(table)
     assert line == {
         "angle": r"$\gamma_1$ and $\gamma_2$",
@@ -154,7 +154,7 @@ def test_each_effect_of_a_misalignment_has_its_column(both):
 def test_table_of_fates():
     size = 20 * ARCSEC
     names = ("alpha1", "alpha2", "beta1", "beta3", "gamma1", "gamma2")
-    table = tables.fates({name: experiment.parts(theory.Case().with_angle(name, size)) for name in names})
+    table = tables.fates({name: experiment.parts(theory.Misalignments().with_angle(name, size)) for name in names})
     assert table.header == ("angle", "telescope", "gyro", "difference", "outcome")
     assert [row[-1] for row in table.body] == [
         "stays",

@@ -11,7 +11,7 @@ import sympy as sp
 
 from gpbnb.report.geometry import derivation, theory
 from gpbnb.report.geometry.derivation import ALPHA, BETA, GAMMA, PHI
-from gpbnb.report.geometry.theory import Case
+from gpbnb.report.geometry.theory import Misalignments
 from gpbnb.report.measurement import ARCSEC, MAS, deroll
 
 NAMES = dict(zip(theory.SINGLE, (*ALPHA, *BETA, *GAMMA), strict=True))
@@ -29,7 +29,7 @@ def test_second_order_of_a_rolling_spacecraft_is_that_of_sympy():
     rng = np.random.default_rng(4)
     for _ in range(5):
         values = rng.uniform(-1, 1, 12) * 1e-4
-        case = Case(tuple(values[:3]), tuple(values[3:6]), tuple(values[6:9]), drift=(values[10], values[11]))
+        case = Misalignments(tuple(values[:3]), tuple(values[3:6]), tuple(values[6:9]), drift=(values[10], values[11]))
         numbers = dict(zip((*ALPHA, *BETA, *GAMMA, *PHI), values, strict=True))
         y, z = (float(e.subs(numbers)) for e in mean_errors(2))
         # products of two numbers of 1e-4; sympy and numpy round them differently by an ulp or two
@@ -52,23 +52,23 @@ def test_small_angle_loss_is_the_third_order_of_sympy(name):
 
 def test_without_roll_the_readout_misalignment_stands_and_the_telescope_one_cancels():
     g = 1e-4
-    assert theory.measured(Case(gamma=(0, g, 0)), False) == pytest.approx([g, 0], abs=g**2)
-    assert theory.measured(Case(gamma=(0, 0, g)), False) == pytest.approx([0, g], abs=g**2)
-    assert theory.measured(Case(beta=(0, g, g)), False) == pytest.approx([0, 0], abs=1e-20)
-    quarter = theory.measured(Case(gamma=(0, g, 0)), False, phase=math.pi / 2)
+    assert theory.measured(Misalignments(gamma=(0, g, 0)), False) == pytest.approx([g, 0], abs=g**2)
+    assert theory.measured(Misalignments(gamma=(0, 0, g)), False) == pytest.approx([0, g], abs=g**2)
+    assert theory.measured(Misalignments(beta=(0, g, g)), False) == pytest.approx([0, 0], abs=1e-20)
+    quarter = theory.measured(Misalignments(gamma=(0, g, 0)), False, phase=math.pi / 2)
     assert quarter == pytest.approx([0, g], abs=g**2)
 
 
 def test_rolling_removes_what_stands():
-    effect = theory.effect(Case(beta=(0, 1e-4, 2e-4), gamma=(0, 1e-4, -3e-4)), True)
+    effect = theory.effect(Misalignments(beta=(0, 1e-4, 2e-4), gamma=(0, 1e-4, -3e-4)), True)
     assert effect.angle == effect.drift == (0, 0)
     assert effect.line == pytest.approx(math.hypot(1e-4, 3e-4), rel=1e-4)
-    assert theory.effect(Case(gamma=(0, 1e-4, 0)), False).line == 0
+    assert theory.effect(Misalignments(gamma=(0, 1e-4, 0)), False).line == 0
 
 
 def test_effect_of_a_twist_in_milliarcseconds():
     for name in ("alpha1", "beta1", "gamma1"):
-        drift = theory.effect(Case().with_angle(name, 20 * ARCSEC), True).drift
+        drift = theory.effect(Misalignments().with_angle(name, 20 * ARCSEC), True).drift
         # 20" in radians times 0.04" and 6.6"
         assert drift[0] / MAS == pytest.approx(20 / 206264.806 * 40, rel=1e-6)
         assert drift[1] / MAS == pytest.approx(-20 / 206264.806 * 6600, rel=1e-6)
@@ -125,7 +125,7 @@ def test_precession_rates_are_of_the_size_that_is_used():
 
 
 def test_cases():
-    case = Case().with_angle("gamma_rate2", 3e-5).with_angle("beta3", 1e-5)
+    case = Misalignments().with_angle("gamma_rate2", 3e-5).with_angle("beta3", 1e-5)
     assert case.gamma_rate == (0, 3e-5, 0)
     assert case.at("gamma", [0, 0.5]).tolist() == [[0, 0, 0], [0, 1.5e-5, 0]]
     assert case.at("beta", [0, 0.5]).tolist() == [0, 0, 1e-5]
@@ -134,12 +134,12 @@ def test_cases():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: Case(alpha=(1, 2)), r"got alpha = \(1, 2\); needed 3 finite numbers, in radians"),
-        (lambda: Case(drift=(1, math.nan)), "got drift = .*; needed 2 finite"),
-        (lambda: Case().with_angle("delta1", 1), "got angle 'delta1'; needed alpha, beta"),
-        (lambda: Case().with_angle("alpha4", 1), "got angle 'alpha4'"),
-        (lambda: Case().with_angle(5, 1), "got angle 5; needed alpha, beta"),
-        (lambda: Case().with_angle("drift1", 1), "got angle 'drift1'"),
+        (lambda: Misalignments(alpha=(1, 2)), r"got alpha = \(1, 2\); needed 3 finite numbers, in radians"),
+        (lambda: Misalignments(drift=(1, math.nan)), "got drift = .*; needed 2 finite"),
+        (lambda: Misalignments().with_angle("delta1", 1), "got angle 'delta1'; needed alpha, beta"),
+        (lambda: Misalignments().with_angle("alpha4", 1), "got angle 'alpha4'"),
+        (lambda: Misalignments().with_angle(5, 1), "got angle 5; needed alpha, beta"),
+        (lambda: Misalignments().with_angle("drift1", 1), "got angle 'drift1'"),
         (lambda: theory.small_angle_loss("theta1", 1), "got angle 'theta1'; needed one of alpha1"),
         (lambda: theory.reach("gamma1", -1), "got allowed = -1"),
         (lambda: theory.twist_limit(0), "got allowed = 0"),
@@ -156,7 +156,7 @@ def test_bad_input_is_refused(call, message):
 
 
 def test_what_stands_is_turned_by_the_phase_that_is_zero_by_default():
-    case = Case(gamma=(0, 1e-4, 2e-4))
+    case = Misalignments(gamma=(0, 1e-4, 2e-4))
     assert theory.measured(case, False) == pytest.approx([1e-4, 2e-4], rel=1e-6)
     assert theory.effect(case, False).angle == pytest.approx((1e-4, 2e-4), rel=1e-6)
     assert theory.measured(case, False, phase=np.pi / 2) == pytest.approx([-2e-4, 1e-4], rel=1e-6)

@@ -101,8 +101,8 @@ NAMES = {
         r"row $i$ between the ends: $\sum_j\varphi^{|i-j|}w_j$": "1",
         "the first row, and the last": "1",
         r"the sum of $w$, with $\tanh\frac\mu2=\frac{1-\varphi}{1+\varphi}$": "1 + n*(1 - varphi)/(1 + varphi)",
-        "the integral over a cycle that two samples of size 1 let expect": "2*(1 - exp(-mu))/(mu*(1 + exp(-mu)))",
-        "the variance of that integral that the samples leave": (
+        "expected integral over a cycle between two samples of size 1": "2*(1 - exp(-mu))/(mu*(1 + exp(-mu)))",
+        "variance of that integral, given the samples": (
             "2*(1 - exp(-mu))/(mu*(1 + exp(-mu)))*((1 + exp(-mu))/(1 - exp(-mu)) - 2/mu)"
         ),
         r"$1-h=L\tanh\frac\mu2$": "1 - 2*(1 - exp(-mu))/(mu*(1 + exp(-mu)))",
@@ -110,10 +110,10 @@ NAMES = {
     },
     "derivatives": {
         "exact for each polynomial of degree 5": "c_0 + c_1/2 + c_2/3 + c_3/4 + c_4/5 + c_5/6",
-        r"a sample's part in the cycles after and before it, at $\theta=\omega T$": "1 - theta**2/60",
-        "the share of the variance after 3 lags": "3/10",
-        "the share of the variance after 4 lags": "2/15",
-        "the share of the variance after 5 lags": "3/25",
+        r"contribution of a sample to the cycles before and after it, at $\theta=\omega T$": "1 - theta**2/60",
+        "share of the variance that remains after 3 lags": "3/10",
+        "share of the variance that remains after 4 lags": "2/15",
+        "share of the variance that remains after 5 lags": "3/25",
     },
 }
 """What each step derives, beside its name; see `steps.check_names`."""

@@ -199,7 +199,7 @@ def test_ten_million_samples_in_bounded_memory():
             ),
             "got a memory of 2 samples; needed 4",
         ),
-        (lambda: experiment.Accumulator(FloatFormat(3, 5), 1.0, 1), "needed base 2 to 53 bits"),
+        (lambda: experiment.Integrator(FloatFormat(3, 5), 1.0, 1), "needed base 2 to 53 bits"),
         (lambda: experiment.emulate(1.0, 1.0, 9.0, [FloatFormat(2, 41)], rng(0)), "needed at most 40 bits"),
         (lambda: experiment.emulate(1.0, -1.0, 9.0, [FloatFormat(2, 24)], rng(0)), "got f_c = -1.0"),
     ],
@@ -223,7 +223,7 @@ def test_the_accumulator_is_exact_arithmetic_rounded_after_each_operation(fmt):
     """Against Fractions, in two feeds, with a T that is not a number of the format."""
     x = rng(15).standard_normal((40, 3)) * 10.0 ** rng(16).integers(-2, 3, (40, 3))
     period = 0.3
-    running = experiment.Accumulator(fmt, period, 3)
+    running = experiment.Integrator(fmt, period, 3)
     running.feed(x[:20])
     running.feed(x[19:])
     half = fmt.round(period / 2)
@@ -310,7 +310,7 @@ def test_both_errors_are_what_came_minus_what_should_come():
     fmt = FloatFormat(2, 11)
     (run,) = experiment.emulate(64.0, 32.0, 4.0, [fmt], rng(22), 3)
     (chunk,) = experiment.chunks(theory.first_order(1.0, 64.0), 32.0, 128, rng(22), 3)
-    running = experiment.Accumulator(fmt, 1 / 32, 3)
+    running = experiment.Integrator(fmt, 1 / 32, 3)
     running.feed(chunk.x)
     trapezoids = (chunk.x[:-1] + chunk.x[1:]).sum(axis=0) / 64
     assert np.array_equal(run.discretization, chunk.d.sum(axis=0))

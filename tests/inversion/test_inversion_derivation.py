@@ -26,7 +26,7 @@ EPS = derivation.EPSILON
 NAMES = {
     "first_approach": {
         r"(35), from $r = A\hat h - u$ and $u = Ah$": "hath - h",
-        r"(38): the same for all columns, $\hat h_j$ those of $A^{-1}+E$": "E",
+        r"(38): the same for all columns; the $\hat h_j$ are the columns of $A^{-1}+E$": "E",
         r"(42), from $r = (A+\Delta)\hat h - u$": "hath - h",
         r"before (43), from $R = (A+\Delta)(A^{-1}+E) - I$: exact with the computed inverse $A^{-1}+E$": "E",
         r"what $\approx$ drops, of second order": "A**-1*Delta*E",
@@ -40,7 +40,7 @@ NAMES = {
     },
     "one_step": {
         r"(47) with one $\epsilon$ for all, as printed": "a0*(1 + epsilon) - (a0 - a1)*(1 + 3*epsilon)",
-        "the same with an error for each rounding": (
+        "the same with a separate error for each rounding": (
             "a1*(epsilon_1 + epsilon_2 + epsilon_3) - a0*(epsilon_1 + epsilon_2)"
         ),
         "where $3a(1) = 2a(0)$, (47) is zero and the error is not": ("a1*(2*epsilon_3 - epsilon_1 - epsilon_2)/2"),
@@ -75,7 +75,7 @@ NAMES = {
     "transfer_cost": {
         r"each absolute value in (59) bounds two products, $u = |\hat a(k-1)|$, $v = |\hat a(k)|$": ("2*(u + v - w)"),
         "the largest weight of (87), where $j = 2 + m$": "n + 1 - m",
-        r"so $|\tilde A|$ is taken at most so many times": "(n + 3)/2",
+        r"so including $L$ increases the bound by at most this factor": "(n + 3)/2",
     },
     "inverse_norms": {
         "(97): (96) divided by $x$": "c",
@@ -99,7 +99,7 @@ NAMES = {
         "(86): $n-k$ subtractions and the division": "n - k + 1",
         "(85): product, subtraction, $n-j$ more, and the division": "n - j + 3",
         "one more row and column, the last: each weight grows by one": "n - j + 4",
-        "(89) of 1982 prints $2n-j$: too much by this, nothing for $n=3$ alone": "n - 3",
+        "(89) of 1982 prints $2n-j$, which is too large by this difference; it is zero only for $n=3$": "n - 3",
     },
 }
 """What each step derives, beside its name; see `steps.check_names`."""

@@ -13,8 +13,8 @@ from matplotlib.patches import ArrowStyle, FancyArrowPatch
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import figures
-from gpbnb.report.inversion.example import Column, Wordlength
-from gpbnb.report.inversion.experiment import Frozen, Trial
+from gpbnb.report.inversion.example import PrintedColumn, Wordlength
+from gpbnb.report.inversion.experiment import Frozen, InverseTrial
 
 #: Figure III-1 of hung1984: what follows from what.
 ARROWS = {
@@ -49,6 +49,11 @@ ERRORS = {
     "$\\Delta A$ and $\\Delta b_j$, (89), (90)",
 }
 ERRORS |= {"$\\delta A = \\tilde A + \\Delta A$\n$\\delta b_j = \\tilde b_j + \\Delta b_j$"}
+#: What follows from both sides.
+RESULTS = {
+    "$\\delta(A^{-1}) = \\hat A^{-1}\\;[\\,\\delta b_j - \\delta A\\,x_j\\,]$, (95)",
+    "Bound $\\|\\delta(A^{-1})\\|$",
+}
 
 
 @pictured
@@ -70,8 +75,8 @@ def test_flow_chart(ax):
     assert len(arrows) == len(ARROWS)
     assert len(boxes) == 10
     edges = {text.get_text(): to_hex(text.get_bbox_patch().get_edgecolor()).upper() for text in boxes.values()}
-    assert {text for text, edge in edges.items() if edge == ORANGE} == ERRORS
-    assert {edge for text, edge in edges.items() if text not in ERRORS} == {BLUE}
+    assert {text for text, edge in edges.items() if edge == ORANGE} == ERRORS | RESULTS
+    assert {edge for text, edge in edges.items() if text not in ERRORS | RESULTS} == {BLUE}
     # The computation runs downwards on the left, the errors on the right.
     assert all(x > 0.5 for (x, _), text in boxes.items() if text.get_text() in ERRORS)
     assert all(boxes_y(boxes, start) >= boxes_y(boxes, end) - 0.02 for start, end in ARROWS)
@@ -85,7 +90,7 @@ def boxes_y(boxes, words):
 @pictured
 def test_table1(ax):
     def column(kind, *values):
-        return Column(kind, Wordlength("t = places", Rounding.NEAREST), "", "column sum", False, values)
+        return PrintedColumn(kind, Wordlength("t = places", Rounding.NEAREST), "", "column sum", False, values)
 
     bounds = [column("bound", 5e-2, 5e-4, 5e-7), column("bound", 9e-2, 9e-4, 9e-7)]
     errors = [column("error", 2e-4, 2e-6, 2e-9)]
@@ -138,7 +143,7 @@ class Matrix(NamedTuple):
 
 def trial(n, condition, error, **bounds):
     matrix = Matrix(FloatFormat(2, 11), n)
-    return Trial("random", matrix, None, True, condition, Fraction(error), bounds)
+    return InverseTrial("random", matrix, None, True, condition, Fraction(error), bounds)
 
 
 @pictured

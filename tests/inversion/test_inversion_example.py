@@ -206,11 +206,11 @@ class TestSearch:
         ("values", "falls"), [((3, 2, 1), True), ((3, 1, 2), False), ((2, 3, 1), False), ((2, 2, 1), False)]
     )
     def test_a_column_decreases_if_each_number_is_smaller(self, values, falls):
-        assert example.Column("8", "8", "x", "column sum", False, values).decreasing == falls
+        assert example.PrintedColumn("8", "8", "x", "column sum", False, values).decreasing == falls
 
     def test_a_bound_below_the_error_would_be_seen(self, monkeypatch):
         columns = example.bound_readings()
-        small = example.Column(
+        small = example.PrintedColumn(
             columns[0].wordlength, columns[0].wordlength, "x", "column sum", False, (1e-9, 1e-9, 1e-9)
         )
         monkeypatch.setattr(example, "bound_readings", lambda: (small,))
@@ -221,7 +221,7 @@ class TestSearch:
     @pytest.mark.parametrize(("values", "holds"), [((1.0, 1.0, 1e-9), 0), ((1e-9, 1.0, 1.0), 0), ((1.0, 1.0, 1.0), 1)])
     def test_a_bound_is_conservative_if_it_is_above_every_error(self, values, holds, monkeypatch):
         first = example.bound_readings()[0]
-        one = example.Column(first.wordlength, first.wordlength, "x", "column sum", False, values)
+        one = example.PrintedColumn(first.wordlength, first.wordlength, "x", "column sum", False, values)
         monkeypatch.setattr(example, "bound_readings", lambda: (one,))
         assert example.claims()[2].holds == holds
 

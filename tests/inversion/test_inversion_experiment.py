@@ -12,7 +12,6 @@ from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import inverse as bounds
-from gpbnb.report.inversion import __main__ as command
 from gpbnb.report.inversion import experiment, procedure, theory
 from gpbnb.report.inversion.procedure import Reading
 
@@ -73,10 +72,14 @@ class TestTrial:
         assert set(one.bounds) >= {*map(str, experiment.PRINTED), "corrected"}
 
     def test_violations_and_ratios(self):
-        bound_below = experiment.Trial("", FMT.array([[1]]), FMT.array([[1]]), True, 1.0, Fraction(1, 3), {"x": 1 / 3})
+        bound_below = experiment.InverseTrial(
+            "", FMT.array([[1]]), FMT.array([[1]]), True, 1.0, Fraction(1, 3), {"x": 1 / 3}
+        )
         assert bound_below.violates("x")  # 1/3 as a float64 is below 1/3
         assert bound_below.overestimation("x") == pytest.approx(1)
-        exact = experiment.Trial("", FMT.array([[1]]), FMT.array([[1]]), True, 1.0, Fraction(0), {"x": 0.1, "y": 0.0})
+        exact = experiment.InverseTrial(
+            "", FMT.array([[1]]), FMT.array([[1]]), True, 1.0, Fraction(0), {"x": 0.1, "y": 0.0}
+        )
         assert exact.overestimation("x") == np.inf
         assert exact.overestimation("y") == 1
         assert not exact.violates("y")
@@ -149,10 +152,10 @@ class TestSweeps:
     def test_cells_have_seeds_of_their_own(self):
         for cells in (experiment.variant_cells(), experiment.random_cells()):
             assert len({cell.seed for cell in cells}) == len(cells)
-        cell = experiment.Cell("random", FMT, True, (2, 3), 3, (1, 2))
+        cell = experiment.InverseCell("random", FMT, True, (2, 3), 3, (1, 2))
         first, again = ([str(one.matrix) for one in cell.trials(()) if one] for _ in range(2))
         assert first == again
-        other = experiment.Cell("random", FMT, True, (2, 3), 3, (1, 3))
+        other = experiment.InverseCell("random", FMT, True, (2, 3), 3, (1, 3))
         assert first != [str(one.matrix) for one in other.trials(()) if one]
 
     def test_what_the_sweeps_cover(self):
@@ -164,7 +167,7 @@ class TestSweeps:
 
     def test_a_cell_by_hand(self):
         # In four digits some of these are regular and some are not, and the second bound is absent for some.
-        cell = experiment.Cell("graded", FloatFormat(10, 4), True, (2, 3), 20, (29,))
+        cell = experiment.InverseCell("graded", FloatFormat(10, 4), True, (2, 3), 20, (29,))
         names = ("signed, chart, A", "Higham")
         trials = [one for one in cell.trials(names) if one]
         rows = experiment.cell_rows(cell, experiment.cell_sample(cell, names))
@@ -193,20 +196,22 @@ class TestSweeps:
         assert int(rows[0]["violations"]) > 0
 
     def test_exact_inverses_have_no_ratio(self):
-        sample = experiment.Sample(("a posteriori",))
+        sample = experiment.InverseSample(("a posteriori",))
         sample.add(experiment.trial(FMT.array([[2, 0], [0, 4]]), names=("a posteriori",)))
         (row,) = sample.rows("x", "x", "x", "x")
         assert (row["trials"], row["exact"], row["absent"], row["violations"]) == ("1", "1", "0", "0")
         assert (row["median"], row["tight"]) == ("", "0")
 
     def test_singular_ones_are_counted_apart(self):
-        cell = experiment.Cell("Hilbert", FloatFormat(10, 1), True, tuple(range(2, 9)), 1, (0,))
+        cell = experiment.InverseCell("Hilbert", FloatFormat(10, 1), True, tuple(range(2, 9)), 1, (0,))
         sample = experiment.cell_sample(cell, ("ball",))
         assert sample.failed > 0
         assert sample.trials + sample.failed == cell.count == 7
 
     def test_all_together(self):
-        cells = [experiment.Cell(family, FMT, True, (2, 4), 3, (1, k)) for k, family in enumerate(("random", "Kahan"))]
+        cells = [
+            experiment.InverseCell(family, FMT, True, (2, 4), 3, (1, k)) for k, family in enumerate(("random", "Kahan"))
+        ]
         names = ("ball",)
         rows = experiment.sweep_rows(cells, names)
         assert [(row["family"], row["format"]) for row in rows] == [
@@ -226,7 +231,7 @@ class TestKept:
     def test_provenance_and_sums(self, sweep):
         kept = experiment.frozen(sweep)
         assert kept.provenance["seed"] == str(experiment.SEED)
-        assert kept.provenance["command"] == f"python -m gpbnb.report.inversion {sweep}"
+        assert kept.provenance["command"] == f"python -m gpbnb.report.stored recompute inversion/{sweep}"
         assert "python-flint" in kept.provenance["versions"]
         assert kept.provenance["commit"]
         cells, names = experiment.SWEEPS[sweep]
@@ -291,23 +296,16 @@ class TestKept:
             experiment.frozen("all")
 
 
-class TestCommand:
-    def test_it_writes_what_is_read(self, tmp_path, monkeypatch, capsys):
-        cells = [experiment.Cell("random", FMT, True, (2,), 5, (1, k)) for k in range(3)]
-        monkeypatch.setattr(experiment, "SWEEPS", {"small": (lambda: cells, ("ball", "a posteriori"))})
-        folder = tmp_path / "new" / "folder"
-        given = ["small", "--folder", str(folder), "--first", "2", "--directory", str(tmp_path / "saved")]
-        for _ in range(2):  # the second time, the folder exists
-            assert command.main(given) == 0
-        text = (folder / "small.csv").read_text(encoding="utf-8")
-        assert text.startswith("# command: python -m gpbnb.report.inversion small\n# seed: 1984\n# cells: 2 of 3\n")
-        assert text.count("\nrandom,2:24:nearest,yes,2,ball,5,") == 2
-        assert "small.csv: 10 inversions" in capsys.readouterr().out
-
-    def test_unknown_sweeps(self, capsys):
-        with pytest.raises(SystemExit):
-            command.main(["other"])
-        assert "needed one of variants, random" in capsys.readouterr().err
+def test_what_is_recomputed_is_read(tmp_path, monkeypatch):
+    cells = [experiment.InverseCell("random", FMT, True, (2,), 5, (1, k)) for k in range(3)]
+    monkeypatch.setattr(experiment, "SWEEPS", {"small": (lambda: cells, ("ball", "a posteriori"))})
+    for _ in range(2):  # the second time, the folder exists
+        file = experiment.stored_sweep("small").recompute(tmp_path / "new" / "folder", count=2)
+    text = file.read_text(encoding="utf-8")
+    command = "python -m gpbnb.report.stored recompute inversion/small"
+    assert text.startswith(f"# command: {command}\n# seed: 1984\n# cells: 2 of 3\n")
+    assert text.count("\nrandom,2:24:nearest,yes,2,ball,5,") == 2
+    assert experiment.stored_sweep("small").load(file).records()[-1]["trials"] == "10"
 
 
 class TestFigureData:

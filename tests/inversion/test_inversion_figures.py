@@ -25,7 +25,7 @@ class TestFlowChart:
         assert not ax.axison
 
     def test_every_box_leads_to_the_bound(self):
-        reached = {"norm"}
+        reached = {"bound on error"}
         for _ in figures.CHART:
             reached |= {name for name, box in figures.CHART.items() if reached.intersection(box.follows)}
         assert reached == set(figures.CHART)
@@ -92,7 +92,7 @@ class TestRatios:
         assert colour(error) == style.OBSERVED
         assert sorted(names_of(ax)) == sorted([*self.NAMES, "error"])
         assert ax.get_yscale() == "log"
-        assert (ax.get_xlabel(), ax.get_ylabel()) == ("rows $n$ (no unit)", "bound / error (no unit)")
+        assert (ax.get_xlabel(), ax.get_ylabel()) == ("rows $n$", "bound / error, median")
 
     def test_against_condition(self, ax):
         trials = experiment.against_condition(FMT, 4, np.linspace(0, 7, 8), np.random.default_rng(1))

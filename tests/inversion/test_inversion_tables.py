@@ -33,8 +33,10 @@ def test_table1():
 
 
 def search(column, wordlength, detail, norm, relative, *values):
-    closest = example.Column(column, example.Wordlength(wordlength, Rounding.CHOP), detail, norm, relative, values)
-    return example.Search(column, 80, 240, 7, 1, 0.4567, closest)
+    closest = example.PrintedColumn(
+        column, example.Wordlength(wordlength, Rounding.CHOP), detail, norm, relative, values
+    )
+    return example.Agreements(column, 80, 240, 7, 1, 0.4567, closest)
 
 
 SEARCHES = (
@@ -64,14 +66,16 @@ def test_the_closest_reading_is_described():
         "readings": "80",
         "numbers that agree in four digits": "7 of 240",
         "expected by chance": "0.46",
-        "closest reading": "t = places, chop; absolute values, product (96), $A_T^{-1}$; column sum, absolute",
+        "closest reading": "t = places, chopped; absolute values, product (96), $A_T^{-1}$; column sum, absolute",
         "its numbers / printed numbers": "1, 2, 0.333",
     }
-    assert second["closest reading"] == "fixed point, chop; rounded once; Frobenius, relative"
+    assert second["closest reading"] == "fixed point, chopped; rounded once; Frobenius, relative"
 
 
 def test_the_first_exception_of_a_claim_is_described():
-    table = tables.claims([example.Claim("one", 9, 5, "signed, chart, A"), example.Claim("other", 8, 8, "")])
+    table = tables.claims(
+        [example.SectionClaim("one", 9, 5, "signed, chart, A"), example.SectionClaim("other", 8, 8, "")]
+    )
     assert table.title == "2 claims"
     assert by_header(table) == [
         {"claim": "one", "holds in": "5 of 9", "first exception": "with signs, norm of (95), $A^{-1}$"},
@@ -90,10 +94,10 @@ def test_each_printed_error_has_a_column_of_possibilities():
         for p, w in ((3, matrix), (5, matrix), (8, None))
     ]
     table = tables.possibilities([*relative, *absolute])
-    assert table.title == "6 searches"
+    assert table.title == "settings that could give the printed errors"
     assert by_header(table) == [
         {
-            "wordlength": "t = places, chop, matrix rounded to this format",
+            "wordlength": "t = places, chopped, matrix rounded to this format",
             "norm": "row sum",
             "kind of error": "relative",
             "3 places: 7.782e-5": "no",
@@ -131,7 +135,7 @@ def test_possibilities():
     found = existence.all_possible()
     table = tables.possibilities(found)
     assert len(table.body) == 6 * 4 * 2
-    assert table.body[-1][0] == "t = places, chop, matrix rounded to this format"
+    assert table.body[-1][0] == "t = places, chopped, matrix rounded to this format"
     answers = [answer for line in table.body for answer in line[3:]]
     assert answers == ["no" if one.witness is None else "yes" for one in found]
     assert table.header[3] == "3 places: 7.782e-5"

@@ -62,8 +62,8 @@ NAMES = {
     },
     "scalar_conditions": {
         r"where $\kappa=\frac16$, possible and allowed are equal": "3",
-        r"and not beyond: possible minus allowed, times $1-\kappa$": "6*kappa - 1",
-        r"(108), first form: 4 roundings of $P_pH$, above and, times $\kappa$, below the line; 1 of "
+        r"beyond it they differ: possible minus allowed, times $1-\kappa$": "6*kappa - 1",
+        r"(108), first form: 4 roundings of $P_pH$ in the numerator and, times $\kappa$, in the denominator; 1 of "
         "$H(P_pH)$; 1 each of sum, quotient and product": "7 - 3*kappa",
     },
     "smallest": {

@@ -13,11 +13,9 @@ from drawn import (
     BLUE,
     GREEN,
     GREY,
-    NAVY,
     ORANGE,
     PINK,
     PURPLE,
-    SKY,
     at,
     labelled,
     legend_of,
@@ -31,6 +29,7 @@ from matplotlib.colors import to_hex
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
+from gpbnb.report.display.style import bits_colour
 from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.answers import Answers
@@ -44,7 +43,7 @@ STEPS = np.array([1, 10, 100])
 
 def run(precision, rounding, form, size, base=2):
     """A year with errors of its own: the rate's are largest, 4 size, half-way; the drift's reach 3 size."""
-    case = year.Case(year.MODELS[0], base, precision, rounding, form)
+    case = year.YearCase(year.MODELS[0], base, precision, rounding, form)
     drift = size * np.array([[1.0, -2.0], [-3.0, 1.0], [0.5, 0.25]])
     rate = size * np.array([[0.0, 0.0], [1.0, -4.0], [2.0, 1.5]])
     one = size * np.array([5.0, 6.0, 7.0])
@@ -61,8 +60,8 @@ def digits(precision, chopped=False):
     [
         ("drift", [2.0, 3.0, 0.5], "error of the drift angle (mas)"),
         ("rate", [None, 4.0, 2.0], "error of the drift rate (mas/yr)"),
-        ("gain", [10.0, 12.0, 14.0], "relative gain error (no unit)"),
-        ("covariance", [15.0, 18.0, 21.0], "relative covariance error (no unit)"),
+        ("gain", [10.0, 12.0, 14.0], "relative error of the gain"),
+        ("covariance", [15.0, 18.0, 21.0], "relative error of the covariance"),
     ],
     ids=["drift", "rate", "gain", "covariance"],
 )
@@ -78,13 +77,10 @@ def test_years(ax, quantity, values, words):
     *curves, tolerance = gravity_probe_b_figures.years(runs, quantity, ax, tolerance=0.3)
     for curve, size in zip(curves, (1.0, 10.0, 100.0, 1000.0, 1e4), strict=True):
         assert at(curve, *((step, size * v) for step, v in zip((1, 10, 100), values, strict=True) if v))
-    assert [look(curve) for curve in curves] == [
-        (BLUE, "-", "o"),
-        (PURPLE, "-", "P"),
-        (PINK, "-", "^"),
-        (NAVY, "-", "s"),
-        (SKY, "-", "D"),
-    ]
+    paints = [bits_colour(each.case.fmt) for each in runs]
+    assert [look(curve) for curve in curves] == [(paint, "-", "o") for paint in paints]
+    assert paints[0] == paints[2] == paints[3] != paints[1]  # the colour is that of the bits
+    assert [curve.get_markerfacecolor() == "none" for curve in curves] == [False, True, False, True, False]
     assert [curve.get_label() for curve in curves] == [
         "24 bits",
         "30 bits, chopped, Hung (1984), second gain",
@@ -94,23 +90,35 @@ def test_years(ax, quantity, values, words):
     ]
     assert (set(tolerance.get_ydata()), look(tolerance)[:2], tolerance.get_label()) == ({0.3}, (GREY, ":"), "tolerance")
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("step $k$", words)
+    names = named(ax)
+    for curve, paint in zip(curves, paints, strict=True):
+        assert near(names.pop(curve.get_label()), paint, (1, curve.get_ydata()[-1]))
+    assert near(names.pop("tolerance"), GREY, (1, 0.3))
+    assert not names
     return ax.figure
 
 
 @pictured
-def test_lines_and_level(ax):
-    curves = [(name, [1, 2], [i + 3.0, i + 5.0]) for i, name in enumerate(("first", "second", "third", "last"))]
-    artists = gravity_probe_b_figures.lines(curves, ax)
-    for i, line in enumerate(artists):
-        assert at(line, (1, i + 3), (2, i + 5))
-    assert {line.get_label(): look(line)[:2] for line in artists} == {
-        "first": (ORANGE, "-"),
-        "second": (ORANGE, "--"),
-        "third": (ORANGE, "-."),
-        "last": (GREEN, "-"),
-    }
-    level = gravity_probe_b_figures.level("printed", 9.0, ax)
-    assert (look(level)[:2], level.get_label(), set(level.get_ydata())) == ((ORANGE, "-"), "printed", {9.0})
+def test_years_with_limits(ax):
+    one = run(24, NEAREST, Form.HUNG, 1.0)
+    limits = [
+        gravity_probe_b_figures.Limit("holds", STEPS, [7.0, 8.0, 9.0], holds=True),
+        gravity_probe_b_figures.Limit("printed", STEPS, [2.0, 3.0, 4.0]),
+        gravity_probe_b_figures.Limit("level", STEPS, 0.5),
+    ]
+    _, *drawn = gravity_probe_b_figures.years([one], "gain", ax, limits=limits)
+    assert [(line.get_label(), *look(line)) for line in drawn] == [
+        ("holds", GREEN, "-", ""),
+        ("printed", ORANGE, "--", ""),
+        ("level", ORANGE, "-.", ""),
+    ]
+    assert at(drawn[0], (1, 7), (10, 8), (100, 9))
+    assert at(drawn[2], (1, 0.5), (10, 0.5), (100, 0.5))
+    names = named(ax)
+    assert near(names.pop("holds"), GREEN, (1, 9))
+    assert near(names.pop("printed"), ORANGE, (1, 4))
+    assert near(names.pop("level"), ORANGE, (1, 0.5))
+    assert set(names) == {"24 bits"}
     return ax.figure
 
 
@@ -137,6 +145,8 @@ ANSWERS = {
     "formula": (10, 16),
     "corrected": (12, 13),
     "observed": {NEAREST: 10.25, CHOP: 11.75},
+    "bits": 32,
+    "error": 0.6,
 }
 
 
@@ -151,84 +161,57 @@ def answers():
     return Answers(runs=runs, **ANSWERS)
 
 
+@pytest.mark.parametrize("others", [False, True], ids=["front", "others"])
 @pictured
-def test_digits_needed(ax):
-    gravity_probe_b_figures.digits_needed(answers(), ax)
-    lines = {line.get_label(): line for line in ax.lines}
+def test_digits_needed(ax, others):
+    gravity_probe_b_figures.digits_needed(answers(), ax, others)
+    lines = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
     assert list(lines) == legend_of(ax)
-    assert at(lines["Hung (1984), nearest"], (digits(24), 4), (digits(32), 8))
-    assert at(lines["UD, nearest"], (digits(40), 64))
-    assert at(lines["Hung (1984), chop"], (digits(24, True), 32))
-    assert at(lines["Joseph, chop"], (digits(40, True), 128))
+    assert at(lines["emulated, rounded"], (digits(24), 4), (digits(32), 8), (digits(40), 64))
+    assert at(lines["emulated, chopped"], (digits(24, True), 32), (digits(40, True), 128))
     size = 6.6e3  # mas, the geodetic drift of a year
     assert float(figures.report_bounds.YEAR_SIZE) == pytest.approx(size, rel=0.01)
     size = float(figures.report_bounds.YEAR_SIZE)
-    assert at(lines["printed answers"], (9, size), (17, size))
-    assert at(lines["formula"], (10, size), (16, size))
-    assert at(lines["all faults corrected"], (12, size), (13, size))
-    assert at(lines["observed"], (10.25, 0.7))
-    assert set(lines["tolerance"].get_ydata()) == {0.7}
+    assert at(lines["asked for in print"], (9, size), (17, size))
     expected = {
-        "Hung (1984), nearest": (BLUE, "", "o"),
-        "UD, nearest": (BLUE, "", "D"),
-        "Hung (1984), chop": (NAVY, "", "o"),
-        "Joseph, chop": (NAVY, "", "s"),
-        "(125), printed formula": (ORANGE, "-", ""),
-        "(125), all faults corrected": (ORANGE, "--", ""),
-        "tolerance": (GREY, ":", ""),
-        "printed answers": (ORANGE, "-", "o"),
-        "formula": (BLACK, "-", "s"),
-        "all faults corrected": (BLACK, "-", "^"),
-        "observed": (BLACK, "", "|"),
+        "emulated, rounded": (BLUE, BLUE, "o"),
+        "emulated, chopped": (BLUE, "none", "o"),
+        "asked for in print": (ORANGE, "none", "o"),
     }
-    for name, line in lines.items():
-        paint, _, mark = expected[name]
-        drawn = line.get_markeredgecolor() if mark else line.get_color()
-        assert (to_hex(drawn).upper(), look(line)[2]) == (paint, mark)
-    printed, corrected = (lines[f"(125), {word}"] for word in ("printed formula", "all faults corrected"))
-    assert (look(printed)[1], look(corrected)[1]) == ("-", "--")
+    if others:
+        assert at(lines["by the printed formula"], (10, size), (16, size))
+        assert at(lines["by the corrected formula"], (12, size), (13, size))
+        expected |= {"by the printed formula": (BLACK, "none", "s"), "by the corrected formula": (BLACK, "none", "^")}
+    assert {
+        name: (line.get_markeredgecolor(), line.get_markerfacecolor(), line.get_marker())
+        for name, line in lines.items()
+    } == expected
+    printed, corrected = (line for line in ax.lines if look(line)[0] == ORANGE and len(line.get_xdata()) > 2)
+    assert (look(printed)[1], look(corrected)[1]) == ("--", "-.")
     bound, x = figures.report_bounds.gravity_probe_b_bound, Fraction(0.5 * 10.0 ** (1 - 3.5))
     assert printed.get_ydata()[0] == bound(x, figures.report_bounds.EXAMPLE[0])
     every = {"once": True, "free_signs": True, "carried": True}
-    assert all(every.values())
     assert corrected.get_ydata()[0] == bound(x, figures.report_bounds.EXAMPLE[0], **every)
-    assert printed.get_ydata()[0] != corrected.get_ydata()[0]
-    return ax.figure
-
-
-@pictured
-def test_headline(ax):
-    gravity_probe_b_figures.headline(answers(), ax)
-    chopped, rounded, printed, corrected, goal, drift, marks = ax.lines
-    assert at(chopped, (digits(24, True), 32), (digits(40, True), 128))
-    assert at(rounded, (digits(24), 4), (digits(32), 8), (digits(40), 64))
-    assert labelled(ax) == {"emulated, chopped": (NAVY, "", "o"), "emulated, rounded": (BLUE, "", "o")}
-    assert (look(chopped), look(rounded)) == ((NAVY, "", "o"), (BLUE, "", "o"))
-    size = float(figures.report_bounds.YEAR_SIZE)
-    assert (set(goal.get_ydata()), set(drift.get_ydata())) == ({0.7}, {size})
-    assert [look(each)[:2] for each in (printed, corrected, goal, drift)] == [
-        (ORANGE, "-"),
-        (ORANGE, "--"),
-        (GREY, ":"),
-        (GREY, ":"),
-    ]
-    bound, beta = figures.report_bounds.gravity_probe_b_bound, Fraction(0.5 * 10.0 ** (1 - 3.5))
-    every = {"once": True, "free_signs": True, "carried": True}
-    assert printed.get_ydata()[0] == bound(beta, figures.report_bounds.EXAMPLE[0])
-    assert corrected.get_ydata()[0] == bound(beta, figures.report_bounds.EXAMPLE[0], **every)
-    assert at(marks, (9, size), (17, size))
-    assert (marks.get_markeredgecolor(), marks.get_markerfacecolor()) == (ORANGE, "none")
+    dotted = [line for line in ax.lines if look(line)[:2] == (GREY, ":")]
+    assert [line.get_xdata()[0] for line in dotted[:2]] == [pytest.approx(digits(24)), pytest.approx(digits(53))]
+    assert [set(line.get_ydata()) for line in dotted[2:]] == [{0.7}, {size}]
+    ring, stem = ax.lines[-2:]
+    assert at(ring, (digits(32), 0.6))
+    assert (look(ring), ring.get_markerfacecolor()) == ((BLACK, "", "o"), "none")
+    assert at(stem, (digits(32), 1e-12), (digits(32), 0.02))
     names = named(ax)
-    assert near(names.pop("(125) as printed"), ORANGE, (3.5, printed.get_ydata()[0]))
-    x = float(corrected.get_xdata()[12])
-    assert near(names.pop("(125) with its faults corrected"), ORANGE, (x, corrected.get_ydata()[12]))
-    assert near(names.pop("tolerance: one milliarcsecond"), GREY, (3.5, 0.7))
-    assert near(names.pop("the drift in a year"), GREY, (16.4, size))
-    assert near(names.pop("9 printed"), ORANGE, (9, size))
-    assert near(names.pop("17 printed"), ORANGE, (17, size))
+    assert near(names.pop("32 bits or\n10.3 digits"), BLACK, (digits(32), 1e-6))
+    assert near(names.pop("binary32"), GREY, (digits(24), 1e-12))
+    assert near(names.pop("binary64"), GREY, (digits(53), 1e-12))
+    assert near(names.pop("tolerance"), GREY, (1, 0.7))
+    assert near(names.pop("drift in\na year"), GREY, (1, size))
+    assert {names.pop(word)[0] for word in ("(125)\nas printed", "(125), errors corrected")} == {ORANGE}
     assert not names
-    assert list(ax.get_xticks()) == [4, 6, 8, 10, 12, 14, 16, 18, 20, 22]
-    assert list(ax.get_yticks()) == [1e-8, 1, 1e8, 1e16]
+    (bits,) = ax.child_axes  # the axis of bits at the top
+    assert (bits.get_xlabel(), list(bits.get_xticks())) == ("bits", [16, 24, 32, 40, 53, 64])
+    ax.figure.canvas.draw()
+    low, high = ax.get_xlim()
+    assert bits.get_xlim() == pytest.approx((1 + (low - 1) * math.log2(10), 1 + (high - 1) * math.log2(10)))
     return ax.figure
 
 
@@ -308,15 +291,17 @@ def test_guarantee(ax):
     found = SimpleNamespace(history=np.array([[9.0, 1.0], [9.0, 2.0]]), bound=np.array([9.0, 3.0]))
     chosen, random = np.array([[5.0, -0.5], [5.0, 1.5], [5.0, 2.5]]), np.array([[4.0, 0.1], [4.0, -0.2], [4.0, 0.3]])
     guarantee_figures.draw_errors(ax, found, chosen, random, 1, "speed, m/s")
-    bound, adversary, noise = ax.lines
+    (bound,) = ax.lines
+    adversary, noise = ax.collections
     assert at(bound, (1, 1), (2, 2), (3, 3))  # the limit, once the history ends
-    assert at(adversary, (1, 0.5), (2, 1.5), (3, 2.5))
-    assert at(noise, (1, 0.1), (2, 0.2), (3, 0.3))
-    assert labelled(ax) == {
-        "bound for every measurement sequence": (GREEN, "-", ""),
-        "measurements chosen by the adversary": (BLUE, "-", ""),
-        "random measurements": (GREY, "-", ""),
-    }
-    assert [look(each)[0] for each in (bound, adversary, noise)] == [GREEN, BLUE, GREY]
+    for band, heights in ((adversary, [0.5, 1.5, 2.5]), (noise, [0.1, 0.2, 0.3])):
+        assert sorted({float(y) for y in band.get_paths()[0].vertices[:, 1]}) == heights
+    assert legend_of(ax) == [
+        "bound for every measurement sequence",
+        "measurements chosen by the adversary",
+        "random measurements",
+    ]
+    paints = [to_hex(band.get_facecolor()[0]).upper() for band in (adversary, noise)]
+    assert (look(bound)[0], paints) == (GREEN, [BLUE, PINK])
     assert ax.get_ylim() == pytest.approx((3e-3, 150))
     return ax.figure

@@ -1,18 +1,11 @@
-"""gpbnb.report.kalman.ensembles: trials come out the same wherever they run, and none is lost when workers die."""
+"""gpbnb.report.kalman.ensembles: trials, their summaries, and the stored sweep."""
 
 from __future__ import annotations
 
 import math
-import os
-import signal
-from concurrent.futures import ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from distributed import Client, KilledWorker
-from executors import Failing, local_cluster
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
@@ -20,8 +13,7 @@ from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.report.kalman import ensembles
-from gpbnb.report.kalman.ensembles import FORMATS, KINDS, Outcome, Task, random_model, summaries, sweep, tasks, trial
-from gpbnb.sweeps import read
+from gpbnb.report.kalman.ensembles import FORMATS, KINDS, Task, TrialOutcome, random_model, summaries, tasks, trial
 
 SINGLE = FloatFormat(2, 24)
 
@@ -97,7 +89,7 @@ def test_tasks_are_every_kind_format_and_form():
 def test_no_bound_was_violated_in_ten_thousand_trials():
     found = ensembles.load()
     assert [(each.kind, each.form) for each in found] == [(kind, form.name.lower()) for kind in KINDS for form in Form]
-    assert sum(each.trials for each in found) == ensembles.provenance()["trials"] == 10_200
+    assert sum(each.trials for each in found) == 10_200
     for each in found:
         assert each.contraction_violations == 0
         assert max(each.state, each.gain, each.covariance) <= 1
@@ -113,24 +105,24 @@ def test_no_bound_was_violated_in_ten_thousand_trials():
 # UD and the second gain take long to compile in base 16. With these seeds, their largest ratios are in other bases.
 @pytest.mark.parametrize("seed", [1, 32])
 def test_a_part_of_the_sweep_comes_out_as_it_is_stored(seed):
-    stored = read(ensembles._HERE / "ensembles.csv", ensembles.COLUMNS, "").rows
-    assert tuple(column.name for column in ensembles.COLUMNS) == ensembles.HEADER
+    stored = ensembles.SWEEP.load().rows
+    names = [column.name for column in ensembles.COLUMNS]
+    assert names == ["seed", *ensembles.Summary._fields]
     todo = [task for task in tasks(1, first_seed=seed) if task.kind in ("one sign", "far scales")]
     without = (Form.UD, Form.HUNG_SECOND_GAIN)
     todo = [task for task in todo if task.fmt.base != 16 or task.form not in without]
     expected = [line for line in stored if line[:2] in {(str(seed), "one sign"), (str(seed), "far scales")}]
-    largest = [ensembles.HEADER.index(name) for name in ("seed", "kind", "form", *ensembles._LARGEST)]
-    for line, row in zip(ensembles.lines(seed, sweep(todo, batch=len(todo))), expected, strict=True):
+    largest = [names.index(name) for name in ("seed", "kind", "form", *ensembles._LARGEST)]
+    for line, row in zip(ensembles.lines(seed, [trial(task) for task in todo]), expected, strict=True):
         few = row[2] in {form.name.lower() for form in without}
         assert [line[at] for at in largest] == [row[at] for at in largest] if few else line == row
 
 
-def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
+def test_what_is_recomputed_is_loaded(tmp_path, monkeypatch):
     monkeypatch.setattr(ensembles, "FORMATS", (SINGLE,))
     monkeypatch.setattr(ensembles, "KINDS", KINDS[:1])
-    monkeypatch.setattr(ensembles, "sweep", lambda todo, progress: tuple(trial(task) for task in todo))
-    assert ensembles.main(["--repeats", "2", "--output", str(tmp_path / "new")]) == 0
-    found = ensembles.load(tmp_path / "new")
+    file = ensembles.SWEEP.recompute(tmp_path, count=2)
+    found = ensembles.load(file)
     assert [each.form for each in found] == [form.name.lower() for form in Form]
     assert [each.trials for each in found] == [2] * len(Form)
     again = summaries([trial(task) for task in tasks(2)])
@@ -139,17 +131,16 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
             **dict.fromkeys(stored._fields[2:], 0)
         )
         assert stored[2:] == pytest.approx(each[2:], rel=1e-5)
-    assert ensembles.provenance(tmp_path / "new")["trials"] == 10
-    (tmp_path / "new" / "ensembles.csv").write_text("kind\n", encoding="utf-8")
+    file.write_text("kind\n", encoding="utf-8")
     ensembles.load.cache_clear()
     with pytest.raises(ValueError, match=r"ensembles\.csv, line 1"):
-        ensembles.load(tmp_path / "new")
+        ensembles.load(file)
 
 
 def outcome(form=Form.UD, **changed):
     values = dict.fromkeys(("state", "gain", "covariance", "last", "bounded"), 0.5)
     values |= dict.fromkeys(("printed_covariance", "printed_gain", "printed_state"), 0.25)
-    return Outcome(Task("stable", SINGLE, form, 0, 4), **(values | {"indefinite": False} | changed))
+    return TrialOutcome(Task("stable", SINGLE, form, 0, 4), **(values | {"indefinite": False} | changed))
 
 
 def test_a_summary_counts():
@@ -175,93 +166,6 @@ def test_a_summary_counts():
     assert (ud.violations_125, ud.worst_125) == (0, 0.25)
     assert (usual.violations_125, usual.worst_125) == (1, 7.0)
     assert (ud.indefinite, usual.indefinite) == (1, 0)
-
-
-# -- executors ------------------------------------------------------------------------------------
-
-
-def test_threads_and_one_after_another_give_the_same():
-    todo = some()
-    serial = sweep(todo, batch=len(todo))
-    assert serial == tuple(trial(task) for task in todo)
-    with ThreadPoolExecutor(2) as pool:
-        assert sweep(todo, pool, batch=3) == serial
-
-
-def killed():
-    return KilledWorker("some", None, 3)
-
-
-def test_a_batch_whose_worker_died_is_sent_anew():
-    executor = Failing(killed(), killed())
-    assert sweep(some(4), executor, batch=2) == sweep(some(4), batch=4)
-    assert executor.sent == 4
-
-
-def test_after_so_many_deaths_it_is_told():
-    executor = Failing(*(killed() for _ in range(9)))
-    with pytest.raises(RuntimeError, match="got 3 workers that died under one batch of 2 trials"):
-        sweep(some(2), executor, batch=2, attempts=3)
-    assert executor.sent == 3
-
-
-@pytest.mark.parametrize("error", [ValueError("mine"), BrokenProcessPool("gone")])
-def test_another_error_is_not_hidden(error):
-    executor = Failing(error)
-    with pytest.raises(type(error)):
-        sweep(some(2), executor)
-    assert executor.sent == 1
-
-
-def test_one_attempt_and_batches_of_one_are_enough():
-    assert ensembles.sweep((), batch=1, attempts=1) == ()
-
-
-@pytest.mark.parametrize("changed", [{"batch": 0}, {"attempts": 0}])
-def test_what_a_sweep_refuses(changed):
-    with pytest.raises(ValueError, match="needed both at least 1"):
-        sweep(some(2), **changed)
-
-
-def test_nothing_to_do_is_done():
-    assert sweep(()) == ()
-
-
-@pytest.fixture
-def cluster():
-    """A worker process, under a nanny that starts it again when it dies."""
-    with local_cluster(processes=True) as cluster:
-        yield cluster
-
-
-@pytest.mark.filterwarnings("default")  # of a worker that is killed while it speaks
-def test_none_is_lost_on_a_cluster_whose_worker_is_killed(cluster):
-    todo = some(40)
-    with Client(cluster) as client:
-        executor = client.get_executor()
-        (pid,) = client.run(os.getpid).values()
-        sent, waiting = [], []
-
-        def kill(_):
-            """Once, after a batch and before the others."""
-            if not waiting:
-                waiting.extend(future for future in sent if not future.done())
-                os.kill(pid, signal.SIGKILL)
-
-        def submit(*call):
-            sent.append(executor.submit(*call))
-            sent[-1].add_done_callback(kill)
-            return sent[-1]
-
-        found = sweep(todo, SimpleNamespace(submit=submit), batch=4)
-        assert waiting
-        assert pid not in client.run(os.getpid).values()
-    assert found == sweep(todo, batch=len(todo))
-
-
-def test_the_processes_of_this_machine_give_the_same():
-    todo = some(4)
-    assert sweep(todo, batch=2) == sweep(todo, batch=4)
 
 
 @pytest.mark.parametrize(

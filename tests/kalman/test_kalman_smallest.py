@@ -64,12 +64,6 @@ def test_the_largest_violating_noise_is_the_largest(fmt, second):
                 assert getattr(smallest.ratios(fmt, smallest.scalar(fmt, r), second), name) <= 1
 
 
-def test_a_step_of_more_measurements_is_refused():
-    case = smallest.scalar(FloatFormat(10, 4))._replace(H=exact([[1], [1]]))
-    with pytest.raises(ValueError, match="got 2 measurements; needed one"):
-        smallest.rounded_step(FloatFormat(10, 4), case)
-
-
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(2, 10, "chop")], ids=str)
 def test_random_steps_are_counted_as_exact_ratios_say(fmt):
     steps = 400
@@ -81,7 +75,7 @@ def test_random_steps_are_counted_as_exact_ratios_say(fmt):
     rounded = [each.to_fractions() for each in smallest.scalar_step(one, *numbers)]
     covariance = state = 0
     for i in range(steps):
-        case = smallest.Case(
+        case = smallest.FilterCase(
             *(exact(each) for each in ([[Phi[i]]], [[H[i]]], [[Q[i]]], [[R[i]]], [x[i]], [[P[i]]], [z[i]]))
         )
         slow = smallest.rounded_step(fmt, case)

@@ -15,6 +15,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.report.confidence import interval
 from gpbnb.report.gravity_probe_b import tables as gravity_probe_b_tables
 from gpbnb.report.gravity_probe_b import year
+from gpbnb.report.gravity_probe_b.answers import Moved
 from gpbnb.report.gravity_probe_b.model import gravity_probe_b
 from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.kalman import ensembles, independent, printed, report_bounds, smallest, tables
@@ -35,7 +36,7 @@ def test_the_example_by_every_formula():
         "term": "second",
         "coefficient": r"$8.8862\times10^{20}$",
         r"$\beta$ = 1 / coefficient": r"$1.125\times10^{-21}$",
-        "digits": "22",
+        "decimal digits": "22",
         "error in IEEE double": r"$9.9\times10^{4}$",
     }
     assert [row[0] for row in rows[::2]] == [row[0] for row in rows[1::2]] == list(report_bounds.CORRECTIONS)
@@ -67,7 +68,11 @@ def test_the_misprints():
     assert rows["second coefficient"][:2] == [r"$1.2949\times10^{16}$", r"$4.0775\times10^{14}$"]
     assert "84" in rows["first coefficient"][2]
     assert r"\cdot84$" in rows["second coefficient"][2]
-    assert rows["first beta"] == [r"$.3775\times10^{-8}$", r"$3.867\times10^{-9}$", "one over the printed coefficient"]
+    assert rows["first beta"] == [
+        r"$.3775\times10^{-8}$",
+        r"$3.867\times10^{-9}$",
+        "1 divided by the printed coefficient",
+    ]
     assert rows["first digits"] == ["$9$", "10", "the printed β corresponds to 9.12 digits, so 10 are needed"]
     assert rows["second digits"] == ["$17$", "16", "the printed β corresponds to 16.81 digits, so 17 are needed"]
 
@@ -80,7 +85,7 @@ def test_misprints_that_are_none_are_not_claimed():
 def test_a_printed_beta_that_does_not_follow_is_named(monkeypatch):
     monkeypatch.setitem(report_bounds.PRINTED, "first beta", ".5e-8")
     rows = {row[0]: row[1:] for row in cells(tables.misprints(*report_bounds.EXAMPLE))}
-    assert rows["first beta"][2] == "not one over the printed coefficient"
+    assert rows["first beta"][2] == "not 1 divided by the printed coefficient"
 
 
 def test_what_one_grants():
@@ -164,7 +169,7 @@ USUAL = year.MODELS[0]
 
 def run(**changes):
     values = {
-        "case": year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.HUNG),
+        "case": year.YearCase(USUAL, 2, 24, Rounding.NEAREST, Form.HUNG),
         "steps": np.array([1, 3]),
         "drift": np.array([[9.0, 9.0], [-2.0, 1.0]]),
         "rate": np.array([[9.0, 9.0], [0.25, -0.5]]),
@@ -182,7 +187,7 @@ def run(**changes):
 def test_year_ends():
     table = gravity_probe_b_tables.year_ends([run(), run(indefinite=12345)])
     assert table.header[:4] == ("arithmetic", "form", "error of the drift (mas)", "error of the rate (mas/yr)")
-    assert table.title == "2 years"
+    assert table.title == "errors after a year"
     assert by_header(table)[0] == {
         "arithmetic": "24 bits",
         "form": "Hung (1984)",
@@ -207,7 +212,9 @@ def test_slack():
     k, beta = 3, float(FloatFormat(2, 24).unit_roundoff)
     terms = printed.Terms(10, 2, *(np.array([size]) for size in (7.0, 5.0, 2.0, 2.0)))
     zeros = (np.zeros(2), np.zeros(2), np.zeros(2))
-    bounds = year.Bounds(run().case.reference, run().steps, np.zeros((2, 2)), np.array([[0, 0], [0, 0.125]]), *zeros)
+    bounds = year.YearBounds(
+        run().case.reference, run().steps, np.zeros((2, 2)), np.array([[0, 0], [0, 0.125]]), *zeros
+    )
     table = gravity_probe_b_tables.slack([run()], [bounds], terms)
     row = cells(table)[0]
     first, second = report_bounds.coefficients(k, 10, 2)
@@ -226,7 +233,7 @@ def test_slack():
     with pytest.raises(ValueError, match="needed one up to step 3"):
         gravity_probe_b_tables.slack(
             [run(steps=np.array([1, 3]))],
-            [year.Bounds(*[*vars(bounds).values()][:1], np.array([1, 2]), *[*vars(bounds).values()][2:])],
+            [year.YearBounds(*[*vars(bounds).values()][:1], np.array([1, 2]), *[*vars(bounds).values()][2:])],
             terms,
         )
 
@@ -260,16 +267,20 @@ def test_trials():
     assert table.header == (
         "models",
         "runs",
-        "(105): violations, largest error / bound",
-        "(108): violations, largest error / bound",
-        "(125): violations, largest error / bound",
-        "contraction bound: violations, largest error / bound",
+        "(105) violated",
+        "(105) largest error / bound",
+        "(108) violated",
+        "(108) largest error / bound",
+        "(125) violated",
+        "(125) largest error / bound",
+        "contraction bound violated",
+        "contraction bound, largest error / bound",
         "contraction bound / error, typical",
     )
     assert rows == [
-        ["a", "20", "50.0 %, 3", "0.0 %, 0", "5.0 %, 2", "1, 0.500", "32"],
-        ["b", "30", "3.3 %, 7", "0.0 %, 0", "0.0 %, 0.1", "0, 0.750", ""],
-        ["all", "50", "22.0 %, 7", "0.0 %, 0", "2.0 %, 2", "1, 0.750", "32"],
+        ["a", "20", "50.0 %", "3", "0.0 %", "0", "5.0 %", "2", "1", "0.500", "32"],
+        ["b", "30", "3.3 %", "7", "0.0 %", "0", "0.0 %", "0.1", "0", "0.750", ""],
+        ["all", "50", "22.0 %", "7", "0.0 %", "0", "2.0 %", "2", "1", "0.750", "32"],
     ]
 
 
@@ -303,8 +314,8 @@ def test_shares():
     assert table.title == "records that stay within a milliarcsecond for a year"
     assert by_header(table) == [
         {
-            "state": "absolute",
-            "form": "hung",
+            "state": "absolute angles",
+            "form": "Hung (1984)",
             "arithmetic": "32 bits",
             "within tolerance": "9 of 10",
             "probability": "0.606 to 0.995",
@@ -323,18 +334,38 @@ def test_needed_precisions():
     table = gravity_probe_b_tables.needed_precisions(found)
     assert table.title == "smallest precision that stays within a milliarcsecond"
     assert by_header(table)[0] == {
-        "model and states": "simple, absolute",
-        "form and rounding": "hung, nearest",
+        "model and states": "simple, absolute angles",
+        "form and rounding": "Hung (1984), rounded to nearest",
         "99 % of the records": "33 bits",
         "passed": "300 of 300",
         "probability": "0.990 to 1.000",
         "99 %, lognormal": "32 bits",
         "99 %, proved with 95 % confidence": "33 bits",
     }
-    row = ["simple, deviation", "hung, nearest", "27 bits", "5 of 5", "0.549 to 1.000", "27 bits", "none"]
+    row = [
+        "simple, deviations",
+        "Hung (1984), rounded to nearest",
+        "27 bits",
+        "5 of 5",
+        "0.549 to 1.000",
+        "27 bits",
+        "none",
+    ]
     assert cells(table)[1] == row
     decimal = gravity_probe_b_tables.needed_precisions([share(10, 5, 5, fmt=FloatFormat(10, 10))])
-    assert cells(decimal)[0][2] == "10 digits"
+    assert cells(decimal)[0][2] == "10 decimal digits"
+
+
+def test_what_moves_the_answer_is_told_in_words_that_a_reader_knows():
+    pairs = [("nearest", "chop"), ("hung", "ud"), ("deviation", "absolute"), ("mission", "known roll phase")]
+    table = gravity_probe_b_tables.sensitivity([Moved("choice", *pair, -1.25, 3) for pair in pairs])
+    assert [row[1:3] for row in cells(table)] == [
+        ["rounded to nearest", "chopped"],
+        ["Hung (1984)", "UD"],
+        ["deviations", "absolute angles"],
+        ["mission", "known roll phase"],
+    ]
+    assert {row[3] for row in cells(table)} == {"−1.2"}
 
 
 def test_first_steps_and_shares_by_form():

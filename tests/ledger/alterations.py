@@ -8,12 +8,13 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
-from gpbnb.report.ledger.formula import Number, Part, Relation, Words, has_dotted_matrix
+from gpbnb.report.ledger.formula import Number, Part, Relation, Words
 from gpbnb.report.ledger.statements import Statement
 
 COMPARISON = "comparison"
-"""Begins the name of an alteration that exchanges = with ≠, or makes an inequality an equation."""
+"""Begins the name of an alteration that exchanges = with ≠, ≤ with <, or makes an inequality an equation."""
 _OTHER = {ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.LtE: ast.Eq, ast.GtE: ast.Eq, ast.Lt: ast.Eq, ast.Gt: ast.Eq}
+_STRICT = {ast.LtE: ast.Lt, ast.Lt: ast.LtE, ast.GtE: ast.Gt, ast.Gt: ast.GtE}
 _OPPOSITE = {ast.LtE: ast.GtE, ast.GtE: ast.LtE, ast.Lt: ast.GtE, ast.Gt: ast.LtE}
 
 
@@ -34,8 +35,7 @@ def _of_part(part: Part) -> Iterator[tuple[str, str]]:
             for name, literal in _of_literal(part.literal):
                 yield name, replace(part, literal=literal).text
         case Relation():
-            if not has_dotted_matrix(part):
-                yield from _of_relation(part)
+            yield from _of_relation(part)
 
 
 def _of_literal(literal: str) -> Iterator[tuple[str, str]]:
@@ -109,7 +109,11 @@ def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
         case ast.Compare(left=left, ops=ops, comparators=rights):
             for i, op in enumerate(ops):
                 place = "" if i == 0 else f" {i + 1}"
-                for name, others in (("direction", _OPPOSITE), (COMPARISON, _OTHER)):
+                for name, others in (
+                    ("direction", _OPPOSITE),
+                    (COMPARISON, _OTHER),
+                    (f"{COMPARISON}, strict", _STRICT),
+                ):
                     if type(op) in others:
                         other = others[type(op)]()
                         yield f"{name}{place}", ast.Compare(left, [*ops[:i], other, *ops[i + 1 :]], rights)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 from dataclasses import replace
@@ -37,7 +38,7 @@ def answer(line):
     print(json.dumps({"ran": ran, "outcomes": {row.statement.id: row.outcome for row in rows}}), flush=True)
 """
 # One statement each of three topics. All of them rest on the compiled kernels, which round numbers to printed digits.
-GEOMETRY, INTEGRATION, ROUNDING = "hung1982.IV.eq1", "savage2016.main.stitle.date", "hung1984.II.eq8"
+GEOMETRY, INTEGRATION, ROUNDING = "hung1982.IV.eq1", "savage2016.main.eq7", "hung1984.II.eq8"
 SAMPLE = (GEOMETRY, INTEGRATION, ROUNDING)
 TWO = [each for each in load_statements() if each.id in SAMPLE]
 
@@ -61,21 +62,54 @@ def append(path, text: str) -> None:
     path.write_text(path.read_text(encoding="utf-8") + text, encoding="utf-8")
 
 
-def test_exactly_the_checks_that_depend_on_a_change_are_run_again(copy):
+def test_exactly_the_checks_that_depend_on_a_change_have_another_file(tmp_path, monkeypatch):
+    """Findings are kept in a file for each module of checks, whose name changes with all that they depend on."""
+    package = tmp_path / "gpbnb"
+    shutil.copytree(caching.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    modules = {each.id: package / checking._module(each, TOPICS).relative_to(caching.PACKAGE) for each in TWO}
+    monkeypatch.setattr(caching, "PACKAGE", package)
+    monkeypatch.setattr(caching, "_IMPORTED", math.inf)
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+
+    def files():
+        caching.forget()
+        for each in (cache._file, caching._named):
+            each.cache_clear()
+        return {key: cache._file(module) for key, module in modules.items()}
+
+    def changed_by(*parts):
+        before, file = files(), package.joinpath(*parts)
+        append(file, "# changed\n") if file.exists() else file.write_text("1\n")
+        after = files()
+        return {key for key in modules if before[key] != after[key]}
+
+    try:
+        # The page that shows findings and the other topics change nothing.
+        assert changed_by("report", "ledger", "page.py") == changed_by("report", "rolling", "theory.py") == set()
+        assert changed_by("arithmetic", "kernels", "binary.py") == set(SAMPLE)
+        assert changed_by("report", "integration", "theory.py") == {INTEGRATION}
+        assert changed_by("report", "geometry", "derivation.py") == {GEOMETRY}
+        assert changed_by("report", "rounding", "stored.csv") == {ROUNDING}  # data beside the sources
+    finally:
+        monkeypatch.undo()
+        files()
+
+
+def test_checks_whose_file_is_another_are_run_again_and_no_others(copy):
     first = copy(*SAMPLE)
     assert sorted(first["ran"]) == sorted(SAMPLE)
-    # The page that shows findings and the other topics change nothing.
     append(copy.package / "report" / "ledger" / "page.py", "# changed\n")
-    append(copy.package / "report" / "rolling" / "theory.py", "# changed\n")
     assert copy(*SAMPLE) == {"ran": [], "outcomes": first["outcomes"]}
-    append(copy.package / "arithmetic" / "kernels" / "binary.py", "# changed\n")
-    assert sorted(copy(*SAMPLE)["ran"]) == sorted(SAMPLE)
     append(copy.package / "report" / "integration" / "theory.py", "# changed\n")
-    assert copy(*SAMPLE)["ran"] == [INTEGRATION]
-    append(copy.package / "report" / "geometry" / "derivation.py", "# changed\n")
-    assert copy(*SAMPLE)["ran"] == [GEOMETRY]
-    (copy.package / "report" / "rounding" / "stored.csv").write_text("1\n")  # data beside the sources
-    assert copy(*SAMPLE)["ran"] == [ROUNDING]
+    key = "savage2016.main.stitle.date"  # a finding that is data follows its file
+    assert copy(*SAMPLE, key) == {"ran": [key, INTEGRATION], "outcomes": first["outcomes"] | {key: "given"}}
+    file = copy.package / "report" / "ledger" / "unjudged.csv"
+    file.write_text(
+        file.read_text(encoding="utf-8").replace(f"{key},integration,given", f"{key},integration,unverifiable")
+    )
+    append(copy.package / "report" / "ledger" / "unjudged.py", "# changed\n")
+    assert copy(key) == {"ran": [key], "outcomes": {key: "unverifiable"}}
+    assert copy(key)["ran"] == []
 
 
 @pytest.fixture

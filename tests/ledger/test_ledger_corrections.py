@@ -3,8 +3,8 @@
 import pytest
 
 from gpbnb.report.ledger import load_statements
-from gpbnb.report.ledger.corrections import Correction, load_corrections, read_corrections
-from gpbnb.report.ledger.statements import Statement
+from gpbnb.report.ledger.corrections import Correction, intended, load_corrections, read_corrections
+from gpbnb.report.ledger.statements import Statement, statement
 
 HEAD = "id,form,text,reason"
 PRINTED = Statement("hung1984.II.x", "hung1984", "II", "1", "x", "equation", "{{1}} [the scan is torn]", "a == b")
@@ -46,6 +46,15 @@ def test_a_row_that_is_no_correction_is_refused(tmp_path, lines, message):
 def test_a_correction_needs_a_form_or_a_reason():
     with pytest.raises(ValueError, match="got form='', text='' and reason='' for x; needed a form"):
         Correction("x")
+
+
+def test_what_was_intended_is_the_correction_or_else_the_print():
+    assert intended("hung1984.II.eq81").form.endswith("*epsilon")
+    assert intended("hung1984.II.eq82") == statement("hung1984.II.eq82")
+    unknown = next(key for key, correction in load_corrections().items() if correction.reason)
+    assert intended(unknown) == statement(unknown)
+    with pytest.raises(KeyError, match="needed the id of a statement"):
+        intended("hung1984.II.eq126")
 
 
 def test_a_corrected_statement_does_not_speak_of_the_scan():

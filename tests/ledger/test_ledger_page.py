@@ -2,6 +2,7 @@
 
 import json
 import re
+from html import escape
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,13 @@ def test_every_statement_is_on_exactly_one_page():
     ]
     ids = [row["id"] for row in Elements(EVERY_PAGE).all("tr") if "id" in row]
     assert sorted(ids) == sorted(statement.id for statement in STATEMENTS)
+
+
+def test_the_errata_count_each_verdict_once():
+    """The counts at the head of the page add up to the number of statements."""
+    head = (BOOK / "errata.md").read_text(encoding="utf-8").partition("\n## ")[0]
+    named = re.findall(r"\{ledger-count\}`([^`]+)`", head)
+    assert sorted(named) == sorted(["statements", "roots", *(verdict.value for verdict in Verdict)])
 
 
 @pytest.mark.parametrize("each", ledger.PAGES, ids=lambda each: each.name)
@@ -222,7 +230,7 @@ def test_each_table_has_a_title_and_names_its_columns():
         ),
         ledger.claim_table([Row(statement, FINDINGS[0]) for statement in STATEMENTS]): (
             f"{len(page.CLAIMS)} claims",
-            ["Claim", "Outcome", "Printed statement, and the chapter that examines it"],
+            ["Claim", "Outcome", "What follows"],
         ),
     }
     for table, (title, header) in expected.items():
@@ -268,38 +276,52 @@ def test_every_verdict_that_a_claim_can_have_has_an_outcome():
         Verdict.NOT_REPRODUCED: "not reproducible",
         Verdict.UNVERIFIABLE: "not reproducible",
     }
-    assert Elements(html).cells[:3] == ["Claim", "Outcome", "Printed statement, and the chapter that examines it"]
+    assert Elements(html).cells[:3] == ["Claim", "Outcome", "What follows"]
 
 
 @pytest.mark.parametrize(
     ("claim", "document", "printed"),
     [
-        ("Unit roundoff of rounding", "hung1984", r"\epsilon\le \frac{1}{2}b^{1-t}=\beta"),
-        ("Rounding error of a sum", "hung1984", r"\frac{\tilde s}{s}"),
-        ("Rounding error of an inner product", "hung1984", r"\left|\tilde I\right|\le \beta"),
-        ("Rounding error of a product of matrices", "hung1984", r"\prod_{i=1}^{N}M_{i}"),
+        ("half a unit of its last digit", "hung1984", r"\epsilon\le \frac{1}{2}b^{1-t}=\beta"),
+        ("error of a sum", "hung1984", r"\frac{\tilde s}{s}"),
+        ("error of an inner product", "hung1984", r"\left|\tilde I\right|\le \beta"),
+        ("error of a product of matrices", "hung1984", r"\prod_{i=1}^{N}M_{i}"),
         (
-            "The residual bound of an inverse is impractical",
+            "by its residual is impractical",
             "hung1984",
             "the residue matrix $R$ cannot easily be obtained",
         ),
-        ("Errors of elimination and back substitution add up", "hung1984", r"\delta A=\tilde A+\Delta A"),
-        ("Table 1: bounds of an inverse", "hung1984", r"3.706\times10^{-2}"),
-        ("Rounding error of one covariance update", "hung1984", r"\tilde P_{k}=\left(n+m+1\right)\epsilon"),
-        ("Rounding error of the Kalman filter after k steps", "hung1984", r"k\left(7n+3m+6\right)"),
-        ("Digits needed for a year of Gravity Probe B: 9", "hung1984", "therefore 9 digits"),
-        ("Digits needed for a year of Gravity Probe B: 17", "hung1984", "hence 17 digits"),
-        ("Deroll of the first drift", "hung1982", r"\hat {\alpha}_{3}"),
-        ("Deroll of the second drift", "hung1982", r"\hat {\theta}_{3}"),
-        ("Random walk of a trapezoidal integrator", "savage2016", r"\frac{1+e^{-\mu}}{1-e^{-\mu}}"),
-        ("Random walk for fast sampling", "savage2016", r"\approx \sqrt{\frac{1}{6}\omega_{bw}}"),
+        ("errors of elimination and back substitution may be added", "hung1984", r"\delta A=\tilde A+\Delta A"),
+        ("Table 1 bounds the inverses", "hung1984", r"3.706\times10^{-2}"),
+        ("One update changes the covariance", "hung1984", r"\tilde P_{k}=\left(n+m+1\right)\epsilon"),
+        ("After k steps, the estimate", "hung1984", r"k\left(7n+3m+6\right)"),
+        ("needs 9 digits", "hung1984", "therefore 9 digits"),
+        ("needs 17 digits", "hung1984", "hence 17 digits"),
+        ("derolls the first drift", "hung1982", r"\hat {\alpha}_{3}"),
+        ("derolls the second drift", "hung1982", r"\hat {\theta}_{3}"),
+        ("integrator of a noisy signal", "savage2016", r"\frac{1+e^{-\mu}}{1-e^{-\mu}}"),
+        ("For fast sampling", "savage2016", r"\approx \sqrt{\frac{1}{6}\omega_{bw}}"),
     ],
 )
 def test_each_claim_is_named_for_what_is_printed(claim, document, printed):
-    (key,) = (key for key, name in page.CLAIMS.items() if name == claim)
+    (key,) = (key for key, each in page.CLAIMS.items() if claim in each.text)
     (statement,) = (statement for statement in STATEMENTS if statement.id == key)
     assert statement.document == document
     assert printed in statement.printed
+
+
+def test_each_claim_says_what_follows_and_shows_what_is_printed():
+    html = ledger.claim_table([Row(statement, FINDINGS[0]) for statement in STATEMENTS]).html
+    for claim in page.CLAIMS.values():
+        assert escape(claim.consequence) in html
+    assert html.count("<summary>As printed</summary>") == len(page.CLAIMS)
+
+
+def test_outcomes_of_claims_are_counted():
+    rows = [Row(statement, FINDINGS[0]) for statement in STATEMENTS]
+    outcomes = ledger.claim_outcomes(rows)
+    assert list(outcomes) == list(page.CLAIMS)
+    assert set(outcomes.values()) == {"replicated"}
 
 
 def test_note_table_labels_what_was_left_undone():

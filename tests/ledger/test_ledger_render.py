@@ -154,4 +154,5 @@ def test_representations_are_short_and_stable():
     title = "Ledger of 6 statements: 1 verified, 1 misprint, 1 unverifiable, 1 answered, 1 check failed, 1 no check"
     assert repr(table(ROWS)) == f"<{title}>"
     assert repr(table(())) == "<Ledger of 0 statements: none>"
-    assert table(ROWS)._repr_markdown_() == table(ROWS).markdown() == to_markdown(ROWS)[:-1]
+    assert table(ROWS)._repr_markdown_() == table(ROWS).page()
+    assert table(ROWS).markdown() == to_markdown(ROWS)[:-1]

@@ -2,15 +2,14 @@
 
 Faults are the changes of :mod:`tests.mutants.operators`, made with cosmic-ray in a copy of the checkout. The tests of a
 mutant are those that execute its line, as far as ``--measure`` has found them, then those that reach its module through
-imports, nearest first, up to a number of seconds. Each result is written at once, so that a campaign that was stopped
-goes on where it was.
+imports, nearest first, up to a number of seconds. Each result is written to the cache at once, so that a campaign that
+was stopped goes on where it was. The repository keeps what no test catches, with the reason, and counts by module.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
-import csv
 import json
 import math
 import os
@@ -21,7 +20,6 @@ import subprocess
 import sys
 import time
 import zlib
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import zip_longest
@@ -31,6 +29,7 @@ from typing import Any
 from tests.mutants.concern import Concern, module_of
 from tests.mutants.covered import Covered
 from tests.mutants.operators import Mutant, mutants, mutated
+from tests.mutants.record import FIELDS, NOT_CAUGHT, by_place, key, read, record, summary, text_of, write
 from tests.mutants.runs import Collected, Fresh, How, Outcome, load_libraries, with_collected
 
 HERE = Path(__file__).resolve().parent
@@ -38,14 +37,8 @@ ROOT = HERE.parents[1]
 CACHE = ROOT / ".cache" / "mutants"
 COMPILED = CACHE / "gpbnb" / "compiled"
 COVERED = CACHE / "covered.json"
-RESULTS = HERE / "results.csv"
-FIELDS = (
-    *("module", "operator", "occurrence", "line", "before", "after"),
-    *("outcome", "by", "seconds", "commit", "date", "reason"),
-)
-#: Outcomes in the order of the table. By hand, a survivor becomes equivalent, with the reason; survivors have one, too.
-OUTCOMES = ("caught", "timeout", "caught by a stored picture", "equivalent", "survived", "no test")
-NOT_CAUGHT = OUTCOMES[2:3] + OUTCOMES[4:]
+RESULTS = CACHE / "results.csv"
+SURVIVORS, MODULES = HERE / "survivors.csv", HERE / "modules.csv"
 MOST_FILES = 30
 """Test files that judge a mutant, the nearest."""
 MOST_TESTS = 600
@@ -274,49 +267,6 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
     return row | {"outcome": outcome, "by": by, "seconds": f"{time.monotonic() - begun:.1f}"}
 
 
-def read(path: Path) -> list[dict[str, str]]:
-    if not path.is_file():
-        return []
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def text_of(name: str) -> str:
-    path = ROOT / name
-    return path.read_text(encoding="utf-8") if path.is_file() else ""
-
-
-def key(row: Mapping[str, str]) -> tuple[str, ...]:
-    return row["module"], row["operator"], str(row["occurrence"]), row["line"]
-
-
-def write(path: Path, rows: Sequence[Mapping[str, str]]) -> None:
-    draft = path.with_suffix(".tmp")
-    with draft.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, FIELDS, lineterminator="\n", restval="")
-        writer.writeheader()
-        writer.writerows(rows)
-    draft.replace(path)
-
-
-def summary(rows: Sequence[Mapping[str, str]]) -> None:
-    """Print the counts of each package, and what was not caught."""
-    for row in rows:
-        if row["outcome"] in NOT_CAUGHT:
-            print(f"{row['module']}:{row['line']} {row['operator']}: {row['outcome']}; {row['reason']}")
-            print(f"  - {row['before']}\n  + {row['after']}")
-    print("\nmutants | caught | by a stored picture only | equivalent | survived | package")
-    packages: dict[str, Counter[str]] = {}
-    for row in rows:
-        packages.setdefault(str(Path(row["module"]).parent), Counter())[row["outcome"]] += 1
-    for name, count in [*sorted(packages.items()), ("all", sum(packages.values(), Counter()))]:
-        caught = count["caught"] + count["timeout"]
-        numbers = (caught, count["caught by a stored picture"], count["equivalent"])
-        print(" | ".join(f"{each:4}" for each in (count.total(), *numbers, count.total() - sum(numbers))), "|", name)
-    if judged := count.total() - count["equivalent"]:
-        print(f"{caught / judged:.1%} of those that are not equivalent are caught")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__.split("\n\n")[0])
     parser.add_argument("files", nargs="*", help="files of gpbnb; without any, all of them")
@@ -336,7 +286,7 @@ def main() -> None:
     names = chosen_files(chosen.files, chosen.since)
     print(f"mutants: seed {chosen.seed}, commit {commit}, {len(names)} files", flush=True)
 
-    rows = {key(row): row for row in read(chosen.results)}
+    rows = {key(row): row for row in (*read(SURVIVORS), *read(chosen.results))}
     # A result is of no use once its line has changed.
     rows = {at: row for at, row in rows.items() if row["before"] in text_of(row["module"])}
     if chosen.again:
@@ -379,10 +329,7 @@ def main() -> None:
             row |= {"commit": commit, "date": f"{now:%Y-%m-%d}"} | judge(judges, name, mutant)
             if row["outcome"] != "no change":
                 rows[key(row)] = row
-                write(
-                    chosen.results,
-                    sorted(rows.values(), key=lambda each: (each["module"], int(each["line"]), key(each))),
-                )
+                write(chosen.results, by_place(rows.values()))
             where = f"{name}:{mutant.line} {mutant.operator}"
             print(f"{number + 1}/{len(plan)} {row['outcome']} {where} {row.get('seconds', '')}", flush=True)
 
@@ -392,7 +339,8 @@ def main() -> None:
         needed = {test for name in names for test in concern.judges(module_of(tree / name, tree))[:MOST_FILES]}
     with_collected(tree, [str(test.relative_to(tree)) for test in sorted(needed)], campaign)
     shutil.rmtree(tree)
-    summary([row for row in read(chosen.results) if row["module"] in names])
+    record(list(rows.values()), {name for name, _ in plan}, SURVIVORS, MODULES)
+    summary([row for row in rows.values() if row["module"] in names])
 
 
 if __name__ == "__main__":

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
+from gpbnb.names import HOMES
+
 #: Tests of the form of the project, and tests against what notebooks and sweeps stored. They judge no mutant.
 NOT_JUDGES = (
     "tests/pages/",
@@ -18,6 +20,7 @@ NOT_JUDGES = (
     "tests/test_distribution.py",
     "tests/test_environment.py",
     "tests/test_execute_notebooks.py",
+    "tests/test_mutants_record.py",
     "tests/test_notebooks.py",
     "tests/test_prose.py",
     "tests/test_single_page.py",
@@ -56,7 +59,7 @@ class Concern:
     def __init__(self, root: Path) -> None:
         self.root = root
         self.modules = {module_of(path, root): path for path in sorted((root / "gpbnb").rglob("*.py"))}
-        self._public = self._public_names()
+        self._public = {f"gpbnb.{name}": home for name, home in HOMES.items()}
         self._below = {name: self._direct(path) for name, path in self.modules.items()}
         self.tests = [
             path
@@ -64,13 +67,6 @@ class Concern:
             if not str(path.relative_to(root)).startswith(NOT_JUDGES)
         ]
         self._needed = {path: self._helpers(path, set()) for path in self.tests}
-
-    def _public_names(self) -> dict[str, str]:
-        tree = ast.parse((self.root / "gpbnb/__init__.py").read_text(encoding="utf-8"))
-        for node in tree.body:
-            if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "_HOME":
-                return {f"gpbnb.{name}": home for name, home in ast.literal_eval(node.value).items()}
-        return {}
 
     def _direct(self, path: Path) -> set[str]:
         inside = "gpbnb" in path.relative_to(self.root).parts

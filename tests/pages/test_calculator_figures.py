@@ -34,8 +34,8 @@ FIGURES = {
         "t",
         (1, 30),
         "Places of the register t",
-        "share lost",
-        {"share of the signal lost, one dimension": "lost"},
+        "loss / signal",
+        {"loss of the signal, one dimension": "lost"},
     ),
     "integration": (
         "rate",
@@ -58,7 +58,7 @@ LINES = {
         "its error Δω (rad/s)": ["error"],
         "period of the off-tuned signal, 2π/Δω (years)": ["beat"],
         "phase at the end (rad)": ["phase"],
-        "share of the signal lost at the end, one dimension": ["lost"],
+        "loss of the signal at the end, one dimension (above 1: sign reversed)": ["lost"],
         "cross drift, two dimensions (mas a year)": ["across"],
     },
     "integration": {

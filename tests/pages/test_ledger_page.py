@@ -104,9 +104,9 @@ def test_the_keyboard_alone_searches_filters_and_resets(page):
 def test_enter_in_the_search_box_stays_on_the_page(page):
     words = page.locator('input[name="words"]')
     words.fill("gain")
-    before = page.url
+    before = page.evaluate("(window.still_here = true, location.href)")  # page.url follows the address a moment later
     words.press("Enter")
-    assert page.url == before
+    assert page.evaluate("[location.href, window.still_here]") == [before, True]
     assert words.input_value() == "gain"
 
 
@@ -196,6 +196,23 @@ def test_a_link_can_set_the_filters(open_page):
             "[...document.querySelectorAll('.ledger tbody tr[id]:not([hidden])')].map(r => r.dataset.verdict)"
         )
         assert set(shown) == {"wrong"}
+
+
+def test_filters_and_words_write_the_address(open_page, page):
+    """The address leads to what is shown, and a reset clears it; the place on the page stays."""
+    page.evaluate("location.hash = 'hung1984.II.eq105'")
+    page.locator('select[name="kind"]').select_option("equation")
+    page.locator('input[name="words"]').fill("gain β")
+    shown = count(page)
+    address = page.evaluate("location.href.slice(location.href.indexOf('book/'))")
+    assert "kind=equation" in address
+    assert address.endswith("#hung1984.II.eq105")
+    page.locator(".ledger-form button").click()
+    assert page.evaluate("location.href").endswith(f"{LEDGER}#hung1984.II.eq105")
+    with open_page(address.partition("#")[0], shared=True) as other:
+        assert other.locator('input[name="words"]').input_value() == "gain β"
+        assert count(other) == shown
+    page.evaluate("history.replaceState(null, '', location.pathname)")
 
 
 def test_the_search_of_the_book_knows_the_ledger():

@@ -50,11 +50,11 @@ NAMES = {
     },
     "varying_phase": {
         "a constant error of 1": "1",
-        "a ramp from -1 to 1, whose mean is zero": "1",
+        "a ramp from −1 to 1, whose mean is zero": "1",
         "an error of 1 in the first half alone": "-1/4",
         "in the second half alone": "5/4",
-        "-1, then 1: the signs of the weight, so the most": "3/2",
-        "independent errors count with the square": "24/5",
+        "−1, then 1: these are the signs of the weight, so no error costs more": "3/2",
+        "independent errors: the square of the weight": "24/5",
         "$n$ cycles of a cosine": "6/(pi*n)**2",
         "$n$ cycles of a sine": "-3/(pi*n)",
     },
@@ -77,7 +77,7 @@ NAMES = {
     "roll_rate": {
         "effect of a step of the rate at $u$ on the fit": "(1 - u)*(1 - u**3)",
         "without resets": "383*k**2*q/1260",
-        "the same with resets, but for $P/2$": "1 + 3*u**2 - 4*u**3",
+        "the same with resets, apart from a factor $P/2$": "1 + 3*u**2 - 4*u**3",
         "with resets": "38*k**2*q/35*(P/2)**2",
         "a sinusoidal rate: the mean of the phase over a cycle": "-a/Omega*sin(beta)",
     },

@@ -12,9 +12,9 @@ from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.ledger.checks.rolling import material
-from gpbnb.report.rolling import experiment, stored, theory
+from gpbnb.report.rolling import experiment, theory
+from gpbnb.report.rolling.experiment import SWEEP
 from gpbnb.report.rolling.flicker import record
-from gpbnb.report.rolling.stored import SWEEP
 from gpbnb.report.rolling.theory import DRIFTS, LEVEL, YEAR
 
 
@@ -179,9 +179,9 @@ def test_the_stored_survey_agrees_with_theory():
 
 
 def test_a_sample_of_the_survey_has_one_to_three_gyros(monkeypatch):
-    monkeypatch.setattr(stored, "compute", lambda gyros: gyros)
+    monkeypatch.setattr(experiment, "survey_of", lambda gyros: gyros)
     rng = np.random.default_rng(1)
-    assert {stored.sample(20, rng) for _ in range(30)} == {1, 2, 3}
+    assert {experiment.first_gyros(20, rng) for _ in range(30)} == {1, 2, 3}
 
 
 @pytest.mark.parametrize("folder", [None, Path("saved")])
@@ -190,7 +190,7 @@ def test_the_stored_survey_is_that_of_its_periods_and_seed(folder, monkeypatch):
     monkeypatch.setattr(experiment, "drift_rates", lambda *given, **options: asked.append((given, options)))
     monkeypatch.setattr(experiment, "survey_rng", lambda: "seeded")
     monkeypatch.setattr(experiment, "survey_rows", lambda study: [("0", "1")])
-    assert stored.compute(7, folder) == [("0", "1")]
+    assert experiment.survey_of(7, folder) == [("0", "1")]
     assert asked == [((experiment.SURVEY_PERIODS, 7, "seeded"), {"progress": folder is not None})]
 
 

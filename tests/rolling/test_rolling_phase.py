@@ -29,8 +29,11 @@ def test_weighted_means_are_the_derived_ones():
     found = {name: phase.means(shape) for name, shape in phase.SHAPES.items()}
     for name, (plain, weighted) in {
         "constant": (1, steps["a constant error of 1"]),
-        "ramp from − to +": (0, steps["a ramp from -1 to 1, whose mean is zero"]),
-        "− in the first half, + in the second": (0, steps["-1, then 1: the signs of the weight, so the most"]),
+        "ramp from − to +": (0, steps["a ramp from −1 to 1, whose mean is zero"]),
+        "− in the first half, + in the second": (
+            0,
+            steps["−1, then 1: these are the signs of the weight, so no error costs more"],
+        ),
         "zero in the first half": (0.5, steps["in the second half alone"]),
         "zero in the second half": (0.5, steps["an error of 1 in the first half alone"]),
     }.items():

@@ -42,7 +42,7 @@ NAMES = {
         "(18), second inequality: the sum of the weights": "(n - 1)*(n - 2)/2",
     },
     "ties": {
-        r"error $(n-1)\beta$ over (18), while $s = 1-(n-3)\beta \ge 0$; above one from $n = 5$ on": (
+        r"error $(n-1)\beta$ over bound (18), while $s = 1-(n-3)\beta \ge 0$; it exceeds one from $n = 5$ on": (
             "1/(1 - (n - 4)*beta/2)"
         ),
     },

@@ -8,11 +8,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from drawn import BLUE, GREEN, ORANGE, PINK, PURPLE, at, look, named, near, pictured
+from drawn import BLUE, GREEN, GREY, ORANGE, PINK, PURPLE, at, look, named, near, pictured
 from matplotlib.colors import to_hex
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.report.display.style import bits_colour
 from gpbnb.report.rounding import figures
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
@@ -26,16 +27,13 @@ def test_sawtooth(ax, rounding, beta, equation):
     result = SimpleNamespace(
         fmt=FloatFormat(10, 2, rounding), x=np.array([1.0, 5.0, 100.0]), error=np.array([0.01, 0.02, 0.0])
     )
-    points, bound, *sharp = figures.sawtooth(result, ax)
+    points, bound, largest = figures.sawtooth(result, ax)
     assert at(points, (1, 0.01), (5, 0.02), (100, 0))
     assert (look(points), points.get_label()) == ((BLUE, "", "."), "error")
     assert (set(bound.get_ydata()), look(bound)[:2], bound.get_label()) == ({beta}, (GREEN, "-"), "bound")
-    if rounding is NEAREST:
-        (largest,) = sharp
-        assert largest.get_ydata()[0] == pytest.approx(0.05 / 1.05)
-        assert (look(largest)[:2], largest.get_label()) == ((GREEN, ":"), "largest error")
-    else:
-        assert not sharp
+    assert largest.get_ydata()[0] == pytest.approx(beta / (1 + beta))
+    assert (look(largest)[:2], largest.get_label()) == ((GREY, ":"), "largest error")
+    assert ax.get_ylim() == (0, 0.13)  # the same for both
     number = "(8)" if rounding is NEAREST else "(13)"
     assert ax.get_title(loc="left") == rf"{equation}, 2 decimal digits: bound $\beta$, {number}"
     ((text, place),) = named(ax).items()
@@ -55,7 +53,8 @@ def test_worst_ratios(ax):
     *lines, bound = figures.worst_ratios(curves, "one", ax, "factors", "bound (20)")
     texts = ("1 decimal digit", "4 bits", "9 bits")
     names = named(ax)
-    for i, (line, text, paint, mark) in enumerate(zip(lines, texts, (BLUE, PURPLE, PINK), "osD", strict=True)):
+    paints = [bits_colour(fmt) for fmt in formats]
+    for i, (line, text, paint, mark) in enumerate(zip(lines, texts, paints, "osD", strict=True)):
         assert at(line, (2, 0.2 + i), (5, 0.5 + i))
         assert (look(line), line.get_label()) == ((paint, "-", mark), text)
         assert near(names.pop(text), paint, (1, 0.5 + i))
@@ -84,6 +83,7 @@ def test_growth(ax):
         assert at(median, (2, 2 * size), (8, 3 * size), (32, 9 * size))
         assert at(largest, (2, 4 * size), (8, 8 * size), (32, 12 * size))
         assert (look(median), look(largest)) == ((paint, "", mark), (paint, "-", ""))
+        assert (median.get_markerfacecolor() == "none") == (i == 1)  # open if chopped
         assert median.get_label() == text.replace("\n", " ")
         assert near(names.pop(text), paint, (1, 12 * size))
     assert at(bound, (2, 1), (8, 7), (32, 31))

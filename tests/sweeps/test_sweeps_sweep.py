@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
+import signal
 import subprocess
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,12 +18,17 @@ import pytest
 from distributed import Client, KilledWorker
 from executors import Failing, local_cluster
 
+from gpbnb.report.guarantees import survey
 from gpbnb.report.stored import SWEEPS
 from gpbnb.sweeps import Column, DamagedFileError, Sweep, read, write
+from gpbnb.sweeps import command as sweep_command
 from gpbnb.sweeps import sweep as sweep_module
-from gpbnb.sweeps.command import INTERRUPTED, run_command
-from gpbnb.sweeps.stored import run, verify
+from gpbnb.sweeps.command import INTERRUPTED, verify
 from gpbnb.sweeps.sweep import ATTEMPTS, machine
+
+
+def run(sweeps, arguments):
+    return sweep_command.run(sweeps, "python -m sweeps", arguments)
 
 
 class Cell(NamedTuple):
@@ -125,27 +133,91 @@ def test_progress_begins_with_the_finished_cells(sweep, tmp_path, capsys):
 
 
 def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(sweep, tmp_path, capsys):
-    def command(one, *arguments):
-        return run_command(one, "A test.", tmp_path / "saved", arguments)
+    def again(one, folder, *arguments):
+        return run([one], ["recompute", one.name, "--output", str(tmp_path / folder), *arguments])
 
     def interrupted(cell, directory):
         raise KeyboardInterrupt
 
     def stored(folder):
-        return sweep.load(tmp_path / folder / sweep.file.name).rows
+        return sweep.load(tmp_path / folder / "tests" / "normal.csv").rows
 
-    assert command(sweep, "--cells", "3") == 0
+    assert again(sweep, "saved", "--cells", "3") == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'saved' / 'tests' / 'normal.csv'}: 9 rows\n"
     assert len(stored("saved")) == 3 * 3
-    assert command(dataclasses.replace(sweep, compute=interrupted)) == INTERRUPTED == 130
+    assert again(dataclasses.replace(sweep, compute=interrupted), "saved") == INTERRUPTED == 130
     assert capsys.readouterr().err.endswith(
         f"\ninterrupted; run the same command again to continue from the progress saved in {tmp_path / 'saved'}\n"
     )
-    assert command(dataclasses.replace(sweep, compute=interrupted), "--store", "--output", str(tmp_path / "new")) == 0
-    assert stored("new") == stored("saved")
-    assert command(sweep) == 0
+    (tmp_path / "saved" / "tests" / "normal.csv").unlink()
+    assert again(dataclasses.replace(sweep, compute=interrupted), "saved", "--store") == 0
+    assert len(stored("saved")) == 3 * 3
+    assert again(sweep, "saved") == 0
     assert len(stored("saved")) == 3 * len(CELLS)
-    assert command(sweep, "--directory", str(tmp_path / "other"), "--cells", "2") == 0
+    assert again(sweep, "other", "--cells", "2") == 0
     assert len(stored("other")) == 3 * 2
+
+
+def test_words_choose_cells_and_the_other_stored_rows_stay(sweep, tmp_path, capsys):
+    sweep.store(EXPECTED)
+    higher = dataclasses.replace(sweep, compute=lambda cell, directory: [value + 1 for value in compute(cell, None)])
+    given = ["recompute", sweep.name, "--output", str(tmp_path / "new"), "--only", "second", "seed=4"]
+    assert run([higher], given) == 0
+    before, after = sweep.load().rows, sweep.load(tmp_path / "new" / "tests" / "normal.csv").rows
+    assert [row[: sweep.key] for row in before] == [row[: sweep.key] for row in after]
+    changed = {row[:2] for row, other in zip(before, after, strict=True) if row != other}
+    assert changed == {cell.key for cell in CELLS if cell.name == "second" or cell.seed == 4}
+    capsys.readouterr()
+    assert run([higher], [*given[:-2], "third"]) == 1
+    assert "tests/normal: got no cell with third; needed words of Cell(name='first', seed=0)" in capsys.readouterr().err
+    summed = dataclasses.replace(sweep, summary=lambda results: [])
+    assert run([summed], given) == 1
+    assert "needed all cells, because the table has their sums" in capsys.readouterr().err
+
+
+def test_the_command_fails_where_a_result_must_not_occur(sweep, tmp_path, capsys):
+    for faults, status in (([], 0), (["first 0 is wrong"], 1)):
+        one = dataclasses.replace(sweep, faults=lambda file, faults=faults: faults if file.exists() else ["no file"])
+        assert run([one], ["recompute", one.name, "--output", str(tmp_path / str(status)), "--cells", "1"]) == status
+        assert capsys.readouterr().out.splitlines()[1:] == faults
+
+
+def test_the_processes_of_this_machine_give_the_stored_rows(tmp_path, capsys):
+    given = ["recompute", "guarantees/survey", "--cells", "6", "--processes", "2", "--output", str(tmp_path)]
+    assert run([survey.SWEEP], given) == 0
+    assert survey.load(tmp_path / "guarantees" / "survey.csv") == survey.load()[:6]
+
+
+@pytest.fixture
+def cluster():
+    """A worker process, under a nanny that starts it again when it dies."""
+    with local_cluster(processes=True) as cluster:
+        yield cluster
+
+
+@pytest.mark.filterwarnings("default")  # of a worker that is killed while it speaks
+def test_none_is_lost_on_a_cluster_whose_worker_is_killed(cluster, tmp_path):
+    with Client(cluster) as client:
+        executor = client.get_executor()
+        (pid,) = client.run(os.getpid).values()
+        sent, waiting = [], []
+
+        def kill(_):
+            """Once, after a chunk and before the others."""
+            if not waiting:
+                waiting.extend(future for future in sent if not future.done())
+                os.kill(pid, signal.SIGKILL)
+
+        def submit(*call):
+            sent.append(executor.submit(*call))
+            sent[-1].add_done_callback(kill)
+            return sent[-1]
+
+        executor_that_kills = SimpleNamespace(submit=submit)
+        found = survey.SWEEP.run(tmp_path, executor_that_kills, chunk=2, cells=range(16), progress=False)
+        assert waiting
+        assert pid not in client.run(os.getpid).values()
+    assert [tuple(row) for _, result in found for row in result] == list(survey.SWEEP.load().rows[:16])
 
 
 def test_chunks_of_dead_workers_are_sent_again(sweep, tmp_path):
@@ -191,9 +263,12 @@ def test_the_commit_is_that_of_the_repository_if_there_is_one(tmp_path, monkeypa
 def test_columns_refuse_numbers_that_cannot_be(stored):
     accepted = {"base": ("2", "16"), "precision": ("1", "53"), "record": ("0", "9999"), "step": ("1", "3153600")}
     others = {
-        "kalman/year": {"precision": ("0", "53")},  # 0 marks the reference run
-        "kalman/filters": {"precision": ("3", "30"), "n": ("1", "4"), "m": ("1", "2")},
-        "kalman/scalar": {"precision": ("3", "6"), "subnormal": ("0", "1")},
+        "gravity_probe_b/year": {"precision": ("0", "53")},  # 0 marks the reference run
+        "gravity_probe_b/horizon": {"precision": ("2", "53"), "steps": ("1", None)},
+        "guarantees/certificates": {"size": ("1", None)},
+        "guarantees/filters": {"precision": ("3", "30"), "n": ("1", "4"), "m": ("1", "2")},
+        "guarantees/scalar": {"precision": ("3", "6"), "subnormal": ("0", "1")},
+        "guarantees/survey": {"base": ("2", "10"), "precision": ("3", "30"), "n": ("1", "4"), "m": ("1", "2")},
     }
     accepted |= others.get(stored.name, {})
     for column in stored.columns:
@@ -289,7 +364,9 @@ def test_the_command_verifies_the_sweeps_that_it_is_told(sweep, capsys, monkeypa
     [
         (["verify", "tests/third"], "got sweeps tests/third; needed some of tests/normal"),
         (["verify", "--sample", "0"], "got --sample 0; needed at least 1"),
-        ([], "usage: python -m gpbnb.report.stored "),
+        ([], "usage: python -m sweeps "),
+        (["recompute"], "the following arguments are required: names"),
+        (["recompute", "tests/third"], "got sweeps tests/third; needed some of tests/normal"),
     ],
 )
 def test_the_command_refuses_what_it_cannot_verify(sweep, capsys, arguments, words):
@@ -303,9 +380,15 @@ def test_the_command_refuses_what_it_cannot_verify(sweep, capsys, arguments, wor
     [
         (["--help"], "list name, command and provenance of each stored sweep"),
         (["--help"], "verify compute a sample of each stored sweep again and compare"),
-        (["verify", "--help"], "names names of sweeps, such as kalman/year; default: all"),
+        (["verify", "--help"], "names names of sweeps, such as rolling/drift_rates; default: all"),
         (["verify", "--help"], "--sample SAMPLE number of cells to compute for each sweep; default: 1"),
         (["verify", "--help"], "--seed SEED seed that selects the cells; default: 1"),
+        (["recompute", "--help"], "names names of sweeps, such as rolling/drift_rates"),
+        (["recompute", "--help"], "--cells CELLS compute only this many cells"),
+        (["recompute", "--help"], "--only WORD [WORD ...] compute only cells with one of these words; keep others"),
+        (["recompute", "--help"], "--store write the finished cells without computing more"),
+        (["recompute", "--help"], "--processes PROCESSES number of processes; default: 1"),
+        (["recompute", "--help"], "--output OUTPUT folder for the tables and for saved progress"),
     ],
 )
 def test_the_help_of_the_command(sweep, capsys, arguments, words):

@@ -11,9 +11,9 @@ import pytest
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.linear import biquad, controller, state_space
 from gpbnb.filters.program import steps_in_python
 from gpbnb.filters.simulation import Simulation
+from gpbnb.filters.system import biquad, controller, state_space
 from gpbnb.wordlength import examples, fixed_point
 from gpbnb.wordlength.fixed_point import ScaledFilter
 
@@ -24,22 +24,6 @@ def tracked() -> tuple[ScaledFilter, np.ndarray[Any, Any]]:
     model = examples.tracker()
     z = Simulation(model, (5.0, 1.0), 0, resolution=2.0**-12).measurements(300)
     return fixed_point.constant_gain(model, z), z
-
-
-def test_shifted_numbers_are_rounded_in_every_mode() -> None:
-    rounded = {
-        Rounding.DOWN: math.floor,
-        Rounding.UP: math.ceil,
-        Rounding.CHOP: int,
-        Rounding.EVEN: round,
-        Rounding.NEAREST: lambda x: math.floor(abs(x) + Fraction(1, 2)) * (-1 if x < 0 else 1),
-        Rounding.ODD: lambda x: math.floor(x) if math.floor(x) % 2 else math.ceil(x),
-    }
-    for mode in MODES:
-        for n in range(-40, 41):
-            assert fixed_point._shifted(n, -2, mode) == 4 * n
-            for shift in range(4):
-                assert fixed_point._shifted(n, shift, mode) == rounded[mode](Fraction(n, 2**shift)), (mode, n, shift)
 
 
 @pytest.mark.parametrize("mode", MODES)

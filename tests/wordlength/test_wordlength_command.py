@@ -17,14 +17,15 @@ import pytest
 from markup import Elements
 
 from gpbnb import __main__ as top
+from gpbnb.bounds.check import prove
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.model import LinearModel
-from gpbnb.wordlength import __main__ as command
+from gpbnb.filters.system import LinearSystem
+from gpbnb.wordlength import running as command
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_measurements, read_model
 from gpbnb.wordlength.precision import required_precision
 from gpbnb.wordlength.report import Answer, Report, study
-from gpbnb.wordlength.system import LinearSystem
 
 MODEL = """
 name = "tracker <1>"
@@ -37,7 +38,7 @@ P0 = [[100, 0], [0, 100]]
 """
 MATRICES = {"A": [["0.5", 0], [0, "0.25"]], "B": [[1], [1]]}
 
-ANSWERED = SimpleNamespace(text="21 digits", digits=21)
+ANSWERED = SimpleNamespace(text="21 digits", mixed="", digits=21, met=True)
 
 
 @pytest.fixture
@@ -119,6 +120,7 @@ def test_each_option_is_the_part_of_the_question_that_it_names(files, monkeypatc
     assert main([str(files[0] / "model.toml"), "--tolerance", "0.01,inf", *options]) == 0
     ((given, named),) = asked
     found = inspect.signature(study).bind(*given, **named).arguments
+    found |= vars(found["asked"])
     assert repr(found[name]) == repr(value)
 
 
@@ -128,8 +130,8 @@ def test_measurements_are_the_source_of_the_answer(files, monkeypatch):
     monkeypatch.setattr(command, "study", lambda *given, **named: asked.append(given) or ANSWERED)
     given = [str(folder / "model.toml"), "--tolerance", "1", "--measurements", str(folder / "z.csv")]
     assert main(given) == 0
-    ((_, _, measured, *_, source, shown, _),) = asked
-    assert np.array_equal(measured, z, equal_nan=True)
+    ((question, source, shown, _),) = asked
+    assert np.array_equal(question.z, z, equal_nan=True)
     assert source == str(folder / "z.csv")
     assert shown == f"python -m gpbnb.wordlength {shlex.join(given)}"
 
@@ -173,6 +175,54 @@ def test_a_guarantee_takes_limits_and_shows_them(files, capsys):
     wider = [*given, "--basis", "guarantee", "--state", "1e8", "--innovation", "3e5"]
     assert main(wider) == 0
     assert json.loads((folder / "out.json").read_text(encoding="utf-8"))["digits"] > expected.precision
+
+
+@pytest.mark.parametrize("form", ["innovation", "UD"])
+def test_a_guarantee_comes_with_a_certificate(files, tmp_path, form, capsys):
+    folder, path = files[0], tmp_path / "certificate.json"
+    # With a precise sensor, the gain repeats soon.
+    (folder / "model.toml").write_text(MODEL.replace("R = [[4]]", "R = [[0.01]]"), encoding="utf-8")
+    given = [str(folder / "model.toml"), "--tolerance", "0.01,inf", "--certificate", str(path), "--form", form]
+    sizes = ["--state", "1e4,50", "--innovation", "30"]
+    assert main([*given, "--basis", "guarantee", *sizes]) == 0
+    content = json.loads(path.read_text(encoding="utf-8"))
+    prove(content)
+    assert capsys.readouterr().out.startswith(f"{content['format']['precision']} bits")
+    assert content["limits"] == {"state": ["10000", "50"], "innovation": ["30"], "measurement": [None]}
+    assert Fraction(content["bound"][0]) <= Fraction("0.01")
+
+
+def test_a_certificate_that_cannot_be_written_is_refused(files, tmp_path, capsys):
+    folder = files[0]
+    (folder / "model.toml").write_text(MODEL.replace("R = [[4]]", "R = [[0.01]]"), encoding="utf-8")
+    given = [str(folder / "model.toml"), "--tolerance", "0.01,inf", "--certificate", str(tmp_path / "certificate.json")]
+    sizes = ["--state", "1e4,50", "--innovation", "30"]
+    assert main(given) == 2
+    assert "needed --basis guarantee" in capsys.readouterr().err
+    assert main([*given, "--basis", "guarantee", *sizes, "--tolerance", "1e-30"]) == 2
+    assert "got no precision with a guarantee" in capsys.readouterr().err
+    assert main([*given, "--basis", "guarantee", *sizes, "--certificate", str(folder / "model.toml")]) == 2
+    assert "which are one file" in capsys.readouterr().err
+
+
+def test_a_digital_filter_comes_with_a_certificate(tmp_path, capsys):
+    model, path = tmp_path / "system.toml", tmp_path / "certificate.json"
+    model.write_text('b = [0.1, 0.2, 0.1]\na = [1, -0.5, 0.3]\nstructure = "direct form I"\n', encoding="utf-8")
+    given = [
+        str(model),
+        "--tolerance",
+        "1e-3",
+        "--basis",
+        "guarantee",
+        "--measurement",
+        "2",
+        "--certificate",
+        str(path),
+    ]
+    assert main(given) == 0
+    content = json.loads(path.read_text(encoding="utf-8"))
+    assert "fixed coefficients" in prove(content)
+    assert content["limits"]["measurement"] == ["2"]
 
 
 def test_a_guarantee_refuses_measurements_with_gaps(files, capsys):

@@ -50,8 +50,8 @@ def refused(capsys, *arguments):
     ("content", "message"),
     [
         (b"", "model.toml: A, B missing; needed"),
-        (b"\x00\xff\xfe", "model.toml is not TOML: 'utf-8' codec"),
-        (toml(FILTER).encode("utf-16"), "model.toml is not TOML: 'utf-8' codec"),
+        (b"\x00\xff\xfe", "model.toml, line 1: got the byte 0xff, which is not UTF-8; needed a file in UTF-8"),
+        (toml(FILTER).encode("utf-16"), "model.toml, line 1: got the byte 0xff, which is not UTF-8; needed a file"),
         (toml(FILTER).encode() + b"\x00", "model.toml is not TOML: Invalid statement"),
         (toml(FILTER).encode() + b"R = [[3]]", "model.toml is not TOML: Cannot overwrite a value"),
         (b"A = " + b"[" * 5000 + b"]" * 5000, "model.toml is not TOML: its lists are nested too deeply"),
@@ -122,9 +122,9 @@ def test_a_value_of_a_wrong_type_is_refused_with_its_key(folder, capsys, entries
     [
         (b"", "z.csv: got no rows of numbers"),
         (b"\n\n", "z.csv: got no rows of numbers"),
-        (b"\x00\xff", "z.csv is not UTF-8"),
-        ("1\n2\n".encode("utf-16"), "z.csv is not UTF-8"),
-        (b"1\n\xe9\n", "z.csv is not UTF-8"),
+        (b"\x00\xff", "z.csv, line 1: got the byte 0xff, which is not UTF-8; needed a file in UTF-8"),
+        ("1\n2\n".encode("utf-16"), "z.csv, line 1: got the byte 0xff, which is not UTF-8; needed a file"),
+        (b"1\n\xe9\n", "z.csv, line 2: got the byte 0xe9, which is not UTF-8; needed a file in UTF-8"),
         (b"1\n\x00\n", r"z.csv, line 2: got '\x00'; needed a number"),
         (b"1\n" + b"1" * 200_000, "z.csv, line 2: field larger than field limit (131072)"),
         (b'1\n"2\n3\n', r"z.csv, line 3: got '2\n3"),
@@ -132,7 +132,7 @@ def test_a_value_of_a_wrong_type_is_refused_with_its_key(folder, capsys, entries
         (b"1\n1e999\n", "z.csv, line 2: got '1e999'; needed a number that float64 holds"),
         (b"z,z\n1,2\n3\n", "z.csv, line 3: got 1 cells; needed 2"),
         (b"z\n1\nz\n", "z.csv, line 3: got 'z'; needed a number"),
-        (b"1;2\n", "z.csv, line 1: got '1;2'; needed a number"),
+        (b"1;2\n", "z.csv, line 1: got semicolons between the cells; needed commas"),
         (b"1\n" + "१\n".encode(), "z.csv, line 2: got '१'; needed a number"),
     ],
 )
@@ -147,14 +147,20 @@ def test_measurements_that_are_none(folder, capsys, model, content, message):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["filter.toml", "--measurements", "folder"], "Is a directory: 'folder'"),
-        (["folder"], "Is a directory: 'folder'"),
-        (["absent.toml"], "No such file or directory: 'absent.toml'"),
-        (["filter.toml", "--inputs", "absent.csv"], "No such file or directory: 'absent.csv'"),
+        (
+            ["filter.toml", "--measurements", "folder"],
+            "got folder, which cannot be read: Is a directory; needed a file",
+        ),
+        (["folder"], "got folder, which cannot be read: Is a directory; needed a file"),
+        (["absent.toml"], "got absent.toml, which cannot be read: No such file or directory; needed a file"),
+        (
+            ["filter.toml", "--inputs", "absent.csv"],
+            "got absent.csv, which cannot be read: No such file or directory; needed a file",
+        ),
         (["\0"], "embedded null byte"),
         (["filter.toml", "--steps", "0"], "got 0 steps; needed a whole number"),
         (["filter.toml", "--steps", "1000000000000"], "got 1,000,000,000,000 steps to simulate; needed at most"),
-        (["filter.toml", "--base", "7"], "got base 7; needed one with compiled loops"),
+        (["filter.toml", "--base", "7"], "got --base 7; needed one of 2, 10, 16"),
         (["filter.toml", "--tolerance=1_0"], "got --tolerance 1_0; needed numbers"),
         (["filter.toml", "--tolerance=1e400"], "got --tolerance 1e400; needed numbers"),
         (["filter.toml", "--inputs", "z.csv"], "filter.toml: got u without B"),
@@ -226,7 +232,7 @@ def test_measurements_that_are_all_missing_leave_a_filter_at_zero(folder, capsys
     (folder / "z.csv").write_text('nan\n""\n', encoding="utf-8")
     assert read_measurements("z.csv").shape == (2, 1)
     assert main(["filter.toml", "--tolerance", "0.1", "--basis", "emulation", "--measurements", "z.csv"]) == 0
-    assert "emulation, 2 steps" in capsys.readouterr().out
+    assert "observed in 2 steps" in capsys.readouterr().out
 
 
 def test_a_key_of_a_mapping_need_not_be_text():

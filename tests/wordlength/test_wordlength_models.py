@@ -25,8 +25,8 @@ from scipy import signal
 
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import reference_states
+from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.models import read_model
-from gpbnb.wordlength.system import LinearSystem
 
 STEPS = 40
 RNG = np.random.default_rng(5)

@@ -9,14 +9,15 @@ from dataclasses import replace
 import pytest
 
 from gpbnb.filters.model import LinearModel
-from gpbnb.wordlength.report import Answer, Report, study
-from gpbnb.wordlength.system import LinearSystem
+from gpbnb.filters.structures import WITH_FIR
+from gpbnb.filters.system import LinearSystem
+from gpbnb.wordlength.report import Answer, Question, Report, study
 
 REPORT = Report(
     name="tracker",
     kind="Kalman filter",
     digits=21,
-    text="21 digits of base 2",
+    text="21 bits",
     base=2,
     rounding="nearest",
     steps=60,
@@ -78,7 +79,7 @@ def test_about_seven_powers_cover_the_ratios_and_the_tolerance(ratios, powers):
     names = re.findall(r'<text x="52" y="[^"]*" text-anchor="end">10([^<]*)</text>', drawn)
     shown = [int(name.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))) for name in names]
     assert shown == list(powers)[:: max(1, (len(powers) - 1) // 6)]
-    heights = [float(y) for y in re.findall(r'<circle cx="[^"]*" cy="([^"]*)"', drawn)]
+    heights = [float(y) for y in re.findall(r"translate\(\S+ (\S+)\)", drawn.partition('<ul class="legend">')[0])]
     assert len(heights) == len(ratios)
     assert all(30 <= y <= 280 for y in heights)
 
@@ -86,9 +87,9 @@ def test_about_seven_powers_cover_the_ratios_and_the_tolerance(ratios, powers):
 def test_the_answer_comes_first():
     assert text_of(REPORT.to_html()).startswith(
         "Wordlength for tracker Wordlength for tracker This Kalman filter needs 21 bits to keep rounding errors within "
-        "the tolerance. 21 digits of base 2. State 3 of 3 limits the answer: its error is 0.5 of its tolerance. "
+        "the tolerance. 21 bits. State 3 of 3 limits the answer: its error is 0.5 of its tolerance. "
     )
-    assert "needs 21 digits of base 10 to" in text_of(replace(REPORT, base=10).to_html())
+    assert "needs 21 decimal digits to" in text_of(replace(REPORT, base=10).to_html())
     assert "needs no precision that can be run to" in text_of(replace(REPORT, digits=None).to_html())
 
 
@@ -131,7 +132,7 @@ def test_each_basis_is_explained_and_no_other(basis, meaning):
     alone = replace(REPORT, answers=(Answer("UD", basis, 21, "", ()),))
     shown = text_of(alone.to_html()).partition("rounding nearest ")[2]
     assert shown.startswith(meaning)
-    assert shown.partition(" None of this limits the exponent range")[0].count(".") == 1
+    assert shown.partition(" These runs have unlimited exponents")[0].count(".") == 1
 
 
 def test_the_report_ends_with_how_to_reproduce_it():
@@ -169,13 +170,69 @@ def test_the_figure_has_its_axes_and_a_line_for_each_answer():
 )
 def test_a_study_says_where_its_measurements_come_from(given, source):
     told: list[str] = []
-    found = study(MODEL, 0.1, bases=("emulation",), tell=told.append, **given)
+    asked = {name: value for name, value in given.items() if name != "source"}
+    found = study(Question(MODEL, 0.1, bases=("emulation",), **asked), given.get("source", ""), tell=told.append)
     assert (found.kind, found.source, found.steps) == ("Kalman filter", source, given.get("steps", 2))
     assert [each.label for each in found.answers] == ["innovation, emulation", "Joseph, emulation", "UD, emulation"]
     assert told[:2] == ["innovation, emulation …", f"innovation, emulation: {found.text}"]
 
 
 def test_a_study_of_a_system_names_only_the_bases():
-    found = study(LinearSystem([["0.5"]], [[1]]), 0.1, [[1], [2]], bases=("bound", "emulation"))
+    found = study(Question(LinearSystem([["0.5"]], [[1]]), 0.1, [[1], [2]], bases=("bound", "emulation")))
     assert (found.kind, found.source) == ("linear system", "given")
     assert [each.label for each in found.answers] == ["bound", "emulation"]
+
+
+def test_curves_of_all_structures_are_told_apart_without_colours():
+    """Each form or structure has a marker of its own, in the figure and in the legend, so that a grey print will do."""
+    tried = ((20, 10.0), (21, 0.4))
+    answers = tuple(Answer(f"{name}, emulation", "emulation", 21, "", tried) for name in WITH_FIR)
+    figure, _, legend = replace(REPORT, answers=answers).to_html().partition('<ul class="legend">')
+    drawn = re.findall(r'<path transform="[^"]*" d="([^"]*)" fill="([^"]*)"', figure)
+    assert len(drawn) == 2 * len(WITH_FIR)
+    assert drawn[::2] == drawn[1::2]
+    assert len({shape for shape, _ in drawn}) == len(WITH_FIR) >= 12
+    assert [fill for _, fill in drawn[2:]] == ["none"] * len(drawn[2:])  # so that one shows what it surrounds
+    items = legend.split("<li>")[1:]
+    assert [re.findall(r'd="([^"]*)"', item) for item in items] == [[shape] for shape, _ in drawn[::2]]
+
+
+def test_a_report_on_a_linear_system_speaks_of_inputs():
+    system = replace(REPORT, kind="linear system", ranges=(), errors=(), limits={})
+    shown = text_of(system.to_html())
+    assert dict(tables_of(system.to_html())["Basis of the answer"][1:])["inputs"] == "z.csv"
+    assert "An emulation holds for these inputs." in shown
+    assert "Colour and marker stand for the structure" in shown
+    assert "measurements" not in shown
+    assert "the ranges below" not in shown  # there are none
+
+
+def test_names_stand_in_every_table_and_sentence():
+    named = replace(REPORT, names=("a (m)", "b <2>", "c"), measurement_names=("z (V)",), limits={"measurement": (5.0,)})
+    tables = tables_of(named.to_html())
+    assert [row[0] for row in tables["Error of each state at the answer"][1:]] == ["a (m)", "b &lt;2&gt;", "c"]
+    question = dict(tables["Basis of the answer"][1:])
+    assert question["limit on the measurement"] == "z (V): 5"
+    assert "State c limits the answer: its error is 0.5 of its tolerance." in text_of(named.to_html())
+    assert (
+        dict(tables_of(replace(named, tolerance=(0.1, None, 2.0)).to_html())["Basis of the answer"][1:])["tolerance"]
+        == "a (m): 0.1, b &lt;2&gt;: any, c: 2"
+    )
+
+
+def test_a_judged_format_is_named_in_the_answer():
+    kept = replace(REPORT, format="BFLOAT16", exponents="-126 to 127")
+    assert "This Kalman filter keeps rounding errors within the tolerance in BFLOAT16 ." in text_of(kept.to_html())
+    missed = text_of(replace(kept, met=False, digits=None).to_html())
+    assert "This Kalman filter does not keep rounding errors within the tolerance in BFLOAT16 ." in missed
+    assert "exponents -126 to 127" in missed
+    assert "These runs have unlimited exponents" not in missed
+
+
+def test_a_report_is_dark_where_the_reader_prefers_it():
+    style = REPORT.to_html().partition("<style>")[2].partition("</style>")[0]
+    assert "color-scheme: light dark" in style
+    light, _, dark = style.partition("@media (prefers-color-scheme: dark)")
+    names = set(re.findall(r"--\w+(?=:)", light))
+    assert names == set(re.findall(r"--\w+(?=:)", dark.partition("}")[0]))
+    assert set(re.findall(r"var\((--\w+)\)", REPORT.to_html())) <= names

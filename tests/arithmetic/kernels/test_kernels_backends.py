@@ -15,7 +15,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, backend
 from gpbnb.arithmetic.named import BINARY16, BINARY32, BINARY64
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, Rules
 
 OPERATIONS = [operator.add, operator.sub, operator.mul, operator.truediv]
 COMPILED = [(2, 1), (2, 24), (2, 26), (2, 53), (10, 1), (10, 9), (10, 10), (10, 18), (16, 1), (16, 13)]
@@ -71,9 +71,9 @@ def same(x: Any, y: Any) -> bool:
 
 @pytest.mark.parametrize(("base", "kind"), [(2, Floats), (16, Floats), (10, Pairs), (3, Exact), (8, Exact)])
 def test_the_carrier_of_a_format(base: int, kind: type) -> None:
-    assert type(backend(base, 6, True)) is kind
-    assert type(backend(base, 54, True)) is Exact
-    assert pickle.loads(pickle.dumps(backend(base, 6, False))).nearest is False
+    assert type(backend(Rules(base, 6, Rounding.NEAREST))) is kind
+    assert type(backend(Rules(base, 54, Rounding.NEAREST))) is Exact
+    assert pickle.loads(pickle.dumps(backend(Rules(base, 6, Rounding.CHOP)))).nearest is False
 
 
 @pytest.mark.parametrize(("base", "precision"), [(2, 11), (2, 53), (10, 3), (10, 18), (16, 5)])
@@ -157,7 +157,7 @@ def test_to_float_of_long_decimals_is_nearest() -> None:
 @pytest.mark.parametrize(("base", "precision"), [(2, 24), (16, 6)])
 def test_floats_hold_powers_of_two_from_minus_960_to_1023(base: int, precision: int) -> None:
     """At the edges: the smallest size is 2**-960, and all sizes are below 2**1024 with one digit to spare."""
-    carrier, bits = backend(base, precision, True), base.bit_length() - 1
+    carrier, bits = backend(Rules(base, precision, Rounding.NEAREST)), base.bit_length() - 1
     least = -960 // bits - (precision - 1)
     most = 1023 // bits - precision
     for m, e, held in (

@@ -98,7 +98,7 @@ def copy(tmp_path, server):
     """A copy of the arithmetic, with three small modules beside it; `copy.run()` says what a process compiled."""
     package = tmp_path / "gpbnb"
     package.mkdir()
-    for name in ("__init__.py", "caching.py", "clock.py"):
+    for name in ("__init__.py", "caching.py", "clock.py", "names.py"):
         shutil.copy(caching.PACKAGE / name, package)
     shutil.copytree(
         caching.PACKAGE / "arithmetic", package / "arithmetic", ignore=shutil.ignore_patterns("__pycache__")
@@ -141,7 +141,11 @@ def test_what_changed_is_compiled_again_and_nothing_else(copy):
     assert copy.run() == {"values": values, "compiled": ["outer", "alone", "product"]}
     assert copy.told.startswith("gpbnb: compiling for this processor.")
     assert str(copy.cache) in copy.told
-    assert len(copy.told.splitlines()) == 1
+    lines = [re.sub(r", \d+ s so far$", "", line) for line in copy.told.splitlines()[1:]]
+    names = ("outer.outer", "alone.alone", "arithmetic.kernels.elementwise.product")
+    assert [line.removeprefix("gpbnb: compiling function ") for line in lines] == [
+        f"{number}, {name}" for number, name in enumerate(names, start=1)
+    ]
     assert copy.run() == {"values": values, "compiled": []}
     assert copy.told == ""
     # A constant of another file, compiled in two calls away, then the file's own body.
@@ -260,7 +264,7 @@ def test_a_file_planted_where_others_write_is_not_loaded(copy, tmp_path, variabl
     kept.chmod(0o777)
     assert copy.run(first) == {"values": VALUES, "compiled": ["outer", "alone"]}
     assert not marker.exists()
-    told, notice = copy.told.splitlines()
+    told, notice, *_ = copy.told.splitlines()
     assert f"but others can write to {kept}; needed a folder that only you can write" in told
     assert str(kept) not in notice
     assert all(path.read_bytes().endswith(pickle.dumps(Planted(marker))) for path in paths)
@@ -388,3 +392,22 @@ def test_a_file_of_other_types_or_with_another_object_is_not_loaded(one):
     ):
         caching.write(path, dumps(content))
         assert (compiling._load(path, key, context) is not None) is loaded, content
+
+
+@pytest.mark.parametrize(
+    "code",
+    ["from gpbnb import linalg; import gpbnb.filters.run", "from gpbnb.wordlength.__main__ import main; main(G)"],
+)
+def test_a_process_without_compilation_is_told_what_to_unset(code, tmp_path):
+    """It ended in a TypeError about a call of a scalar operation."""
+    (tmp_path / "model.toml").write_text("A = [[0.5]]\nB = [[1]]\n")
+    given = f"G = [{str(tmp_path / 'model.toml')!r}, '--tolerance', '1', '--simulate', 'step']; "
+    found = subprocess.run(
+        [sys.executable, "-c", given + code],
+        env=ENVIRONMENT | {"NUMBA_DISABLE_JIT": "1"},
+        capture_output=True,
+        text=True,
+        cwd=caching.PACKAGE.parent,
+    )
+    assert "got NUMBA_DISABLE_JIT=1 in the environment; needed compiled loops" in found.stderr.splitlines()[-1]
+    assert ("Traceback" in found.stderr) is ("linalg" in code)

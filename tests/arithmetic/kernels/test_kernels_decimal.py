@@ -12,7 +12,9 @@ from gpbnb.arithmetic.kernels import elementwise, scalar
 from gpbnb.arithmetic.kernels.backends import backend
 from gpbnb.arithmetic.kernels.exact import kernel
 from gpbnb.arithmetic.kernels.tags import LARGEST_SHORT, Decimal, ShortDecimal
+from gpbnb.arithmetic.rounding import Rounding, Rules
 
+ROUNDING = {True: Rounding.NEAREST, False: Rounding.CHOP}
 TAGS = [Decimal, ShortDecimal]
 
 
@@ -31,7 +33,7 @@ def test_every_pair_of_short_numbers(precision: int, nearest: bool) -> None:
     positive = np.arange(10 ** (precision - 1), 10**precision)
     both = np.concatenate([-positive[::-1], positive])  # backwards these are their negatives
     gaps = np.arange(-precision - 4, precision + 5)
-    oracle = kernel(10, precision, nearest)
+    oracle = kernel(Rules(10, precision, ROUNDING[nearest]))
     one, results = both if precision == 1 else positive, []
     for name in ("add", "subtract", "multiply", "divide"):
         first, gap, second = np.meshgrid(one, gaps if name in ("add", "subtract") else [3], both, indexing="ij")
@@ -55,7 +57,7 @@ def test_carries_and_clamped_exponents_of_eight_digits(nearest: bool) -> None:
     both = np.concatenate([-edges, edges])
     first, gap, second = np.meshgrid(both, np.arange(-t - 5, t + 6), both, indexing="ij")
     for name in ("add", "subtract", "multiply"):
-        exact = np.frompyfunc(getattr(kernel(10, t, nearest), name), 4, 2)
+        exact = np.frompyfunc(getattr(kernel(Rules(10, t, ROUNDING[nearest])), name), 4, 2)
         m, e = (part.astype(np.int64).ravel() for part in exact(first, gap, second, 0))
         for tag in TAGS:
             n, f = computed(tag(t, nearest), name, first, gap, second, np.zeros_like(gap))
@@ -79,7 +81,9 @@ def test_zeros(nearest: bool) -> None:
 
 def test_the_kernel_of_a_precision() -> None:
     for precision in range(1, 19):
-        assert type(backend(10, precision, True).tag) is (ShortDecimal if precision <= LARGEST_SHORT else Decimal)
+        assert type(backend(Rules(10, precision, Rounding.NEAREST)).tag) is (
+            ShortDecimal if precision <= LARGEST_SHORT else Decimal
+        )
 
 
 @njit

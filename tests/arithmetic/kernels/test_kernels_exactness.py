@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks import exactness
 from gpbnb.arithmetic.kernels.backends import backend
+from gpbnb.arithmetic.rounding import Rounding, Rules
 
 
 @pytest.mark.parametrize("base", [2, 10, 16])
@@ -44,7 +45,7 @@ def test_rounding_twice_is_found_where_it_is_wrong(operation: str, precision: in
     job = exactness.Job(2, precision, nearest, operation, 20_000, (1, precision))
     x, y = operands(job)
     y = np.where(y == 0, 1.0, y) if operation == "divide" else y
-    kernel = backend(2, precision, nearest)
+    kernel = backend(job.rules)
     once = kernel.apply(operation, (x,), (y,))[0]
     twice = kernel.apply("round_", (getattr(np, operation)(x, y),))[0]
     assert bool(np.any(once != twice)) is found
@@ -55,7 +56,7 @@ def test_roots_rounded_twice_are_found() -> None:
         job = exactness.Job(2, precision, False, "sqrt", 20_000, (2,))
         m, e = exactness.radicands(job)
         x = np.ldexp(m.astype(float), e.astype(np.int64))
-        kernel = backend(2, precision, False)
+        kernel = backend(job.rules)
         once, twice = kernel.apply("sqrt", (x,))[0], kernel.apply("round_", (np.sqrt(x),))[0]
         assert bool(np.any(once != twice)) is found
 
@@ -63,7 +64,7 @@ def test_roots_rounded_twice_are_found() -> None:
 @pytest.mark.parametrize("base", [2, 10])
 def test_a_wrong_digit_is_reported(base: int, monkeypatch: pytest.MonkeyPatch) -> None:
     job = exactness.Job(base, 8, True, "add", 500, (3,))
-    wrong = backend(base, 8, False)
+    wrong = backend(Rules(base, 8, Rounding.CHOP))
     monkeypatch.setattr(exactness.backends, "backend", lambda *_: wrong)
     mismatches = exactness.compare(job).mismatches
     assert mismatches

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks import processors
+from benchmarks.journal import Journal
 
 
 def test_a_thousandth_of_all() -> None:
@@ -42,16 +43,15 @@ def test_a_wrong_format_is_found_in_pairs(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_a_journal_resumes_where_it_ended(tmp_path: Path) -> None:
     file = tmp_path / "journal.csv"
-    journal = processors.Journal(file)
+    journal = Journal(file, "12345678")
     first = list(processors.pairs("FP8 E5M2", 1, np.random.default_rng(0), journal))
-    again = processors.Journal(file)
+    again = Journal(file, "12345678")
     assert again.parts == journal.parts != {}
     marked = next(iter(again.parts))
-    again.parts[marked] = again.parts[marked]._replace(different=7)  # taken as it stands, not compared anew
+    again.parts[marked][-1] = "7"  # taken as it stands, not compared anew
     assert sum(count.different for count in first) == 0
     assert sum(c.different for c in processors.pairs("FP8 E5M2", 1, np.random.default_rng(0), again)) == 7
-    file.write_text(file.read_text(encoding="utf-8").replace(again.code, "00000000"), encoding="utf-8")
-    assert processors.Journal(file).parts == {}
+    assert Journal(file, "00000000").parts == {}
 
 
 def test_float16_is_rounded_as_numpy_rounds_it() -> None:

@@ -57,7 +57,7 @@ def test_findings_have_their_notes_and_numbers(rows):
     assert r"85 arcseconds apart with $\gamma_2=\gamma_3=60''$" in found["IV.axes-colinear"].recomputed
     assert "31 arcseconds" in found["IV.identity-transformation"].note
     assert "0.000 arcseconds a year, instead of 6.62 and 0.041" in found["I.spin-spin"].recomputed
-    assert "takes at least 2 changes of sign, before C, C" in found["IV.eq8"].recomputed
+    assert "takes at least 2 changes of sign; these signs stand before C, C" in found["IV.eq8"].recomputed
     # (5, 3) + (-2, 4); √(9² + 5²); 5 + 4; the declination of Rigel
     assert "is (3, 7) arcseconds" in found["IV.thetas-drift"].recomputed
     assert "turns by 10.3 arcseconds" in found["IV.intermediate-frame"].recomputed

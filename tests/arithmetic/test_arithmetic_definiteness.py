@@ -1,0 +1,79 @@
+"""gpbnb.arithmetic.definiteness: the fast test of large matrices decides as exact elimination does."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gpbnb import LinearModel
+from gpbnb.arithmetic import definiteness
+from gpbnb.arithmetic.definiteness import factor, is_definite
+from gpbnb.arithmetic.rational import exact
+
+
+@pytest.fixture
+def without_elimination(monkeypatch):
+    def only_small(matrix):
+        assert len(matrix) <= 8, "exact elimination takes half a minute for 100 rows"
+        return factor(matrix)
+
+    monkeypatch.setattr(definiteness, "factor", only_small)
+
+
+def eliminated(matrix, strictly):
+    try:
+        return bool(np.all(factor(matrix)[1] > 0)) or not strictly
+    except ValueError:
+        return False
+
+
+ENTRIES = st.fractions(-3, 3, max_denominator=7)
+
+
+@settings(derandomize=True, deadline=None, database=None, max_examples=300)
+@given(st.data())
+def test_it_decides_as_elimination_does(data):
+    """Of semidefinite matrices of every rank, and of those that differ from them by the least or the most."""
+    n = data.draw(st.integers(1, 5))
+    rank = data.draw(st.integers(0, n))
+    G = np.array([[data.draw(ENTRIES) for _ in range(rank)] for _ in range(n)], dtype=object).reshape(n, rank)
+    matrix = G @ G.T + exact(np.zeros((n, n), dtype=int))
+    i, change = data.draw(st.integers(0, n - 1)), data.draw(st.sampled_from([0, 1, -1, "1e-60", "-1e-60", "-1e-8"]))
+    matrix[i, i] += Fraction(change)
+    units = [Fraction(10) ** data.draw(st.integers(-40, 40)) for _ in range(n)]
+    matrix = matrix * np.multiply.outer(units, units)
+    for strictly in (False, True):
+        assert definiteness._by_congruence(matrix, strictly) is eliminated(matrix, strictly)
+
+
+def hilbert(n):
+    return np.array([[Fraction(1, i + j + 1) for j in range(n)] for i in range(n)], dtype=object)
+
+
+@pytest.mark.parametrize("n", [20, 60])
+def test_definite_matrices_are_told_from_those_that_miss_it_by_the_least(n, without_elimination):
+    """The least eigenvalue of Hilbert's matrix of 60 rows is near 1e-90; less 1 from a sum of squares is negative."""
+    assert is_definite(hilbert(n), strictly=True)
+    G = exact(np.random.default_rng(n).integers(-9, 9, (n, n - 1)))
+    singular = G @ G.T
+    assert is_definite(singular)
+    assert not is_definite(singular, strictly=True)
+    for change, definite in ((Fraction(1, 10**50), True), (-Fraction(1, 10**50), False)):
+        changed = singular + change * exact(np.eye(n, dtype=int))
+        assert is_definite(changed, strictly=True) is is_definite(changed) is definite
+
+
+def test_a_model_of_100_states_is_checked_without_elimination(without_elimination):
+    n, rng = 100, np.random.default_rng(5)
+    G, few = rng.standard_normal((n, n)), rng.standard_normal((n, 3))
+    model = LinearModel(0.9 * np.eye(n), rng.standard_normal((2, n)), few @ few.T, np.eye(2), np.zeros(n), G @ G.T)
+    assert model.n == n
+    (repair,) = model.repairs
+    assert repair.letter == "Q"
+    assert 0 < repair.shift < 2.0**-40
+    with pytest.raises(ValueError, match="got P0 with a least eigenvalue near -1; needed a positive semidefinite"):
+        LinearModel(np.eye(n), np.eye(n)[:2], np.eye(n), np.eye(2), np.zeros(n), np.diag([*np.ones(n - 1), -1.0]))

@@ -1,0 +1,209 @@
+"""What NumPy's users write: copies with other entries, np.linalg, pandas, and text in which the format is one line."""
+
+from __future__ import annotations
+
+import itertools
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from oracles import Arithmetic, rounded, square_root
+
+from gpbnb import BINARY32, BINARY64, BINARY128, FixedFormat, FloatArray, FloatFormat, Rounding, linalg
+
+FORMATS = [BINARY32, BINARY128, FloatFormat(10, 5), FixedFormat(7, 8)]
+INDICES = [1, -1, slice(1, None), (0, 2), (slice(None), 0), [2, 0], ([0, 1], [2, 2]), ..., (..., np.newaxis, 1)]
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+@pytest.mark.parametrize("index", INDICES, ids=str)
+def test_a_copy_has_the_entries_that_an_assignment_would_give(fmt, index):
+    given = np.arange(1, 10).reshape(3, 3)
+    x = fmt.array(given)
+    wanted = given.copy()
+    wanted[index] = 17
+    assert x.at[index].set(17).to_float().tolist() == wanted.tolist()
+    values = np.arange(20, 20 + given[index].size).reshape(given[index].shape)
+    wanted[index] = values
+    assert x.at[index].set(values).to_float().tolist() == wanted.tolist()
+    for name, operation in (("add", np.add), ("subtract", np.subtract), ("multiply", np.multiply)):
+        wanted = given.copy()
+        wanted[index] = operation(given[index], 3)
+        assert getattr(x.at[index], name)(3).to_float().tolist() == wanted.tolist()
+    assert x.at[index].get().to_float().tolist() == given[index].tolist()
+    assert x.to_float().tolist() == given.tolist()
+
+
+def test_operations_on_entries_are_rounded_and_masks_select():
+    x = BINARY32.array([1, 10, 100])
+    assert x.at[x > 5].divide(3).to_float().tolist() == [
+        1,
+        float(np.float32(10) / np.float32(3)),
+        float(np.float32(100 / 3)),
+    ]
+    assert x.at[[0, 0]].set([5, 7]).to_float().tolist() == [7, 10, 100]  # as NumPy's assignment
+    assert x.at[[0, 0]].add(1).to_float().tolist() == [2, 10, 100]
+    assert isinstance(FixedFormat(7, 8).array([1, 2]).at[0].set(3), type(FixedFormat(7, 8).array(1)))
+    y = x.at[0].set(BINARY32.array("1e-45").on_exact_backend())  # of another backend
+    assert y.to_float().tolist() == [float(np.float32(1e-45)), 10, 100]
+    with pytest.raises(ValueError, match=r"got the operand 0\.1; needed a number that"):
+        x.at[0].set(0.1)
+    with pytest.raises(IndexError):
+        x.at[3].set(1)
+    with pytest.raises(ValueError, match=r"shape mismatch|could not broadcast"):
+        x.at[:2].set([1, 2, 3])
+
+
+@pytest.mark.parametrize(
+    "assign",
+    [
+        lambda x: x.__setitem__(0, 1),
+        lambda x: x.__delitem__(0),
+        lambda x: np.put(x, 0, 1),
+        lambda x: np.copyto(x, x),
+        lambda x: np.place(x, [True, False], [1]),
+        lambda x: np.putmask(x, [True, False], 1),
+        lambda x: np.put_along_axis(x, np.array([0]), 1, 0),
+        lambda x: np.fill_diagonal(x.reshape(1, 2), 1),
+    ],
+)
+def test_an_assignment_is_refused_with_the_way(assign):
+    with pytest.raises(
+        TypeError, match=r"which cannot be changed; needed a copy with other entries: x = x.at\[i\].set\("
+    ):
+        assign(BINARY32.array([1, 2]))
+
+
+def test_names_of_numpys_assignments_lead_to_copies():
+    for name in ("put", "fill", "itemset"):
+        with pytest.raises(AttributeError, match=f"no attribute '{name}'; the nearest is x.at;"):
+            getattr(BINARY32.array([1, 2]), name)
+
+
+def matrices(fmt, n, seed):
+    rng = np.random.default_rng(seed)
+    a = fmt.array(rng.normal(size=(n, n)))
+    return a, a.to_fractions().tolist(), fmt.array(rng.normal(size=n))
+
+
+@pytest.mark.parametrize("nearest", [True, False])
+@pytest.mark.parametrize("n", [1, 2, 3, 5])
+def test_linear_algebra_of_numpy_pivots_as_lapack(n, nearest):
+    fmt = FloatFormat(10, 4, "nearest" if nearest else "chop")
+    loops = Arithmetic(10, 4, nearest)
+    for seed in range(5):
+        a, rows, b = matrices(fmt, n, seed)
+        right = [[each] for each in b.to_fractions()]
+        assert np.linalg.solve(a, b).to_fractions().tolist() == [each for (each,) in loops.solve(rows, right, True)]
+        assert np.linalg.inv(a).to_fractions().tolist() == loops.inv(rows, True)
+        _, upper, _, order = loops.eliminate(rows, [[0]] * n, True)
+        sign = 1
+        for i, j in itertools.combinations(range(n), 2):
+            sign *= -1 if order[i] > order[j] else 1
+        product = upper[0][0]
+        for k in range(1, n):
+            product = loops.fl(product * upper[k][k])
+        assert np.linalg.det(a).to_fractions() == linalg.det(a).to_fractions() == sign * product
+        assert np.dot(a, b).to_fractions().tolist() == [e for (e,) in loops.matmul(rows, right)]
+        assert np.linalg.norm(b).to_fractions() == square_root(
+            Fraction(loops.dot(b.to_fractions(), b.to_fractions())), 10, 4, nearest
+        )
+
+
+def test_determinants_of_singular_matrices_and_of_permutations_are_exact():
+    assert np.linalg.det(BINARY32.array([[1, 2], [2, 4]])) == 0
+    assert np.linalg.det(BINARY32.array([[0, 0], [1, 2]])) == 0
+    for order in itertools.permutations(range(4)):
+        matrix = np.eye(4, dtype=int)[list(order)]
+        assert np.linalg.det(BINARY32.array(matrix)).to_fractions() == round(np.linalg.det(matrix))
+
+
+@pytest.mark.parametrize("nearest", [True, False])
+@pytest.mark.parametrize("n", [1, 2, 4, 6])
+def test_cholesky_is_its_loops(n, nearest):
+    fmt = FloatFormat(2, 12, "nearest" if nearest else "chop")
+
+    def fl(x):
+        return rounded(Fraction(x), 2, 12, nearest)
+
+    for seed in range(5):
+        b = np.random.default_rng(seed).normal(size=(n, n))
+        a = fmt.array(b @ b.T + n * np.eye(n))
+        s = a.to_fractions().tolist()
+        lower = [[Fraction(0)] * n for _ in range(n)]
+        for i in range(n):
+            for k in range(i + 1):
+                rest = s[i][k]
+                for j in range(k):
+                    rest = fl(rest - fl(lower[i][j] * lower[k][j]))
+                lower[i][k] = square_root(rest, 2, 12, nearest) if i == k else fl(rest / lower[k][k])
+        assert np.linalg.cholesky(a).to_fractions().tolist() == linalg.cholesky(a).to_fractions().tolist() == lower
+    with pytest.raises(np.linalg.LinAlgError, match="got a pivot -3 in column 2 of 2; needed one above zero"):
+        linalg.cholesky(fmt.array([[1, 2], [2, 1]]))
+
+
+def test_other_names_of_numpys_linear_algebra_are_refused_with_those_there_are():
+    x = BINARY32.eye(2)
+    for function in (np.linalg.eig, np.linalg.svd, np.linalg.qr, np.linalg.pinv, np.linalg.cond, np.linalg.slogdet):
+        with pytest.raises(
+            TypeError, match=f"got np.linalg.{function.__name__} of a FloatArray; needed one of np.linalg.ch"
+        ):
+            function(x)
+    assert np.linalg.trace(x) == 2
+    assert np.linalg.solve(np.eye(2), BINARY32.array([1, 2])).to_float().tolist() == [1, 2]
+
+
+class Frame:
+    """What pandas gives: an array that has made whole numbers float64, and exact objects where they are asked for."""
+
+    def __init__(self, columns):
+        self.columns = columns
+
+    def __array__(self, dtype=None, copy=None):
+        return np.column_stack([np.asarray(each, dtype=np.float64) for each in self.columns])
+
+    def to_numpy(self, dtype=None, copy=False, na_value=None):
+        assert dtype is object
+        return np.array(self.columns, dtype=object).T
+
+
+Frame.__module__ = "pandas.core.frame"
+
+
+def test_a_table_of_pandas_gives_exact_numbers_or_the_reason():
+    large = 2**53 + 1
+    table = Frame([[large, 3], [0.1, 0.25], ["0.1", Fraction(1, 3)]])
+    found = BINARY128.array(table)
+    assert found.to_fractions()[:, 0].tolist() == [large, 3]
+    assert found[0, 1].to_fractions() == Fraction(0.1)
+    assert (found[:, 2] == BINARY128.array(["0.1", "1/3"])).all()
+    with pytest.raises(
+        ValueError, match=r"entry \[1, 0\]: got nan; needed a finite number; remove or replace the entry"
+    ):
+        BINARY64.array(Frame([[1, float("nan")]]))
+    for value, kind in ((None, "NoneType"), (np.datetime64("2026-01-01"), "datetime64"), (True, "truth value")):
+        with pytest.raises(TypeError, match=rf"entry \[0, 0\]: got .*{kind}.*; needed a str, int, float"):
+            BINARY64.array(Frame([[value, 1]]))
+
+
+def test_a_table_of_pandas_itself():
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"count": [2**53 + 1, 3], "volt": [0.1, 0.25]})
+    assert BINARY128.array(table).to_fractions()[:, 0].tolist() == [2**53 + 1, 3]
+    assert BINARY128.array(table["count"]).to_fractions().tolist() == [2**53 + 1, 3]
+    with pytest.raises(TypeError, match="needed a str, int, float"):
+        BINARY64.array(pandas.Series([1, None], dtype="Int64"))
+
+
+@pytest.mark.parametrize("fmt", [*FORMATS, FloatFormat(2, 24)], ids=str)
+@pytest.mark.parametrize("shape", [(), (3,), (40,), (12, 5), (2, 3, 4), (0,), (0, 3)], ids=str)
+def test_the_format_stands_in_the_first_line_of_the_text(fmt, shape):
+    x = fmt.array(np.arange(np.prod(shape, dtype=int)).reshape(shape) / 8)
+    lines = repr(x).splitlines()
+    assert lines[0].startswith(f"{fmt}.array(")
+    assert max(map(len, lines[1:]), default=0) <= 120
+    made = {"FloatFormat": FloatFormat, "FixedFormat": FixedFormat, "Rounding": Rounding}
+    back = eval(repr(x).replace("<Rounding.NEAREST: 'nearest'>", "Rounding.NEAREST"), made)
+    assert isinstance(back, FloatArray)
+    assert back.shape == x.shape
+    assert (back == x).all()

@@ -1,0 +1,411 @@
+"""Traced functions: the digits of the function itself, in every arithmetic; what cannot be traced runs as it is."""
+
+from __future__ import annotations
+
+import time
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb import BINARY32, FixedFormat, FloatFormat, peek, required_fraction_bits, required_precision
+from gpbnb.arithmetic import linalg, tape
+from gpbnb.arithmetic.traced import TracedFunction
+from tests.plain_structures import fixed, floating, limited
+
+FORMATS = {
+    "24 bits, away": FloatFormat(2, 24),
+    "24 bits, even": FloatFormat(2, 24, "even"),
+    "24 bits, floor": FloatFormat(2, 24, "down"),
+    "53 bits": FloatFormat(2, 53, "chop"),
+    "8 bits, small range": FloatFormat(2, 8, "even", emin=-14, emax=15),
+    "binary32": BINARY32,
+    "8 decimal digits": FloatFormat(10, 8),
+    "16 decimal digits": FloatFormat(10, 16),
+    "7 decimal digits, range": FloatFormat(10, 7, "even", emin=-95, emax=96),
+    "6 hexadecimal digits": FloatFormat(16, 6, "chop"),
+    "100 bits": FloatFormat(2, 100),
+    "fixed, saturating": FixedFormat(4, 19, "down", "saturate"),
+    "fixed, wrapping": FixedFormat(4, 19, "nearest", "wrap"),
+    "fixed": FixedFormat(4, 27, "even"),
+    "stochastic": FloatFormat(2, 20, "stochastic", seed=5),
+}
+Z = np.round(2 * np.sin(np.arange(100) / 5), 3)
+
+
+def pi_controller(fmt, z):
+    kp, ki, low, high = fmt.array("0.8"), fmt.array("0.05"), fmt.array(-1), fmt.array(1)
+    a, b, i, y, found = fmt.array("0.95"), fmt.array("0.05"), fmt.array(0), fmt.array(0), []
+    for r in z:
+        e = r - y
+        i = np.clip(i + ki * e, low, high)
+        y = a * y + b * np.clip(kp * e + i, low, high)
+        found.append(y)
+    return np.stack(found)
+
+
+def pid_with_anti_windup(fmt, z):
+    kp, ki, kd, kb = fmt.array(["0.9", "0.1", "0.3", "0.25"])
+    i, before, y, found = fmt.array(0), fmt.array(0), fmt.array(0), []
+    for r in z:
+        e = r - y
+        wanted = (kp * e + i) + kd * (e - before)
+        u = np.minimum(np.maximum(wanted, -1), 1)
+        i, before = i + (ki * e + kb * (u - wanted)), e
+        y = y + (u - y) / 8
+        found.append(np.stack([u, y]))
+    return found
+
+
+def cascade(fmt, z):
+    sections = fmt.array([["0.2", "0.4", "0.2", "-0.4", "0.2"], ["0.5", "-0.25", "0.1", "0.3", "0.15"]])
+    states, found = [[fmt.array(0), fmt.array(0)] for _ in sections], []
+    for x in z:
+        for section, s in zip(sections, states, strict=True):
+            b0, b1, b2, a1, a2 = section
+            y = b0 * x + s[0]
+            s[0], s[1] = (b1 * x - a1 * y) + s[1], b2 * x - a2 * y
+            x = y
+        found.append(x)
+    return np.stack(found)
+
+
+def fir(fmt, z):
+    taps = fmt.array(["0.1", "0.2", "0.4", "0.2", "0.1"])
+    return np.stack([taps @ z[k : k + 5] for k in range(len(z) - 4)])
+
+
+def rms(fmt, z):
+    return np.stack([np.sqrt(np.mean(z[k : k + 4] / 4 * z[k : k + 4])) for k in range(0, len(z) - 4, 2)])
+
+
+def limiter(fmt, z):
+    gain, found = fmt.array(1), []
+    for x in z:
+        loud = (abs(x) > 1) & ~(gain < fmt.array("0.25"))
+        gain = np.where(loud, gain * fmt.array("0.7"), np.where(gain >= 1, 1, gain + fmt.array("0.01")))
+        found.append(gain * x)
+    return found
+
+
+def goertzel(fmt, z):
+    c, one, two = fmt.array("1.6"), fmt.array(0), fmt.array(0)
+    for x in z[:20]:
+        one, two = (x / 8 + c * one) - two, one
+    return (one * one / 4 + two * two / 4) - c * one / 4 * two
+
+
+def newton_root(fmt, z):
+    a, x = abs(z) + 1, fmt.array(np.ones(len(z)))
+    for _ in range(6):
+        x = (x + a / x) / 2
+    return x
+
+
+def state_update(fmt, z):
+    A, B = fmt.array([["0.9", "0.1"], ["-0.2", "0.8"]]), fmt.array([["0.1"], ["0.05"]])
+    x, found = fmt.array([0, 0]), []
+    for u in z:
+        x = A @ x + B @ u.reshape(1)
+        found.append(x)
+    return np.stack(found)
+
+
+def integrator(fmt, z):
+    held = np.cumsum(z / 8)
+    return np.where(held > 1, 1, -np.minimum(-held, abs(z))) + np.sum(held[:5]) / 8
+
+
+def angles(fmt, z):
+    """Elementary functions are calls between compiled operations."""
+    angle, found = fmt.array(0), []
+    for x in z[:30]:
+        angle = np.fmod(angle + x, 3)
+        found.append(np.sin(angle) * np.arctan2(x, 2) + np.floor(x).multiply_add(x / 4, angle / 4))
+    return np.stack(found)
+
+
+def many_functions(fmt, z):
+    """Functions that move, choose and reduce."""
+    m = z[:12].reshape(3, 4) / 2
+    small = np.logical_or(m < 0, m == m[0]) ^ (m != 1)
+    chosen = np.select([m > 1, small], [m, -m], 0) + np.triu(m) / 2
+    some = np.where(np.any(m > 1, axis=0), np.max(m, axis=0), np.min(m, axis=0))
+    held = np.where(np.all(m[0] < 1) & True, np.sign(m[0]), np.copysign(m[1], m[2]))
+    return np.concatenate(
+        [chosen.ravel(), some, held, np.diff(m, axis=0)[0], fmt.array([m[0, 1], 1]), np.tile(m[1], 2)]
+    )
+
+
+def kalman(fmt, z):
+    """A Kalman filter with a covariance, two measurements and elimination."""
+    Phi, H, x, P = fmt.array([[1, "0.25"], [0, "0.875"]]), fmt.eye(2), fmt.array([0, 1]), fmt.eye(2)
+    Q, R, found = fmt.eye(2) / 8, fmt.array([["0.5", "0.125"], ["0.125", "0.25"]]), []
+    for value in z[:12]:
+        x, P = Phi @ x, Phi @ P @ Phi.T + Q
+        K = P @ H.T @ linalg.inv(H @ P @ H.T + R)
+        x, P = x + K @ (np.stack([value, value / 2]) - H @ x), P - K @ (H @ P)
+        found.append(x)
+    return np.stack([*found, linalg.lu(P).upper[1]])
+
+
+FUNCTIONS = [
+    pi_controller, pid_with_anti_windup, cascade, fir, rms, limiter, goertzel, newton_root, state_update, integrator,
+    angles, many_functions, kalman,
+]  # fmt: skip
+
+
+def numbers(found):
+    """Exact numbers of what a function returns."""
+    return list(map(numbers, found)) if isinstance(found, list) else np.asarray(found.to_fractions()).tolist()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda each: each.__name__)
+def test_traced_functions_have_the_digits_of_the_function(function, name, monkeypatch):
+    fmt, traced = FORMATS[name], TracedFunction(function)
+    expected = numbers((fmt.restart(), function(fmt, fmt.array(Z)))[1])
+    for few in (0, 10**9):  # in compiled code where the format has it, and in integers of Python
+        monkeypatch.setattr(tape, "FEW_OPERATIONS", few)
+        assert numbers((fmt.restart(), traced(fmt, Z))[1]) == expected
+        assert traced.refusal == ""
+        assert bool(traced.reason) == (name == "stochastic")
+
+
+@pytest.mark.parametrize(
+    ("fmt", "r"),
+    [
+        (FloatFormat(2, 24), floating(2, 24, "nearest")),
+        (FloatFormat(2, 24, "down"), floating(2, 24, "down")),
+        (FloatFormat(10, 8, "even"), floating(10, 8, "even")),
+        (FixedFormat(4, 12, "chop", "saturate"), lambda x: limited(12, 4, "saturate")(fixed(12, "chop")(x))),
+        (FixedFormat(4, 12, "even", "wrap"), lambda x: limited(12, 4, "wrap")(fixed(12, "even")(x))),
+    ],
+    ids=["24 bits, away", "24 bits, floor", "8 decimal digits, even", "saturating", "wrapping"],
+)
+def test_traced_functions_equal_plain_loops_over_fractions(fmt, r, monkeypatch):
+    monkeypatch.setattr(tape, "FEW_OPERATIONS", 0)
+    z = [r(Fraction(str(each))) for each in Z]
+    kp, ki, a, b = (r(Fraction(each)) for each in ("0.8", "0.05", "0.95", "0.05"))
+    i, y, found = Fraction(0), Fraction(0), []
+    for each in z:
+        e = r(each - y)
+        i = min(max(r(i + r(ki * e)), -1), 1)
+        y = r(r(a * y) + r(b * min(max(r(r(kp * e) + i), -1), 1)))
+        found.append(y)
+    assert TracedFunction(pi_controller)(fmt, list(map(str, Z))).to_fractions().tolist() == found
+
+    roots = []
+    for each in z:
+        given, x = r(abs(each) + 1), Fraction(1)
+        for _ in range(6):
+            x = r(r(x + r(given / x)) / 2)
+        roots.append(x)
+    assert TracedFunction(newton_root)(fmt, list(map(str, Z))).to_fractions().tolist() == roots
+
+    c, one, two = r(Fraction("1.6")), Fraction(0), Fraction(0)
+    for each in z[:20]:
+        one, two = r(r(r(each / 8) + r(c * one)) - two), one
+    power = r(r(r(one * one) / 4) + r(r(two * two) / 4))
+    power = r(power - r(r(r(c * one) / 4) * two))
+    assert TracedFunction(goertzel)(fmt, list(map(str, Z))).to_fractions() == power
+
+
+OPERATIONS = [
+    lambda a, b, c: a + b,
+    lambda a, b, c: a - b * c,
+    lambda a, b, c: a * b,
+    lambda a, b, c: a / (abs(b) + 1),
+    lambda a, b, c: np.sqrt(abs(a)),
+    lambda a, b, c: np.where(a < b, c, -a),
+    lambda a, b, c: np.where((a <= b) ^ (b > c), a, b),
+    lambda a, b, c: np.clip(a, -1, 2),
+    lambda a, b, c: np.maximum(a, b) + 1,
+    lambda a, b, c: np.where(~(a == b) | (c != a), abs(c), 0),
+]
+
+
+def drawn(random):
+    """A function of random operations on the entries and rows of a matrix."""
+    steps = random.integers(0, 100, (30, 4)).tolist()
+
+    def function(fmt, z):
+        known = [*z, z[0] * z[1], fmt.array("0.7"), z[2, 1]]
+        for kind, *choice in steps:
+            operands = (known[each % len(known)] for each in choice)
+            known.append(OPERATIONS[kind % len(OPERATIONS)](*operands))
+        return known[6:]
+
+    return function
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_functions(seed, monkeypatch):
+    random = np.random.default_rng(seed)
+    function, z = drawn(random), np.round(random.standard_normal((3, 4)), 2)
+    for name in ("24 bits, even", "binary32", "8 decimal digits", "fixed, saturating", "fixed, wrapping", "100 bits"):
+        fmt, traced = FORMATS[name], TracedFunction(function)
+        for few in (0, 10**9):
+            monkeypatch.setattr(tape, "FEW_OPERATIONS", few)
+            assert numbers(traced(fmt, z)) == numbers(function(fmt, fmt.array(z)))
+            assert traced.reason == ""
+
+
+@pytest.mark.parametrize("few", [0, 10**9])
+@pytest.mark.parametrize(
+    ("function", "fmt", "kind"),
+    [
+        (lambda fmt, z: z[1] / (z[0] - 2), BINARY32, ZeroDivisionError),
+        (lambda fmt, z: np.sqrt(z - 3), FloatFormat(10, 5), ValueError),
+        (lambda fmt, z: np.fmod(z[1], z[0] - 2), FloatFormat(2, 24), ZeroDivisionError),
+        (lambda fmt, z: z * z * z, FixedFormat(3, 10), OverflowError),
+        (lambda fmt, z: np.exp(z * 40), BINARY32, OverflowError),
+        (lambda fmt, z: z + fmt.array("9"), FixedFormat(3, 10), OverflowError),
+        (lambda fmt, z: z + fmt.array("nine"), BINARY32, ValueError),
+        (lambda fmt, z: z[3], BINARY32, IndexError),
+        (lambda fmt, z: linalg.lu(z - z.reshape(2, 1)).upper, BINARY32, np.linalg.LinAlgError),
+        (lambda fmt, z: linalg.lu(fmt.array([[1, 1], [1, 1]]) * z[0]).upper, BINARY32, np.linalg.LinAlgError),
+    ],
+)
+def test_errors_are_those_of_the_function(function, fmt, kind, few, monkeypatch):
+    monkeypatch.setattr(tape, "FEW_OPERATIONS", few)
+    with pytest.raises(kind) as expected:
+        function(fmt, fmt.array([2, 5]))
+    with pytest.raises(kind) as found:
+        TracedFunction(function)(fmt, [2, 5])
+    assert str(found.value) == str(expected.value)
+
+
+def test_a_function_may_handle_its_own_errors():
+    def careful(fmt, z):
+        try:
+            return 1 / z
+        except ZeroDivisionError:
+            return z
+
+    traced = TracedFunction(careful)
+    assert traced(BINARY32, [0, 2]).to_float().tolist() == [0, 2]
+    assert traced.reason.startswith("a run of its operations stops: got a division by zero")
+    assert traced(BINARY32, [4, 2]).to_float().tolist() == [0.25, 0.5]
+    assert traced.reason == ""
+
+
+def test_numbers_beyond_the_range_of_compiled_code():
+    """0.5**2000 has no place in the loops of 24 bits, and every digit on integers of Python."""
+
+    def powers(fmt, z):
+        found = [z[0]]
+        for _ in range(6000):
+            found.append(found[-1] * z[0] if len(found) < 2000 else -found[-1])
+        return np.stack(found[1990:2010])
+
+    fmt, traced = FloatFormat(2, 24), TracedFunction(powers)
+    assert traced(fmt, ["0.55"]).to_fractions().tolist() == powers(fmt, fmt.array(["0.55"])).to_fractions().tolist()
+    assert traced.reason == ""
+
+
+REFUSED = [
+    (lambda fmt, z: z + 1 if z[0] > 0 else z, "it branches on a comparison"),
+    (lambda fmt, z: z + 1 if z[0] else z, "it branches on a number"),
+    (lambda fmt, z: z[np.argsort(z)], "it asks for fmt.kernel"),
+    (lambda fmt, z: z + int(np.argmax(z)), "it branches on a comparison, or counts or converts it"),
+    (lambda fmt, z: z * np.sum(z > 0), "it branches on a comparison, or counts or converts it"),
+    (lambda fmt, z: z * 2 if fmt.precision > 9 else z, "it asks for fmt.precision"),
+    (lambda fmt, z: z * 2 if fmt == BINARY32 else z, "it asks for its format"),
+    (lambda fmt, z: z * 2 if isinstance(fmt, FloatFormat) else z, "it asks for its format"),
+    (lambda fmt, z: z * 2 if "24" in f"{fmt}" else z, "it asks for its format"),
+    (lambda fmt, z: (peek(z, lambda x: None), z)[1], "it shows values with peek"),
+    (lambda fmt, z: linalg.matmul(z, z, sums=FloatFormat(2, 53)), "it asks for fmt.base"),
+    (lambda fmt, z: linalg.solve(fmt.eye(8), z, pivot=True), "it branches on a comparison"),
+    (lambda fmt, z: {"z": z}, "it returns a dict"),
+    (lambda fmt, z: z + np.where(z > 0, 1, 2) * 0, "it chooses between plain numbers"),
+    (lambda fmt, z: z + len([x for x in z if x in z[:3]]), "it branches on a comparison"),
+    (lambda fmt, z: (z > 0) * z, "it takes arrays of another format, or truth values, as numbers"),
+]
+
+
+@pytest.mark.parametrize(("function", "reason"), REFUSED)
+def test_what_cannot_be_traced_runs_as_it_is_and_says_why(function, reason):
+    traced = TracedFunction(function)
+    fmt = FloatFormat(2, 24)
+
+    def shown(run):
+        try:
+            found = run()
+        except TypeError as error:
+            return str(error)
+        return numbers(found["z"] if isinstance(found, dict) else found)
+
+    assert shown(lambda: traced(fmt, Z[:8])) == shown(lambda: function(fmt, fmt.array(Z[:8])))
+    assert traced.reason.startswith(reason)
+    assert traced.refusal == traced.reason
+    assert "in line" in traced.reason or "peek" in reason or "returns" in reason
+
+
+def test_a_refusal_that_the_function_catches_counts():
+    def stubborn(fmt, z):
+        try:
+            return z * (2 if z[0] > 0 else 3)
+        except Exception:
+            return z
+
+    fmt, traced = FloatFormat(2, 24), TracedFunction(stubborn)
+    assert traced(fmt, [1, 2]).to_float().tolist() == [2, 4]
+    assert traced.reason.startswith("it branches on a comparison")
+
+
+def test_long_traces_are_refused(monkeypatch):
+    monkeypatch.setattr(tape, "MOST_OPERATIONS", 100)
+    traced = TracedFunction(pi_controller)
+    assert traced(BINARY32, Z).shape == Z.shape
+    assert traced.reason.startswith("it takes more than 100 operations")
+
+
+def test_constants_must_be_exact_where_the_function_demands_it():
+    traced = TracedFunction(lambda fmt, z: z * 0.1)
+    with pytest.raises(ValueError, match=r"got the operand 0.1; needed a number that .* holds exactly"):
+        traced(BINARY32, [1])
+    assert traced(FloatFormat(2, 60), [2]).to_float().tolist() == [0.2]
+    assert traced.reason == ""
+
+
+def test_a_trace_belongs_to_shapes_and_takes_new_numbers():
+    calls = []
+
+    def summed(fmt, z):
+        calls.append(z.shape)
+        total = fmt.array(0)
+        for each in z:
+            total = total + each
+        return total
+
+    traced = TracedFunction(summed)
+    for numbers_ in ([1, 2], [5, 6], [1, 2, 3]):
+        assert traced(BINARY32, numbers_).to_float() == sum(numbers_)
+    assert calls == [(2,), (3,)]
+
+
+def test_the_search_says_whether_it_was_traced():
+    found = required_precision(pi_controller, 100, 1e-3, z=Z)
+    assert found.untraced == ""
+    assert found.precision > 5
+
+    def branching(fmt, z):
+        return [x if x > 0 else x / 3 for x in z]
+
+    found = required_precision(branching, 100, 1e-2, z=Z)
+    assert found.untraced.startswith("it branches on a comparison")
+    assert "; the function ran operation by operation: it branches on a comparison" in str(found)
+    bits = required_fraction_bits(pi_controller, Z, 1e-3, like=FixedFormat(4, 1))
+    assert bits.fmt.fraction_bits > 5
+
+
+def test_a_controller_of_1000_steps_takes_less_than_a_tenth_of_a_second():
+    z, fmt, traced = np.sin(np.arange(1000) / 50) * 2, FloatFormat(2, 24), TracedFunction(pi_controller)
+    expected = pi_controller(fmt, fmt.array(z))
+    traced(fmt, z)
+    began = time.process_time()
+    found = traced(fmt, z)
+    assert time.process_time() - began < 0.1
+    assert traced.reason == ""
+    assert numbers(found) == numbers(expected)

@@ -1,0 +1,148 @@
+"""The numbers of a format, what it makes, and its bits, compared with NumPy, ml_dtypes and struct."""
+
+from __future__ import annotations
+
+import pickle
+import struct
+from dataclasses import replace
+from fractions import Fraction
+
+import ml_dtypes
+import numpy as np
+import pytest
+
+import gpbnb
+from gpbnb import BINARY32, BINARY64, BINARY128, DECIMAL32, FP8_E4M3, IBM_704, IBM_HEX32, TF32, FixedFormat, FloatFormat
+from gpbnb.arithmetic.fixed import FixedArray
+from gpbnb.arithmetic.rounding import Rounding, rounding_named
+
+Q15 = FixedFormat(0, 15)
+NATIVE = {
+    "BINARY16": (np.float16, np.uint16),
+    "BINARY32": (np.float32, np.uint32),
+    "BINARY64": (np.float64, np.uint64),
+    "BFLOAT16": (ml_dtypes.bfloat16, np.uint16),
+    "FP8_E4M3": (ml_dtypes.float8_e4m3fn, np.uint8),
+    "FP8_E5M2": (ml_dtypes.float8_e5m2, np.uint8),
+    "FP6_E3M2": (ml_dtypes.float6_e3m2fn, np.uint8),
+    "FP6_E2M3": (ml_dtypes.float6_e2m3fn, np.uint8),
+    "FP4_E2M1": (ml_dtypes.float4_e2m1fn, np.uint8),
+}
+
+
+@pytest.mark.parametrize("name", NATIVE)
+def test_the_numbers_of_a_format_are_those_of_the_type(name):
+    fmt, (native, _) = getattr(gpbnb, name), NATIVE[name]
+    info = ml_dtypes.finfo(native)
+    found = [float(each) for each in (fmt.largest, fmt.smallest_normal, fmt.smallest, fmt.unit_roundoff)]
+    assert found == [float(each) for each in (info.max, info.tiny, info.smallest_subnormal, info.eps / 2)]
+    assert all(type(each) is Fraction for each in (fmt.largest, fmt.smallest_normal, fmt.smallest))
+
+
+def test_formats_without_subnormal_numbers_have_no_smaller_one_than_the_smallest_normal():
+    assert IBM_HEX32.smallest == IBM_HEX32.smallest_normal == Fraction(16) ** -65
+    assert BINARY128.largest == (2 - Fraction(1, 2**112)) * 2**16383
+    assert (Q15.largest, Q15.lowest, Q15.smallest) == (1 - Fraction(1, 2**15), -1, Fraction(1, 2**15))
+
+
+@pytest.mark.parametrize("name", ["largest", "smallest", "smallest_normal"])
+def test_unlimited_exponents_have_no_largest_number(name):
+    with pytest.raises(ValueError, match=r"whose exponents are unlimited.*needed a format with emin and emax"):
+        getattr(FloatFormat(2, 8), name)
+
+
+def test_another_precision_has_another_largest_number():
+    """`dataclasses.replace` keeps a largest number that was given, and computes another one again."""
+    assert replace(BINARY32, precision=8).largest == gpbnb.BFLOAT16.largest
+    assert replace(FP8_E4M3, rounding="up").largest == 448
+    assert FloatFormat(2, 4, Rounding.EVEN, -6, 8, largest=448) == FP8_E4M3
+    assert pickle.loads(pickle.dumps(FP8_E4M3)) == FP8_E4M3 != replace(FP8_E4M3, given_largest=None)
+
+
+@pytest.mark.parametrize("name", NATIVE)
+def test_every_word_stores_the_number_of_the_type(name):
+    """All words of 8 and 16 bits, and many of more."""
+    fmt, (native, unsigned) = getattr(gpbnb, name), NATIVE[name]
+    bits = fmt.layout.width
+    if bits <= 8:
+        every = np.arange(2**bits, dtype=unsigned)
+    else:
+        some = np.random.default_rng(7).integers(0, 2**bits, 4000, dtype=unsigned, endpoint=False)
+        least = np.arange(40, dtype=unsigned)  # zero and subnormal numbers
+        every = np.concatenate([some, least, least + unsigned(2 ** (bits - 1))])
+    values = every.view(native)
+    with np.errstate(invalid="ignore"):  # signalling NaNs
+        finite = np.isfinite(values.astype(np.float64))
+    found = fmt.from_bits(every[finite])
+    assert found.to_float().tolist() == values[finite].astype(np.float64).tolist()
+    back = found.to_bits()
+    assert back.dtype == unsigned
+    zero = values[finite] == 0
+    assert not back[zero].any()  # there is no negative zero
+    assert back[~zero].tolist() == every[finite][~zero].tolist()
+    for word in every[~finite][:5].tolist():
+        with pytest.raises(ValueError, match=f"got bits {word:#x}, which are infinity, NaN or beyond the range"):
+            fmt.from_bits(word)
+
+
+def test_words_of_other_machines():
+    """118.625 in hexadecimal floating point is the textbook's example; the 704 stored 1/2 with characteristic 128."""
+    assert IBM_HEX32.array("-118.625").to_bits() == 0xC276A000
+    assert IBM_HEX32.from_bits(0xC276A000).to_fractions() == Fraction("-118.625")
+    assert IBM_704.array("0.5").to_bits() == (128 << 27) | (1 << 26)
+    assert (IBM_704.layout.width, TF32.layout.width, BINARY128.layout.width) == (36, 19, 128)
+    assert BINARY128.array(1).to_bits() == 0x3FFF << 112
+    assert BINARY128.array([1]).to_bits().dtype == object
+    assert BINARY64.array(["0.1"]).to_bits().tolist() == list(struct.unpack("<Q", struct.pack("<d", 0.1)))
+    assert Q15.array(["-1", "0.5", "-0.25"]).to_bits().tolist() == [0x8000, 0x4000, 0xE000]
+    assert Q15.from_bits([0x8000, 0x4000, 0xE000]).to_float().tolist() == [-1, 0.5, -0.25]
+
+
+@pytest.mark.parametrize(
+    ("fmt", "bits", "error", "message"),
+    [
+        (BINARY32, 1 << 32, ValueError, "got bits 0x100000000; needed a word of 32 bits, from 0 to 0xffffffff"),
+        (BINARY32, -1, ValueError, "got bits -0x1; needed a word of 32 bits"),
+        (BINARY32, 1.0, TypeError, "got bits 1.0; needed whole numbers such as 0x3f800000"),
+        (BINARY32, [0, 0x7F800000], ValueError, r"entry \[1\]: got bits 0x7f800000, which are infinity"),
+        (DECIMAL32, 0, ValueError, "which has no bits; needed a range emin, emax, and base 2, or base 16 with"),
+        (FloatFormat(2, 24), 0, ValueError, "which has no bits; needed a range"),
+        (FloatFormat(16, 6, emin=-65, emax=62), 0, ValueError, "which has no bits; needed a range"),
+    ],
+)
+def test_bits_that_store_no_number_are_refused(fmt, bits, error, message):
+    with pytest.raises(error, match=message):
+        fmt.from_bits(bits)
+
+
+def test_zeros_and_identities():
+    assert BINARY32.zeros((2, 3)).to_float().tolist() == np.zeros((2, 3)).tolist()
+    assert BINARY32.eye(2, 3).to_float().tolist() == np.eye(2, 3).tolist()
+    assert type(Q15.zeros(4)) is FixedArray
+    assert FixedFormat(3, 4).eye(2).to_float().tolist() == np.eye(2).tolist()
+    with pytest.raises(OverflowError, match=r"got a result of about 1; needed one from -1 to 0\.9999695"):
+        Q15.eye(2)
+
+
+@pytest.mark.parametrize(
+    ("fmt", "value", "message"),
+    [
+        (Q15, 10**400, r"got a result of about 10\*\*400; needed one from -1 to 0\.9999695; scale the numbers"),
+        (Q15, -(10**400), r"got a result of about -10\*\*400; needed one"),
+        (BINARY128, "1e5000", r"needed at most 10\*\*4932 in size; scale the numbers"),
+    ],
+)
+def test_numbers_beyond_float64_are_refused_in_words(fmt, value, message):
+    with pytest.raises(OverflowError, match=message):
+        fmt.array(value)
+
+
+@pytest.mark.parametrize(
+    ("name", "rounding"), [("floor", "DOWN"), ("CEIL", "UP"), ("ceiling", "UP"), ("truncate", "CHOP")]
+)
+def test_roundings_have_the_names_of_programming_languages(name, rounding):
+    assert rounding_named(name) is Rounding(name) is Rounding[rounding]
+    assert Rounding(rounding) is Rounding[rounding]
+    with pytest.raises(ValueError, match="got rounding 'towards'; needed a Rounding or one of 'nearest', 'chop', "):
+        Rounding("towards")
+    assert FloatFormat(2, 8, name).rounding is FixedFormat(2, 8, name).rounding is Rounding[rounding]

@@ -1,0 +1,142 @@
+"""gpbnb.arithmetic.derivatives against SymPy, and its values against the functions themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy
+
+from gpbnb import BINARY32, FloatFormat, linalg
+from gpbnb.arithmetic.derivatives import SLOPES, jacobian
+
+FMT = FloatFormat(2, 53)
+X = ["0.3", "-0.7", "0.45"]
+SYMBOLS = sympy.symbols("x:3")
+
+ELEMENTARY = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
+
+
+def by_sympy(expressions):
+    at = dict(zip(SYMBOLS, map(sympy.Rational, X), strict=True))
+    return np.array(sympy.Matrix(expressions).jacobian(SYMBOLS).evalf(30, subs=at).tolist(), dtype=float)
+
+
+def close(function, expressions):
+    x = FMT.array(X)
+    value, slopes = jacobian(function, x)
+    assert np.array_equal(value, function(x))
+    expected = by_sympy(expressions)
+    assert np.abs(slopes.to_float() - expected).max() < 2**-48 * max(1, np.abs(expected).max())  # some 30 roundings
+
+
+@pytest.mark.parametrize("name", sorted(SLOPES))
+def test_the_slope_of_each_function(name):
+    inner = SYMBOLS[0] * SYMBOLS[1] + (2 if name.startswith("log") else 0)
+    formula = {"expm1": sympy.exp(inner) - 1, "log1p": sympy.log(1 + inner)}.get(name)
+    formula = getattr(sympy, ELEMENTARY.get(name, name))(inner) if formula is None else formula
+    close(lambda x: getattr(np, name)(x[0] * x[1] + (2 if name.startswith("log") else 0)).reshape(1), [formula])
+
+
+def test_operations_and_functions_of_two_numbers():
+    a, b, c = SYMBOLS
+
+    def function(x):
+        return np.stack(
+            [
+                x[0] / x[1] - 2 * x[2],
+                np.hypot(x[0], x[1]),
+                np.arctan2(x[1], x[2]),
+                np.sqrt(x[0] + 1) * x[1] ** 3,
+                (1 / x[2] - x[0]) / (3 - x[1]),
+                abs(x[1]) + np.abs(x[0]),
+                x @ x + np.linalg.norm(x),
+                np.cross(x, [1, 2, 4])[1] + x.sum() - x.mean() * 3,
+                np.where(x[0] > x[1], x[0] * x[2], x[1]),
+                np.maximum(x[0], x[1]) * np.minimum(x[0], x[2]),
+                np.prod(x) + np.square(x[0]),
+                (x[1] + 5) % 2 * x[2],
+                -x[0],
+            ]
+        )
+
+    square = a**2 + b**2 + c**2
+    close(
+        function,
+        [
+            a / b - 2 * c,
+            sympy.sqrt(a**2 + b**2),
+            sympy.atan2(b, c),
+            sympy.sqrt(a + 1) * b**3,
+            (1 / c - a) / (3 - b),
+            -b + a,
+            square + sympy.sqrt(square),
+            c * 1 - a * 4 + a + b + c - (a + b + c),
+            a * c,
+            a * a,
+            a * b * c + a**2,
+            (b + 1) * c,  # 4.3 - 2 * 2 = 0.3 = b + 1
+            -a,
+        ],
+    )
+
+
+def test_products_of_matrices():
+    A, B = sympy.Matrix(2, 2, [SYMBOLS[0], 2, SYMBOLS[1], SYMBOLS[2]]), sympy.Matrix(2, 2, [1, SYMBOLS[1], 3, 4])
+
+    def function(x):
+        left = np.stack([np.stack([x[0], x[0] * 0 + 2]), np.stack([x[1], x[2]])])
+        right = np.stack([np.stack([x[0] * 0 + 1, x[1]]), FMT.array([3, 4])])
+        product = left @ right
+        return np.concatenate([product.ravel(), FMT.array([[1, 2], [3, 5]]) @ product[:, 0], left[0] @ [[1], [2]]])
+
+    product = A * B
+    close(
+        function,
+        [*product, product[0] + 2 * product[2], 3 * product[0] + 5 * product[2], SYMBOLS[0] + 4],
+    )
+
+
+def test_derivatives_round_in_the_order_that_is_stated():
+    fmt = FloatFormat(10, 3)
+    x = fmt.array(["1.23", "4.56"])
+    _, slopes = jacobian(lambda x: np.stack([x[0] / x[1], np.hypot(x[0], x[1]), x[0] * x[1] * x[0]]), x)
+    # (1 - 0.270 * 0) / 4.56 = 0.219, (0 - 0.270) / 4.56 = -0.0592; 1.23 / 4.72, 4.56 / 4.72
+    assert slopes[:2].to_fractions().tolist() == fmt.array([["0.219", "-0.0592"], ["0.261", "0.966"]]).tolist()
+    # (4.56 * 1.23) + 5.61 = 5.61 + 5.61; 1.23 * 1.23 = 1.51
+    assert slopes[2].tolist() == fmt.array(["11.2", "1.51"]).tolist()
+
+
+def test_a_linear_function_has_its_matrix():
+    A = BINARY32.array([["0.1", "0.2"], ["0.3", "-7"]])
+    assert np.array_equal(jacobian(lambda x: A @ x, BINARY32.array(["0.9", "1.1"]))[1], A)
+    assert np.array_equal(jacobian(lambda x: A[0], BINARY32.array(["0.9", "1.1"]))[1], BINARY32.array(np.zeros((2, 2))))
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        np.cumsum,
+        np.floor,
+        np.sort,
+        np.sign,
+        lambda x: x**x,
+        lambda x: 2**x,
+        lambda x: x**0.5,
+        lambda x: x // 2,
+        lambda x: 2 % x,
+        lambda x: np.copysign(x, x),
+        lambda x: np.add.accumulate(x),
+        lambda x: x.to_float(),
+        lambda x: x * float(x[0]),
+        lambda x: linalg.solve(x.format.eye(3), x),
+        lambda x: x.multiply_add(x, x),
+    ],
+)
+def test_operations_without_a_rule_are_refused(function):
+    with pytest.raises(TypeError, match=r"derivatives; needed operations with a rule: \+ - \* / @, powers, sqrt"):
+        jacobian(function, FMT.array(X))
+
+
+def test_a_slope_that_does_not_exist_is_refused():
+    with pytest.raises(ZeroDivisionError):
+        jacobian(lambda x: np.sqrt(x), FMT.array([0, 1]))

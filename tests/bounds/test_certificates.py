@@ -1,0 +1,518 @@
+"""Certificates of guarantees: the checker proves those of the book, and rejects what is altered or was wrong."""
+
+from __future__ import annotations
+
+import ast
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_openings import NINE, WITHIN, raised_while_factored
+
+from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
+from gpbnb.bounds import check
+from gpbnb.bounds import guarantee as guarantees
+from gpbnb.bounds.check import NotProvedError, prove
+from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
+from gpbnb.bounds.linear import filter_schedule
+from gpbnb.filters.forms import Form
+from gpbnb.filters.system import biquad
+from gpbnb.report.guarantees import certificates
+from gpbnb.report.guarantees.random_filters import draw
+from gpbnb.wordlength.examples import cyclic, tracker
+
+Content = dict[str, Any]
+FORMAT = FloatFormat(2, 24)
+CHECKER = Path(check.__file__)
+CHAPTER = certificates.guarantees()
+
+
+def small(**changes: Any) -> LinearModel:
+    given = {
+        "Phi": [["1/2", 0], ["1/4", "1/3"]], "H": [[1, 1]], "Q": [[1, 0], [0, 1]], "R": [["0.75"]],
+        "x0": ["0.3", 0], "P0": [[1, 0], [0, 1]],
+    }  # fmt: skip
+    return LinearModel(**(given | changes))
+
+
+def written(model: Any, fmt: Any, within: Any, form: Form | str = Form.INNOVATION, **options: Any) -> Content:
+    return dict(json.loads(guarantee(model, fmt, within, form, **options).certificate()))
+
+
+def section(fmt: Any) -> Content:
+    made = biquad("0.01", "0.02", "0.01", "-1.6", "0.7")
+    found = from_schedule(filter_schedule(made, fmt), limits(3, 1, measurement=1.0))
+    return dict(json.loads(found.certificate()))
+
+
+def refused(content: Content) -> str:
+    with pytest.raises((NotProvedError, NotImplementedError)) as error:
+        prove(content)
+    return str(error.value)
+
+
+# -- what is proved ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [name for name in CHAPTER if name not in certificates.SLOW])
+def test_the_checker_proves_the_guarantees_of_the_book(name: str) -> None:
+    found = CHAPTER[name]()
+    content = json.loads(found.certificate())
+    prove(content)
+    claimed = np.array([float(Fraction(each)) for each in content["bound"]])
+    assert (claimed >= found.bound).all()
+    assert (claimed <= found.bound * (1 + 1e-6) + 1e-12 * found.bound.max()).all()
+
+
+FORMATS = [
+    FloatFormat(2, 11, Rounding.CHOP),
+    FloatFormat(2, 9, Rounding.EVEN, -14, 15),
+    FloatFormat(2, 9, Rounding.ODD, -20, 15, subnormal=False),
+    FloatFormat(10, 5, Rounding.UP),
+    FloatFormat(16, 4, Rounding.DOWN),
+    FixedFormat(6, 12),
+]
+
+
+@pytest.mark.parametrize("form", Form)
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_the_checker_covers_formats_forms_and_limits(fmt: Any, form: Form) -> None:
+    """In fixed point, sums of a step may leave the range for one kind of limits."""
+    within = limits(2, 1, state=6, innovation=6)
+    prove(written(small(), fmt, within, form))
+    prove(written(small(), fmt, limits(2, 1, measurement=4), form))
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_the_checker_covers_linear_structures(fmt: Any) -> None:
+    prove(section(fmt))
+
+
+def test_models_of_cycles_and_of_some_steps_are_proved() -> None:
+    model = small(Phi=[[["1/2", 0], ["1/4", "1/3"]], [["1/4", 0], ["1/8", "1/2"]]], R=[[["0.75"]], [["0.5"]], [["2"]]])
+    for form in (Form.INNOVATION, Form.UD):
+        content = written(model, FloatFormat(2, 11), limits(2, 1, measurement=4), form)
+        assert content["period"] % 6 == 0
+        prove(content)
+    content = written(small(steps=7), FORMAT, limits(2, 1, measurement=4))
+    assert content["steps"] == 7
+    assert "after 7 steps" in prove(content)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_random_filters_are_proved(seed: int) -> None:
+    """Every form, rounding, base and kind of limits; two of the filters have no bound, or no filter."""
+    drawn = draw(seed)
+    try:
+        found = guarantee(drawn.model, drawn.fmt, drawn.within, drawn.form, most=300, horizon=20)
+    except ValueError:
+        assert seed in REFUSED
+        return
+    if np.isfinite(found.bound).all():
+        (refused if seed in DEGENERATE else prove)(json.loads(found.certificate()))
+    else:
+        assert seed in WITHOUT_BOUND
+
+
+REFUSED, WITHOUT_BOUND = (14, 23, 29), (11, 16)
+DEGENERATE = (28,)
+"""Nothing is measured, and all numbers are zero; but the checker, which rounds outwards, claims positive bounds."""
+
+
+def test_a_running_sum_is_proved_for_its_steps() -> None:
+    """It keeps its errors, so only a number of steps has a bound."""
+    made = LinearSystem([["1"]], [["1"]]).as_filter()
+    found = from_schedule(filter_schedule(made, FloatFormat(2, 11)), limits(2, 1, measurement=1.0), 50)
+    content = dict(json.loads(found.certificate()))
+    assert content["steps"] == 50
+    assert "after 50 steps" in prove(content)
+    scale_bound("0.99")(content)
+    assert "may exceed its bound after step 50" in refused(content)
+
+
+def test_a_certificate_holds_the_model_as_given() -> None:
+    content = written(tracker(), FORMAT, limits(2, 1, state=[1000, 30], innovation=8))
+    assert content["filter"]["Phi"] == [[["1", "1/10"], ["0", "1"]]]
+    assert content["limits"] == {"state": ["1000", "30"], "innovation": ["8"], "measurement": [None]}
+    assert (content["repeat"], content["period"], content["steps"]) == (173, 1, None)
+
+
+# -- the checker stands alone -----------------------------------------------------------------------------------------
+
+
+def run(folder: Path, content: Content | str) -> subprocess.CompletedProcess[str]:
+    """Run a copy of the checker without the packages of this environment."""
+    shutil.copy(CHECKER, folder / "check.py")
+    text = content if isinstance(content, str) else json.dumps(content)
+    (folder / "certificate.json").write_text(text, encoding="utf-8")
+    command = [sys.executable, "-I", "-S", "check.py", "certificate.json"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_a_copy_of_the_checker_runs_anywhere(tmp_path: Path) -> None:
+    content = written(small(), FloatFormat(2, 11), limits(2, 1, state=6, innovation=6))
+    done = run(tmp_path, content)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith("\nproved\n")
+    assert "rounding has moved states by at most" in done.stdout
+    done = run(tmp_path, content | {"bound": ["1/1000000"] * 2})
+    assert (done.returncode, done.stderr) == (1, "")
+    assert done.stdout.startswith("not proved: ")
+    done = run(tmp_path, content | {"order": "pairwise sums"})
+    assert (done.returncode, done.stdout.partition(":")[0]) == (1, "not covered")
+
+
+def test_the_checker_needs_only_the_standard_library() -> None:
+    tree = ast.parse(CHECKER.read_text(encoding="utf-8"))
+    imported = {
+        name.split(".")[0]
+        for node in ast.walk(tree)
+        for name in (
+            [alias.name for alias in node.names]
+            if isinstance(node, ast.Import)
+            else [node.module or "."]
+            if isinstance(node, ast.ImportFrom)
+            else []
+        )
+    }
+    assert imported <= set(sys.stdlib_module_names)
+
+
+# -- what is altered is rejected --------------------------------------------------------------------------------------
+
+
+@cache
+def original(name: str) -> str:
+    """Certificates of some kinds."""
+    contents = {
+        "tracker": lambda: written(tracker(), FORMAT, limits(2, 1, state=[1000, 30], innovation=8)),
+        "joseph": lambda: written(small(), FloatFormat(2, 11), limits(2, 1, measurement=4), Form.JOSEPH),
+        "ud": lambda: written(small(), FloatFormat(10, 4, "up"), limits(2, 1, state=6, innovation=6), Form.UD),
+        "hung": lambda: written(small(), FloatFormat(2, 9, emin=-14, emax=15), limits(2, 1, 6, 6), Form.HUNG),
+        "section": lambda: section(FORMAT),
+        "fixed": lambda: section(FixedFormat(6, 12)),
+        "cycle": lambda: written(
+            small(R=[[["0.75"]], [["0.5"]]]), FloatFormat(2, 11), limits(2, 1, measurement=4), Form.JOSEPH
+        ),
+    }
+    return json.dumps(contents[name]())
+
+
+KALMAN = ("tracker", "joseph", "ud", "hung")
+STEADY = ("tracker", "joseph", "hung", "section")  # the bound of the UD form is that of its first steps
+EVERY = (*KALMAN, "section")
+
+
+def factor(text: str, by: str) -> str:
+    return str(Fraction(text) * Fraction(by))
+
+
+def scale_bound(by: str) -> Callable[[Content], None]:
+    def alter(content: Content) -> None:
+        content["bound"] = [factor(each, by) for each in content["bound"]]
+
+    return alter
+
+
+def scale_one(state: int) -> Callable[[Content], None]:
+    def alter(content: Content) -> None:
+        content["bound"][state] = factor(content["bound"][state], "0.99")
+
+    return alter
+
+
+def set_to(*keys: Any) -> Callable[[Content], None]:
+    *path, last, value = keys
+
+    def alter(content: Content) -> None:
+        place: Any = content
+        for key in path:
+            place = place[key]
+        assert place[last] != value
+        place[last] = value(place[last]) if callable(value) else value
+
+    return alter
+
+
+def narrower(by: str) -> Callable[[Content], None]:
+    return set_to("width", lambda width: [[factor(each, by) for each in row] for row in width])
+
+
+ALTERED: dict[str, tuple[tuple[str, ...], Callable[[Content], None]]] = {
+    "a bound smaller by a hundredth": (EVERY, scale_bound("0.99")),
+    "the bound of one state smaller by a hundredth": (EVERY, scale_one(1)),
+    "one more binary digit": (EVERY, scale_bound("1/2")),
+    "one more decimal digit": (EVERY, scale_bound("1/10")),
+    "a negative bound": (EVERY, scale_bound("-1")),
+    "half of the steps back": (("joseph", "section"), set_to("back", lambda lags: lags // 2)),
+    "one step back": (STEADY, set_to("back", 1)),
+    "no steps back": (EVERY, set_to("back", 0)),
+    "steps back in floats": (EVERY, set_to("back", float)),
+    "no limits of the exact covariance": (KALMAN, set_to("width", [])),
+    "limits of the exact covariance without width": (KALMAN, narrower("0")),
+    "limits of the exact covariance that are negative": (KALMAN, narrower("-1")),
+    "limits of the exact covariance that are too narrow": (("tracker",), narrower("1/1000")),
+    "limits of the exact covariance that are too wide": (("tracker", "joseph", "hung"), narrower("1e15")),
+    "another period": (("cycle",), set_to("period", lambda p: p + 1)),
+    "half of the period": (("cycle",), set_to("period", lambda p: p // 2)),
+    "no period": (KALMAN, set_to("period", 0)),
+    "repeats too soon": (KALMAN, set_to("repeat", lambda k: k - 1)),
+    "repeats from the beginning": (KALMAN, set_to("repeat", 0)),
+    "settles before it repeats": (KALMAN, set_to("first", 0)),
+    "a period that is no number": (KALMAN, set_to("period", lambda p: p + 0.5)),
+    "an entry of Phi": (KALMAN, set_to("filter", "Phi", 0, 1, 1, lambda x: factor(x, "3"))),
+    "an entry of R": (("tracker", "joseph", "hung"), set_to("filter", "R", 0, 0, 0, lambda x: factor(x, "1.01"))),
+    "Q is not symmetric": (KALMAN, set_to("filter", "Q", 0, 0, 1, lambda x: str(Fraction(x) + 1))),
+    "another form": (("tracker",), set_to("filter", "form", "hung")),
+    "an unknown form": (KALMAN, set_to("filter", "form", "carlson")),
+    "a state limit twice as large": (("tracker", "ud", "hung"), set_to("limits", "state", 0, lambda x: factor(x, "2"))),
+    "a measurement limit twice as large": (("joseph", "section"), set_to("limits", "measurement", ["8"])),
+    "no limit on the state": (("tracker", "ud", "hung"), set_to("limits", "state", 0, None)),
+    "a derived limit too small": (("joseph", "section"), set_to("derived", "state", 0, lambda x: factor(x, "0.9"))),
+    "a derived limit of an innovation": (("joseph",), set_to("derived", "innovation", 0, lambda x: factor(x, "0.9"))),
+    "a first estimate beyond its limit": (("tracker", "ud", "hung"), set_to("filter", "x0", ["5000", "5000"])),
+    "a digit less": (EVERY, set_to("format", "precision", lambda t: t - 1)),
+    "chopped": (("tracker", "joseph", "hung", "section"), set_to("format", "rounding", "chop")),
+    "at random": (EVERY, set_to("format", "rounding", "stochastic")),
+    "another order": (EVERY, set_to("order", "sums from right to left")),
+    "a coefficient": (("section",), set_to("filter", "coefficients", 3, lambda x: factor(x, "1.01"))),
+    "another operation": (("section",), set_to("filter", "operations", 1, 0, "subtract")),
+    "an operation on itself": (("section",), set_to("filter", "operations", 1, 1, 5)),
+    "another recursion": (("section",), set_to("filter", "A", 0, 0, lambda x: str(Fraction(x) + 1))),
+    "too small a range": (("hung",), set_to("format", "emax", 1)),
+    "limits of another filter": (EVERY, set_to("limits", "innovation", ["1", "1"])),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "alteration"), [(name, each) for each, (names, _) in ALTERED.items() for name in names]
+)
+def test_altered_certificates_are_rejected(name: str, alteration: str) -> None:
+    """Where a smaller bound might hold, the rows do not prove it."""
+    content: Content = json.loads(original(name))
+    ALTERED[alteration][1](content)
+    assert json.dumps(content) != original(name)
+    refused(content)
+
+
+@pytest.mark.parametrize("name", [*EVERY, "cycle"])
+def test_the_originals_are_proved(name: str) -> None:
+    prove(json.loads(original(name)))
+
+
+@pytest.mark.parametrize("key", ["filter", "format", "limits", "bound", "back", "steps", "keep", "derived", "width"])
+def test_incomplete_certificates_are_rejected(key: str) -> None:
+    content = json.loads(original("joseph"))
+    del content[key]
+    assert "no certificate" in refused(content)
+
+
+# -- what is forged is rejected ---------------------------------------------------------------------------------------
+
+FORGED: dict[str, tuple[str, Callable[[Content], None]]] = {
+    "a number as a float": ("joseph", set_to("bound", 0, 1e9)),
+    "a number that is none": ("joseph", set_to("bound", 0, float("nan"))),
+    "an infinite number": ("joseph", set_to("bound", 0, float("inf"))),
+    "a truth value as a number": ("joseph", set_to("filter", "x0", 0, True)),
+    "a power of ten": ("joseph", set_to("bound", 0, "1e3")),
+    "digits of another script": ("joseph", set_to("bound", 0, "\u0661")),
+    "digits with a gap": ("joseph", set_to("bound", 0, "1_000")),
+    "a denominator of zero": ("joseph", set_to("bound", 0, "1/0")),
+    "a number of 5000 digits": ("joseph", set_to("bound", 0, "9" * 5000)),
+    "no bound": ("joseph", set_to("bound", 0, None)),
+    "a truth value as a period": ("joseph", set_to("period", True)),
+    "a negative period": ("joseph", set_to("period", -1)),
+    "negative steps": ("joseph", set_to("steps", -1)),
+    "a truth value as steps": ("joseph", set_to("steps", True)),
+    "steps of zero": ("joseph", set_to("steps", 0)),
+    "a base as a float": ("joseph", lambda content: content["format"].update(base=2.0)),
+    "a base of one": ("joseph", set_to("format", "base", 1)),
+    "no digits": ("joseph", set_to("format", "precision", 0)),
+    "a million digits": ("joseph", set_to("format", "precision", 10**6)),
+    "an exponent as a float": ("hung", lambda content: content["format"].update(emin=-14.0)),
+    "exponents in the wrong order": ("hung", set_to("format", "emin", 20)),
+    "subnormal numbers in words": ("hung", set_to("format", "subnormal", "no")),
+    "a repair in words": ("joseph", set_to("filter", "repair", "no")),
+    "an unknown overflow": ("fixed", set_to("format", "overflow", "sometimes")),
+    "an overflow beside exponents": ("joseph", lambda content: content["format"].update(overflow="wrap")),
+    "an unknown entry of the format": ("joseph", lambda content: content["format"].update(accumulator=48)),
+    "an unknown limit": ("joseph", lambda content: content["limits"].update(acceleration=["1"])),
+    "an unknown derived limit": ("joseph", lambda content: content["derived"].update(acceleration=["1"])),
+    "a largest exponent alone": ("joseph", set_to("format", "emax", 3)),
+    "a largest number without a range": ("joseph", set_to("format", "largest", "2")),
+    "flushed without a range": ("joseph", set_to("format", "subnormal", False)),
+    "a column more": ("joseph", set_to("filter", "Phi", 0, lambda rows: [[*row, "0"] for row in rows])),
+    "a row more": ("joseph", set_to("filter", "Phi", 0, lambda rows: [*rows, rows[0]])),
+    "a state less": ("joseph", set_to("filter", "x0", ["0"])),
+    "a negative derived limit": ("section", set_to("derived", "state", lambda sizes: ["-1"] * len(sizes))),
+    "a derived limit of another filter": ("section", set_to("derived", "innovation", [])),
+    "known inputs": ("joseph", lambda content: content["filter"].update(B=[[["1"]]])),
+    "an unknown entry": ("joseph", lambda content: content.update(assume="the bound holds")),
+    "an unknown kind": ("section", set_to("filter", "kind", "nonlinear")),
+    "a limited value": ("section", set_to("filter", "operations", 1, 0, "limit")),
+    "a coefficient from the end": ("section", set_to("filter", "operations", 0, 1, -1)),
+    "a later value": ("section", set_to("filter", "operations", 2, 2, 99)),
+    "a truth value as a state": ("section", set_to("filter", "outputs", 0, True)),
+    "fixed coefficients of a Kalman filter": ("joseph", set_to("filter", "form", "fixed coefficients")),
+}
+NOT_COVERED = (
+    "an overflow beside exponents",
+    "an unknown entry of the format",
+    "an unknown limit",
+    "an unknown derived limit",
+    "known inputs",
+    "an unknown entry",
+    "an unknown kind",
+    "a limited value",
+    "fixed coefficients of a Kalman filter",
+)
+
+
+@pytest.mark.parametrize("forgery", FORGED)
+def test_forged_certificates_are_rejected(forgery: str) -> None:
+    name, forge = FORGED[forgery]
+    content: Content = json.loads(original(name))
+    forge(content)
+    with pytest.raises((NotProvedError, NotImplementedError)) as error:
+        prove(content)
+    covered = not isinstance(error.value, NotImplementedError)
+    assert covered == (forgery not in (*NOT_COVERED, "a million digits"))
+
+
+def test_a_key_that_occurs_twice_is_rejected(tmp_path: Path) -> None:
+    """JSON allows it, and a reader sees the other one."""
+    text = original("joseph").replace('"bound": ', '"bound": ["1/1000000", "1/1000000"], "bound": ', 1)
+    done = run(tmp_path, text)
+    assert (done.returncode, done.stdout) == (1, "not proved: a key occurs twice\n")
+
+
+def test_a_name_cannot_look_like_a_verdict(tmp_path: Path) -> None:
+    done = run(tmp_path, json.loads(original("joseph")) | {"name": "x\nproved", "bound": ["1/1000000"] * 2})
+    assert "proved" not in done.stdout.splitlines()
+    done = run(tmp_path, json.loads(original("joseph")) | {"name": "x\nproved"})
+    assert [line.startswith("proved") for line in done.stdout.splitlines()] == [False, True]
+
+
+@pytest.mark.parametrize("power", [0, 200])
+def test_units_do_not_change_the_verdict(power: int) -> None:
+    """Lengths of segments once underflowed in float64, and the checker lost what they bound."""
+    given = json.loads(original("tracker"))
+    given["keep"] = [3, 2]
+    assert "may exceed" in refused(given)
+    scaled = lambda x, by: [scaled(each, by) for each in x] if isinstance(x, list) else x and factor(x, by)  # noqa: E731
+    for key in ("Q", "R", "P0"):
+        given["filter"][key] = scaled(given["filter"][key], f"1e{2 * power}")
+    given["width"] = scaled(given["width"], f"1e{2 * power}")
+    given["filter"]["x0"], given["bound"] = (scaled(x, f"1e{power}") for x in (given["filter"]["x0"], given["bound"]))
+    for key in ("limits", "derived"):
+        given[key] = {name: scaled(sizes, f"1e{power}") for name, sizes in given[key].items()}
+    assert "may exceed" in refused(given)
+
+
+# -- guarantees that were wrong ---------------------------------------------------------------------------------------
+
+
+def test_factors_that_were_raised_twice_are_rejected() -> None:
+    """A run reaches 0.011478 where a bound of 0.0097876 was claimed."""
+    content = written(raised_while_factored(), NINE, WITHIN, Form.UD)
+    prove(content)
+    assert "may exceed" in refused(content | {"bound": [content["bound"][0], "0.0097876", content["bound"][2]]})
+
+
+def test_a_filter_that_must_not_be_repaired_is_rejected() -> None:
+    content = written(raised_while_factored(), NINE, WITHIN, Form.UD)
+    content["filter"]["repair"] = False
+    assert "factors of a covariance are not definite" in refused(content)
+
+
+def test_stochastic_rounding_is_not_covered() -> None:
+    """Bound "for ever" of 4.82, but an error of 5.217 at the third step: the covariance occurs again by chance."""
+    model = LinearModel([[0]], [[1]], [[1]], [["0.4375"]], [0], [[1]])
+    content = written(model, FloatFormat(2, 5), limits(1, 1, state=100, innovation=100, measurement=100))
+    prove(content)
+    content["format"]["rounding"] = "stochastic"
+    content["bound"] = ["4.82"]
+    with pytest.raises(NotImplementedError, match="stochastic rounding"):
+        prove(content)
+
+
+def test_measurements_that_are_stored_beyond_their_limit_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three bits store 0.95 as 1; a bound for 0.95 once forgot the roundings of results above 1."""
+    fmt, within = FloatFormat(2, 3), limits(2, 1, measurement=0.95)
+    made = filter_schedule(LinearSystem([["0.5"]], [["1"]]).as_filter(), fmt)
+    prove(json.loads(from_schedule(made, within).certificate()))
+    monkeypatch.setattr(guarantees, "stored_sizes", lambda _, sizes: sizes)
+    refused(json.loads(from_schedule(made, within).certificate()))
+
+
+@pytest.mark.parametrize("subnormal", [True, False])
+def test_underflow_counts(subnormal: bool) -> None:
+    """A bound that holds for any exponents does not hold where results underflow."""
+    made = biquad("0.01", "0.02", "0.01", "-1.6", "0.7")
+    within = limits(3, 1, measurement=2.0**-9)
+    content = json.loads(from_schedule(filter_schedule(made, FloatFormat(2, 11)), within).certificate())
+    prove(content)
+    content["format"] |= {"emin": -14, "emax": 15, "subnormal": subnormal}
+    refused(content)
+
+
+def test_signs_of_a_first_estimate_count() -> None:
+    """Its states add where those of its sizes cancel, so chopping loses 982 where a bound of 640 was claimed.
+
+    The first step computes 16 (x_0 - x_1) = 32,000, and each later one multiplies by 255 / 256.
+    """
+    true = stored = Fraction(32_000)
+    for _ in range(60):
+        true, product = true * Fraction(255, 256), stored * Fraction(255, 256)
+        unit = Fraction(2) ** (int(product).bit_length() - 8)
+        stored = product // unit * unit
+    assert 982 < true - stored < 983
+    first, later = [["16", "-16"], ["0", "1"]], [["255/256", "0"], ["0", "1"]]
+    content = {
+        "certificate": "rounding guarantee 1",
+        "name": "a difference that is kept",
+        "filter": {
+            "kind": "kalman", "form": "innovation", "repair": False, "repaired": [],
+            "Phi": [first] + [later] * 60, "H": [[["1", "0"]]], "Q": [[["0", "0"], ["0", "0"]]], "R": [[["1"]]],
+            "x0": ["1000", "-1000"], "P0": [["0", "0"], ["0", "0"]],
+        },
+        "format": json.loads(original("joseph"))["format"] | {"precision": 8, "rounding": "chop"},
+        "order": "each product and sum rounded once, sums from left to right",
+        "limits": {"state": [None, None], "innovation": [None], "measurement": ["1"]},
+        "derived": {"state": ["1100", "1100"], "innovation": ["1200"]},
+        "bound": ["640", "640"],
+        "steps": 61, "repeat": 0, "period": 0, "first": 0, "keep": [99, 99], "back": 0, "width": [],
+    }  # fmt: skip
+    assert "may exceed its limit" in refused(content)
+    content |= {"derived": {"state": ["40000", "1100"], "innovation": ["50000"]}, "bound": ["40000", "40000"]}
+    prove(content)
+
+
+def test_limits_of_zero_are_numbers() -> None:
+    """An input that is zero moves nothing; its limit, a Fraction, once met an operation of integers."""
+    content = written(small(), FloatFormat(2, 11), limits(2, 1, measurement=0))
+    assert content["limits"]["measurement"] == ["0"]
+    prove(content)
+
+
+def test_a_first_estimate_beyond_its_limit_is_rejected() -> None:
+    content = written(small(), FORMAT, limits(2, 1, state=6, innovation=6))
+    content["filter"]["x0"] = ["1", "-11"]
+    assert "the first estimate is beyond its limit" in refused(content)
+
+
+def test_what_has_no_certificate_says_so() -> None:
+    slow = guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(10, 2, state=100, innovation=10), most=1000)
+    with pytest.raises(ValueError, match="never repeats"):
+        slow.certificate()
+    none = guarantee(small(), FloatFormat(2, 11, emin=-14, emax=15), limits(2, 1, measurement=1e6))
+    with pytest.raises(ValueError, match="without a bound"):
+        none.certificate()

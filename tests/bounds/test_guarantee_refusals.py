@@ -1,0 +1,352 @@
+"""What a guarantee assumes is checked, and what it cannot cover is refused with a reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
+from gpbnb.bounds import gains
+from gpbnb.bounds.adversary import attack
+from gpbnb.bounds.envelope import Disturbances, FilterLimits, columns
+from gpbnb.bounds.gains import schedule
+from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
+from gpbnb.bounds.linear import filter_schedule
+from gpbnb.bounds.probable import probable_error
+from gpbnb.bounds.storing import stored_sizes, storing_errors
+from gpbnb.filters.forms import Form
+from gpbnb.filters.run import Run, reference_states
+from gpbnb.filters.system import state_space
+from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
+from gpbnb.wordlength.precision import required_precision
+
+FORMAT = FloatFormat(2, 11)
+Asked = Callable[[LinearModel, Any, FloatFormat], Any]
+
+
+def scalar(**changes: Any) -> LinearModel:
+    return LinearModel(**({"Phi": [["1/2"]], "H": [[1]], "Q": [[1]], "R": [[1]], "x0": [0], "P0": [[1]]} | changes))
+
+
+def two_states(**changes: Any) -> LinearModel:
+    given = {
+        "Phi": [["1/2", 0], ["1/4", "1/3"]], "H": [[1, 1]], "Q": [[1, 0], [0, 1]], "R": [["0.75"]], "x0": [0, 0],
+        "P0": [[1, 0], [0, 1]],
+    }  # fmt: skip
+    return LinearModel(**(given | changes))
+
+
+def _guarantee(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
+    return guarantee(model, fmt, within)
+
+
+def _from_schedule(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
+    return from_schedule(schedule(model, fmt, Form.INNOVATION), within)
+
+
+def _blocks(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
+    return next(bounds_in_blocks(model, fmt, [within], [np.ones(model.n)], 5))
+
+
+def _precision(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
+    return required_precision(model, 5, 0.01, rounding=fmt.rounding, basis="guarantee", within=within)
+
+
+def _probable(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
+    return required_precision(model, 5, 0.01, rounding=fmt.rounding, basis="probable", within=within)
+
+
+ASKED = [_guarantee, _from_schedule, _blocks, _precision, _probable]
+
+
+# -- stochastic rounding ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("asked", ASKED)
+def test_a_filter_that_computes_its_gain_must_not_round_at_random(asked: Asked) -> None:
+    """Bound "for ever" of 4.82, but an error of 5.217 at the third step: its covariance occurs again by chance."""
+    model = scalar(Phi=[[0]], R=[["0.4375"]])
+    fmt = FloatFormat(2, 5, Rounding.STOCHASTIC)
+    with pytest.raises(ValueError, match="got stochastic rounding for a Kalman filter; needed another"):
+        asked(model, limits(1, 1, state=100, innovation=100, measurement=100), fmt)
+
+
+def test_fixed_coefficients_may_be_rounded_at_random() -> None:
+    """Each rounding is off by less than a unit; coefficients and their bound are those of the run's own seed."""
+    system = LinearSystem([["0.9"]], [["0.3"]])
+    for seed in range(8):
+        fmt = FloatFormat(2, 6, Rounding.STOCHASTIC, seed=seed)
+        made = filter_schedule(system.as_filter(), fmt)
+        fmt.restart()
+        assert [*made.packed[0]] == [*fmt.array(system.as_filter().coefficients).to_float()]
+        again = filter_schedule(system.as_filter(), fmt)
+        assert np.array_equal(made.packed, again.packed)
+        found = from_schedule(made, limits(2, 1, measurement=4))
+        z = np.random.default_rng(seed).choice([-4.0, 4.0, 3.9375], (300, 1))
+        A, B = made.packed[0, :2]
+        x, exactly, worst = system.outputs(z, fmt)[:, 0, 0], 0.0, 0.0
+        for k in range(len(z) - 1):  # an output is the state before the step
+            exactly = A * exactly + B * z[k, 0]
+            worst = max(worst, abs(x[k + 1] - exactly))
+        assert 0.01 * found.bound[0] < worst <= found.bound[0]
+    found = required_precision(
+        system, 300, 0.1, rounding="stochastic", basis="guarantee", within=limits(1, 1, measurement=4)
+    )
+    assert found.fmt is not None
+
+
+# -- limits -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("asked", ASKED)
+def test_a_first_estimate_beyond_its_limit_is_refused(asked: Asked) -> None:
+    model = two_states(x0=[1, -11])
+    within = limits(2, 1, state=10, innovation=30)
+    with pytest.raises(ValueError, match=r"got a first estimate -11.0 of state 1, beyond its limit 10.0"):
+        asked(model, within, FORMAT)
+    asked(two_states(x0=[10, -10]), within, FORMAT)
+
+
+@pytest.mark.parametrize("asked", ASKED)
+@pytest.mark.parametrize(
+    ("within", "says"),
+    [
+        (limits(1, 1, state=10, innovation=30), r"shape \(1,\) on the state; needed \(2,\)"),
+        (limits(3, 1, state=10, innovation=30), r"shape \(3,\) on the state; needed \(2,\)"),
+        (limits(2, 2, state=10, innovation=30), r"shape \(2,\) on the innovation; needed \(1,\)"),
+        (
+            FilterLimits(np.ones(2), np.ones(1), np.ones(2)),
+            r"shape \(2,\) on the measurement; needed \(1,\).*write limits\(2, 1, ...\)",
+        ),
+    ],
+)
+def test_limits_for_another_filter_are_refused(asked: Asked, within: Any, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        asked(two_states(), within, FORMAT)
+
+
+@pytest.mark.parametrize("asked", ASKED)
+def test_limits_that_were_not_checked_are(asked: Asked) -> None:
+    with pytest.raises(ValueError, match="needed numbers that are not negative"):
+        asked(two_states(), FilterLimits(np.ones(2), -np.ones(1), np.ones(1)), FORMAT)
+    with pytest.raises(TypeError, match=r"needed the result of limits"):
+        asked(two_states(), (np.ones(2), np.ones(1), np.ones(1)), FORMAT)
+
+
+def test_limits_of_a_system_have_one_entry_for_each_input() -> None:
+    system = LinearSystem([["0.5"]], [["0.5", "0.25"]])
+    with pytest.raises(ValueError, match=r"shape \(1,\) on the measurement; needed \(2,\)"):
+        required_precision(system, 10, 0.1, basis="guarantee", within=limits(1, 1, measurement=3))
+    assert required_precision(system, 10, 0.1, basis="guarantee", within=limits(1, 2, measurement=3)).fmt
+
+
+@pytest.mark.parametrize("size", [2.0**-451, 2.0**451])
+def test_limits_whose_squares_float64_cannot_store_are_refused(size: float) -> None:
+    with pytest.raises(ValueError, match=r"needed 0, infinity, or 2\*\*-450 to 2\*\*450"):
+        limits(2, 1, state=[1, size], innovation=1)
+
+
+def test_bounds_in_blocks_need_limits_on_state_and_innovation() -> None:
+    with pytest.raises(ValueError, match="needed finite ones: bounds in blocks"):
+        next(bounds_in_blocks(scalar(), FORMAT, [limits(1, 1, measurement=10)], [[1]], 5))
+    with pytest.raises(ValueError, match=r"assumed errors of shape \(2,\); needed \(1,\)"):
+        next(bounds_in_blocks(scalar(), FORMAT, [limits(1, 1, 10, 10)], [[1, 1]], 5))
+
+
+# -- nothing measured, nothing allowed --------------------------------------------------------------------------------
+
+
+DETERMINISTIC = [each for each in Rounding if each is not Rounding.STOCHASTIC]
+
+
+@pytest.mark.parametrize("rounding", DETERMINISTIC)
+@pytest.mark.parametrize("x0", [[0, 0], ["0.3", "-0.7"]])
+def test_a_filter_that_measures_nothing(rounding: Rounding, x0: list[Any]) -> None:
+    """Its estimate is the first one, predicted: from zero it stays zero, otherwise only roundings of that decay."""
+    model, fmt = two_states(H=[[0, 0]], x0=x0), FloatFormat(2, 7, rounding)
+    for within in (limits(2, 1, measurement=10), limits(2, 1, state=1, innovation=10)):
+        for form in Form:
+            found = guarantee(model, fmt, within, form)
+            assert found.for_ever
+            run = Run(model, fmt, form, ())
+            z = fmt.array(np.full((30, 1), 10.0))
+            error = np.abs((run.states(z) - reference_states(model.rounded(fmt), z.to_fractions())).sum(axis=2))
+            assert (error.max(axis=0) <= found.bound).all()
+            if within.state[0] > 1:
+                assert (found.bound == 0).all() == (x0 == [0, 0])
+
+
+def test_a_filter_that_measures_nothing_is_attacked_in_vain() -> None:
+    found = guarantee(scalar(H=[[0]]), FORMAT, limits(1, 1, measurement=10))
+    outcome = attack(found, 20, 5)
+    assert outcome.admissible
+    assert (outcome.errors.tolist(), outcome.ratio) == ([0.0], 0.0)
+
+
+def test_limits_of_zero_allow_no_error() -> None:
+    assert (guarantee(two_states(), FORMAT, limits(2, 1, measurement=0)).bound == 0).all()
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 11, emin=-14, emax=15), FixedFormat(3, 8)], ids=str)
+def test_numbers_beyond_the_range_have_no_bound(fmt: Any) -> None:
+    """Columns of infinite limits, some of which have no effect: 0 times infinity is not used."""
+    found = guarantee(scalar(), fmt, limits(1, 1, measurement=1e6))
+    assert not found.for_ever
+    assert np.isinf(found.bound).all()
+    assert "may exceed the largest" in found.why
+
+
+def test_a_disturbance_of_every_other_step_counts() -> None:
+    """A column whose limit is infinite where it has no effect must not hide its effect at other steps."""
+    G, given = np.array([[[0.0]], [[2.0]]]), np.array([[np.inf], [3.0]])
+    none = np.zeros((2, 1, 1))
+    found = Disturbances(none, none, G, given, none[..., 0], none, none, none)
+    assert columns(found).tolist() == [[[0.0]], [[6.0]]]
+
+
+# -- a model of finitely many steps -----------------------------------------------------------------------------------
+
+
+def test_a_model_of_some_steps_has_a_bound_for_these() -> None:
+    within = limits(1, 1, measurement=10)
+    whole = guarantee(scalar(), FORMAT, within)
+    for steps in (3, 50, 500):
+        found = guarantee(scalar(steps=steps), FORMAT, within)
+        assert found.steps == steps
+        assert not found.for_ever
+        assert "describes no more" in str(found)
+        assert (found.bound <= whole.bound * (1 + 1e-6)).all()
+    falling = scalar(Phi=lambda k: [[1 / (1 + k)]], R=lambda k: [[1 + k / 8]], steps=40)
+    found = guarantee(falling, FORMAT, within)
+    assert (found.steps, len(found.history)) == (40, 40)
+    run, z = Run(falling, FORMAT, Form.INNOVATION, ()), FORMAT.array(np.full((40, 1), 9.99))
+    errors = np.abs((run.states(z) - reference_states(falling.rounded(FORMAT), z.to_fractions())).sum(axis=2))
+    assert (errors <= found.history).all()
+    assert errors.max() > 0.02 * found.bound.max()
+
+
+def test_blocks_end_with_the_model() -> None:
+    with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
+        next(bounds_in_blocks(scalar(steps=5), FORMAT, [limits(1, 1, 10, 20)], [[1]], 6))
+    done = [count for count, _ in bounds_in_blocks(scalar(steps=5), FORMAT, [limits(1, 1, 10, 20)], [[1]], 5)]
+    assert done == [1, 2, 3, 4, 5]
+
+
+def test_outputs_that_depend_on_nothing() -> None:
+    schedule_of = filter_schedule(state_space([["1/2"]], [[0]], [[0]], [[0]]), FORMAT)
+    assert (from_schedule(schedule_of, limits(2, 1, measurement=1)).bound == 0).all()
+
+
+# -- inputs of a linear system as a format stores them ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("basis", ["guarantee", "bound"])
+def test_inputs_that_underflow_count_among_the_errors_of_storing(basis: Any) -> None:
+    """A delay line: 6e-5 is below the least normal number and stored as 0, whatever the precision."""
+    delay = LinearSystem([[0]], [[1]], [[1]])
+    ranged: dict[str, Any] = {"emin": -14, "emax": 15, "subnormal": False}
+    u, within = np.full((5, 1), 0.05), limits(1, 1, measurement=0.05)
+    lost = np.full((3, 1), 6e-5)
+    for rounding in ("nearest", "chop", "up", "stochastic"):
+        asked = {"z": u, "basis": basis, "within": within, "rounding": rounding} | ranged
+        refused = required_precision(delay, 5, 3e-5, **asked)
+        assert refused.fmt is None
+        found = required_precision(delay, 5, 7e-5, **asked)
+        assert found.fmt is not None
+        error = abs(6e-5 - delay.outputs(lost, found.fmt)[-1, 0, 0])
+        assert error == 6e-5 or rounding == "up"
+        assert error <= 7e-5 * dict(found.tried)[found.fmt.precision]
+    # With subnormal numbers, their spacing is the least error.
+    gradual = required_precision(delay, 5, 2e-6, basis=basis, z=u, within=within, emin=-14, emax=15)
+    assert gradual.fmt is not None
+    precision = gradual.fmt.precision
+    assert 2.0 ** (-14 - precision + 1) / 2 <= 2e-6 * dict(gradual.tried)[precision]
+
+
+@pytest.mark.parametrize(
+    "fmt", [FloatFormat(2, 5), FloatFormat(10, 3, Rounding.UP), FloatFormat(2, 6, emin=-3, emax=4)]
+)
+def test_the_errors_of_storing_are_those_of_operations(fmt: FloatFormat) -> None:
+    rng = np.random.default_rng(3)
+    sizes = np.array([0.0, 0.01, 0.2, 1.0, 7.3])
+    found = storing_errors(fmt, sizes)
+    assert found[0] == 0
+    for size, most in zip(sizes, found, strict=True):
+        values = [float(v) for v in (*(size * rng.uniform(-1, 1, 300)), size, -size)]
+        errors = [abs(fmt.round(v) - Fraction(v)) for v in values]
+        assert max(errors) <= Fraction(float(most))
+        assert max(errors) >= Fraction(float(most)) / 4
+    assert (storing_errors(FixedFormat(2, 5), np.array([3.0, 4.0])) == [2.0**-6, np.inf]).all()
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+def test_limits_of_measurements_are_for_those_before_storing(rounding: Rounding) -> None:
+    """Three bits store 0.95 as 1, so that results above 1 occur, whose roundings are twice as large."""
+    fmt, rng = FloatFormat(2, 3, rounding), np.random.default_rng(1)
+    for size in (0.95, 1.0, 3.3, 0.0):
+        (most,) = stored_sizes(fmt, np.array([size]))
+        stored = [abs(float(fmt.round(float(v)))) for v in (*(size * rng.uniform(-1, 1, 500)), *([size, -size] * 9))]
+        assert max(stored) <= most
+        assert most in (size, max(stored)) or rounding is Rounding.STOCHASTIC
+    assert stored_sizes(fmt, np.array([np.inf]))[0] == np.inf
+    assert stored_sizes(FloatFormat(2, 3, rounding, -3, 3), np.array([99.0]))[0] == 99.0
+    system = LinearSystem([["0.5"]], [["1"]]).as_filter()
+    wide, narrow = (from_schedule(filter_schedule(system, fmt), limits(2, 1, measurement=size)) for size in (1.0, 0.95))
+    if rounding in (Rounding.NEAREST, Rounding.EVEN, Rounding.STOCHASTIC):
+        assert np.array_equal(narrow.bound, wide.bound)
+
+
+def test_inputs_beyond_the_range_are_refused() -> None:
+    system, within = LinearSystem([["0.5"]], [["0.5"]]), limits(1, 1, measurement=1e6)
+    found = required_precision(system, 10, 0.1, basis="guarantee", within=within, emin=-14, emax=15)
+    assert found.fmt is None
+    assert "needed inputs within the range" in found.why
+
+
+def test_a_filter_whose_roundings_grow_with_its_error_has_no_bound() -> None:
+    """In two bits, the products and sums of a slow filter add more than it forgets."""
+    filter_ = state_space([["0.75", "0.5"], ["-0.5", "0.5"]], [[1], [1]])
+    found = from_schedule(filter_schedule(filter_, FloatFormat(2, 2, Rounding.CHOP)), limits(2, 1, measurement=1))
+    assert found.radius < 1
+    assert not found.for_ever
+    assert found.steps == 0
+    assert "as large as itself" in found.why
+    with pytest.raises(ValueError, match="as large as itself"):
+        probable_error(found)
+
+
+# -- filters that never settle ----------------------------------------------------------------------------------------
+
+
+def test_an_exact_gain_that_does_not_settle_has_its_bounds_for_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gains, "_closes", lambda *_: None)
+    for most in (500, 1000):
+        given = schedule(two_states(), FORMAT, Form.INNOVATION, most)
+        assert not given.settled
+        assert len(given.coefficients) == len(given.exact) == len(given.dK) == given.steps
+        found = from_schedule(given, limits(2, 1, measurement=10))
+        assert np.isfinite(found.bound).all()
+
+
+def test_a_covariance_that_grows_for_ever_has_a_bound_for_some_steps() -> None:
+    """Nothing is measured: the exact covariance leaves float64, while saturated fixed point repeats its own."""
+    model, fmt = scalar(Phi=[[200]], H=[[0]]), FixedFormat(8, 4, overflow="saturate")
+    found = guarantee(model, fmt, limits(1, 1, measurement=1), horizon=20)
+    assert (found.steps, found.for_ever) == (20, False)
+    assert "the exact filter leaves the range of float64 at step" in found.why
+    answer = required_precision(model, 5, 0.1, basis="guarantee", within=limits(1, 1, measurement=1))
+    assert (answer.precision, answer.ends) == (2, True)  # the estimate stays 0
+
+
+def test_limits_that_do_not_follow_from_the_measurements_are_infinite() -> None:
+    """An unstable state that is never measured grows with every rounding: no number is infinite times zero."""
+    model = two_states(Phi=[["5/4", 0], ["1/4", "1/3"]], H=[[0, 1]], x0=[1, 0])
+    found = guarantee(model, FloatFormat(2, 5), limits(2, 1, measurement=10), most=2000, horizon=300)
+    assert found.bound[0] > 0
+    drifting = two_states(Phi=[["5/4", 0], [0, "1/3"]], H=[[0, 1]], x0=[1, 0])
+    found = guarantee(drifting, FloatFormat(2, 5), limits(2, 1, measurement=10), most=2000, horizon=300)
+    assert not found.for_ever

@@ -1,0 +1,111 @@
+"""Limit cycles against runs from every state by plain loops, and against closed forms."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import plain_structures as plain
+import pytest
+
+from gpbnb import FixedFormat, LinearSystem
+from gpbnb.bounds.limit_cycles import limit_cycles
+from gpbnb.filters.words import WordFormats
+
+MODES = ["nearest", "even", "chop", "up", "down", "odd"]
+
+
+def ends_of(step, states):
+    """The cycles, as sets of their states, in which runs from some states end."""
+    following = {state: step(state) for state in states}
+    left = set(following)
+    while (kept := {following[state] for state in left}) != left:
+        left = kept
+    found = set()
+    while left:
+        cycle = [left.pop()]
+        while (state := following[cycle[-1]]) != cycle[0]:
+            cycle.append(state)
+            left.remove(state)
+        found.add(frozenset(cycle))
+    return found
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("a1", "a2"), [("-1.5", "0.75"), ("0.7", "0.85"), ("-1.2", "0.8"), ("0", "-0.9")])
+def test_cycles_are_those_in_which_runs_from_every_state_end(mode, a1, a2):
+    """A section of second order in direct form I with one rounding for each output; words of 7 bits."""
+    system = LinearSystem.from_coefficients([1], [1, a1, a2], "direct form I")
+    words = WordFormats(FixedFormat(6, 0, mode, "saturate"), FixedFormat(2, 8), FixedFormat(12, 8))
+    r, keep = plain.fixed(0, mode), plain.limited(0, 6, "saturate")
+    c1, c2 = (plain.fixed(8, "nearest")(Fraction(each)) for each in (a1, a2))
+
+    def step(state):
+        y = keep(r(Fraction(0) - c1 * state[0] - c2 * state[1]))
+        return int(y), state[0]
+
+    expected = ends_of(step, product(range(-64, 64), repeat=2))
+    found = limit_cycles(system, words, everywhere=True)
+    cycles = {frozenset(map(tuple, cycle.states[:, :2].tolist())) for cycle in found.cycles}
+    assert cycles == expected
+    assert found.searched == 128**2
+    inner = limit_cycles(system, words)
+    if found.largest <= inner.bound:  # no cycle needs an overflow
+        assert {frozenset(map(tuple, cycle.states[:, :2].tolist())) for cycle in inner.cycles} == expected
+        assert inner.searched < found.searched
+    assert inner.largest <= inner.bound
+    assert sorted(map(len, cycles)) == sorted(cycle.period for cycle in found.cycles)
+
+
+@pytest.mark.parametrize(("a", "period"), [("-0.90625", 1), ("0.90625", 2)])
+def test_the_dead_band_of_a_filter_of_first_order(a, period):
+    """|y| stays if the rounding of 0.90625 |y| is |y|: up to half a unit over 1 - 0.90625, which is 5.33."""
+    system = LinearSystem.from_coefficients([1], [1, a], "direct form I")
+    found = limit_cycles(system, WordFormats(FixedFormat(9, 0), FixedFormat(1, 8)))
+    assert found.largest == [5]
+    assert found.bound[0] == pytest.approx(0.5 / (1 - 0.90625))
+    assert max(cycle.period for cycle in found.cycles) == period
+    assert len(found.cycles) == (11 if period == 1 else 6)
+    assert "outputs stay within 5 units of rest, by a search of 11 states" in str(found)
+
+
+def test_a_smoother_with_floor_rests_up_to_three_units_below_its_input():
+    words = WordFormats(FixedFormat(15, 0, "down"), FixedFormat(3, 12))
+    found = limit_cycles(LinearSystem.smoother("1097/4096"), words, 512)
+    assert sorted(int(cycle.outputs[0, 0]) for cycle in found.cycles) == [509, 510, 511, 512]
+    assert found.largest == [3]
+    assert found.rest == [512]
+
+
+def test_overflow_that_wraps_oscillates_at_full_size():
+    """y = 1.5 y1 - 0.75 y2 is stable, and wrapping keeps it between the ends of the word for ever."""
+    system = LinearSystem.from_coefficients([1], [1, "-1.5", "0.75"], "direct form I")
+    words = WordFormats(FixedFormat(5, 0, "nearest", "wrap"), FixedFormat(2, 8), FixedFormat(9, 8))
+    found = limit_cycles(system, words, everywhere=True)
+    assert found.largest > 16
+    assert limit_cycles(system, words).largest <= limit_cycles(system, words).bound < 8
+
+
+def test_too_many_states_have_a_bound():
+    system = LinearSystem.from_coefficients([1], [1, "-1.5", "0.75"])
+    found = limit_cycles(system, WordFormats(FixedFormat(9, 4), FixedFormat(2, 8)), most=10)
+    assert (found.cycles, found.searched) == (None, 0)
+    assert (found.largest == found.bound).all()
+    assert "too many states to try each" in str(found)
+
+
+def test_filters_without_rest_are_refused():
+    words = WordFormats(FixedFormat(9, 0), FixedFormat(2, 8))
+    with pytest.raises(ValueError, match="got a filter that is not stable as stored in data of 10 bits"):
+        limit_cycles(LinearSystem.from_coefficients([1], [1, -1]), words)
+    with pytest.raises(ValueError, match="which limits its values"):
+        limit_cycles(LinearSystem.pid(1, 1, limits=(-1, 1)), words)
+
+
+def test_a_state_of_a_delayed_input_is_known():
+    """Only the two delayed outputs are free: the delayed inputs equal the input."""
+    system = LinearSystem.from_coefficients([1, 1, 1], [1, "-0.5", "0.25"], "direct form I")
+    found = limit_cycles(system, WordFormats(FixedFormat(9, 0), FixedFormat(2, 8)), 7)
+    assert np.all([cycle.states[:, :2] == 7 for cycle in found.cycles])
+    assert found.searched < 100

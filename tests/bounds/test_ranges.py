@@ -1,0 +1,241 @@
+"""Answers and guarantees for formats with a limited range: overflow is named, underflow is part of the bound."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.adversary import attack
+from gpbnb.bounds.envelope import ROUNDING, units
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run, reference_states
+from gpbnb.filters.system import LinearSystem
+from gpbnb.wordlength.precision import required_precision, survey
+from gpbnb.wordlength.records import survey_records
+
+HALF = {"emin": -14, "emax": 15, "rounding": "even"}
+WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
+WITHIN = limits(1, 1, state=100, innovation=10)
+# Filters in other rounding modes take long to compile; tests/arithmetic compares every mode with Fractions.
+EVEN = Rounding.EVEN
+
+
+def uncertain(variance, h=1):
+    return LinearModel([[1]], [[h]], [["0.01"]], [[1]], [0], [[variance]])
+
+
+def test_a_range_that_suffices_changes_nothing():
+    z = np.round(np.random.default_rng(5).standard_normal((50, 1)) * 2**20) / 2**20
+    ranged = required_precision(WALK, 50, 0.01, rounding="even", emin=-126, emax=127, z=z)
+    assert ranged.tried == required_precision(WALK, 50, 0.01, rounding="even", z=z).tried
+    assert (ranged.fmt.emin, ranged.fmt.emax, ranged.fmt.rounding) == (-126, 127, EVEN)
+    digits = [7, 9]
+    assert survey(WALK, z, 0.01, digits, rounding="even", emin=-126, emax=127) == survey(
+        WALK, z, 0.01, digits, rounding="even"
+    )
+
+
+def test_an_answer_names_the_quantity_and_the_step_that_overflow():
+    found = required_precision(uncertain("4e4", 2), 20, 0.01, **HALF)
+    assert found.fmt is None
+    assert "the run is refused: overflow in the innovation covariance at step 1" in str(found)
+    found = required_precision(uncertain("1e5"), 20, 0.01, **HALF)
+    assert "overflow: P0: entry [0, 0]" in str(found)
+    growing = LinearModel([[2]], [["1e-3"]], [["0.01"]], [[1]], [1], [["0.01"]])
+    found = required_precision(growing, 30, 0.01, **HALF | {"emax": 6}, z=np.zeros((30, 1)))
+    assert found.fmt is None
+    assert "overflow in " in found.why
+    assert "at step " in found.why
+
+
+@pytest.mark.parametrize(
+    ("form", "given", "reason"),
+    [
+        (Form.INNOVATION, {"Phi": [[300]], "P0": [[300]]}, "the predicted covariance at step 1"),
+        (Form.INNOVATION, {"H": [[300]], "P0": [[300]]}, "the innovation covariance at step 1"),
+        (Form.INNOVATION, {"H": [["1/4096"]], "Q": [[0]], "R": [["1/16777216"]]}, "its inverse at step 1"),
+        (Form.INNOVATION, {"Phi": [[2]]}, "the estimate at step 2"),
+        (Form.UD, {"Phi": [[300]], "P0": [[300]]}, "the predicted covariance at step 1"),
+        (Form.UD, {"Phi": [[2]]}, "the update of factors and estimate at step 2"),
+    ],
+)
+def test_a_run_names_what_overflows(form, given, reason):
+    """Numbers above 65504: squares and products with 300, and the reciprocal of 2**-24; twice an estimate of 40000."""
+    model = LinearModel(**{"Phi": [[1]], "H": [[1]], "Q": [[1]], "R": [[1]], "x0": [0], "P0": [[1]]} | given)
+    run = Run(model, BINARY16, form, range(1, 3))
+    run.take(BINARY16.array(np.full((2, 1), 4e4)))
+    assert run.reason == f"overflow in {reason}"
+
+
+def test_more_range_gives_an_answer():
+    assert required_precision(uncertain("1e5"), 20, 0.01, emin=-126, emax=127, rounding="even").precision < 53
+
+
+def test_many_records_in_named_formats():
+    found = survey_records(uncertain("4e4", 2), 2, 0.01, [BINARY16, BFLOAT16, BINARY32], steps=20)
+    assert np.isinf(found.ratios[:, 0]).all()
+    assert {reasons[0] for reasons in found.reasons} == {
+        "the run is refused: overflow in the innovation covariance at step 1"
+    }
+    assert [reasons[2] for reasons in found.reasons] == ["", ""]
+    assert found.enough() == (BINARY32,)
+
+
+def test_a_history_says_why_it_ended():
+    found = emulate(uncertain("4e4", 2), np.ones((5, 1)), BINARY16)
+    assert (found.stopped, found.reason) == (1, "overflow in the innovation covariance at step 1")
+
+
+def test_a_linear_system_and_a_function_have_ranges():
+    smoother, ten = LinearSystem([["0.9"]], [["0.1"]]), np.full((50, 1), 10.0)
+    assert required_precision(smoother, 50, 0.01, z=ten, **HALF).precision < 20
+    found = required_precision(smoother, 50, 0.01, z=ten, **HALF | {"emax": 2})
+    assert found.fmt is None
+    assert "needed at most" in str(found)
+
+    def squares(fmt, z):
+        return [x * x for x in z]
+
+    assert required_precision(squares, 50, 0.5, z=ten, emin=-14, emax=15).precision < 20
+    found = required_precision(squares, 50, 0.5, z=ten, emin=-14, emax=4)
+    assert found.fmt is None
+    assert "the function stops: multiplication at [0]" in found.why
+
+
+@pytest.mark.parametrize("given", [{"emin": 1}, {"emin": 5, "emax": 1}, {"subnormal": False}])
+def test_half_a_range_is_refused(given):
+    with pytest.raises(ValueError, match="needed"):
+        required_precision(WALK, 5, 0.1, **given)
+
+
+# -- guarantees -------------------------------------------------------------------------------------------
+
+
+def test_a_guarantee_within_the_range_is_that_without_limits():
+    assert guarantee(WALK, BINARY32, WITHIN).bound == guarantee(WALK, FloatFormat(2, 24, EVEN), WITHIN).bound
+    assert (
+        guarantee(WALK, FloatFormat(2, 24, EVEN), WITHIN).bound
+        < guarantee(WALK, FloatFormat(2, 24, Rounding.CHOP), WITHIN).bound / 1.9
+    )
+
+
+def test_a_number_beyond_the_range_has_no_guarantee():
+    found = guarantee(WALK, BINARY16, limits(1, 1, state=7e4, innovation=10))
+    assert not found.for_ever
+    assert found.bound[0] == math.inf
+    assert "a number may exceed the largest" in str(found)
+    answer = required_precision(WALK, 1, 0.01, basis="guarantee", within=WITHIN, **HALF | {"emax": 5})
+    assert answer.fmt is None
+    assert "a number may exceed the largest" in str(answer)
+    assert required_precision(WALK, 1, 0.01, basis="guarantee", within=WITHIN, **HALF).precision == 17
+
+
+@pytest.mark.parametrize(("subnormal", "size"), [(True, 2.0**-9), (False, 2.0**-5)])
+def test_underflow_is_part_of_the_guarantee(subnormal, size):
+    """The errors of small numbers exceed the bound for an unlimited range."""
+    small = limits(1, 1, state=2 * size, innovation=2 * size)
+    fmt = FloatFormat(2, 11, EVEN, -6, 15, subnormal)
+    model = LinearModel([["0.9"]], [[1]], [["0.03125"]], [["0.125"]], [0], [[1]])
+    z = np.random.default_rng(0).uniform(-size, size, (4000, 1))
+    run = Run(model, fmt, "innovation", ())
+    true = reference_states(model.rounded(fmt), fmt.array(z).to_fractions())
+    error = np.abs((run.states(fmt.array(z)) - true).sum(axis=2)).max()
+    assert guarantee(model, FloatFormat(2, 11, EVEN), small).bound[0] < error < guarantee(model, fmt, small).bound[0]
+
+
+@pytest.mark.parametrize("fmt", [BINARY16, FloatFormat(2, 5, EVEN, -3, 4, False), FloatFormat(10, 3, emin=-2, emax=3)])
+def test_no_rounding_error_exceeds_its_unit(fmt):
+    """Against Fractions, for numbers below, at and above each entry of the table, down to the least and up."""
+    table, kernel = units(fmt), fmt.round
+    largest = float(fmt.limits.largest)
+    rng = np.random.default_rng(1)
+    sizes = np.concatenate([largest * 2.0 ** -rng.uniform(0, 60, 3000), table.powers[table.powers <= largest]])
+    for size in sizes:
+        at = np.searchsorted(table.powers, size)
+        assert abs(float(kernel(float(size))) - size) <= table.errors[at] * (1 + 2.0**-40)
+    assert table.powers[-1] == largest
+    assert table.exact.tolist() == [[1.0, 0.0]]
+
+
+CAR = LinearModel([[1, "0.5"], [0, 1]], [[1, 0]], [["0.01", 0], [0, "0.01"]], [["0.25"]], [0, 0], np.eye(2, dtype=int))
+ROAD = limits(2, 1, state=(100, 20), innovation=10)
+
+
+@pytest.mark.parametrize("form", ["innovation", "Joseph", "UD"])
+def test_a_filter_in_fixed_point_has_a_guarantee(form):
+    """Covariance and gain are computed in fixed point, too."""
+    found = guarantee(CAR, FixedFormat(8, 12, EVEN), ROAD, form)
+    against = attack(found, 300, 20)
+    assert found.for_ever
+    assert against.admissible
+    assert 0.1 < against.ratio <= 1
+    finer = guarantee(CAR, FixedFormat(8, 20, EVEN), ROAD, form)
+    assert (finer.bound < found.bound / 50).all()
+
+
+def test_in_fixed_point_only_products_are_rounded():
+    """The bound of x + K (z - x) in the steady state: the rounding of one product, and the error of the gain."""
+    fmt = FixedFormat(8, 12, EVEN)
+    found = guarantee(WALK, fmt, WITHIN)
+    schedule = found.schedule
+    half, gain = 2.0**-13, schedule.coefficients[-1, -1, 0]
+    off = abs(gain - schedule.exact[-1, 0, 0, 0]) * 10
+    assert found.bound[0] == pytest.approx((half + off) / gain, rel=0.02)
+    assert found.parts[0, ROUNDING] == pytest.approx(half / gain, rel=0.01)
+    table = units(fmt)
+    assert (table.powers.tolist(), table.errors.tolist()) == ([256 - 2.0**-12], [half])
+    assert table.sums_exact
+    assert not units(BINARY16).sums_exact
+    assert units(FixedFormat(8, 12, Rounding.DOWN)).errors.tolist() == [2 * half]
+
+
+def test_fixed_point_that_may_overflow_has_no_guarantee():
+    found = guarantee(WALK, FixedFormat(5, 16, EVEN), WITHIN)
+    assert found.bound[0] == math.inf
+    assert "a number may exceed the largest" in found.why
+    with pytest.raises(TypeError, match="needed a FloatFormat or a FixedFormat"):
+        guarantee(WALK, 24, WITHIN)
+
+
+# -- formats of any exponent ------------------------------------------------------------------------------
+
+
+def in_units(exponent):
+    """The car, in units of 2**-exponent."""
+    square = Fraction(4) ** exponent
+    return LinearModel(CAR.Phi, CAR.H, CAR.Q * square, CAR.R * square, CAR.x0, CAR.P0 * square)
+
+
+@pytest.mark.parametrize("form", ["innovation", "Joseph", "UD"])
+@pytest.mark.parametrize("basis", ["emulation", "bound"])
+def test_units_far_from_one_change_nothing(form, basis):
+    answers = {required_precision(in_units(e), 30, 0.01 * 2.0**e, form=form, basis=basis).tried for e in (0, 210, -210)}
+    assert len(answers) == 1
+
+
+@pytest.mark.parametrize("exponent", [230, -230])
+def test_units_too_far_from_one_are_refused(exponent):
+    """Compiled loops of a format with any exponent have the exponents of float64."""
+    with pytest.raises(OverflowError, match=r"got Q with an entry near 2.*; needed 2.*; scale the model"):
+        required_precision(in_units(exponent), 30, 0.01)
+    with pytest.raises(OverflowError, match="scale the model"):
+        survey(in_units(exponent), np.ones((3, 1)), 0.01, [24])
+    wide = required_precision(in_units(exponent), 30, 0.01 * 2.0**exponent, emin=-1000, emax=1000)
+    assert wide.tried
+
+
+def test_a_range_too_long_to_compute_with_is_refused():
+    for range_ in ({"emin": -(10**12), "emax": 5}, {"emin": -5, "emax": 10**12}):
+        with pytest.raises(ValueError, match="needed exponents of at most 1048576"):
+            FloatFormat(2, 8, **range_)
+    assert FloatFormat(2, 113, emin=-16382, emax=16383).limits is not None

@@ -1,0 +1,143 @@
+"""gpbnb.filters.covariance: roundings of textbook covariances are undone and reported; other faults are refused."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from gpbnb.arithmetic.definiteness import factor
+from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.covariance import REPAIR_TOLERANCE, in_floats
+from gpbnb.filters.model import LinearModel
+from gpbnb.wordlength.precision import required_precision
+
+
+def white_noise(n, dt, size):
+    column = np.array([dt**2 / 2, dt, 1.0])[:n]
+    return np.outer(column, column) * size**2
+
+
+def van_loan(n, dt, density):
+    """Covariance of a chain of n integrators of white noise over a step; Van Loan 1978."""
+    drift, noise = np.diag(np.ones(n - 1), 1), np.zeros((n, n))
+    noise[-1, -1] = density
+    whole = expm(np.block([[-drift, noise], [np.zeros((n, n)), drift.T]]) * dt)
+    return whole[n:, n:].T @ whole[:n, n:]
+
+
+def inverses(count):
+    rng = np.random.default_rng(20)
+    for _ in range(count):
+        n = int(rng.integers(2, 7))
+        sample = rng.standard_normal((n, n + 3))
+        yield np.linalg.inv(sample @ sample.T)
+
+
+STEPS = (0.001, 0.005, 0.01, 0.02, 0.04, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0)
+TEXTBOOK = [
+    *(white_noise(n, dt, size) for n in (2, 3) for dt in STEPS for size in (0.1, 0.3, 0.5, 1.3, 2.0)),
+    *(van_loan(n, dt, 0.3) for n in (2, 3) for dt in (0.001, 0.01, 0.1, 1.0, 10.0)),
+    *inverses(100),
+]
+
+
+def model(Q, **others):
+    n = len(Q)
+    given = {"Phi": np.eye(n), "H": np.eye(1, n), "Q": Q, "R": [[1]], "x0": np.zeros(n), "P0": np.eye(n)}
+    return LinearModel(**(given | others))
+
+
+def test_textbook_covariances_are_accepted_with_the_least_change():
+    """More than half of them are not exactly symmetric and semidefinite."""
+    changed = 0
+    for Q in TEXTBOOK:
+        found = model(Q)
+        factor(found.Q[0])  # exactly semidefinite
+        variances = np.sqrt(np.diagonal(Q))
+        change = np.abs((found.Q[0] - exact(Q)).astype(float)) / np.multiply.outer(variances, variances)
+        assert change.max() <= REPAIR_TOLERANCE
+        changed += bool(found.repairs)
+        assert bool(found.repairs) == bool(np.any(found.Q[0] != exact(Q)))
+    assert changed > len(TEXTBOOK) / 2
+
+
+def not_quite(n):
+    """The first white noise of so many states that float64 makes indefinite."""
+    return next(Q for Q in TEXTBOOK if len(Q) == n and model(Q).repairs)
+
+
+def test_a_repair_is_off_for_exact_input_and_on_demand():
+    Q = not_quite(2)
+    as_fractions = exact(Q)
+    assert model(Q).repairs
+    with pytest.raises(ValueError, match="got Q with"):
+        model(as_fractions)
+    with pytest.raises(ValueError, match="got Q with"):
+        model(Q, repair=False)
+    assert model(as_fractions, repair=True).repairs == model(Q).repairs
+
+
+def test_symmetry_is_judged_by_both_variances():
+    """The second is 1e32 times the first, in other units."""
+    found = model([[1e-16, 0.5], [0.5 + 1e-9, 1e16]])
+    assert (found.Q[0] == found.Q[0].T).all()
+
+
+@pytest.mark.parametrize(
+    ("Q", "message"),
+    [
+        ([[1.0, 0.5], [0.5 + 1e-6, 1.0]], "needed a symmetric matrix"),
+        ([[1.0, 1.0 + 2e-8], [1.0 + 2e-8, 1.0]], "needed a positive semidefinite matrix"),  # half the digits are 1.5e-8
+        ([[1.0, 1.0 + 1e-6], [1.0 + 1e-6, 1.0]], "needed a positive semidefinite matrix"),
+        ([[1.0, 0.0], [0.0, -1e-20]], "needed a positive semidefinite matrix"),
+        ([[1.0, 1e-20], [1e-20, 0.0]], "needed a positive semidefinite matrix"),
+        ([[1.0, 1e-20], [0.0, 0.0]], "needed a symmetric matrix"),
+    ],
+)
+def test_what_no_rounding_explains_is_refused(Q, message):
+    with pytest.raises(ValueError, match=message):
+        model(Q)
+
+
+def test_noise_of_measurements_is_made_symmetric_but_never_raised():
+    H, R = np.eye(2), [[1.0, 0.25], [0.25 + 2.0**-50, 1.0]]
+    found = model(np.eye(2), H=H, R=R)
+    assert found.R[0, 0, 1] == found.R[0, 1, 0] == Fraction(1, 4) + Fraction(1, 2**51)
+    with pytest.raises(ValueError, match="needed a positive definite matrix"):
+        model(np.eye(2), H=H, R=[[1.0, 1.0], [1.0, 1.0]])
+
+
+def test_units_by_powers_of_two_change_no_repair():
+    Q = not_quite(3)
+    scale = 2.0 ** np.array([-30, 3, 41])
+    first, second = model(Q), model(Q * np.multiply.outer(scale, scale))
+    assert first.repairs == second.repairs != ()
+
+
+def test_cycles_and_answers_report_their_repairs():
+    found = model([np.eye(2), not_quite(2)])
+    assert [(each.letter, each.member) for each in found.repairs] == [("Q", 1)]
+    answer = required_precision(found, 5, 0.1)
+    assert answer.repairs == tuple(str(each) for each in found.repairs)
+    assert answer.repairs[0] in str(answer)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        (1, False),
+        ("0.1", False),
+        ([[1, Fraction(1, 3)]], False),
+        ([[1, 0.5]], True),
+        (np.eye(2), True),
+        (np.eye(2, dtype=int), False),
+        (np.array([["1", "2"]]), False),
+        (np.array([[1, 2.5]], dtype=object), True),
+        (np.float32(1), True),
+    ],
+)
+def test_input_in_floats_is_recognized(values, expected):
+    assert in_floats(values) is expected

@@ -1,0 +1,381 @@
+"""Filter runs, their errors and bounds: the exact filter, what ends a run, and what it refuses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from small_filter import FORMATS, FORMATS_OF_ALL_FORMS, STEPS, measurements, model, run
+
+from gpbnb import BFLOAT16, FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.bounded_run import emulate_with_bound
+from gpbnb.filters.emulation import compare_runs, emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run, log_spaced, reference
+from gpbnb.filters.simulation import BLOCK, Simulation
+from gpbnb.report.kalman import exact_step
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+
+# -- the reference --------------------------------------------------------------------------------
+
+
+def exactly(given, z):
+    """Exact estimates, gains and covariances of each step."""
+    x, P, found = given.x0, given.P0, []
+    for k in range(len(z)):
+        Phi, H, Q, R = (each[k % len(each)] for each in (given.Phi, given.H, given.Q, given.R))
+        step = exact_step.exact_step(Phi, H, Q, R, x, P, z[k])
+        x, P = step.x, step.P
+        found.append(step)
+    return found
+
+
+def test_the_reference_is_the_exact_filter_to_thirty_digits():
+    given, z = model(), measurements()
+    checkpoints = reference(given, z, range(1, STEPS + 1))
+    for k, step in enumerate(exactly(given, z)):
+        for found, true in ((checkpoints.x[k], step.x), (checkpoints.K[k], step.gain), (checkpoints.P[k], step.P)):
+            # A hundred operations a step, each within 2**-102, on numbers that nothing here magnifies a hundredfold.
+            assert np.abs(found - true).max() < Fraction(10**4 * (k + 1), 2**102) * np.abs(true).max()
+
+
+@pytest.mark.parametrize("form", list(Form))
+def test_all_forms_are_one_filter(form):
+    """In double-double each is the exact filter; in many digits, each comes near."""
+    given, z = model(), measurements()
+    checkpoints = reference(given, z, (STEPS,), form)
+    step = exactly(given, z)[-1]
+    for found, true in ((checkpoints.x[0], step.x), (checkpoints.P[0], step.P)):
+        assert np.abs(found - true).max() < Fraction(1, 2**85)
+    if form is not Form.HUNG_SECOND_GAIN:  # whose own gain is P H' R^-1 as well, but by another rounding
+        assert np.abs(checkpoints.K[0] - step.gain).max() < Fraction(1, 2**85)
+    history = emulate(given, z, FloatFormat(2, 53), form)
+    assert 0 < history.state_norm.max() < 1e-14
+    assert history.gain_norm.max() < 1e-14
+    assert history.covariance_norm.max() < 1e-14
+    assert history.indefinite is None
+    assert history.stopped is None
+
+
+def test_errors_fall_with_the_digits_in_every_form():
+    given, z = model(), measurements(40)
+    for form in Form:
+        errors = [emulate(given, z, FloatFormat(2, t), form, (40,)).covariance_norm[0] for t in (12, 24, 36, 48)]
+        for coarse, fine in pairwise(errors):
+            assert 2**7 < coarse / fine < 2**17  # 2**12, and what chance may do
+
+
+def test_a_reference_of_the_model_as_given_adds_the_errors_of_storing_it():
+    given, z, fmt = model(), measurements(), FloatFormat(10, 4)
+    alone = emulate(given, z, fmt, Form.INNOVATION, (STEPS,))
+    stored = np.array([[fmt.round(float(v)) for v in row] for row in z], dtype=object)
+    both = emulate(given, z, fmt, Form.INNOVATION, (STEPS,), reference(given, z, (STEPS,)))
+    step = exactly(given.rounded(fmt), stored)[-1]
+    assert alone.state[0] == pytest.approx(
+        (run(fmt, Form.INNOVATION).checkpoints().x[-1] - step.x).astype(float), rel=1e-12
+    )
+    step = exactly(given, z)[-1]
+    assert both.state[0] == pytest.approx(
+        (run(fmt, Form.INNOVATION).checkpoints().x[-1] - step.x).astype(float), rel=1e-12
+    )
+
+
+# -- runs -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", [Form.HUNG, Form.UD])
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8), None])
+def test_a_run_in_pieces_is_the_run_in_one(fmt, form):
+    given, z = model(), measurements(20)
+    whole, parts = run(fmt, form, given, z), Run(given, fmt, form, range(1, 21))
+    for piece in (z[:1], z[1:1], z[1:8], z[8:]):
+        parts.take(piece)
+    assert parts.steps == whole.steps == 20
+    for name in ("x", "P", "X", "G", "C", "notes"):
+        assert np.array_equal(getattr(parts, name), getattr(whole, name))
+
+
+def test_the_norms_of_a_history():
+    history = emulate(model(), measurements(), FloatFormat(10, 4), Form.HUNG, (2, 5))
+    assert history.steps.tolist() == [2, 5]
+    for at in range(2):
+        true = history.reference
+        assert history.state_norm[at] == np.abs(history.state[at]).max()
+        for norm, error, size in (
+            (history.gain_norm, history.gain, true.K),
+            (history.covariance_norm, history.covariance, true.P),
+        ):
+            columns = np.abs(error[at]).sum(axis=0).max() / np.abs(size[at].astype(float)).sum(axis=0).max()
+            assert norm[at] == pytest.approx(columns, rel=1e-15)
+        computed = true.P[at].astype(float) + history.covariance[at]
+        scale = np.diag(1 / np.sqrt(np.diag(true.P[at].astype(float))))
+        values = np.linalg.eigvalsh(scale @ (computed + computed.T) @ scale / 2)
+        assert history.least_eigenvalue[at] == pytest.approx(values[0], rel=1e-9)
+
+
+def scalar(r, p=1, h=1, q=0):
+    return LinearModel([[1]], [[h]], [[q]], [[r]], [1], [[p]])
+
+
+def test_a_variance_that_is_lost_is_a_result():
+    fmt = FloatFormat(10, 4)
+    history = emulate(scalar("1e-6"), np.ones((5, 1)), fmt, Form.HUNG, range(1, 6))
+    # 1 + 1e-6 is 1 in four digits, the gain is 1, and nothing is left of 1 - 1.
+    assert history.indefinite == 1
+    assert history.stopped is None
+    assert history.steps.tolist() == [1, 2, 3, 4, 5]
+    assert history.covariance[0, 0, 0] == pytest.approx(-1e-6, rel=1e-5)
+    assert emulate(scalar("1e-6"), np.ones((5, 1)), fmt, Form.JOSEPH).indefinite is None
+
+
+def test_a_covariance_that_is_indefinite_in_a_run_is_a_result():
+    """Two states that are nearly one, measured precisely, in four digits."""
+    given = LinearModel(np.eye(2), [[1, "0.99"]], np.zeros((2, 2)), [["1e-5"]], [0, 0], [[1, "0.97"], ["0.97", 1]])
+    found = {form: emulate(given, np.ones((30, 1)), FloatFormat(10, 4), form, range(1, 31)) for form in Form}
+    assert found[Form.HUNG].indefinite == 5
+    assert found[Form.HUNG].least_eigenvalue.min() < -1
+    # Joseph's keeps its variances, and loses the rest by less; the factors keep all.
+    assert found[Form.JOSEPH].indefinite is None
+    assert -1e-4 < found[Form.JOSEPH].least_eigenvalue.min() < 0
+    assert found[Form.UD].indefinite is None
+    assert found[Form.UD].least_eigenvalue.min() > 0
+    assert all(history.steps[-1] == 30 for history in found.values())
+
+
+def test_a_division_by_zero_ends_a_run_and_is_a_result():
+    """In the first step, P comes out as 0; R, whose size one digit does not tell from 0, must hold the rest."""
+    given = LinearModel([[1]], [[[1]], [[1]]], [[0]], [[[1]], [["1e-40"]]], [1], [[1]])
+    # The second row: P = 0.5 after the first step; S = 0.5 + 1e-40 = 0.5 in a format; K = 1, P = 0.
+    history = emulate(given, np.ones((4, 1)), FloatFormat(2, 8), Form.HUNG, range(1, 5))
+    assert history.indefinite == 2
+    # A negative variance can make S zero: P0 = 1, H'P H + R with one digit.
+    run = Run(scalar(1), FloatFormat(2, 8), Form.HUNG, range(1, 5))
+    run.P[...] = -1.0
+    run.take(np.ones((3, 1)))
+    assert run.stopped == 1
+    assert run.steps == 0
+    before = run.x.copy()
+    run.take(np.ones((3, 1)))
+    assert run.steps == 0
+    assert np.array_equal(run.x, before)
+    assert run.checkpoints().steps == ()
+
+
+def test_a_zero_pivot_ends_a_run_at_its_step():
+    """In the second step, both sensors measure the same, and eleven bits cannot hold their noise beside it."""
+    one, same = np.eye(2, dtype=int), [[1, 0], [1, 0]]
+    given = LinearModel(one, np.array([one, same, one]), one, exact([["1e-6", 0], [0, "1e-6"]]), [0, 0], one)
+    found = run(FloatFormat(2, 11), Form.INNOVATION, given, np.ones((4, 2)))
+    assert (found.steps, found.stopped) == (1, 2)
+    assert found.reason == "a zero pivot in the innovation covariance at step 2"
+
+
+@pytest.mark.parametrize("form", list(Form))
+def test_a_number_beyond_the_backend_ends_a_run_and_is_a_result(form):
+    """A state that grows by 1e60 a step, and that nobody sees: its variance would be 1e360 after the third."""
+    given = LinearModel([["1e60", 0], [0, 1]], [[0, 1]], np.zeros((2, 2)), [[1]], [1, 1], np.eye(2))
+    found = run(FloatFormat(2, 24), form, given, np.ones((9, 1)))
+    assert (found.steps, found.stopped) == (2, 3)
+    checkpoints = found.checkpoints()
+    history = compare_runs(found, reference(given, np.ones((2, 1)), (1, 2)))
+    assert history.stopped == 3
+    assert history.steps.tolist() == list(checkpoints.steps) == [1, 2]
+    # Base 10 has exponents for it.
+    assert run(FloatFormat(10, 8), form, given, np.ones((9, 1))).steps == 9
+
+
+def test_what_a_run_refuses():
+    given = model()
+    with pytest.raises(ValueError, match="got base 3; needed one with compiled loops: 2, 10, 16"):
+        Run(given, FloatFormat(3, 5), Form.HUNG, (1,))
+    for checkpoint_steps in ((2, 1), (0, 1), (1, 1)):
+        with pytest.raises(ValueError, match="needed increasing steps of 1 or more"):
+            Run(given, FloatFormat(2, 24), Form.HUNG, checkpoint_steps)
+    for bounded in (False, True):
+        for z in (np.ones((3, 3)), np.ones(2)):
+            with pytest.raises(ValueError, match=r"needed \(steps, 2\)"):
+                Run(given, FloatFormat(2, 24), Form.HUNG, (1,), bounded=bounded).take(z)
+    with pytest.raises(ValueError, match="finite"):
+        emulate(given, [[1.0, math.inf]], FloatFormat(2, 24))
+    with pytest.raises(OverflowError, match="beyond the range of the compiled loops"):
+        Run(scalar(Fraction(10**400)), FloatFormat(2, 24), Form.HUNG, (1,))
+    # In two digits 1.04 * 1.07 > 1.05**2 becomes 1.0 * 1.1 < 1.1**2.
+    near = [["1.04", "1.05"], ["1.05", "1.07"]]
+    close = LinearModel(np.eye(2), [[1, 0]], np.eye(2), [[1]], [0, 0], near, repair=False)
+    with pytest.raises(ValueError, match="needed covariances that stay definite"):
+        Run(close, FloatFormat(10, 2), Form.UD, (1,))
+    assert Run(close, FloatFormat(10, 3), Form.UD, (1,)).steps == 0
+    with pytest.raises(ValueError, match="needed equal steps"):
+        compare_runs(run(FloatFormat(2, 24), Form.HUNG), reference(given, measurements(), (2, 4)))
+    huge = LinearModel([["1e200"]], [[1]], [[0]], [[1]], [1], [[1]])
+    with pytest.raises(ArithmeticError, match="the reference stopped at step 1"):
+        reference(huge, np.ones((3, 1)), (1,), Form.UD)
+    assert float(reference(huge, np.ones((3, 1)), (3,)).x[0, 0]) == 1
+
+
+def test_checkpoint_steps():
+    assert log_spaced(1) == (1,)
+    assert log_spaced(1000, 3) == (1, 2, 5, 10, 22, 46, 100, 215, 464, 1000)
+    assert log_spaced(20, 1) == (1, 10, 20)
+    with pytest.raises(ValueError, match="got 0 steps"):
+        log_spaced(0)
+    with pytest.raises(ValueError, match="0 per decade"):
+        log_spaced(5, 0)
+
+
+def test_the_names_of_the_forms():
+    assert [str(form) for form in Form] == ["Hung (1984)", "Hung (1984), second gain", "innovation", "Joseph", "UD"]
+
+
+# -- simulated measurements -----------------------------------------------------------------------
+
+
+def test_measurements_are_the_same_in_blocks_and_at_once():
+    source = Simulation(model(), (1.0, 2.0, 3.0), seed=3, resolution=0.25)
+    z = source.measurements(BLOCK + 10)
+    first, truth = source.block(0, np.array([1.0, 2.0, 3.0]))
+    second, _ = source.block(1, truth, 10)
+    assert np.array_equal(z, np.concatenate([first, second]))
+    assert np.array_equal(z * 4, np.rint(z * 4))
+    assert source.measurements(0).shape == (0, 2)
+    assert not np.array_equal(z, Simulation(model(), (1.0, 2.0, 3.0), seed=4, resolution=0.25).measurements(BLOCK + 10))
+
+
+def test_a_cycle_and_the_noise_go_on_from_block_to_block():
+    """A truth that stays at 5, seen through 1, 2 and 3 in turn; 4096 is no multiple of 3. And noise alone."""
+    turning = LinearModel([[1]], [[[1]], [[2]], [[3]]], [[0]], [["1e-20"]], [5], [[1]])
+    z = Simulation(turning, (5.0,), seed=1, resolution=1.0).measurements(2 * BLOCK + 10)
+    assert z[:, 0].tolist() == [5 * (1 + k % 3) for k in range(2 * BLOCK + 10)]
+    z = Simulation(scalar(1), (0.0,), seed=1, resolution=2.0**-20).measurements(2 * BLOCK)
+    assert not np.array_equal(z[:BLOCK], z[BLOCK:])
+    assert abs(np.corrcoef(z[:BLOCK, 0], z[BLOCK:, 0])[0, 1]) < 5 / math.sqrt(BLOCK)
+
+
+def test_measurements_are_those_of_the_model():
+    """The filter that knows the model finds its innovations white, with the covariance that it predicts."""
+    given = model()
+    z = Simulation(given, tuple(given.x0.astype(float)), seed=5, resolution=2.0**-20).measurements(4000)
+    x, P = given.x0.astype(float), given.P0.astype(float) * 0 + np.eye(3) * 1e-12
+    given, squares, lagged, last = given.to_float(), [], [], None
+    for k in range(len(z)):
+        Phi, H, Q, R = (given[name][k % len(given[name])] for name in ("Phi", "H", "Q", "R"))
+        P = Phi @ P @ Phi.T + Q
+        S = H @ P @ H.T + R
+        innovation = np.linalg.solve(np.linalg.cholesky(S), z[k] - H @ Phi @ x)
+        K = P @ H.T @ np.linalg.inv(S)
+        x, P = Phi @ x + K @ (z[k] - H @ Phi @ x), P - K @ H @ P
+        squares.append(np.outer(innovation, innovation))
+        if last is not None:
+            lagged.append(np.outer(innovation, last))
+        last = innovation
+    # Means of 4000 products of unit normals: variance 2 or 1; five standard errors.
+    assert np.abs(np.mean(squares, axis=0) - np.eye(2)).max() < 5 * math.sqrt(2 / 4000)
+    assert np.abs(np.mean(lagged, axis=0)).max() < 5 / math.sqrt(3999)
+
+
+def test_what_a_simulation_refuses():
+    with pytest.raises(ValueError, match="got a start of 2 numbers; needed 3"):
+        Simulation(model(), (1.0, 2.0), 0, 1.0)
+    for resolution in (0.0, -1.0, math.inf, math.nan):
+        with pytest.raises(ValueError, match="got resolution"):
+            Simulation(model(), (1.0, 2.0, 3.0), 0, resolution)
+
+
+# -- the bound beside a run -----------------------------------------------------------------------
+
+
+# Factors and inverses take long to compile. Their loops are the same in each format, so that five formats are enough.
+@pytest.mark.parametrize(
+    ("fmt", "form"),
+    [
+        (f, form)
+        for f in FORMATS
+        for form in Form
+        if form not in (Form.UD, Form.HUNG_SECOND_GAIN) or f in FORMATS_OF_ALL_FORMS
+    ],
+)
+def test_no_error_exceeds_the_bound_beside_the_run(fmt, form):
+    """Against the exact filter, not the reference."""
+    given, z = model(), measurements()
+    found = emulate_with_bound(given, z, fmt, form, range(1, STEPS + 1))
+    ratios = found.ratios()
+    assert ratios.max() <= 1
+    stored = np.array([[fmt.round(float(v)) for v in row] for row in z], dtype=object)
+    checkpoints = run(fmt, form).checkpoints()
+    worst = 0.0
+    for k, step in enumerate(exactly(given.rounded(fmt), stored)):
+        P = (checkpoints.P[k] + checkpoints.P[k].T) / 2
+        for error, bound in (
+            (checkpoints.x[k] - step.x, found.state[k]),
+            (checkpoints.K[k] - step.gain, found.gain[k]),
+            (P - step.P, found.covariance[k]),
+        ):
+            assert (np.abs(error).astype(float) <= bound * (1 + 1e-12)).all()
+            worst = max(worst, float((np.abs(error).astype(float) / bound).max()))
+    if fmt.precision * math.log2(fmt.base) > 20:  # with fewer, the covariance's error may be too large
+        assert worst > 0.01
+        assert np.isfinite(found.state).all()
+    # The run itself is the one without a bound at its side.
+    assert np.array_equal(found.history.state, emulate(given, z, fmt, form, range(1, STEPS + 1)).state)
+
+
+def test_the_bound_of_the_reference_holds():
+    """Also where the stored model is no double-double number."""
+    given, z = model(), measurements(40)
+    run = Run(given, None, Form.INNOVATION, range(1, 41), bounded=True)
+    run.take(z[:7])
+    run.take(z[7:])
+    checkpoints = run.checkpoints()
+    for k, step in enumerate(exactly(given, z)):
+        for error, bound in (
+            (checkpoints.x[k] - step.x, run.bounds[0][k]),
+            (checkpoints.P[k] - step.P, run.bounds[2][k]),
+        ):
+            ratio = (np.abs(error).astype(float) / bound).max()
+            assert ratio <= 1
+            assert (bound < 1e-22).all()
+
+
+def test_ratios_tell_a_violation():
+    found = emulate_with_bound(model(), measurements(), FloatFormat(2, 24), Form.HUNG, (1, 6))
+    for name, column in (("state", 0), ("gain", 1), ("covariance", 2)):
+        small = {each: getattr(found, each) * (1e-9 if each == name else 1) for each in ("state", "gain", "covariance")}
+        ratios = type(found)(found.history, **small).ratios()
+        assert ratios.shape == (2, 3)
+        assert (ratios[:, column] > 1).all()
+        assert (np.delete(ratios, column, axis=1) <= 1).all()
+
+
+def test_the_bound_ends_where_the_gain_is_not_known():
+    found = emulate_with_bound(scalar("1e-6"), np.ones((3, 1)), FloatFormat(10, 4), Form.HUNG, (1, 2, 3))
+    assert np.isfinite(found.state[:2]).all()
+    assert np.isinf(found.state[2]).all()
+    assert found.ratios().max() <= 1
+
+
+def test_forms_are_given_by_name():
+    given, z = model(), measurements()
+    named, member = run(FloatFormat(2, 24), "joseph", given, z), run(FloatFormat(2, 24), Form.JOSEPH, given, z)
+    assert named.form is Form.JOSEPH
+    assert np.array_equal(named.x, member.x)
+    with pytest.raises(ValueError, match="Potter form; needed one with compiled loops: Hung"):
+        run(FloatFormat(2, 24), "potter", given, z)
+
+
+def test_a_bound_needs_a_format_that_tells_of_an_overflow():
+    """What saturates is wrong by more than any rounding, which the bound does not see."""
+    with pytest.raises(ValueError, match=r"got a bound along with a run in .*; needed overflow 'raise'"):
+        Run(model(), FixedFormat(3, 12, overflow="saturate"), Form.INNOVATION, [1], bounded=True)
+    with pytest.raises(ValueError, match="needed overflow 'raise'"):
+        Run(model(), replace(BFLOAT16, overflow="saturate"), Form.INNOVATION, [1], bounded=True)
+    with pytest.raises(ValueError, match="got overflow to infinity; needed 'raise' or 'saturate' for compiled loops"):
+        Run(model(), replace(BFLOAT16, overflow="infinity"), Form.INNOVATION, [1])

@@ -1,0 +1,339 @@
+"""Known inputs, offsets, matrices as functions of the step, and the forms written with array operations."""
+
+import itertools
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb import BINARY64, FloatFormat, LinearModel, Rounding, required_precision
+from gpbnb.arithmetic.rational import exact
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.array_run import ArrayRun
+from gpbnb.filters.emulation import compare_runs, emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel as Model
+from gpbnb.filters.run import Run, Sums, reference
+from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
+from gpbnb.report.kalman.exact_step import exact_step
+from gpbnb.wordlength.precision import survey
+
+FORMS = (*Form, *ArrayForm)
+STEPS = 40
+
+
+def drawn(seed=0, n=3, m=2, inputs=True, cycle=2):
+    """A random stable model with everything that changes from step to step."""
+    rng = np.random.default_rng(seed)
+    Phi = rng.standard_normal((cycle, n, n)) / 3
+    G = rng.standard_normal((n, n)) / 4
+    V = rng.standard_normal((m, m)) / 4
+    given = LinearModel(
+        Phi=Phi,
+        H=rng.standard_normal((3, m, n)),
+        Q=G @ G.T,
+        R=V @ V.T + np.eye(m),
+        x0=rng.standard_normal(n),
+        P0=np.eye(n),
+    )
+    if not inputs:
+        return given
+    return replace(
+        given,
+        B=rng.standard_normal((2, n, 2)),
+        u=rng.standard_normal((STEPS, 2)),
+        b=rng.standard_normal(n),
+        d=rng.standard_normal((5, m)),
+    )
+
+
+def exactly(model, z):
+    """The filter in Fractions, step by step: an oracle that shares no code with the runs."""
+    x, P, found = model.x0, model.P0, []
+    for k, measured in enumerate(exact(z)):
+        Phi, H, Q, R = (getattr(model, letter)[k % len(getattr(model, letter))] for letter in ("Phi", "H", "Q", "R"))
+        c, d = np.array([Fraction(0)] * model.n), np.array([Fraction(0)] * model.m)
+        if model.B is not None:
+            c = c + model.B[k % len(model.B)] @ model.u[k]
+        if model.b is not None:
+            c = c + model.b[k % len(model.b)]
+        if model.d is not None:
+            d = model.d[k % len(model.d)]
+        # inputs by hand: predict with Phi x + c through a step from Phi x + c with Phi = 1 and Q = 0
+        ahead, unit = Phi @ x + c, exact(np.eye(model.n, dtype=int))
+        step = exact_step(unit, H, Phi @ P @ Phi.T + Q, R, ahead, 0 * P, measured - d)
+        x, P = step.x, step.P
+        found.append(x)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_reference_with_inputs_is_the_exact_filter(seed):
+    model = drawn(seed)
+    z = simulated_measurements(model, 6, seed)
+    found = reference(model, z, range(1, 7)).x
+    true = exactly(model, z)
+    # double-double: 2**-102 an operation, some hundred operations a step
+    assert np.abs((found - true).astype(float)).max() < 2.0**-85 * np.abs(true.astype(float)).max()
+
+
+# UD and the second gain take long to compile. Their loops are the same for all formats, so two formats are enough.
+@pytest.mark.parametrize(
+    ("fmt", "form"),
+    [
+        *itertools.product((FloatFormat(2, 24), FloatFormat(10, 7)), (*Form, ArrayForm.COMPENSATED)),
+        *((FloatFormat(16, 6, Rounding.CHOP), form) for form in (Form.HUNG, Form.JOSEPH, ArrayForm.COMPENSATED)),
+    ],
+    ids=str,
+)
+def test_arrays_give_the_digits_of_the_compiled_loops(fmt, form):
+    model = drawn(4, inputs=False)
+    z = fmt.array(simulated_measurements(model, 12, 1))
+    steps = (1, 2, 3, 7, 12)
+    slow = ArrayRun(model, fmt, form, steps)
+    compensated = form is ArrayForm.COMPENSATED
+    fast = Run(model, fmt, Form.INNOVATION if compensated else form, steps, compensated=compensated)
+    for run in (slow, fast):
+        run.take(z)
+    for a, b in zip(_parts(slow), _parts(fast), strict=True):
+        assert np.array_equal(a, b)
+    assert slow.indefinite == fast.indefinite
+
+
+def _parts(run):
+    found = run.checkpoints()
+    return found.x, found.K, found.P
+
+
+@pytest.mark.parametrize("form", FORMS, ids=str)
+def test_every_form_agrees_with_the_reference_in_many_digits(form):
+    model = drawn(5, inputs=form not in (Form.HUNG, Form.HUNG_SECOND_GAIN))
+    z = simulated_measurements(model, STEPS)
+    fmt = FloatFormat(2, 53)
+    steps = (1, 2, 5, STEPS)
+    run = ArrayRun(model, fmt, form, steps)
+    run.take(z)
+    history = compare_runs(run, reference(model, z, steps))
+    # well conditioned: a few hundred roundings of 2**-53
+    for error in (history.state, history.gain, history.covariance):
+        assert np.abs(error).max() < 2.0**-44
+    assert np.abs(history.state).max() > 0
+    assert run.indefinite is None
+
+
+@pytest.mark.parametrize("form", [form for form in FORMS if form not in (Form.HUNG, Form.HUNG_SECOND_GAIN)], ids=str)
+def test_the_bound_holds_with_inputs_and_is_not_vacuous(form):
+    model, fmt = drawn(6), FloatFormat(2, 20)
+    z = fmt.array(simulated_measurements(model, STEPS))
+    steps = tuple(range(1, STEPS + 1))
+    run = ArrayRun(model, fmt, form, steps, bounded=True)
+    run.take(z)
+    errors = np.abs(compare_runs(run, reference(model.rounded(fmt), z.to_fractions(), steps)).state)
+    (bound,) = run.bounds
+    assert (errors <= bound).all()
+    assert errors.max() > 2.0**-24  # it does round
+    assert bound.max() < 2000 * errors.max()
+
+
+@pytest.mark.parametrize("form", [Form.UD, Form.INNOVATION, Form.JOSEPH], ids=str)
+def test_the_bound_is_that_of_the_compiled_run(form):
+    model, fmt = drawn(7, inputs=False), FloatFormat(2, 24)
+    z = fmt.array(simulated_measurements(model, 20))
+    steps = tuple(range(1, 21))
+    fast, slow = Run(model, fmt, form, steps, bounded=True), ArrayRun(model, fmt, form, steps, bounded=True)
+    fast.take(z)
+    slow.take(z)
+    # the evaluation errors, 2**-100, are taken from slightly different magnitudes
+    assert np.allclose(slow.bounds[0], fast.bounds[0], rtol=1e-9, atol=0)
+
+
+def test_without_inputs_the_simulation_is_that_of_the_model():
+    model = drawn(8)
+    plain = model.without_inputs()
+    assert not plain.has_inputs
+    z = simulated_measurements(model, STEPS)
+    silent = simulated_measurements(plain, STEPS)
+    assert not np.array_equal(z, silent)
+    simulation = Simulation(plain, tuple(map(float, plain.x0)), 0, fine_resolution(plain))
+    assert np.array_equal(silent, simulation.measurements(STEPS))
+
+
+CART = {
+    "Phi": [[1, "0.1"], [0, 1]],
+    "H": [[1, 0]],
+    "Q": [["1e-6", 0], [0, "1e-4"]],
+    "R": [["0.04"]],
+    "x0": [0, 0],
+    "P0": [[1, 0], [0, 1]],
+}
+
+
+@pytest.mark.parametrize("basis", ["emulation", "bound"])
+def test_answers_with_inputs(basis):
+    u = np.sin(np.arange(60) / 7).reshape(-1, 1)
+    cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=u, d=["0.5"])
+    answer = required_precision(cart, 60, [1e-3, 1e-2], basis=basis)
+    assert answer.fmt is not None
+    assert dict(answer.tried)[answer.precision] <= 1 < dict(answer.tried)[answer.precision - 1]
+
+
+@pytest.mark.parametrize("basis", ["emulation", "bound"])
+def test_answers_with_inputs_do_not_depend_on_units(basis):
+    u = np.sin(np.arange(20) / 7).reshape(-1, 1)
+    cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=u, b=["0.001", 0], d=["0.5"])
+    scale = Fraction(2) ** -40
+    small = replace(
+        cart,
+        B=cart.B * scale,
+        b=cart.b * scale,
+        d=cart.d * scale,
+        **{letter: getattr(cart, letter) * scale**2 for letter in ("Q", "R", "P0")},
+    )
+    answers = [
+        required_precision(cart, 20, 1e-3, basis=basis),
+        required_precision(small, 20, 1e-3 * float(scale), basis=basis),
+    ]
+    assert answers[0].tried == answers[1].tried
+
+
+def test_an_offset_of_the_states_is_an_input_of_one():
+    by_offset = LinearModel(**CART, b=["0.1", "-0.2"])
+    by_input = LinearModel(**CART, B=[["0.1"], ["-0.2"]], u=[1])
+    z = simulated_measurements(by_offset, 50)
+    assert np.array_equal(z, simulated_measurements(by_input, 50))
+    for fmt in (FloatFormat(2, 12), FloatFormat(10, 5)):
+        a, b = (emulate(each, z, fmt).state for each in (by_offset, by_input))
+        assert np.array_equal(a, b)
+
+
+def test_functions_of_the_step_are_cycles():
+    def transition(k):
+        return [[1, Fraction(k, 100)], [0, Fraction(9, 10)]]
+
+    varying = LinearModel(**CART | {"Phi": transition}, steps=30)
+    cycle = LinearModel(**CART | {"Phi": [transition(k) for k in range(1, 31)]})
+    z = simulated_measurements(varying, 30)
+    assert varying.Phi.shape == (30, 2, 2)
+    for basis in ("emulation", "bound"):
+        a, b = (required_precision(each, 30, 1e-2, z=z, basis=basis).tried for each in (varying, cycle))
+        assert a == b
+
+
+def test_missing_measurements_with_inputs():
+    model = drawn(9)
+    z = simulated_measurements(model, STEPS)
+    z[3, 0] = z[10] = np.nan
+    answers = {form: survey(model, z, 1.0, [20], form=form)[0][1] for form in ("innovation", "Joseph", "UD", "Carlson")}
+    assert all(0 < ratio < 1e-3 for ratio in answers.values())
+
+
+@pytest.mark.parametrize("form", ["symmetrized", "Potter", "Cholesky", "compensated", "square root"])
+def test_answers_of_the_forms_without_compiled_loops(form):
+    cart = LinearModel(**CART)
+    for basis in ("emulation", "bound"):
+        answer = required_precision(cart, 20, 1e-3, form=form, basis=basis)
+        assert answer.fmt is not None
+        assert isinstance(answer.form, ArrayForm)
+
+
+def test_square_roots_survive_where_the_innovation_form_loses_its_variance():
+    """A sensor far more precise than the prior: the classic case for square roots."""
+    precise = LinearModel(
+        Phi=[[1, "0.1"], [0, 1]],
+        H=[[1, "0.5"]],
+        Q=[["1/30000", "1/2000"], ["1/2000", "1/100"]],
+        R=[["1e-12"]],
+        x0=[0, 0],
+        P0=[["1e4", 0], [0, "1e4"]],
+    )
+    z = simulated_measurements(precise, 30)
+    needed = {form: required_precision(precise, 30, 0.1, z=z, form=form) for form in ("innovation", "Carlson")}
+    assert needed["Carlson"].precision < needed["innovation"].precision
+
+
+REFUSED = [
+    ({"B": [[1], [1]]}, "got B without u; needed both"),
+    ({"u": [[1]]}, "got u without B; needed both"),
+    ({"B": [[1, 2], [1, 2]], "u": [[1]]}, "got B with 2 columns and u with 1 numbers per step"),
+    ({"B": [[1]], "u": [[1]]}, r"got B of shape \(1, 1\); needed \(2, p\)"),
+    ({"B": [[1], [1]], "u": [[[1]]]}, r"got u of shape \(1, 1, 1\); needed \(p,\) or \(steps, p\)"),
+    ({"b": [1]}, r"got b of shape \(1,\); needed \(2,\)"),
+    ({"d": [[[1]]]}, r"got d of shape \(1, 1, 1\); needed \(1,\)"),
+    ({"d": ["nan"]}, "d: "),
+    ({"Phi": lambda k: [[1, 0], [0, 1]]}, "got a function for Phi without steps"),
+    ({"Phi": lambda k: np.eye(1 + k), "steps": 2}, "Phi: the function gave shapes"),
+    ({"steps": 0}, "got steps 0"),
+    ({"steps": True}, "got steps True"),
+    ({"B": [[1], [1]], "u": [[1]], "steps": 5}, "got u for 1 steps; needed one row for each of the 5"),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), REFUSED, ids=[message[:30] for _, message in REFUSED])
+def test_what_does_not_fit_is_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        LinearModel(**CART | given)
+
+
+def test_inputs_are_refused_where_they_would_be_ignored():
+    cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=[[1]] * 5)
+    fmt, within = FloatFormat(2, 24), limits(2, 1, state=1, innovation=1)
+    z = np.zeros((5, 1))
+    for call in (
+        lambda: Run(cart, fmt, Form.INNOVATION, ()),
+        lambda: Run(cart, fmt, Form.INNOVATION, (), bounded=True),
+        lambda: Simulation(cart, (0.0, 0.0), 0, 0.1),
+        lambda: guarantee(cart, fmt, within),
+        lambda: required_precision(cart, 5, 0.1, z=z, basis="guarantee", within=within),
+        lambda: required_precision(cart, 5, 0.1, z=z, basis="probable", within=within),
+    ):
+        with pytest.raises(ValueError, match="got a linear model with known inputs or offsets; needed none"):
+            call()
+    for form in ("Hung", "Hung second gain"):
+        with pytest.raises(ValueError, match="form"):
+            emulate(cart, z, fmt, form)
+    with pytest.raises(ValueError, match="got known inputs in the Hung"):
+        emulate(cart, z, fmt, Form.HUNG)
+    for sums, compensated in (
+        (Sums(fused=True), False),
+        (Sums(fmt=BINARY64), False),
+        (Sums(), True),
+        (Sums(order="pairwise"), False),
+    ):
+        with pytest.raises(ValueError, match="got sums or compensated with known inputs"):
+            emulate(cart, z, fmt, sums=sums, compensated=compensated)
+
+
+def test_a_run_is_not_longer_than_its_model():
+    cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=[[1]] * 5)
+    with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
+        required_precision(cart, 6, 0.1, z=np.zeros((6, 1)))
+    with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
+        required_precision(cart, 6, 0.1)
+    short = LinearModel(**CART, steps=5)
+    for basis in ("emulation", "bound"):
+        with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
+            required_precision(short, 6, 0.1, z=np.zeros((6, 1)), basis=basis)
+    with pytest.raises(ValueError, match="got a model of 5 steps"):
+        required_precision(short, 5, 0.1, basis="guarantee", within=limits(2, 1, state=1, innovation=1))
+
+
+def test_a_rounded_model_keeps_its_inputs():
+    model = drawn(2).rounded(FloatFormat(2, 12))
+    assert isinstance(model, Model)
+    assert model.has_inputs
+    assert model.steps == STEPS
+
+
+def test_random_rounding_stores_one_model_whose_covariances_are_symmetric():
+    """The stored model is the one that a run takes, with its inputs, too."""
+    fmt = FloatFormat(2, 9, Rounding.STOCHASTIC, seed=4)
+    model = replace(drawn(), P0=np.eye(3) + drawn().Q[0])
+    assert np.any(fmt.array(model.P0) != fmt.array(model.P0).T)
+    stored = model.rounded(fmt)
+    run = ArrayRun(model, fmt, Form.INNOVATION, range(1, STEPS + 1))
+    assert np.array_equal(run.x.to_fractions(), stored.x0)
+    assert np.array_equal(run.P.to_fractions(), stored.P0)
+    z = simulated_measurements(model, STEPS, 1)
+    assert 0 < emulate(model, z, fmt, "symmetrized").state.max() < 1

@@ -1,0 +1,160 @@
+"""gpbnb.filters.model: what is refused, and the model of Gravity Probe B against its geometry."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.definiteness import factor
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.filters.model import LinearModel
+from gpbnb.report.gravity_probe_b.model import STATES, YEAR, gravity_probe_b
+
+GOOD = {
+    "Phi": [["0.9", "0.1"], [0, "0.8"]],
+    "H": [[1, 0]],
+    "Q": [["0.01", 0], [0, "0.02"]],
+    "R": [["0.5"]],
+    "x0": [1, 2],
+    "P0": [[1, "0.5"], ["0.5", 1]],
+}
+
+
+def test_entries_are_read_exactly_and_held_for_ever():
+    model = LinearModel(**GOOD)
+    assert (model.n, model.m, model.cycle) == (2, 1, 1)
+    assert model.Phi[0, 0, 0] == Fraction(9, 10)
+    assert model.Phi.shape == (1, 2, 2)
+    with pytest.raises(ValueError, match="read-only"):
+        model.Phi[0, 0, 0] = Fraction(1)
+    assert model.to_float()["P0"].tolist() == [[1.0, 0.5], [0.5, 1.0]]
+
+
+def test_cycles_of_matrices_have_periods_of_their_own():
+    model = LinearModel(**(GOOD | {"H": [[[1, 0]], [[0, 1]]], "R": [[["0.5"]], [[1]], [[2]]]}))
+    assert model.cycle == 6
+    assert model.H[1].tolist() == [[0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("letter", "value", "message"),
+    [
+        ("Phi", [[1, 0, 0], [0, 1, 0]], r"got Phi of shape \(2, 3\); needed \(2, 2\)"),
+        ("Phi", [1, 2], "got Phi of shape"),
+        ("H", [[1, 0, 0]], r"got H of shape \(1, 3\); needed \(m, 2\)"),
+        ("H", np.empty((0, 2)), "got H of shape"),
+        ("H", [[1, "nan"]], "H: entry 0, 1: got 'nan'; needed a finite number"),
+        ("Q", [[1, 0], [0, math.inf]], "Q: entry 1, 1"),
+        ("Q", [[1, 2], [1, 1]], r"got Q with 2.0 at \(0, 1\) and 1.0 at \(1, 0\); needed a symmetric matrix"),
+        ("Q", [[1, 0], [0, -1]], "got Q with a least eigenvalue near -1; needed a positive semidefinite matrix"),
+        ("Q", [[1]], r"got Q of shape \(1, 1\); needed \(2, 2\)"),
+        ("R", [[0]], "got R with a least eigenvalue near 0; needed a positive definite matrix"),
+        ("R", [["-0.1"]], "needed a positive definite matrix"),
+        ("R", [[1, 0], [0, 1]], "got R of shape"),
+        ("P0", [[1, 2], [2, 1]], "got P0 with a least eigenvalue near -1"),
+        ("P0", [1, 2], r"got P0 of shape \(2,\); needed \(2, 2\)"),
+        ("x0", [[1], [2]], r"got x0 of shape \(2, 1\); needed \(n,\)"),
+        ("x0", [], "got x0 of shape"),
+    ],
+)
+def test_bad_models_are_refused_with_the_cure(letter, value, message):
+    with pytest.raises(ValueError, match=message):
+        LinearModel(**(GOOD | {letter: value}))
+
+
+def test_what_is_no_number_is_refused():
+    with pytest.raises(TypeError, match="Phi: entry 0, 0"):
+        LinearModel(**(GOOD | {"Phi": [[None, 0], [0, 1]]}))
+
+
+def test_semidefiniteness_is_decided_exactly():
+    rank_one = [[1, 2], [2, 4]]
+    assert LinearModel(**(GOOD | {"Q": rank_one, "P0": [[0, 0], [0, 0]]})).Q[0, 1, 1] == 4
+    below = Fraction(4) - Fraction(1, 10**40)
+    with pytest.raises(ValueError, match="got Q with a least eigenvalue"):
+        LinearModel(**(GOOD | {"Q": [[1, 2], [2, below]]}))
+
+
+def test_only_roundings_are_advised_away():
+    """A negative variance that no rounding explains is an error of the model, and so is a zero in R."""
+    for letter, value, advised in (("Q", [[1, 0], [0, -1]], False), ("Q", [[1, 0], [0, "-1e-9"]], True),
+                                   ("R", [[1, 0], [0, "-1e-9"]], False)):  # fmt: skip
+        with pytest.raises(ValueError, match="needed a positive") as error:
+            LinearModel(**(GOOD | {"H": [[1, 0], [0, 1]], "R": [[1, 0], [0, 1]], letter: value}))
+        assert ("add a little to its diagonal" in str(error.value)) is advised
+
+
+def test_factors_of_covariances_multiply_to_them():
+    rng = np.random.default_rng(5)
+    A = np.array([[Fraction(int(k)) for k in row] for row in rng.integers(-5, 6, (4, 2))], dtype=object)
+    covariance = A @ A.T
+    lower, d = factor(covariance)
+    assert np.array_equal((lower * d) @ lower.T, covariance)
+    assert (d >= 0).all()
+    assert (d > 0).sum() == 2
+    with pytest.raises(ValueError, match="semidefinite"):
+        factor(-covariance)
+
+
+def test_rounding_a_model_rounds_each_entry():
+    fmt = FloatFormat(10, 3)
+    stored = gravity_probe_b().rounded(fmt)
+    assert stored.Phi[0, 0, 2] == Fraction("3.17e-7")
+    assert stored.H[0, 0, 0] == fmt.round("0.994522")
+    assert stored.name.startswith("GP-B, roll 600 s, in ")
+
+
+def test_the_gp_b_model_has_the_periods_of_roll_and_orbit():
+    assert YEAR == 365 * 24 * 3600 // 10
+    model = gravity_probe_b()
+    assert (model.n, model.m, model.cycle) == (10, 2, 2340)
+    assert len(STATES) == 10
+    # 60 steps of a roll, 585 of an orbit: the smallest common multiple
+    assert math.lcm(60, 585) == 2340
+    for k in (0, 7, 77, 2339):
+        assert model.H[k][:, :9].tolist() == model.H[(k + 60) % 2340][:, :9].tolist()
+    # cos a cos b + sin a sin b = cos(a - b), of orbit and roll, from directions to six decimals
+    for k in range(2340):
+        angle = 2 * math.pi * 10 * (k + 1) * (1 / 5850 - 1 / 600)
+        assert float(model.H[k, 0, 9]) == pytest.approx(5.2 * math.cos(angle), abs=5.2 * 2e-6)
+
+
+def test_the_gp_b_model_is_that_of_the_geometry_to_first_order():
+    """(1) and (2) of hung1982, ch. IV, multiplied out with small angles in place of the model's own formula."""
+    model, rng = gravity_probe_b(), np.random.default_rng(4)
+    size = 1e-6  # products of two angles are below 1e-11
+
+    def small(angles):
+        one, two, three = angles
+        return np.array([[1, three, -two], [-three, 1, one], [two, -one, 1]])
+
+    for k in (0, 11, 500):
+        alpha, beta, gamma, psi = size * rng.standard_normal((4, 3))
+        angle = 2 * math.pi * 10 * (k + 1) / 600
+        c, s = math.cos(angle), math.sin(angle)
+        turn = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
+        telescope = small(beta) @ turn @ small(alpha) @ [1, 0, 0]
+        gyro = small(gamma) @ small(beta) @ turn @ small(psi + alpha) @ [1, 0, 0]
+        state = np.array([psi[1], psi[2], 0, 0, alpha[1], alpha[2], beta[1], gamma[1], 0, 0])
+        shown = model.H[k].astype(float) @ state
+        # six decimals of the directions, and the second order
+        assert np.abs(shown - [gyro[2], telescope[2]]).max() < 4 * 1e-6 * size * 4 + 20 * size**2
+
+
+def test_the_gp_b_model_as_flown_and_without_noise():
+    flown = gravity_probe_b("77.5")
+    assert flown.cycle == math.lcm(31, 585)
+    assert float(flown.H[0, 0, 0]) == pytest.approx(math.cos(2 * math.pi * 10 / 77.5), abs=1e-6)
+    assert flown.H[30, 0, 0] == 1
+    still = gravity_probe_b(process_noise=False)
+    assert still.Q[0, 0, 0] == still.Q[0, 9, 9] == 0
+    assert still.Q[0, 4, 4] == 76
+
+
+@pytest.mark.parametrize("roll", ["10", "0", "-600", "77.3"])
+def test_rolls_that_steps_do_not_divide_are_refused(roll):
+    with pytest.raises(ValueError, match=r"needed a period in seconds above 10, a multiple of 0\.5"):
+        gravity_probe_b(roll)

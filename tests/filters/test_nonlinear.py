@@ -1,0 +1,698 @@
+"""gpbnb.filters.nonlinear: runs against plain loops over fractions, digit for digit.
+
+The loops are written from the equations of each form, with an explicit rounding after each operation. Elementary
+functions come from mpmath, with 300 bits, and are rounded once. Nothing is taken from the package but the answers.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+
+from gpbnb import FixedIntervalSmoother, FloatFormat, Form, LinearModel, NonlinearModel, required_precision
+from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.array_run import opened_run
+from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.nonlinear import SigmaPoints
+from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, simulated, true_states
+from gpbnb.filters.run import Run
+from gpbnb.wordlength.blocks import required_block_precisions
+from gpbnb.wordlength.precision import survey
+from gpbnb.wordlength.records import survey_records
+
+STEPS = 50
+PRECISE = mpmath.mp.clone()
+PRECISE.prec = 300
+
+
+def rounding(base, digits):
+    """Round a fraction to the nearest number with some digits, ties away from zero."""
+
+    def rounded(x):
+        x = Fraction(x)
+        if not x:
+            return x
+        e = 0
+        while abs(x) * Fraction(base) ** -e >= base**digits:
+            e += 1
+        while abs(x) * Fraction(base) ** -e < base ** (digits - 1):
+            e -= 1
+        whole = (2 * abs(x) * Fraction(base) ** -e + 1) // 2
+        return (whole if x > 0 else -whole) * Fraction(base) ** e
+
+    return rounded
+
+
+def of_mpmath(r, function, *arguments):
+    """The value of a function of mpmath, rounded once."""
+    value = getattr(PRECISE, function)(*(PRECISE.mpf(a.numerator) / a.denominator for a in map(Fraction, arguments)))
+    sign, mantissa, exponent, _ = value._mpf_
+    return r((-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** exponent)
+
+
+class PlainMatrices:
+    """Matrices of fractions as lists of rows, with every operation rounded."""
+
+    def __init__(self, r):
+        self.r = r
+
+    def times(self, A, B):
+        def entry(row, column):
+            total = self.r(row[0] * column[0])
+            for a, b in zip(row[1:], column[1:], strict=True):
+                total = self.r(total + self.r(a * b))
+            return total
+
+        return [[entry(row, column) for column in zip(*B, strict=True)] for row in A]
+
+    def plus(self, A, B, sign=1):
+        return [[self.r(a + sign * b) for a, b in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
+
+    def take(self, A):
+        return [[self.r(a) for a in row] for row in A]
+
+
+def transposed(A):
+    return [list(row) for row in zip(*A, strict=True)]
+
+
+def eye(n):
+    return [[Fraction(i == j) for j in range(n)] for i in range(n)]
+
+
+def inverse(r, A):
+    """Elimination without exchanges, each operation rounded."""
+    m, A, C = len(A), [row[:] for row in A], eye(len(A))
+    for k in range(m):
+        for i in range(k + 1, m):
+            f = r(A[i][k] / A[k][k])
+            A[i] = [*A[i][: k + 1], *(r(A[i][j] - r(f * A[k][j])) for j in range(k + 1, m))]
+            C[i] = [r(c - r(f * d)) for c, d in zip(C[i], C[k], strict=True)]
+    for k in range(m - 1, -1, -1):
+        for i in range(k + 1, m):
+            C[k] = [r(c - r(A[k][i] * d)) for c, d in zip(C[k], C[i], strict=True)]
+        C[k] = [r(c / A[k][k]) for c in C[k]]
+    return C
+
+
+def factors(A):
+    """Exact factors U D U' of a covariance; D is on the diagonal."""
+    n, A, U = len(A), [row[:] for row in A], [[Fraction(0)] * len(A) for _ in A]
+    for j in range(n - 1, -1, -1):
+        U[j][j] = d = A[j][j]
+        for i in range(j):
+            U[i][j] = A[i][j] / d if d else Fraction(0)
+        for i in range(j):
+            for k in range(j):
+                A[i][k] -= U[i][j] * U[k][j] * d
+    return U
+
+
+class Ranges:
+    """A vehicle that measures range and bearing of a beacon, with its Jacobians written out."""
+
+    def __init__(self, beacon):
+        self.beacon = beacon
+
+    def emulated(self, x, u=None):
+        a, b = (x.format.array(each) - x[i] for i, each in enumerate(self.beacon))
+        return np.stack([np.hypot(a, b), np.arctan2(b, a)])
+
+    def plain(self, r, x, u):
+        a, b = (r(r(Fraction(each)) - x[i]) for i, each in enumerate(self.beacon))
+        c, s = of_mpmath(r, "hypot", a, b), r(r(a * a) + r(b * b))
+        rest = [Fraction(0)] * (len(x) - 2)
+        H = [[r(-a / c), r(-b / c), *rest], [r(b / s), r(-a / s), *rest]]
+        return [c, of_mpmath(r, "atan2", b, a)], H
+
+
+class Moving:
+    """States x and y, moved by known velocities u."""
+
+    n = 2
+
+    def emulated(self, x, u):
+        return x + u
+
+    def plain(self, r, x, u):
+        return [r(a + b) for a, b in zip(x, u, strict=True)], eye(2)
+
+
+class Turning:
+    """States x, y and heading, moved by a distance and a turn."""
+
+    n = 3
+
+    def emulated(self, x, u):
+        return np.stack([x[0] + u[0] * np.cos(x[2]), x[1] + u[0] * np.sin(x[2]), x[2] + u[1]])
+
+    def plain(self, r, x, u):
+        c, s = of_mpmath(r, "cos", x[2]), of_mpmath(r, "sin", x[2])
+        F = eye(3)
+        F[0][2], F[1][2] = r(u[0] * -s), r(u[0] * c)
+        return [r(x[0] + r(u[0] * c)), r(x[1] + r(u[0] * s)), r(x[2] + u[1])], F
+
+
+class Coasting:
+    """States x, y and two velocities, for steps of 0.1 s; the inputs are not used."""
+
+    n = 4
+
+    def emulated(self, x, u):
+        dt = x.format.array("0.1")
+        return np.stack([x[0] + dt * x[2], x[1] + dt * x[3], x[2], x[3]])
+
+    def plain(self, r, x, u):
+        dt = r(Fraction(1, 10))
+        F = eye(4)
+        F[0][2] = F[1][3] = dt
+        return [r(x[0] + r(dt * x[2])), r(x[1] + r(dt * x[3])), x[2], x[3]], F
+
+
+class PlainFilter:
+    """An extended Kalman filter in plain loops."""
+
+    def __init__(self, motion, sight, given, form, r, blocks=None, iterations=1):
+        self.motion, self.sight, self.form, self.iterations = motion, sight, form, iterations
+        blocks = blocks or {}
+        self.state, self.gain, self.covariance, self.innovation = (
+            PlainMatrices(blocks.get(name, r)) for name in ("state", "gain", "covariance", "innovation")
+        )
+        self.r = self.state.r
+        Q, R, x0, P0 = given
+        self.x = [self.r(r(a)) for a in x0]
+        if form is Form.UD:
+            Q, R, P0 = map(factors, (Q, R, P0))
+        self.Q, self.R = ([[r(a) for a in row] for row in each] for each in (Q, R))
+        self.P = self.covariance.take([[r(a) for a in row] for row in P0])
+
+    def step(self, z, u):
+        r = self.r
+        z, u = [r(Fraction(each)) for each in z], [r(Fraction(each)) for each in u]
+        ahead, F = self.motion.plain(r, self.x, u)
+        V = self.predicted(self.covariance.take(F))
+        x = ahead
+        for i in range(self.iterations):
+            expected, H = self.sight.plain(r, x, u)
+            y = [r(a - b) for a, b in zip(z, expected, strict=True)]
+            y[1] = self.wrapped(y[1])
+            if i:
+                moved = [[r(a - b)] for a, b in zip(ahead, x, strict=True)]
+                y = [r(a - b[0]) for a, b in zip(y, self.state.times(H, moved), strict=True)]
+            x, P = self.updated(ahead, V, H, y)
+        self.x, self.P = x, P
+
+    def wrapped(self, y):
+        r = self.r
+        turn = r(2 * of_mpmath(r, "atan2", 0, -1))
+        return r(y - r(round(r(y / turn)) * turn))
+
+    def predicted(self, F):
+        p = self.covariance
+        if self.form is Form.UD:
+            return self.thornton(F)
+        return p.plus(p.times(p.times(F, self.P), transposed(F)), p.take(self.Q))
+
+    def updated(self, ahead, V, H, y):
+        if self.form is Form.UD:
+            return self.bierman(ahead, V, H, y)
+        p, s, g = self.covariance, self.innovation, self.gain
+        VH = s.times(s.take(V), transposed(s.take(H)))
+        S = s.plus(s.times(s.take(H), VH), s.take(self.R))
+        K = g.times(g.take(VH), g.take(inverse(s.r, S)))
+        own = p.take(K)
+        W = p.plus(eye(len(V)), p.times(own, p.take(H)), -1)
+        P = p.times(W, V)
+        if self.form is Form.JOSEPH:
+            P = p.plus(p.times(P, transposed(W)), p.times(p.times(own, p.take(self.R)), transposed(own)))
+        step = self.state.times(self.state.take(K), [[a] for a in y])
+        return [self.r(a + b[0]) for a, b in zip(ahead, step, strict=True)], P
+
+    def thornton(self, F):
+        r, n = self.covariance.r, len(self.P)
+        unit = [[self.P[i][j] if i < j else Fraction(i == j) for j in range(n)] for i in range(n)]
+        Q = self.covariance.take(self.Q)
+        noise = [[Q[i][j] if i < j else Fraction(i == j) for j in range(n)] for i in range(n)]
+        W = [a + b for a, b in zip(self.covariance.times(F, unit), noise, strict=True)]
+        D = [self.P[i][i] for i in range(n)] + [Q[i][i] for i in range(n)]
+        U = [[Fraction(0)] * n for _ in range(n)]
+
+        def dot(a, b):
+            total = Fraction(0)
+            for left, right in zip(a, b, strict=True):
+                total = r(total + r(left * right))
+            return total
+
+        for j in range(n - 1, -1, -1):
+            c = [r(d * w) for d, w in zip(D, W[j], strict=True)]
+            U[j][j] = dot(W[j], c)
+            for i in range(j):
+                U[i][j] = r(dot(W[i], c) / U[j][j]) if U[j][j] else Fraction(0)
+                W[i] = [r(a - r(U[i][j] * b)) for a, b in zip(W[i], W[j], strict=True)]
+        return U
+
+    def bierman(self, ahead, U, H, y):
+        s, p, g, r = self.innovation.r, self.covariance.r, self.gain.r, self.r
+        n, m, U = len(U), len(y), [row[:] for row in U]
+
+        def without_correlation(one, columns):
+            rows = [list(row) for row in columns]
+            for i in range(m - 1, -1, -1):
+                for k in range(i + 1, m):
+                    rows[i] = [one(a - one(one(self.R[i][k]) * b)) for a, b in zip(rows[i], rows[k], strict=True)]
+            return rows
+
+        rows = without_correlation(s, self.innovation.take(H))
+        values = [row[0] for row in without_correlation(r, [[each] for each in y])]
+        change = [Fraction(0)] * n
+        for h, value, i in zip(rows, values, range(m), strict=True):
+            for j in range(n):
+                value = r(value - r(r(h[j]) * change[j]))
+            f = []
+            for j in range(n):
+                total = Fraction(0)
+                for k in range(j + 1):
+                    total = s(total + s(s(U[k][j]) * h[k] if k < j else h[j]))
+                f.append(total)
+            v = [s(s(U[j][j]) * f[j]) for j in range(n)]
+            a, K = s(self.R[i][i]), []
+            for j in range(n):
+                before, a = a, s(a + s(f[j] * v[j]))
+                column = [U[k][j] for k in range(j)]
+                if v[j]:
+                    U[j][j] = p(p(U[j][j] * p(before)) / p(a))
+                    factor = -p(p(f[j]) / p(before))
+                    for k in range(j):
+                        U[k][j] = p(U[k][j] + p(factor * p(K[k])))
+                for k in range(j):
+                    K[k] = g(K[k] + g(g(v[j]) * g(column[k])))
+                K.append(g(v[j]))
+            K = [g(each / g(a)) for each in K]
+            change = [r(c + r(r(k) * value)) for c, k in zip(change, K, strict=True)]
+        return [r(a + b) for a, b in zip(ahead, change, strict=True)], U
+
+
+def case(motion, seed):
+    """A model that passes a beacon, so that its bearing crosses π, with measurements of 50 steps."""
+    rng = np.random.default_rng(seed)
+    n = motion.n
+    Q = np.diag([2.0**-8] * n)
+    R = np.array([[2.0**-4, 2.0**-9], [2.0**-9, 2.0**-8]])
+    P0 = np.eye(n) + 2.0**-3
+    x0 = [4.0, -1.5, 2.0, 0.25][:n]
+    u = np.round(rng.normal(size=(STEPS, 2)) * 0.2, 3) + np.array([-0.2, 0.05])
+    sight = Ranges(["0.3", "0.2"])
+    model = NonlinearModel(motion.emulated, None, sight.emulated, None, Q, R, x0, P0, u=u, angles=[1])
+    x, z = np.array(x0), []
+    for k in range(STEPS):
+        fmt = FloatFormat(2, 53)
+        x = motion.emulated(fmt.array(x), fmt.array(u[k])).to_float() + rng.normal(size=n) / 16
+        a, b = 0.3 - x[0], 0.2 - x[1]
+        bearing = np.arctan2(b, a) + rng.normal() / 16
+        z.append([np.hypot(a, b) + rng.normal() / 4, (bearing + np.pi) % (2 * np.pi) - np.pi])
+    exactly = [[[Fraction(a) for a in row] for row in each] for each in (Q.tolist(), R.tolist(), P0.tolist())]
+    return model, np.round(z, 4), sight, (exactly[0], exactly[1], [Fraction(a) for a in x0], exactly[2]), u
+
+
+MOTIONS = {motion.n: motion for motion in (Moving(), Turning(), Coasting())}
+
+
+def plain_estimates(filter_, z, u):
+    for measured, known in zip(z.tolist(), u.tolist(), strict=True):
+        filter_.step(measured, known)
+        yield list(filter_.x)
+
+
+@pytest.mark.parametrize(
+    ("n", "base", "digits", "form"),
+    [
+        (2, 2, 11, Form.INNOVATION),
+        (2, 2, 24, Form.UD),
+        (2, 10, 7, Form.JOSEPH),
+        (3, 2, 11, Form.UD),
+        (3, 2, 24, Form.JOSEPH),
+        (3, 10, 7, Form.INNOVATION),
+        (4, 2, 11, Form.JOSEPH),
+        (4, 2, 24, Form.INNOVATION),
+        (4, 10, 7, Form.UD),
+    ],
+)
+def test_every_digit_is_that_of_plain_loops(n, base, digits, form):
+    model, z, sight, given, u = case(MOTIONS[n], seed=n)
+    run = NonlinearRun(model, FloatFormat(base, digits), form, range(1, STEPS + 1))
+    run.take(z)
+    assert run.stopped is None, run.reason
+    plain = PlainFilter(MOTIONS[n], sight, given, form, rounding(base, digits))
+    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
+    assert run.P.to_fractions().tolist() == plain.P
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD])
+def test_blocks_round_in_formats_of_their_own(form):
+    model, z, sight, given, u = case(MOTIONS[3], seed=9)
+    digits = {"state": 20, "gain": 12, "covariance": 17, "innovation": 14}
+    formats = BlockFormats(**{name: FloatFormat(2, count) for name, count in digits.items()})
+    run = NonlinearRun(model, formats, form, range(1, STEPS + 1))
+    run.take(z)
+    blocks = {name: rounding(2, count) for name, count in digits.items()}
+    plain = PlainFilter(MOTIONS[3], sight, given, form, rounding(2, 20), blocks)
+    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
+    assert run.P.to_fractions().tolist() == plain.P
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.UD])
+def test_an_iterated_update_takes_functions_at_the_last_estimate(form):
+    motion, z, sight, given, u = MOTIONS[2], *case(MOTIONS[2], seed=4)[1:]
+    model = case(motion, seed=4)[0]
+    made = NonlinearModel(
+        model.f, None, model.h, None, model.noise.Q[0], model.noise.R[0], model.noise.x0, model.noise.P0, u=u,
+        angles=[1], iterations=3,
+    )  # fmt: skip
+    run = NonlinearRun(made, FloatFormat(2, 18), form, range(1, STEPS + 1))
+    run.take(z)
+    plain = PlainFilter(motion, sight, given, form, rounding(2, 18), iterations=3)
+    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
+
+
+class PlainUnscented(PlainFilter):
+    """An unscented filter in plain loops, with weights alpha = 1/2, beta = 2, kappa = 1."""
+
+    def step(self, z, u):
+        r, n = self.r, len(self.x)
+        z, u = [r(Fraction(each)) for each in z], [r(Fraction(each)) for each in u]
+        exactly = Fraction(1, 4) * (n + 1)
+        scale, center, other = r(exactly), r(1 - n / exactly + Fraction(11, 4)), r(1 / (2 * exactly))
+        L = self.root([[r(scale * a) for a in row] for row in self.P])
+        X = [self.x]
+        X += [[r(a + b) for a, b in zip(self.x, column, strict=True)] for column in transposed(L)]
+        X += [[r(a - b) for a, b in zip(self.x, column, strict=True)] for column in transposed(L)]
+        Y = [self.motion.plain(r, each, u)[0] for each in X]
+        Z = [self.sight.plain(r, each, u)[0] for each in Y]
+        ahead, D = self.mean(other, Y, lambda a, b: [r(c - d) for c, d in zip(a, b, strict=True)])
+        expected, E = self.mean(other, Z, self.difference)
+        weights = [center, *[other] * (2 * n)]
+        plain = self.state
+        weighted = [[r(a * w) for a, w in zip(column, weights, strict=True)] for column in transposed(D)]
+        V = plain.plus(plain.times(weighted, D), self.Q)
+        across = [[r(a * w) for a, w in zip(column, weights, strict=True)] for column in transposed(E)]
+        S = plain.plus(plain.times(across, E), self.R)
+        K = plain.times(plain.times(weighted, E), inverse(r, S))
+        y = self.difference(z, expected)
+        self.P = plain.plus(V, plain.times(plain.times(K, S), transposed(K)), -1)
+        change = plain.times(K, [[a] for a in y])
+        self.x = [r(a + b[0]) for a, b in zip(ahead, change, strict=True)]
+
+    def difference(self, a, b):
+        y = [self.r(c - d) for c, d in zip(a, b, strict=True)]
+        return [y[0], self.wrapped(y[1])]
+
+    def mean(self, weight, points, difference):
+        r, total = self.r, None
+        for point in points[1:]:
+            part = [r(weight * a) for a in difference(point, points[0])]
+            total = part if total is None else [r(a + b) for a, b in zip(total, part, strict=True)]
+        mean = [r(a + b) for a, b in zip(points[0], total, strict=True)]
+        return mean, [difference(each, mean) for each in points]
+
+    def root(self, A):
+        r, n = self.r, len(A)
+        L = [[Fraction(0)] * n for _ in range(n)]
+        for j in range(n):
+            rest = [A[i][j] for i in range(n)]
+            for k in range(j):
+                rest = [r(a - r(L[i][k] * L[j][k])) for i, a in enumerate(rest)]
+            L[j][j] = of_mpmath(r, "sqrt", rest[j])
+            for i in range(j + 1, n):
+                L[i][j] = r(rest[i] / L[j][j])
+        return L
+
+
+@pytest.mark.parametrize(("n", "base", "digits"), [(2, 2, 24), (3, 10, 7), (4, 2, 14)])
+def test_the_unscented_filter_has_the_digits_of_plain_loops(n, base, digits):
+    model, z, sight, given, u = case(MOTIONS[n], seed=n)
+    noise = model.noise
+    made = NonlinearModel(
+        model.f, None, model.h, None, noise.Q[0], noise.R[0], noise.x0, noise.P0, u=u, angles=[1],
+        method="unscented", points=SigmaPoints("0.5", 2, 1),
+    )  # fmt: skip
+    run = NonlinearRun(made, FloatFormat(base, digits), Form.INNOVATION, range(1, STEPS + 1))
+    run.take(z)
+    assert run.stopped is None, run.reason
+    plain = PlainUnscented(MOTIONS[n], sight, given, Form.INNOVATION, rounding(base, digits))
+    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
+    assert run.P.to_fractions().tolist() == plain.P
+
+
+# -- linear functions -------------------------------------------------------------------------------------------------
+
+PHI, SEEN = [["1", "0.1"], ["-0.1", "0.9"]], [["1", "0.3"], ["0.2", "1"]]
+NOISE = {"Q": [[0, 0], [0, "0.01"]], "R": [["0.5", "0.1"], ["0.1", 1]], "x0": [0, 1], "P0": [[1, 0], [0, 1]]}
+RECORD = np.random.default_rng(0).standard_normal((60, 2))
+
+
+def linear():
+    return LinearModel(PHI, SEEN, **NOISE)
+
+
+def by_functions(**options):
+    def f(x):
+        return x.format.array(PHI) @ x
+
+    def h(x):
+        return x.format.array(SEEN) @ x
+
+    return NonlinearModel(f, None, h, None, **NOISE, **options)
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 11), FloatFormat(2, 24, "chop"), FloatFormat(10, 6)])
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, ArrayForm.SYMMETRIZED])
+def test_linear_functions_have_the_digits_of_the_linear_filter(form, fmt):
+    run, expected = NonlinearRun(by_functions(), fmt, form, [60]), opened_run(linear(), fmt, form, [60])
+    assert np.array_equal(run.states(RECORD), expected.states(RECORD))
+    assert np.array_equal(run.checkpoints().P, expected.checkpoints().P)
+    assert np.array_equal(run.checkpoints().K, expected.checkpoints().K)
+
+
+def test_linear_functions_in_blocks_have_the_digits_of_the_compiled_loops():
+    formats = BlockFormats(*(FloatFormat(2, t) for t in (15, 11, 13, 12)))
+    for form in (Form.INNOVATION, Form.JOSEPH):
+        states = NonlinearRun(by_functions(), formats, form).states(RECORD)
+        assert np.array_equal(states, Run(linear(), formats, form, ()).states(RECORD))
+
+
+def test_factored_forms_subtract_the_predicted_measurement_as_a_sum():
+    """The linear filter subtracts one product after the other, so that only exact arithmetic would agree."""
+    fmt = FloatFormat(2, 24)
+    for form in (Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON):
+        run, expected = NonlinearRun(by_functions(), fmt, form, [60]), opened_run(linear(), fmt, form, [60])
+        difference = np.abs(run.states(RECORD) - expected.states(RECORD)).max()
+        assert 0 < difference < 1e-5  # a few units in the last place of estimates near one
+        whole = run.checkpoints().K.astype(float)
+        assert np.allclose(whole, expected.checkpoints().K.astype(float), atol=1e-6)  # the same rounding errors
+
+
+def test_the_reference_is_that_of_the_linear_filter():
+    difference = (true_states(by_functions(), RECORD) - true_states(linear(), RECORD)).sum(axis=2)
+    assert np.abs(difference).max() < 1e-28  # double-double, with 32 digits
+
+
+def test_the_reference_agrees_with_one_in_more_digits():
+    """The same program in 1200 bits, read as fractions: a tenth of the digits are enough to agree to 2**-104."""
+    model, z, *_ = case(MOTIONS[3], seed=3)
+    run = NonlinearRun(model, FloatFormat(2, 1200), Form.INNOVATION, [8])
+    run.take(z[:8])
+    found = nonlinear_reference(model, z[:8])[-1][0]
+    assert max(abs(a - b) for a, b in zip(run.checkpoints().x[0], found, strict=True)) < Fraction(1, 2**200)
+
+
+# -- angles, missing measurements, normalization ----------------------------------------------------------------------
+
+
+def heading(**options):
+    def same(x):
+        return x
+
+    return NonlinearModel(same, None, same, None, [[0]], [["0.01"]], ["3.1"], [["0.01"]], **options)
+
+
+def test_an_angle_wraps_across_pi():
+    z = [["-3.1"], ["-3.14"], ["3.1"]]
+    values = [
+        NonlinearRun(heading(**options), FloatFormat(2, 24)).states(z)[0, 0, 0] for options in ({}, {"angles": [0]})
+    ]
+    # half of the way from 3.1 to -3.1, directly and across pi; binary32 has 7 digits
+    assert values == pytest.approx([0, 3.1 + (np.pi - 3.1)], abs=1e-6)
+    wrapped = heading(residual=lambda z, y: (z - y + 3) % z.format.array("6.25") - 3)
+    assert NonlinearRun(wrapped, FloatFormat(2, 24)).states(z)[0, 0, 0] == pytest.approx(3.125, abs=1e-6)
+
+
+@pytest.mark.parametrize("turns", [-3, -1, 0, 1, 2])
+def test_whole_turns_make_no_difference(turns):
+    fmt = FloatFormat(2, 60)
+    model, y = heading(angles=[0]), fmt.array([0.25])
+    turn = 2 * np.arctan2(fmt.array(0), fmt.array(-1))
+    assert float(model.wrapped(y + turns * turn)[0].to_float()) == pytest.approx(0.25, abs=1e-15)  # 60 bits
+
+
+@pytest.mark.parametrize("options", [{}, {"method": "unscented"}])
+def test_a_missing_measurement_changes_nothing(options):
+    z = RECORD[:3].copy()
+    z[1] = np.nan
+    model, filled = by_functions(**options).without_missing(z)
+    run = NonlinearRun(model, FloatFormat(2, 30), Form.INNOVATION, [2])
+    run.take(filled)
+    assert not run.checkpoints().K[0].any()
+    z[1, 0] = 1
+    model, filled = by_functions(**options).without_missing(z)
+    run = NonlinearRun(model, FloatFormat(2, 30), Form.INNOVATION, [2])
+    run.take(filled)
+    assert run.checkpoints().K[0][:, 0].all()
+    assert not run.checkpoints().K[0][:, 1].any()
+
+
+def test_new_estimates_are_normalized():
+    def unit(x):
+        return x / np.linalg.norm(x)
+
+    run = NonlinearRun(by_functions(normalize=unit), FloatFormat(2, 40))
+    sizes = np.sqrt((run.states(RECORD)[:, :, 0] ** 2).sum(axis=1))
+    assert np.abs(sizes - 1).max() < 2**-38  # a few units in the last place
+
+
+# -- questions --------------------------------------------------------------------------------------------------------
+
+
+def test_a_search_a_survey_and_records_answer_for_a_nonlinear_filter():
+    model = by_functions()
+    found = required_precision(model, 20, 0.01, z=RECORD[:20])
+    assert found.precision == required_precision(linear(), 20, 0.01, z=RECORD[:20]).precision
+    ratios = dict(survey(model, RECORD[:20], 0.01, [found.precision - 1, found.precision, 70]))
+    assert ratios[found.precision] <= 1 < ratios[found.precision - 1]
+    assert ratios[70] < 2**-50
+    formats = [FloatFormat(2, found.precision - 1), FloatFormat(2, 30)]
+    assert survey_records(model, [RECORD[:20], RECORD[20:40]], 0.01, formats).shares[1] == 1
+    blocks = required_block_precisions(model, 20, 0.01, z=RECORD[:20])
+    assert blocks.uniform.precision == found.precision
+    assert blocks.alone == required_block_precisions(linear(), 20, 0.01, z=RECORD[:20]).alone
+
+
+def test_simulated_measurements_are_repeatable_and_scatter_as_the_noise_says():
+    model = by_functions(measurement_names=["a", "b"])
+    z = simulated(model, 300, 1)
+    assert np.array_equal(z, simulated(model, 300, 1))
+    assert z.std(axis=0) == pytest.approx(simulated(linear(), 300, 1).std(axis=0), rel=0.5)  # other noise
+
+
+def test_a_lost_root_stops_the_run_and_says_why():
+    model = by_functions(method="unscented")
+    run = NonlinearRun(model, FloatFormat(2, 24))
+    run.P = FloatFormat(2, 24).array([[1, 2], [2, 1]])
+    run.take(RECORD)
+    assert (run.stopped, run.reason) == (1, "the square root of a negative number at step 1")
+
+
+@pytest.mark.parametrize("basis", ["bound", "guarantee", "probable"])
+def test_no_guarantee_is_claimed(basis):
+    with pytest.raises(ValueError, match=f'basis "{basis}" for a nonlinear model; needed "emulation": a bound needs'):
+        required_precision(by_functions(), 5, 0.01, basis=basis)
+    with pytest.raises(ValueError, match="emulation"):
+        survey_records(by_functions(), [RECORD], 0.01, [FloatFormat(2, 24)], basis="bound")
+
+
+def wrong_shape(x):
+    return np.stack([x[0], x[1], x[1]])
+
+
+def in_float64(x):
+    return np.sin(np.asarray(x.to_float()))
+
+
+def in_another_format(x):
+    return FloatFormat(2, 30).array([1, 2])
+
+
+def without_rule(x):
+    return np.floor(x)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"f": 3}, TypeError, "got f 3; needed a function"),
+        ({"H": [[1, 0]]}, TypeError, r"got H \[\[1, 0\]\]; needed .*, or None to differentiate"),
+        ({"normalize": 1}, TypeError, "got normalize 1"),
+        ({"method": "particle"}, ValueError, 'needed "extended" or "unscented"'),
+        ({"angles": [2]}, ValueError, "got the angle 2; needed a measurement, 0 to 1"),
+        ({"angles": ["tilt"]}, ValueError, "got the angle 'tilt'"),
+        ({"angles": [0], "residual": lambda z, y: z - y}, ValueError, "angles and a residual"),
+        ({"iterations": 0}, ValueError, "iterations"),
+        ({"iterations": 2, "method": "unscented"}, ValueError, "for the unscented filter"),
+        ({"points": (0, 2, 0), "method": "unscented"}, ValueError, "needed alpha other than zero"),
+        ({"u": [1, 2]}, ValueError, r"got u of shape \(2,\); needed \(steps, p\)"),
+        ({"u": [[1], [2]], "steps": 3}, ValueError, "got u for 2 steps; needed one row for each of the 3"),
+        ({"R": [[0, 0], [0, 1]]}, ValueError, "R"),
+        ({"x0": [[0], [1]]}, ValueError, "x0"),
+        ({"Q": [[1]]}, ValueError, "Q"),
+    ],
+)
+def test_a_model_that_is_none_is_refused(options, error, message):
+    given = {"f": lambda x: x, "F": None, "h": lambda x: x, "H": None, **NOISE, **options}
+    with pytest.raises(error, match=message):
+        NonlinearModel(**given)
+
+
+@pytest.mark.parametrize(
+    ("function", "error", "message"),
+    [
+        (wrong_shape, ValueError, r"got shape \(3,\) from f; needed an array of shape \(2,\)"),
+        (in_float64, TypeError, "got to_float"),
+        (in_another_format, ValueError, "got numbers in .* from f"),
+        (without_rule, TypeError, "got np.floor on an array that carries its derivatives"),
+        (lambda x: [1, 2], ValueError, "got a list from f"),
+    ],
+)
+def test_a_function_that_leaves_the_format_is_refused(function, error, message):
+    def h(x):
+        return x
+
+    for slopes in (None, lambda x: x.format.eye(2)) if function is not without_rule else (None,):
+        with pytest.raises(error, match=message):
+            NonlinearRun(NonlinearModel(function, slopes, h, None, **NOISE), FloatFormat(2, 24)).take(RECORD)
+
+
+def test_forms_that_a_nonlinear_filter_does_not_have_are_refused():
+    fmt = FloatFormat(2, 24)
+    for form in (Form.HUNG, Form.HUNG_SECOND_GAIN, ArrayForm.COMPENSATED):
+        with pytest.raises(ValueError, match="closed loops and compensated estimates need a linear model"):
+            NonlinearRun(by_functions(), fmt, form)
+    with pytest.raises(ValueError, match="UD form for an unscented filter"):
+        required_precision(by_functions(method="unscented"), 60, 0.01, z=RECORD, form="UD")
+    with pytest.raises(ValueError, match="formats of blocks in the Potter form"):
+        NonlinearRun(by_functions(), BlockFormats.uniform(fmt), ArrayForm.POTTER)
+    with pytest.raises(TypeError, match="needed a LinearModel"):
+        FixedIntervalSmoother(by_functions(), RECORD)
+    with pytest.raises(ValueError, match="directory"):
+        survey_records(by_functions(), [RECORD], 0.01, [fmt], directory="here")
+    with pytest.raises(ValueError, match=r"measurements of shape \(60, 3\)"):
+        NonlinearRun(by_functions(), fmt).take(np.zeros((60, 3)))
+
+
+def test_jacobians_may_be_given():
+    seen = []
+
+    def F(x):
+        seen.append(x)
+        return x.format.array(PHI)
+
+    def H(x):
+        return x.format.array(SEEN)
+
+    given = by_functions()
+    made = NonlinearModel(given.f, F, given.h, H, **NOISE)
+    states = NonlinearRun(made, FloatFormat(2, 24)).states(RECORD)
+    assert np.array_equal(states, NonlinearRun(given, FloatFormat(2, 24)).states(RECORD))
+    assert len(seen) == len(RECORD)
+    assert "extended, 2 states; 2 measurements" in repr(made)

@@ -1,0 +1,182 @@
+"""Long runs whose covariance comes back, wide models, and the processor's own arithmetic: the same digits."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import double_doubles
+from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.matrices import product
+from gpbnb.arithmetic.kernels.tags import DoubleDouble
+from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32, BINARY64
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.products import product_by_columns, product_with_units
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.opening import as_packed
+from gpbnb.filters.run import Run, reference
+
+STEPS = 400
+
+
+def model(n, seed, repeated=False):
+    rng = np.random.default_rng([n, seed])
+    Phi = np.eye(n) + 0.1 / np.sqrt(n) * rng.standard_normal((n, n))
+    Phi /= 1.3 * abs(np.linalg.eigvals(Phi)).max()
+    H, A = rng.standard_normal((2, n)), rng.standard_normal((n, n))
+    if repeated:
+        Phi, H = np.stack([Phi, Phi / 2]), np.stack([H, 2 * H, -H])
+    P0 = A @ A.T / n + np.eye(n)
+    return LinearModel(
+        Phi=Phi, H=H, Q=0.01 * np.eye(n) + 1e-3, R=[[1, 0.1], [0.1, 1]], x0=rng.standard_normal(n), P0=(P0 + P0.T) / 2
+    )
+
+
+def measurements(steps):
+    return np.random.default_rng(8).standard_normal((steps, 2))
+
+
+def step_by_step(given, fmt, form, z, compensated=False):
+    """The same run, each step by a call of its own, which cannot know that a covariance came back."""
+    run = Run(given, fmt, form, range(1, len(z) + 1), compensated=compensated)
+    packed = run.pack_measurements(z if fmt is None else fmt.array(z))
+    for each in packed:
+        run.advance(each[None], (run.checkpoint_steps, run.X, run.G, run.C), run.notes)
+    return run
+
+
+@pytest.mark.parametrize("repeated", [False, True])
+@pytest.mark.parametrize(
+    ("fmt", "form", "compensated"),
+    [
+        (None, Form.INNOVATION, False),
+        (BINARY32, Form.INNOVATION, False),
+        (BINARY32, Form.INNOVATION, True),
+        (BINARY32, Form.HUNG, False),
+        (BINARY64, Form.JOSEPH, False),
+        (FloatFormat(2, 12), Form.JOSEPH, True),
+        (FloatFormat(10, 5), Form.INNOVATION, False),
+        (FloatFormat(2, 12, "stochastic"), Form.INNOVATION, False),
+    ],
+)
+def test_a_covariance_that_comes_back_changes_no_digit(fmt, form, compensated, repeated):
+    given, z = model(3, 1, repeated), measurements(STEPS)
+    expected = step_by_step(given, fmt, form, z, compensated)
+    run = Run(given, fmt, form, range(1, STEPS + 1), compensated=compensated)
+    run.take(z if fmt is None else fmt.array(z))
+    for found, each in zip(
+        (run.x, run.P, run.X, run.G, run.C, run.notes),
+        (expected.x, expected.P, expected.X, expected.G, expected.C, expected.notes),
+        strict=True,
+    ):
+        assert np.array_equal(found, each)
+    if form is not Form.HUNG and (fmt is None or fmt.rounding.value != "stochastic"):
+        # the covariance does come back within the run
+        cycle = given.cycle
+        assert any(np.array_equal(run.C[-1], earlier) for earlier in run.C[-1 - cycle : 0 : -cycle][:300])
+
+
+def test_a_run_may_be_cut_anywhere():
+    given, z = model(2, 1), BINARY32.array(measurements(900))
+    whole, cut = (Run(given, BINARY32, Form.INNOVATION, (450, 777)) for _ in range(2))
+    whole.take(z)
+    for begin, end in ((0, 1), (1, 700), (700, 702), (702, 900)):
+        cut.take(z[begin:end])
+    for one, other in ((whole.x, cut.x), (whole.P, cut.P), (whole.C, cut.C), (whole.G, cut.G), (whole.X, cut.X)):
+        assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    "fmt",
+    [
+        BINARY16,
+        BFLOAT16,
+        BINARY32,
+        BINARY64,
+        FloatFormat(2, 24),
+        FloatFormat(2, 24, "chop"),
+        FloatFormat(2, 53),
+        FloatFormat(16, 6),
+        FloatFormat(2, 24, "even", emin=-30, emax=10, subnormal=False),
+    ],
+)
+@pytest.mark.parametrize("scale", [1.0, 2.0**-20, 2.0**6])
+def test_wide_steps_have_the_digits_of_arrays(fmt, scale):
+    given, z = model(9, 3), measurements(2)
+    given = LinearModel(
+        Phi=given.Phi, H=given.H, Q=given.Q * Fraction(scale), R=given.R, x0=given.x0, P0=given.P0 * Fraction(scale)
+    )
+    run = Run(given, fmt, Form.INNOVATION, ())
+    run.take(fmt.array(z))
+    matrices = given.Phi[0], given.H[0], given.Q[0], given.R[0], given.P0
+    Phi, H, Q, R, P = (fmt.array(each).on_exact_backend() for each in matrices)
+    one = fmt.array(np.eye(9)).on_exact_backend()
+    for _ in range(2):
+        V = Phi @ P @ Phi.T + Q
+        PHt = V @ H.T
+        S = H @ PHt + R
+        K = PHt @ inverse(fmt, S)
+        P = (one - K @ H) @ V
+    assert np.array_equal(run.exactly(run.P), P.to_fractions())
+
+
+def inverse(fmt, S):
+    """Of two rows, by elimination, as the filter does it."""
+    (a, b), (c, d) = S
+    f = c / a
+    u = d - f * b
+    one, nothing = fmt.array(1).on_exact_backend(), fmt.array(0).on_exact_backend()
+    rows = [[one, nothing], [nothing - f * one, one - f * nothing]]
+    second = [each / u for each in rows[1]]
+    first = [(rows[0][j] - b * second[j]) / a for j in range(2)]
+    return np.stack([np.stack(first), np.stack(second)])
+
+
+@compiled
+def three_products(fmt, a, b, c, d, e):
+    product(fmt, a, b, c)
+    product_with_units(fmt, a, b, d)
+    product_by_columns(fmt, a, b, e)
+
+
+@compiled
+def by_dots(fmt, a, b, c):
+    for j in range(b.shape[1]):
+        product(fmt, a, b[:, j : j + 1], c[:, j : j + 1])
+
+
+@pytest.mark.parametrize("shape", [(8, 9, 8), (9, 3, 11), (12, 12, 12), (7, 8, 9)])
+def test_wide_products_in_double_double(shape):
+    """Those of high and low parts taken apart are those of one column at a time."""
+    n, m, p = shape
+    rng = np.random.default_rng(shape)
+    a, b = (rng.standard_normal((*s, 2)) * [1.0, 2.0**-55] for s in ((n, m), (m, p)))
+    a[rng.random((n, m)) < 0.3] = 0
+    a[rng.random((n, m)) < 0.2] = (1.0, 0.0)
+    found, expected = [np.empty((n, p, 2)) for _ in range(3)], np.empty((n, p, 2))
+    three_products(DoubleDouble(), a, b, *found)
+    by_dots(DoubleDouble(), a, b, expected)
+    for each in found:
+        assert np.array_equal(each, expected)
+    with pytest.raises(OverflowError):
+        three_products(DoubleDouble(), a * 2.0**800, b * 2.0**800, *found)
+
+
+@pytest.mark.parametrize("precision", [3, 8, 15, 16, 18])
+def test_decimal_measurements_become_the_nearest_double_doubles(precision):
+    rng = np.random.default_rng(precision)
+    fmt = FloatFormat(10, precision)
+    x = fmt.array([f"{v:.17e}" for v in rng.standard_normal(200) * 10.0 ** rng.integers(-30, 30, 200)] + ["0", "1e-5"])
+    assert np.array_equal(as_packed(None, x), double_doubles(x.to_fractions()))
+
+
+@pytest.mark.parametrize("fmt", [BINARY32, FloatFormat(10, 6), FloatFormat(16, 6)])
+def test_the_reference_takes_measurements_of_a_format(fmt):
+    given, z = model(3, 4), fmt.array(measurements(60))
+    own = reference(given.rounded(fmt), z.to_fractions(), (5, 60))
+    assert np.array_equal(emulate(given, z, fmt, checkpoint_steps=(5, 60)).reference.P, own.P)
+    assert np.array_equal(emulate(given, z, fmt, checkpoint_steps=(5, 60)).reference.x, own.x)

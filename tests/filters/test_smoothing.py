@@ -1,0 +1,359 @@
+"""The smoother: its digits are those of plain loops over Fractions, and its algebra is that of exact least squares."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import pytest
+from gmpy2 import mpq
+from oracles import Arithmetic, square_root
+from small_filter import measurements, model
+
+from gpbnb import (
+    FixedFormat,
+    FixedIntervalSmoother,
+    FloatFormat,
+    LinearModel,
+    required_fraction_bits,
+    required_precision,
+)
+from gpbnb.arithmetic.algebra import EXACT
+from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import StepModel
+from gpbnb.filters.simulation import simulated_measurements
+from gpbnb.filters.smoothing import smooth_covariances
+
+FORMATS = [(2, 9, True), (2, 24, False), (2, 70, True), (10, 6, True), (16, 5, False), (3, 9, True)]
+FORMS = ("innovation", "Joseph", "square root")
+
+
+class Plain(Arithmetic):
+    """Matrices as lists of lists, every operation rounded once, written from the formulas of the smoother."""
+
+    def __init__(self, base, precision, nearest):
+        super().__init__(base, precision, nearest)
+        self.root = lambda x: mpq(square_root(Fraction(x.numerator, x.denominator), base, precision, nearest))
+
+    def stored(self, a):
+        return [[self.fl(mpq(x)) for x in row] for row in a]
+
+    def add(self, a, b, sign=1):
+        return [[self.fl(x + sign * y) for x, y in zip(p, q, strict=True)] for p, q in zip(a, b, strict=True)]
+
+    def product(self, *factors):
+        found = factors[0]
+        for each in factors[1:]:
+            found = self.matmul(found, each)
+        return found
+
+    def by_covariances(self, given, z, joseph):
+        forward, x, P = [], self.stored([[value] for value in given.x0]), self.stored(given.P0)
+        for k, row in enumerate(z):
+            Phi, H, Q, R = (self.stored(c[k % len(c)]) for c in (given.Phi, given.H, given.Q, given.R))
+            V = self.add(self.product(Phi, P, turned(Phi)), Q)
+            VH = self.matmul(V, turned(H))
+            K = self.matmul(VH, self.inv(self.add(self.matmul(H, VH), R), pivot=False))
+            W = self.add(unit(len(V)), self.matmul(K, H), -1)
+            P = self.matmul(W, V)
+            if joseph:
+                P = self.add(self.matmul(P, turned(W)), self.product(K, R, turned(K)))
+            ahead = self.matmul(Phi, x)
+            innovation = self.add(self.stored([[value] for value in row]), self.matmul(H, ahead), -1)
+            x = self.add(ahead, self.matmul(K, innovation))
+            forward.append((Phi, V, ahead, x, P))
+        found = [(x, P)]
+        for k in range(len(z) - 2, -1, -1):
+            (Phi, V, ahead, _, _), (_, _, _, xf, Pf) = forward[k + 1], forward[k]
+            G = self.product(Pf, turned(Phi), self.inv(V, pivot=False))
+            x = self.add(xf, self.matmul(G, self.add(x, ahead, -1)))
+            P = self.add(Pf, self.product(G, self.add(P, V, -1), turned(G)))
+            found.insert(0, (x, P))
+        return found
+
+    def factored(self, M):
+        """Exact U and D, rounded: from the last column to the first."""
+        rest, n = [[mpq(value) for value in row] for row in M], len(M)
+        U, D = unit(n), [mpq(0)] * n
+        for j in range(n - 1, -1, -1):
+            D[j] = rest[j][j]
+            for i in range(j):
+                U[i][j] = rest[i][j] / D[j] if D[j] else mpq(0)
+            for i in range(j):
+                for other in range(j):
+                    rest[i][other] -= U[i][j] * U[other][j] * D[j]
+        return self.stored(U), [self.fl(d) for d in D]
+
+    def root_of(self, M):
+        U, D = self.factored(M)
+        return [[self.fl(u * self.root(d)) for u, d in zip(row, D, strict=True)] for row in U]
+
+    def triangle(self, W):
+        """The upper triangle T of W = T times orthonormal rows, by modified Gram-Schmidt from the last row on."""
+        W, n = [list(row) for row in W], len(W)
+        T = [[mpq(0)] * n for _ in range(n)]
+        for j in range(n - 1, -1, -1):
+            T[j][j] = size = self.root(self.dot(W[j], W[j]))
+            if size:
+                direction = [self.fl(value / size) for value in W[j]]
+                for i in range(j):
+                    T[i][j] = s = self.dot(W[i], direction)
+                    W[i] = [self.fl(a - self.fl(s * b)) for a, b in zip(W[i], direction, strict=True)]
+        return T
+
+    def by_roots(self, given, z):
+        fl, n, forward = self.fl, len(given.x0), []
+        x, S = [fl(mpq(value)) for value in given.x0], self.root_of(given.P0)
+        for k, row in enumerate(z):
+            Phi, H = (self.stored(c[k % len(c)]) for c in (given.Phi, given.H))
+            SQ, (U, D) = self.root_of(given.Q[k % len(given.Q)]), self.factored(given.R[k % len(given.R)])
+            moved = self.matmul(Phi, S)
+            T = self.triangle([S[i] + [mpq(0)] * n for i in range(n)] + [moved[i] + SQ[i] for i in range(n)])
+            A, B, C = (
+                [row[c:d] for row in T[a:b]] for a, b, c, d in ((0, n, 0, n), (0, n, n, 2 * n), (n, 2 * n, n, 2 * n))
+            )
+            ahead = [self.dot(row, x) for row in Phi]
+            x, S, y = ahead, C, [fl(mpq(value)) for value in row]
+            for i in range(len(H) - 1, -1, -1):
+                for other in range(i + 1, len(H)):
+                    H[i] = [fl(a - fl(U[i][other] * b)) for a, b in zip(H[i], H[other], strict=True)]
+                    y[i] = fl(y[i] - fl(U[i][other] * y[other]))
+            for h, value, r in zip(H, y, D, strict=True):
+                x, S = self.carlson(h, value, r, x, S)
+            forward.append((A, B, C, ahead, x))
+        found = [([[value] for value in x], S)]
+        for k in range(len(z) - 2, -1, -1):
+            A, B, C, ahead, _ = forward[k + 1]
+            joined = [[fl(x[i] - ahead[i]), *S[i]] for i in range(n)]
+            for i in range(n - 1, -1, -1):
+                for other in range(i + 1, n):
+                    joined[i] = [fl(a - fl(C[i][other] * b)) for a, b in zip(joined[i], joined[other], strict=True)]
+                joined[i] = [fl(a / C[i][i]) for a in joined[i]]
+            x = [fl(a + self.dot(row, [line[0] for line in joined])) for a, row in zip(forward[k][4], B, strict=True)]
+            moved = self.matmul(B, [line[1:] for line in joined])
+            S = self.triangle([moved[i] + A[i] for i in range(n)])
+            found.insert(0, ([[value] for value in x], S))
+        return found
+
+    def carlson(self, h, z, r, x, S):
+        fl, n = self.fl, len(x)
+        f = [self.dot([S[i][j] for i in range(n)], h) for j in range(n)]
+        a, k, new = r, [mpq(0)] * n, [list(row) for row in S]
+        for j in range(n):
+            if f[j]:
+                before, a = a, fl(a + fl(f[j] * f[j]))
+                p, q = self.root(fl(before / a)), fl(f[j] / self.root(fl(before * a)))
+                for i in range(n):
+                    new[i][j] = fl(fl(p * S[i][j]) - fl(q * k[i]))
+                    k[i] = fl(k[i] + fl(f[j] * S[i][j]))
+        y = fl(z - self.dot(h, x))
+        return [fl(value + fl(fl(gain / a) * y)) for value, gain in zip(x, k, strict=True)], new
+
+
+def turned(a):
+    return [list(column) for column in zip(*a, strict=True)]
+
+
+def unit(n):
+    return [[mpq(int(i == j)) for j in range(n)] for i in range(n)]
+
+
+def cyclic():
+    """Three states and two measurements; Phi, H and Q are cycles of 2, and R of 3."""
+    given = model()
+    turned_over = given.Phi[0][::-1, ::-1]
+    return model(Phi=[given.Phi[0], turned_over], Q=[given.Q[0], given.Q[0] * Fraction(3, 2)])
+
+
+def scalar():
+    """One state and one measurement."""
+    return LinearModel([["0.9"]], [["1.1"]], [["0.3"]], [["0.7"]], ["0.4"], [["2.3"]])
+
+
+CASES = {"cycles": (cyclic(), measurements()), "scalar": (scalar(), measurements(5, 1))}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("parts", FORMATS, ids=str)
+def test_digits_are_those_of_plain_loops(parts, name, form):
+    base, precision, nearest = parts
+    given, z = CASES[name]
+    fmt = FloatFormat(base, precision, "nearest" if nearest else "chop")
+    plain, found = Plain(*parts), FixedIntervalSmoother(given, z, form).run(fmt)
+    expected = (
+        plain.by_roots(given, exact(z))
+        if form == "square root"
+        else plain.by_covariances(given, exact(z), form == "Joseph")
+    )
+    assert found.x.to_fractions().tolist() == [[row[0] for row in x] for x, _ in expected]
+    assert found.P.to_fractions().tolist() == [P for _, P in expected]
+
+
+def least_squares(given, z, present):
+    """The smoothed states and covariances from all equations at once: the minimum of a quadratic form, exactly.
+
+    The unknowns are x_0 … x_N; P0, Q and R weigh the prior, the transitions and the measurements that are present.
+    """
+    n, steps = given.n, len(z)
+    size = n * (steps + 1)
+    N, b = exact(np.zeros((size, size), dtype=int)), exact(np.zeros(size, dtype=int))
+
+    def weigh(rows, right, covariance):
+        weight = solved(covariance, exact(np.eye(len(covariance), dtype=int)))
+        N[:] += rows.T @ weight @ rows
+        b[:] += rows.T @ weight @ right
+
+    def zeros(count):
+        return exact(np.zeros((count, size), dtype=int))
+
+    identity = exact(np.eye(n, dtype=int))
+    first = zeros(n)
+    first[:, :n] = identity
+    weigh(first, given.x0, given.P0)
+    for k in range(steps):
+        here, after = slice(k * n, (k + 1) * n), slice((k + 1) * n, (k + 2) * n)
+        step = zeros(n)
+        step[:, here], step[:, after] = -given.Phi[k % len(given.Phi)], identity
+        weigh(step, exact(np.zeros(n, dtype=int)), given.Q[k % len(given.Q)])
+        if (seen := np.flatnonzero(present[k])).size:
+            rows = zeros(len(seen))
+            rows[:, after] = given.H[k % len(given.H)][seen]
+            weigh(rows, exact(z[k][seen]), given.R[k % len(given.R)][np.ix_(seen, seen)])
+    covariance = solved(N, exact(np.eye(size, dtype=int)))
+    x = covariance @ b
+    return x.reshape(-1, n)[1:], [covariance[k * n : (k + 1) * n, k * n : (k + 1) * n] for k in range(1, steps + 1)]
+
+
+def solved(a, b):
+    """Gauss-Jordan elimination over Fractions; the matrices are definite."""
+    a, b = a.copy(), b.copy()
+    for k in range(len(a)):
+        b[k], a[k] = b[k] / a[k, k], a[k] / a[k, k]
+        for i in range(len(a)):
+            if i != k and a[i, k]:
+                b[i], a[i] = b[i] - a[i, k] * b[k], a[i] - a[i, k] * a[k]
+    return b
+
+
+def gaps():
+    """The record with a whole step and single measurements missing."""
+    z = measurements()
+    z[1], z[3, 0], z[4, 1] = math.nan, math.nan, math.nan
+    return z
+
+
+@pytest.mark.parametrize("z", [measurements(), gaps(), gaps()[:1]], ids=["full", "gaps", "one step"])
+def test_the_algebra_is_that_of_exact_least_squares(z):
+    given = cyclic()
+    x, P = least_squares(given, z, ~np.isnan(z))
+    read = FixedIntervalSmoother(given, z)
+    for form in (Form.INNOVATION, Form.JOSEPH):
+        models = [
+            StepModel(*(c[k % len(c)] for c in (read.model.Phi, read.model.H, read.model.Q, read.model.R)))
+            for k in range(len(z))
+        ]
+        found = smooth_covariances(EXACT, form, models, given.x0[:, None], given.P0, list(read.z[:, :, None]))
+        assert [step.x[:, 0].tolist() for step in found] == x.tolist()
+        assert [step.P.tolist() for step in found] == [each.tolist() for each in P]
+    root = FixedIntervalSmoother(given, z, "square root").run(FloatFormat(2, 300))
+    S = root.P.to_fractions()
+    assert np.abs(root.x.to_fractions() - x).max() < Fraction(1, 2**280)  # 300 bits lose fewer than 20
+    assert np.abs(np.array([each @ each.T for each in S]) - np.array(P)).max() < Fraction(1, 2**280)
+    assert all(each[i, j] == 0 for each in S for i in range(3) for j in range(i))
+
+
+def tracked():
+    """A target in random acceleration whose position is measured each second, and whose prior says almost nothing."""
+    q = Fraction(1, 10**4)
+    return LinearModel(
+        [[1, 1], [0, 1]], [[1, 0]], [[q / 3, q / 2], [q / 2, q]], [["0.01"]], [0, 0], [[10**6, 0], [0, 10**6]]
+    )
+
+
+@cache
+def exact_track(steps=60):
+    """The smoothed estimates without rounding, (steps, n)."""
+    given = tracked()
+    models = [StepModel(given.Phi[0], given.H[0], given.Q[0], given.R[0])] * steps
+    z = list(exact(simulated_measurements(given, steps))[:, :, None])
+    found = smooth_covariances(EXACT, Form.INNOVATION, models, given.x0[:, None], given.P0, z)
+    return np.array([step.x[:, 0] for step in found])
+
+
+@pytest.mark.parametrize(("form", "bits"), [("innovation", 31), ("Joseph", 29), ("square root", 7)])
+def test_the_search_is_right_by_the_exact_smoother(form, bits):
+    """The answer meets 0.01, one bit less does not; the true estimates are exact."""
+    given, steps = tracked(), 60
+    z = simulated_measurements(given, steps)
+    read = FixedIntervalSmoother(given, z, form)
+    found = required_precision(read, steps, 0.01)
+    assert found.precision == bits
+    true = exact_track()
+    for digits, ratio in dict(found.tried).items():
+        try:
+            error = np.abs(read(FloatFormat(2, digits)).to_fractions() - true).max()
+        except ZeroDivisionError:
+            assert ratio == math.inf
+        else:
+            assert ratio == pytest.approx(float(error) / 0.01, rel=1e-9)  # the search compares with 237 bits
+    assert dict(found.tried)[bits] <= 1 < dict(found.tried)[bits - 1]
+
+
+def test_missing_measurements_are_searched():
+    z = measurements()
+    z[2] = math.nan
+    given = model()
+    assert required_precision(FixedIntervalSmoother(given, z), len(z), 0.01).precision == 9
+    masked = np.ma.masked_invalid(z)
+    by_mask, by_nan = (FixedIntervalSmoother(given, each)(FloatFormat(10, 7)).to_fractions() for each in (masked, z))
+    assert (by_mask == by_nan).all()
+
+
+@pytest.mark.parametrize(("form", "bits"), [("innovation", 12), ("square root", 10)])
+def test_fixed_point(form, bits):
+    """Estimates are multiples of the last place, and the answer counts fraction bits."""
+    z = measurements(5, 1)
+    read = FixedIntervalSmoother(scalar(), z, form)
+    found = required_fraction_bits(read, None, 0.001, like=FixedFormat(5, 8))
+    assert found.fmt.fraction_bits == bits
+    x, _ = least_squares(scalar(), z, ~np.isnan(z))
+    errors = [float(np.abs(read(FixedFormat(5, each)).to_fractions() - x).max()) for each in (bits - 1, bits, bits + 1)]
+    assert max(errors[1:]) <= 0.001 < errors[0]
+    assert all((value * 2**bits).denominator == 1 for value in read(FixedFormat(5, bits)).to_fractions().flat)
+
+
+def test_a_singular_prediction_is_refused_with_the_way_out():
+    certain = LinearModel([[1]], [[1]], [[0]], [[1]], [0], [[0]])
+    for form in FORMS:
+        with pytest.raises(
+            ZeroDivisionError, match=r"got a singular .*precision=24.*; needed pivots .* to the diagonals"
+        ):
+            FixedIntervalSmoother(certain, [[1], [2]], form).run(FloatFormat(2, 24))
+
+
+@pytest.mark.parametrize(
+    ("changed", "kind", "message"),
+    [
+        ({"model": "walk"}, TypeError, "got a model str; needed a LinearModel"),
+        ({"form": "UD"}, ValueError, 'got the UD form; needed "innovation", "Joseph" or "square root"'),
+        ({"form": "round"}, ValueError, "got form 'round'; needed one of"),
+        ({"z": [[1], [2, 3]]}, ValueError, "got measurements in rows of different lengths"),
+        ({"z": [1, 2]}, ValueError, r"got measurements of shape \(2,\); needed \(steps, 1\)"),
+        ({"z": np.empty((0, 1))}, ValueError, "got no measurements; needed one step or more"),
+        ({"z": [[math.inf]]}, ValueError, "measurements: entry 0, 0: got .*; write NaN where one is missing"),
+        ({"z": [["three"]]}, ValueError, "measurements: "),
+        ({"model": LinearModel([[1]], [[1]], [[1]], [[1]], [0], [[1]], b=[1])}, ValueError, "with known inputs"),
+        (
+            {"model": LinearModel(lambda k: [[k]], [[1]], [[1]], [[1]], [0], [[1]], steps=1)},
+            ValueError,
+            "got 2 steps; needed at most 1",
+        ),
+    ],
+)
+def test_errors_say_what_is_needed(changed, kind, message):
+    with pytest.raises(kind, match=message):
+        FixedIntervalSmoother(**{"model": scalar(), "z": [[1], [2]], **changed})

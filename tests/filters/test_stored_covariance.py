@@ -1,0 +1,223 @@
+"""gpbnb.report.kalman: a covariance that a format makes indefinite is stored with raised variances, in every form."""
+
+from __future__ import annotations
+
+import itertools
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.definiteness import is_definite
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.bounded_run import emulate_with_bound
+from gpbnb.filters import bounded_steps
+from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.array_run import ArrayRun, _double_doubles
+from gpbnb.filters.array_steps import predict_root, predict_ud
+from gpbnb.filters.covariance import Repair, raised_until
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.factors import covariance_of_factors
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
+from gpbnb.filters.simulation import simulated_measurements
+from gpbnb.wordlength.precision import required_precision
+
+STEPS = ("0.001", "0.005", "0.01", "0.02", "0.04", "0.05", "0.1", "0.2", "0.3", "0.7")
+FORMATS = (FloatFormat(2, 8), FloatFormat(2, 24), FloatFormat(2, 24, Rounding.CHOP), FloatFormat(10, 5))
+
+
+def chain(n, dt, size="1/3"):
+    """A chain of n integrators, driven by white noise of the last derivative: Q has rank one."""
+    dt, size = Fraction(dt), Fraction(size)
+    column = exact([[dt**2 / 2, dt, Fraction(1)][:n]])
+    Phi = np.eye(n) + np.diag([float(dt)] * (n - 1), 1)
+    P0 = np.eye(n, dtype=int)
+    return LinearModel(exact(Phi), exact(np.eye(1, n)), size**2 * column.T @ column, [["0.25"]], [0] * n, P0)
+
+
+MODELS = [chain(n, dt) for n in (2, 3) for dt in STEPS]
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_every_model_can_be_stored_and_factored(fmt):
+    changed = 0
+    for model in MODELS:
+        stored = model.rounded(fmt)
+        assert all(is_definite(each) for each in stored.Q)
+        assert np.array_equal(fmt.array(stored.Q).to_fractions(), stored.Q)
+        changed += stored.repairs != ()
+        run = Run(model, fmt, Form.UD, ())
+        assert list(stored.repairs) == run.repairs[: len(stored.repairs)]
+        assert len(set(run.repairs)) == len(run.repairs)
+        for form in (Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON):
+            assert ArrayRun(model, fmt, form, ()).repairs == run.repairs
+    assert changed > len(MODELS) / 5
+
+
+def test_the_variances_are_raised_no_more_than_necessary():
+    fmt = FloatFormat(2, 24)
+    model = next(each for each in MODELS if each.rounded(fmt).repairs)
+    (repair,) = model.rounded(fmt).repairs
+    assert (repair.letter, repair.member, repair.asymmetry, repair.fmt) == ("Q", 0, 0.0, fmt)
+    unit = float(fmt.unit_roundoff)
+    assert unit <= repair.shift <= 4 * model.n * unit
+    raised = model.Q[0].copy()
+    i = np.arange(model.n)
+    raised[i, i] *= 1 + Fraction(repair.shift)
+    assert np.array_equal(model.rounded(fmt).Q[0], fmt.array(raised).to_fractions())
+    if repair.shift > unit:
+        raised[i, i] = model.Q[0].diagonal() * (1 + Fraction(repair.shift / 2))
+        assert not is_definite(fmt.array(raised).to_fractions())
+    assert "Q, stored in FloatFormat(base=2, precision=24" in str(repair)
+
+
+def test_a_definite_model_is_stored_as_it_is():
+    model = LinearModel([[1]], [[1]], [["0.01"]], [["0.3"]], [0], [[1]])
+    for fmt in FORMATS:
+        assert model.definite_in(fmt) is model
+
+
+def test_noise_of_measurements_is_stored_definite():
+    R = [[1, "0.9999"], ["0.9999", 1]]
+    model = LinearModel(np.eye(2, dtype=int), np.eye(2, dtype=int), np.eye(2, dtype=int), R, [0, 0], np.eye(2))
+    stored = model.rounded(FloatFormat(2, 8))
+    assert is_definite(stored.R[0], strictly=True)
+    assert "R, stored in" in str(stored.repairs[0])
+    assert "made definite" in str(stored.repairs[0])
+
+
+def test_without_repair_an_indefinite_covariance_is_refused():
+    fmt = FloatFormat(2, 24)
+    given = next(each for each in MODELS if each.rounded(fmt).repairs)
+    model = LinearModel(given.Phi, given.H, given.Q, given.R, given.x0, given.P0, repair=False)
+    assert model.definite_in(fmt) is model
+    with pytest.raises(ValueError, match="needed a positive semidefinite matrix"):
+        model.rounded(fmt)
+    with pytest.raises(ValueError, match="needed covariances that stay definite"):
+        Run(model, fmt, Form.UD, ())
+
+
+def test_a_variance_that_becomes_zero_cannot_be_raised():
+    """In fixed point a small variance is rounded to zero while a covariance is not."""
+    fmt = FixedFormat(2, 8)
+    Q = [["0.001", "0.03"], ["0.03", 1]]
+    model = LinearModel(np.eye(2, dtype=int), [[1, 0]], Q, [[1]], [0, 0], np.eye(2))
+    assert model.definite_in(fmt) is model
+    with pytest.raises(ValueError, match="needed a positive semidefinite matrix"):
+        model.rounded(fmt)
+
+
+def test_emulation_and_bound_of_a_raised_covariance_agree():
+    """The bound belongs to the covariance that is stored."""
+    fmt = FloatFormat(2, 24)
+    model = next(each for each in MODELS if each.rounded(fmt).repairs)
+    z = simulated_measurements(model, 40, 3)
+    history = emulate(model, z, fmt)
+    assert history.repairs == tuple(map(str, model.rounded(fmt).repairs))
+    for form in (Form.INNOVATION, Form.UD):
+        assert 0 < emulate_with_bound(model, z, fmt, form).ratios().max() <= 1
+
+
+def test_answers_exist_for_every_precision_and_name_the_change():
+    """Without the change, a bound existed for some precisions and not for others."""
+    for model in MODELS[:10]:
+        found = required_precision(model, 50, 0.01, basis="bound", form="UD")
+        assert found.precision < 24
+        assert found.advice == ""
+        stored = model.definite_in(found.fmt).repairs
+        assert found.repairs[: len(stored)] == tuple(map(str, stored))
+
+
+def test_factors_are_those_of_the_raised_covariance():
+    for fmt, model in itertools.product(FORMATS, MODELS):
+        run, stored = Run(model, fmt, Form.UD, ()), model.definite_in(fmt)
+        if run.repairs != list(stored.repairs):
+            assert run.repairs[-1].letter == "Q"
+            found = covariance_of_factors(run.exactly(run.UQ)[0])
+            sizes = np.sqrt(np.diagonal(stored.Q[0]).astype(float))
+            off = (np.abs(found - stored.Q[0]) / np.multiply.outer(sizes, sizes)).astype(float)
+            assert 0 < off.max() <= 2 * run.repairs[-1].shift + 8 * model.n * float(fmt.unit_roundoff)
+            return
+    raise AssertionError("no factors were raised")
+
+
+@pytest.mark.parametrize("letter", ["Q", "R", "P0"])
+def test_each_covariance_is_raised_by_itself(letter):
+    """This one is definite in 24 bits, but its computed factors are not."""
+    fmt, one = FloatFormat(2, 24), np.eye(3, dtype=int)
+    given = exact([["4058.0002", "-176", "430"], ["-176", "4264.00001", "7812"], ["430", "7812", "14452.00002"]])
+    units = {"Phi": one, "H": one, "Q": one, "R": one, "x0": [0, 0, 0], "P0": one}
+    model = LinearModel(**(units | {letter: given}), repair=True)
+    assert model.rounded(fmt).repairs == ()
+    run = Run(model, fmt, Form.UD, ())
+    assert [each.letter for each in run.repairs] == [letter]
+    sizes = np.sqrt(np.diagonal(given).astype(float))
+    for name, factors in (("Q", run.UQ[0]), ("R", run.UR[0]), ("P0", run.P)):
+        off = covariance_of_factors(run.exactly(factors)) - (given if name == letter else one)
+        assert np.abs(off / np.multiply.outer(sizes, sizes)).max() <= 2 * run.repairs[0].shift + 24 * 2.0**-24
+
+
+def test_the_search_for_the_least_change():
+    found = raised_until(exact([[1, 2], [2, 1]]), is_definite, 0.125, 4)
+    assert found is not None
+    assert found[1] == 1.0
+    assert found[0].tolist() == [[2, 2], [2, 2]]
+    assert raised_until(exact([[1, 2], [2, 1]]), is_definite, 0.125, 0.5) is None
+    assert str(Repair("P0", 0, 0.0, 0.25)) == (
+        "P0 was made semidefinite (its variances were raised by 0.2 of themselves)"
+    )
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 53), FloatFormat(2, 80), FloatFormat(10, 18)], ids=str)
+def test_bounds_start_from_all_digits_of_an_array(fmt):
+    a = fmt.array([["1/3", "-2/7"], ["1e5", "1/1234567"]])
+    for found, true in zip(_double_doubles(a).reshape(-1, 2), a.to_fractions().ravel(), strict=True):
+        assert abs(sum(map(Fraction, found.tolist())) / true - 1) < Fraction(1, 2**100)
+
+
+def test_a_predicted_root_with_a_zero_on_the_diagonal_is_not_definite():
+    fmt = FloatFormat(2, 24)
+    S, zero = fmt.array([[2, 1], [0, 0]]), fmt.array([[0, 0], [0, 0]])
+    root, definite = predict_root(fmt.array([[1, 0], [0, 1]]), S, zero)
+    assert not definite
+    assert (root @ root.T).tolist() == (S @ S.T).tolist()
+    assert predict_root(fmt.array([[1, 0], [0, 1]]), fmt.array([[2, 1], [0, 1]]), zero)[1]
+
+
+@pytest.mark.parametrize("zero", [0, 1])
+def test_a_predicted_variance_of_zero_is_reported_whichever_it_is(zero):
+    fmt, nothing = FloatFormat(2, 24), np.zeros((2, 2))
+    Phi = np.eye(2)
+    Phi[zero, zero] = 0
+    found, definite = predict_ud(fmt.array(Phi), fmt.array(np.eye(2)), fmt.array(nothing))
+    assert found.to_float().tolist() == Phi.tolist()
+    assert not definite
+    assert predict_ud(fmt.array(np.eye(2)), fmt.array(np.eye(2)), fmt.array(nothing))[1]
+
+
+@pytest.mark.parametrize("zero", [0, 1])
+def test_a_run_in_factors_reports_it_although_the_measurement_is_taken_as_usual(zero):
+    fmt, Phi = FloatFormat(2, 24), np.eye(2, dtype=int)
+    Phi[zero, zero] = 0
+    run = Run(LinearModel(Phi, [[1, 1]], [[0, 0], [0, 0]], [[1]], [0, 0], np.eye(2, dtype=int)), fmt, Form.UD, (1, 2))
+    run.take(fmt.array(np.ones((2, 1))))
+    assert (run.indefinite, run.stopped) == (1, None)
+
+
+@pytest.mark.parametrize("form", [Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON])
+def test_a_bound_begins_with_the_distance_of_the_factors_from_the_covariance(form, monkeypatch):
+    """Above it, and by no more than a few roundings of float64."""
+    model, fmt, asked = chain(2, "0.1"), FloatFormat(2, 8), []
+    model = LinearModel(model.Phi, model.H, model.Q, model.R, model.x0, [["3", "1.1"], ["1.1", "0.7"]])
+    start = bounded_steps.contraction_start
+    monkeypatch.setattr(bounded_steps, "contraction_start", lambda P, x, off: asked.append(off) or start(P, x, off))
+    run = ArrayRun(model, fmt, form, (1,), bounded=True)
+    true = np.abs(run.covariance(run.P) - model.rounded(fmt).P0)
+    assert true.any()
+    for off, exactly in zip(asked[0].flat, true.flat, strict=True):
+        assert exactly <= Fraction(off) <= exactly * (1 + Fraction(1, 2**49))

@@ -1,0 +1,230 @@
+"""Structures of digital filters: every digit against plain fraction loops, responses against SciPy, and refusals."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import plain_structures as plain
+import pytest
+from scipy import linalg, signal
+
+from gpbnb import BINARY16, FixedFormat, FloatFormat, LinearSystem, required_precision
+from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.sections import _filtered, factored
+from gpbnb.filters.structures import STRUCTURES, balanced, companion, reflections, steady_covariance
+from gpbnb.wordlength.system import BoundedSystem
+
+FORMATS = [
+    (FloatFormat(2, 11), plain.floating(2, 11, "nearest")),
+    (FloatFormat(2, 7, "even"), plain.floating(2, 7, "even")),
+    (FloatFormat(2, 9, "chop"), plain.floating(2, 9, "chop")),
+    (FloatFormat(2, 13, "down"), plain.floating(2, 13, "down")),
+    (FloatFormat(10, 5), plain.floating(10, 5, "nearest")),
+    (FloatFormat(10, 4, "chop"), plain.floating(10, 4, "chop")),
+    (FloatFormat(16, 4), plain.floating(16, 4, "nearest")),
+    (BINARY16, plain.floating(2, 11, "even", -14)),
+    (FloatFormat(2, 8, "up", -6, 30, subnormal=False), plain.floating(2, 8, "up", -6, False)),
+    (FixedFormat(20, 11, "down"), plain.fixed(11, "down")),
+    (FixedFormat(20, 9), plain.fixed(9, "nearest")),
+]
+
+
+def random_filter(rng, order):
+    """Coefficients b, a of a stable filter, floats, some of them short or zero."""
+    poles = rng.uniform(0.2, 0.95, order // 2) * np.exp(1j * rng.uniform(0, math.pi, order // 2))
+    zeros = rng.uniform(0.2, 1.2, order // 2) * np.exp(1j * rng.uniform(0, math.pi, order // 2))
+    poles, zeros = ([*each, *each.conj(), *([rng.uniform(-0.9, 0.9)] if order % 2 else [])] for each in (poles, zeros))
+    b, a = np.poly(zeros).real * rng.uniform(0.1, 2), np.poly(poles).real
+    if rng.random() < 0.3:
+        b = np.round(b * 64) / 64
+        b[0] = b[0] or 1.0
+    if rng.random() < 0.2 and order > 1:
+        b = b[: rng.integers(1, order + 1)]
+    return b, a * rng.choice([1.0, 2.0, -0.5])
+
+
+def numbers(found, fmt):
+    """The outputs as fractions; sums of two float64 are only near a decimal number."""
+    sums = (exact(found[:, 0, 0]) + exact(found[:, 0, 1])).tolist()
+    return list(map(plain.floating(10, fmt.precision, "nearest"), sums)) if fmt.base == 10 else sums
+
+
+def slowly(structure, b, a, u, f):
+    """Outputs of a structure by a loop that shares no code with the package, from its exact design coefficients."""
+    top = [Fraction(x) / Fraction(a[0]) for x in b]
+    bottom = [Fraction(x) / Fraction(a[0]) for x in a[1:]]
+    if structure in plain.FORMS:
+        return plain.FORMS[structure](top, bottom, u, f)
+    if structure.startswith("cascade"):
+        return plain.cascade(factored(top, bottom), structure.removeprefix("cascade of "), u, f)
+    if structure == "lattice":
+        return plain.lattice(*reflections([*top, *[Fraction(0)] * (len(a) - len(b))], [Fraction(1), *bottom]), u, f)
+    matrices = companion(top, bottom)
+    return plain.state_space(*(balanced(matrices) if structure.startswith("balanced") else matrices), u, f)
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+def test_no_run_is_beyond_its_bound(structure):
+    """Inputs of full size, among them the signs of the reversed response, which drive an output to its peak."""
+    rng = np.random.default_rng([11, STRUCTURES.index(structure)])
+    shares = []
+    for fmt, _ in FORMATS[:9]:
+        b, a = random_filter(rng, int(rng.integers(1, 6)))
+        system = LinearSystem.from_coefficients(b, a, structure)
+        bound = BoundedSystem(system, np.array([1.0]), np.array([1.0])).error(fmt).ratio
+        if math.isinf(bound):
+            continue
+        response = system.outputs(np.eye(150, 1))[:, 0, 0]
+        for u in (np.where(response[::-1] < 0, -1.0, 1.0), np.ones(150), rng.choice([-1.0, 1.0], 150)):
+            found, true = (system.outputs(u[:, None], each) for each in (fmt, None))
+            shares.append(np.abs((found - true).sum(axis=-1)).max() / bound)
+    assert len(shares) >= 12
+    assert 1 / 20 < max(shares) <= 1
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+@pytest.mark.parametrize("order", range(1, 9))
+def test_each_digit_is_that_of_a_plain_loop(structure, order):
+    rng = np.random.default_rng([order, STRUCTURES.index(structure)])
+    for fmt, r in FORMATS:
+        b, a = random_filter(rng, order)
+        system = LinearSystem.from_coefficients(b, a, structure)
+        u = rng.uniform(-1, 1, (12, 1))
+        found = system.outputs(u, fmt)
+        expected = slowly(structure, b, a, [Fraction(x) for x in u[:, 0]], plain.uniform(r))
+        assert numbers(found, fmt) == expected, (fmt, b, a)
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+def test_responses_are_those_of_scipy(structure):
+    rng = np.random.default_rng(7)
+    for order in range(1, 9):
+        b, a = random_filter(rng, order)
+        system = LinearSystem.from_coefficients(b, a, structure)
+        impulse = np.zeros((60, 1))
+        impulse[0] = 1
+        found = system.outputs(impulse)[:, 0, 0]
+        # the accuracy of lfilter itself, whose poles may be as near as 0.1 to each other
+        assert found == pytest.approx(signal.lfilter(b, a, impulse[:, 0]), rel=1e-9, abs=1e-9)
+
+
+def test_reflections_of_a_filter_of_second_order():
+    """For 1 + a1/z + a2/z²: k2 = a2, k1 = a1 / (1 + a2); for the taps, b less what the higher ones add."""
+    k, v = reflections([Fraction(1), Fraction(2), Fraction(3)], [Fraction(1), Fraction(1, 2), Fraction(1, 4)])
+    assert k == [Fraction(2, 5), Fraction(1, 4)]
+    assert v[2] == 3
+    assert v[1] == 2 - 3 * Fraction(1, 2)
+    assert v[0] == 1 - 3 * Fraction(1, 4) - v[1] * Fraction(2, 5)
+
+
+CONTROLLERS = [
+    {},
+    {"Kd": "0.7"},
+    {"limits": ("-0.8", "0.9")},
+    {"Kd": "0.3", "limits": ("-1.1", "0.4"), "back": "0.6", "leak": "0.99"},
+    {"integral_limits": ("-0.25", "0.3"), "Kd": "-0.2"},
+    {"integral_limits": ("-0.5", "0.5"), "limits": ("-1", "1"), "back": "0.3", "Kd": "1.3", "leak": "0.9"},
+]
+
+
+def controller_of(given):
+    """The controller with these settings, and all its settings as fractions."""
+    system = LinearSystem.pid(
+        "0.8", "0.1", given.get("Kd"), given.get("leak", 1), given.get("limits"), given.get("integral_limits"),
+        given.get("back"),
+    )  # fmt: skip
+    full = {"Kp": "0.8", "Ki": "0.1", "leak": 1} | given
+    settings = {name: full.get(name) for name in ("Kp", "Ki", "Kd", "leak", "limits", "integral_limits", "back")}
+    return system, {
+        name: tuple(map(Fraction, each)) if isinstance(each, tuple) else None if each is None else Fraction(each)
+        for name, each in settings.items()
+    }
+
+
+@pytest.mark.parametrize("given", CONTROLLERS, ids=str)
+def test_each_digit_of_a_controller_is_that_of_a_plain_loop(given):
+    system, settings = controller_of(given)
+    rng = np.random.default_rng(5)
+    limited = 0
+    for fmt, r in FORMATS:
+        e = rng.uniform(-1.5, 1.5, (40, 1)) + 0.5 * np.sign(np.sin(np.arange(40) / 6))[:, None]
+        expected = plain.pid(settings, [Fraction(x) for x in e[:, 0]], plain.uniform(r))
+        assert numbers(system.outputs(e, fmt), fmt) == expected, fmt
+        limited += expected.count(expected[-1]) > 1
+        exactly = plain.pid(settings, [Fraction(x) for x in e[:, 0]], plain.uniform(lambda x: x))
+        assert system.outputs(e)[:, 0, 0] == pytest.approx([float(each) for each in exactly], rel=1e-14, abs=1e-15)
+
+
+def test_a_smoother_is_that_of_a_plain_loop():
+    rng = np.random.default_rng(2)
+    for fmt, r in FORMATS:
+        u = rng.uniform(-3, 3, (40, 1))
+        expected = plain.smoother(Fraction("0.3"), [Fraction(x) for x in u[:, 0]], plain.uniform(r))
+        assert numbers(LinearSystem.smoother("0.3").outputs(u, fmt), fmt) == expected, fmt
+
+
+@pytest.mark.parametrize("basis", ["emulation", "bound"])
+def test_two_equal_sections_need_thirty_bits_at_once_and_twenty_in_a_row(basis):
+    """Low-pass filters at 440 Hz for 44.1 kHz with Q = 1, and an impulse of 100; a bound needs ten bits more."""
+    angle = 2 * math.pi * 440 / 44100
+    c, alpha = math.cos(angle), math.sin(angle) / 2
+    sos = np.array([[(1 - c) / 2, 1 - c, (1 - c) / 2, 1 + alpha, -2 * c, 1 - alpha]] * 2)
+    u = np.zeros((1000, 1))
+    u[0] = 100
+    whole = LinearSystem.from_coefficients(*signal.sos2tf(sos))
+    parts = LinearSystem.from_sections(sos)
+    found = [required_precision(each, 1000, 0.001, z=u, basis=basis).precision for each in (whole, parts)]
+    assert found == ([30, 20] if basis == "emulation" else [39, 30])
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+def test_a_response_decays_to_zero(structure):
+    """After 2000 steps, 0.3**2000 is below the least float64 by far; the digits before are those of the recursion."""
+    system = LinearSystem.from_coefficients([1, "0.5"], [1, "-0.5", "0.06"], structure)  # poles 0.2 and 0.3
+    impulse = np.zeros((2000, 1))
+    impulse[0] = 100
+    for fmt in (None, FloatFormat(2, 24), FloatFormat(2, 24, "even"), FloatFormat(16, 6), FloatFormat(10, 7)):
+        found = system.outputs(impulse, fmt)[:, 0].sum(axis=1)
+        expected = [100 * (8 * 0.3**k - 7 * 0.2**k) for k in range(60)]
+        assert found[:60] == pytest.approx(expected, rel=1e-4)
+        assert abs(found[-1]) < 2.0**-700
+    assert required_precision(system, 2000, 0.001, z=impulse).precision < 24
+
+
+def test_a_number_that_grows_is_still_refused():
+    system = LinearSystem.from_coefficients([1], [1, -2, "0.1"])
+    with pytest.raises(OverflowError, match="the system as given is not stable"):
+        system.outputs(np.eye(2000, 1))
+
+
+@pytest.mark.parametrize("order", [2, 3, 6, 8, 12])
+def test_steady_covariance_solves_its_equation(order):
+    rng = np.random.default_rng(order)
+    b, a = random_filter(rng, order)
+    A, B = (each.astype(np.float64) for each in companion(exact(b / a[0]), exact(a / a[0])[1:])[:2])
+    Q = B @ B.T
+    found, known = steady_covariance(A, Q), linalg.solve_discrete_lyapunov(A, Q)
+    # Both solve the same system in float64; its condition is below 1e6 here.
+    np.testing.assert_allclose(found, known, rtol=1e-9, atol=1e-9 * np.abs(known).max())
+
+
+def test_steady_covariance_of_a_slow_filter_is_its_series():
+    # 1 / (1 - a²) for a within 1e-9 of 1, where the plain sum has 1e10 terms; a² loses half of the digits of 1 - a²
+    assert steady_covariance(np.array([[1 - 2.0**-30]]), np.eye(1))[0, 0] == pytest.approx(2.0**29, rel=1e-6)
+
+
+@pytest.mark.parametrize("pole", [1.0, -1.0, 1.5, 1e200])
+def test_steady_covariance_refuses_an_unstable_filter(pole):
+    with pytest.raises(ValueError, match="does not converge"):
+        steady_covariance(np.array([[pole]]), np.eye(1))
+
+
+def test_a_response_is_that_of_scipy_digit_for_digit():
+    rng = np.random.default_rng(3)
+    for order in (1, 2, 3, 5):
+        b, a = random_filter(rng, order)
+        values = rng.standard_normal(200)
+        found = _filtered(values, exact(b / a[0]), exact(a / a[0])[1:])
+        assert np.array_equal(found, signal.lfilter(b / a[0], a / a[0], values))

@@ -1,0 +1,355 @@
+"""gpbnb.filters.system: linear filters against rounded Fractions, their bounds, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
+from gpbnb.bounds.guarantee import from_schedule, limits
+from gpbnb.bounds.linear import filter_schedule, peak_gain
+from gpbnb.bounds.probable import probable_error
+from gpbnb.filters.system import LinearSystem, biquad, controller, is_stable, state_space
+from gpbnb.wordlength.precision import required_precision
+
+BUTTERWORTH = LinearSystem(*signal.tf2ss(*signal.butter(4, 0.05)), name="Butterworth")
+SMALL = LinearSystem([["0.9", "0.2"], [0, "-0.5"]], [["0.1"], [1]], [[1, "0.3"]], [["0.25"]])
+U = np.random.default_rng(3).uniform(-1, 1, (80, 1))
+
+
+def slowly(system, u, round_):
+    """Outputs by the recursion as it stands, each operation rounded by a function."""
+
+    def row(coefficients, values):
+        total = round_(coefficients[0] * values[0])
+        for c, v in zip(coefficients[1:], values[1:], strict=True):
+            product = round_(c * v)
+            total = product if total == 0 else total if product == 0 else round_(total + product)
+        return total
+
+    A, B, C, D = (np.vectorize(round_, otypes=[object])(each) for each in (system.A, system.B, system.C, system.D))
+    x, outputs = [round_(each) for each in system.x0], []
+    for inputs in exact(u):
+        given = [*x, *(round_(each) for each in inputs)]
+        outputs.append([row(line, given) for line in np.hstack([C, D])])
+        x = [row(line, given) for line in np.hstack([A, B])]
+    return np.array(outputs, dtype=object)
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 11), FloatFormat(10, 5)], ids=str)
+def test_outputs_are_those_of_the_recursion_with_every_operation_rounded(fmt):
+    system = LinearSystem(SMALL.A, SMALL.B, SMALL.C, SMALL.D, ["0.7", "-0.2"])
+    found = system.outputs(U, fmt)
+    expected = slowly(system, U, fmt.round)
+    assert (exact(found[..., 0]) + exact(found[..., 1]) - expected).astype(float) == pytest.approx(0, abs=1e-20)
+    exactly = slowly(system, U, Fraction)
+    true = system.outputs(U)
+    assert (exact(true[..., 0]) + exact(true[..., 1]) - exactly).astype(float) == pytest.approx(0, abs=1e-29)
+
+
+def test_an_answer_is_the_smallest_precision_of_the_recursion():
+    found = required_precision(SMALL, len(U), 1e-3, z=U)
+    exactly = slowly(SMALL, U, Fraction)
+    for digits, ratio in found.tried:
+        if digits < 30:
+            error = np.abs(slowly(SMALL, U, FloatFormat(2, digits).round) - exactly).max()
+            assert ratio == pytest.approx(float(error) / 1e-3, rel=1e-9)
+    assert (found.basis, found.form) == ("emulation", None)
+
+
+def test_bounds_hold_and_are_not_far_above():
+    """A bound proved for every input as large as these, against the errors of these."""
+    observed = dict(required_precision(SMALL, 80, 1e-3, z=U).tried)
+    found = required_precision(SMALL, 80, 1e-3, z=U, basis="bound")
+    bounded = dict(found.tried)
+    both = set(observed) & set(bounded)
+    assert len(both) >= 3
+    assert all(observed[t] <= bounded[t] <= 300 * observed[t] for t in both)
+    within = limits(3, 1, measurement=float(np.abs(U).max()))
+    assert required_precision(SMALL, 1, 1e-3, basis="guarantee", within=within).tried == found.tried
+
+
+@pytest.mark.parametrize("basis", ["emulation", "bound"])
+def test_units_of_states_inputs_and_outputs_do_not_matter(basis):
+    x, u, y = Fraction(2) ** -40, Fraction(2) ** 30, Fraction(2) ** -10
+    other = LinearSystem(SMALL.A, SMALL.B * x / u, SMALL.C * y / x, SMALL.D * y / u)
+    first = required_precision(SMALL, 80, 1e-3, z=U, basis=basis)
+    second = required_precision(other, 80, 1e-3 * 2.0**-10, z=U * 2.0**30, basis=basis)
+    assert first.fmt == second.fmt is not None
+    assert [ratio for _, ratio in first.tried] == pytest.approx([ratio for _, ratio in second.tried], rel=1e-9, abs=0)
+
+
+def test_probable_errors_are_three_standard_deviations():
+    """Of x+ = x/2 + u: the peak gain is 2, and storing an input of at most 1 in 12 bits is off by at most 2**-13."""
+    system, fmt = LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 12)
+    found = from_schedule(
+        filter_schedule(system.as_filter(), fmt), limits(2, 1, state=[2, 2], innovation=1, measurement=1), 1
+    )
+    ratios = dict(required_precision(system, 1, 1e-3, basis="probable", within=limits(2, 1, measurement=1)).tried)
+    assert ratios[12] == pytest.approx((3 * probable_error(found)[1] + 2 * 2**-13) / 1e-3, rel=1e-3)
+
+
+def test_only_errors_beyond_float64_are_said_not_to_be_finite():
+    missed = required_precision(SMALL, 8, 1e-40, z=U[:8])
+    assert missed.fmt is None
+    assert missed.why == ""
+    beyond = required_precision(SMALL, 8, 1e-320, z=U[:8] * 2.0**30)
+    assert beyond.fmt is None
+    assert beyond.why.endswith("an error over its tolerance is beyond the range of float64")
+
+
+def test_a_peak_gain_of_a_filter_in_companion_form_is_found():
+    """Its entries are near 6: balls grow beyond all bounds at 256 bits, and their ends once compared as if narrow."""
+    gain = peak_gain(BUTTERWORTH.A, BUTTERWORTH.B, BUTTERWORTH.C, BUTTERWORTH.D)
+    response = signal.dimpulse((*(each.astype(float) for each in vars_of(BUTTERWORTH)), 1), n=2000)[1][0][:, 0]
+    assert gain.low[0, 0] <= np.abs(response).sum() * (1 + 1e-9)
+    assert gain.high[0, 0] == pytest.approx(np.abs(response).sum(), rel=1e-6)
+
+
+def test_small_entries_of_a_peak_gain_are_as_exact_as_large_ones():
+    half = [["1/2", 0], [0, "1/2"]]
+    gain = peak_gain(exact(half), exact([[1], [1]]), exact([[2**40, 0], [0, 1], [0, 0]]))
+    assert gain.low[:, 0] == pytest.approx([2**41, 2, 0], rel=2**-40)
+    assert (gain.low <= [[2**41], [2], [0]]).all()
+    assert (gain.high >= [[2**41], [2], [0]]).all()
+
+
+def vars_of(system):
+    return system.A, system.B, system.C, system.D
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"z": None}, "got no inputs"),
+        ({"z": U[:, 0]}, r"write u.reshape\(-1, 1\)"),
+        ({"z": U[:7]}, r"needed \(80, 1\)"),
+        ({"z": U * math.nan}, "needed a finite number"),
+        ({"tolerance": 0}, "needed an error above 0 for each of the 1 outputs"),
+        ({"tolerance": "0.1"}, "got tolerance '0.1'"),
+        ({"steps": True}, "got True steps"),
+        ({"basis": "guarantee"}, "without limits"),
+    ],
+)
+def test_what_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        required_precision(**({"model": SMALL, "steps": 80, "tolerance": 1e-3, "z": U} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"A": [[1, 2]]}, r"got A of shape \(1, 2\); needed \(1, 1\)"),
+        ({"B": [[1], [2]]}, "got B of shape"),
+        ({"C": [[1, 1]]}, "got C of shape"),
+        ({"D": [[1, 1]]}, "got D of shape"),
+        ({"x0": [1, 2]}, "got x0 of shape"),
+        ({"A": 3}, "got A of shape"),
+        ({"A": [["nan"]]}, "A: entry 0, 0"),
+    ],
+)
+def test_shapes_that_do_not_fit(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        LinearSystem(**({"A": [["0.5"]], "B": [[1]]} | arguments))
+
+
+@pytest.mark.parametrize("x0", [[1, 0], [0, 1], [1, 1]])
+@pytest.mark.parametrize("basis", ["bound", "guarantee"])
+def test_a_system_with_a_first_state_has_no_bound(x0, basis):
+    system = LinearSystem([["0.5", 0], [0, "0.25"]], [[1], [1]], [[1, 1]], x0=x0)
+    with pytest.raises(ValueError, match=rf"got a first state .* and basis \"{basis}\"; needed x0 = 0 for a bound"):
+        required_precision(system, 80, 1e-3, z=U, basis=basis, within=limits(3, 1, measurement=1.0))
+
+
+def test_an_unstable_system_has_a_bound_only_for_some_steps():
+    growing = LinearSystem([["1.01"]], [[1]])
+    found = required_precision(growing, 80, 1e-3, z=U, basis="bound")
+    assert found.ends
+    observed = required_precision(growing, 80, 1e-3, z=U)
+    assert found.precision >= observed.precision
+    probable = required_precision(growing, 80, 1e-3, basis="probable", within=limits(1, 1, measurement=1))
+    assert probable.fmt is None
+    assert "the system as given is not stable, since A has an eigenvalue of size 1.01," in str(probable)
+
+
+@pytest.mark.parametrize("fmt", [None, FloatFormat(2, 24), FloatFormat(2, 53), FloatFormat(16, 6), FloatFormat(10, 8)])
+@pytest.mark.parametrize(
+    ("C", "place"),
+    [
+        # the state after k steps is 2**(300 k + 1), and an output is 2**(300 (k - 1) + 1) times its entry of C
+        ([[1]], "output 0 at step 5"),
+        ([[1], [2**500]], "output 1 at step 3"),
+        ([[0], [1], [0]], "output 1 at step 5"),
+    ],
+)
+def test_an_overflow_names_output_and_step(C, place, fmt):
+    system = LinearSystem([[2**300]], [[0]], C, x0=[2])
+    if "step 5" in place and (fmt is None or fmt.base != 10):  # loops of base 10 keep states that float64 does not
+        place = "state 0 at step 4"
+    assert np.isfinite(system.outputs([[0]] * (int(place[-1]) - 1), fmt)).all()
+    with pytest.raises(OverflowError, match=rf"^{place}: got a (result|number) beyond the range of float64"):
+        system.outputs([[0]] * 6, fmt)
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        lambda name: LinearSystem([[1]], [[1]], name=name),
+        lambda name: state_space([[1]], [[1]], name=name),
+        lambda name: biquad(1, 0, 0, 0, 0, name),
+        lambda name: controller("0.9", 1, 1, 0, name),
+    ],
+)
+def test_a_name_is_text(named):
+    assert named("mine").name == "mine"
+    for wrong in (5, None, b"mine"):
+        with pytest.raises(TypeError, match=r"got name .* of type .*; needed text"):
+            named(wrong)
+
+
+# -- why there is no answer ------------------------------------------------------------------------------------------
+
+
+def companion(roots):
+    """Return a companion matrix with the given eigenvalues, exact."""
+    p = [Fraction(1)]
+    for root in roots:
+        p = [a - Fraction(root) * b for a, b in zip([*p, 0], [0, *p], strict=True)]
+    A = np.full((len(roots), len(roots)), Fraction(0), dtype=object)
+    A[0] = [-each for each in p[1:]]
+    for i in range(1, len(roots)):
+        A[i, i - 1] = Fraction(1)
+    return A
+
+
+def rotation(size):
+    """Return a rotation by an angle with rational sine and cosine, times a size."""
+    return np.array([["3/5", "-4/5"], ["4/5", "3/5"]], dtype=object), Fraction(size)
+
+
+@pytest.mark.parametrize(
+    ("roots", "stable"),
+    [
+        ((0, 0, 0), True),
+        (("1/2", "-1/2", "1/3"), True),
+        ((1,), False),
+        ((-1, "1/2"), False),
+        (("1/2", "3/2"), False),
+        ((Fraction(2**60 - 1, 2**60), "-99/100", "1/2", 0), True),
+        ((Fraction(2**60 + 1, 2**60), "-99/100", "1/2", 0), False),
+        ((2, "1/2"), False),  # a root and its inverse: the first and the last coefficient are equal
+    ],
+)
+def test_stability_is_decided_exactly(roots, stable):
+    assert is_stable(companion(roots)) == stable
+
+
+@pytest.mark.parametrize(
+    ("size", "stable"), [(1, False), (1 - Fraction(1, 10**30), True), (1 + Fraction(1, 10**30), False)]
+)
+def test_stability_of_oscillations_is_decided_exactly(size, stable):
+    given, factor = rotation(size)
+    assert is_stable(np.vectorize(Fraction, otypes=[object])(given) * factor) == stable
+
+
+UNSTABLE = LinearSystem([["1.1"]], [[1]])
+SHORT = FloatFormat(2, 24, emin=-6, emax=7)
+ACCUMULATOR = LinearSystem([[1]], [[1]])
+# Both poles are 1 - 1e-20: the rounded coefficients have a pole at 1 or beyond in every precision with compiled loops.
+NEAR = LinearSystem(companion([1 - Fraction(1, 10**20)] * 2), [[1], [0]])
+
+
+@pytest.mark.parametrize(("system", "size"), [(UNSTABLE, "1.1"), (ACCUMULATOR, "1 or more")])
+def test_an_unstable_system_has_no_steady_state_in_any_precision_and_the_answer_says_why(system, size):
+    within = limits(1, 1, measurement=1)
+    found = required_precision(system, 20, 1e-3, z=np.ones((20, 1)), basis="probable", within=within)
+    assert found.precision is None
+    assert str(found) == (
+        "no precision meets the tolerance by three times the probable error: the system as given is not stable, since "
+        f"A has an eigenvalue of size {size}, mostly in state 0, so that an error of rounding never decays; ask with "
+        'basis "bound" or "guarantee" for a number of steps instead, or reset the state now and then'
+    )
+
+
+@pytest.mark.parametrize("basis", ["bound", "probable"])
+def test_a_system_that_is_unstable_only_as_stored_is_said_to_be(basis):
+    within = None if basis == "bound" else limits(2, 1, measurement=1)
+    found = required_precision(NEAR, 20, 1e-3, z=np.ones((20, 1)), basis=basis, within=within)
+    assert found.precision is None
+    assert "no precision up to 53 digits, the most with compiled loops" in str(found)
+    assert "in 53 digits the system is stable, but as stored in FloatFormat(base=2, precision=53" in found.why
+    assert "eigenvalue of size 1 or more" in found.why
+
+
+def test_below_the_answer_a_system_that_is_unstable_as_stored_is_named_with_the_digits():
+    system = LinearSystem(companion(["0.99", "0.98"]), [[1], [0]])
+    stable = [t for t in range(2, 19) if is_stable(FloatFormat(2, t).array(system.A).to_fractions())]
+    radii = [np.abs(np.linalg.eigvals(FloatFormat(2, t).array(system.A).to_float())).max() for t in range(2, 19)]
+    assert stable == [t for t, radius in zip(range(2, 19), radii, strict=True) if radius < 1 - 1e-6]
+    assert 12 not in stable
+    assert 14 in stable
+    asked = {"steps": 20, "tolerance": 1e3, "z": np.ones((20, 1)), "basis": "bound"}
+    at_12 = required_precision(system, **asked, largest=12)
+    assert at_12.why == f"in 12 digits {system.unstable(FloatFormat(2, 12))}"
+    assert "the system is stable, but as stored in FloatFormat" in at_12.why
+    assert at_12.cause == ""
+    found = required_precision(system, **asked)
+    assert found.why.startswith(
+        "in 14 digits no bound was found: in this precision, an error causes rounding errors as large as itself"
+    )
+    assert found.precision == 18
+    assert system.unstable(found.fmt) == ""
+
+
+def test_a_stable_system_without_a_proof_is_not_said_to_be_unstable():
+    system = LinearSystem(companion(["0.999", "0.998"]), [[1], [0]])
+    found = required_precision(system, 20, 1e3, z=np.ones((20, 1)), basis="bound", largest=27)
+    assert found.precision is None
+    assert found.cause == ""
+    assert "in 27 digits the system is stable, but decays too slowly for its peak gain to be enclosed" in found.why
+
+
+def test_errors_that_grow_in_every_step_are_named_where_no_precision_is_enough():
+    found = required_precision(LinearSystem([[2]], [[1]]), 200, 1e-3, z=np.full((200, 1), 0.1))
+    assert found.precision is None
+    assert (
+        "is not stable, since A has an eigenvalue of size 2, mostly in state 0, so that errors grow with every"
+        in str(found)
+    )
+    assert "whatever the precision: take fewer steps" in found.advice
+    stable = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 5, 1e-30, z=np.ones((5, 1)))
+    assert stable.precision is None
+    assert stable.advice == stable.cause == ""
+
+
+@pytest.mark.parametrize(
+    ("A", "b", "fmt", "message"),
+    [
+        (2, 1, None, r"range of float64; the system as given is not stable, .* of size 2, .* scaling delays"),
+        ("0.9", "1e305", None, "got a number beyond the range of float64; scale the numbers$"),
+        ("0.9", "3e307", FloatFormat(2, 24), "beyond the range of float64; scale the numbers, or use base 10$"),
+        ("0.9", 100, SHORT, "emax=7.; scale the numbers, or use a format with a larger range$"),
+        (1, 100, SHORT, r"emax=7.; the system as given is not stable, .* 1 or more"),
+        ("15/16", 100, replace(SHORT, precision=2), r"stable, but as stored .* it is not, .* of size 1 or more"),
+    ],
+)
+def test_an_overflow_names_its_cause_and_a_cure_that_helps(A, b, fmt, message):
+    with pytest.raises(OverflowError, match=message) as caught:
+        LinearSystem([[A]], [[b]]).outputs(np.full((3000, 1), 1.5), fmt)
+    assert "at step" in str(caught.value)
+
+
+def test_sizes_beyond_float64_are_named():
+    for basis, within in (("bound", None), ("probable", limits(1, 1, measurement=1))):
+        found = required_precision(
+            LinearSystem([["0.9"]], [["1e308"]]), 5, 1e300, z=np.ones((5, 1)), basis=basis, within=within
+        )
+        assert (
+            "in 53 digits got a filter whose largest gain is beyond the range of float64; scale its inputs" in found.why
+        )

@@ -1,0 +1,199 @@
+"""Fixed-point words: every integer against plain fraction loops, in compiled loops and in Python's integers."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import plain_structures as plain
+import pytest
+from test_structures import CONTROLLERS, controller_of, random_filter, slowly
+
+from gpbnb import FixedFormat, LinearSystem
+from gpbnb.bounds.words import WordGuarantee
+from gpbnb.filters import words as words_module
+from gpbnb.filters.structures import STRUCTURES
+from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_words
+
+MODES = ["nearest", "even", "chop", "up", "down", "odd"]
+
+
+def random_words(rng):
+    """Formats of words, and the arithmetic of a plain loop in them."""
+    data = (
+        int(rng.integers(3, 8)),
+        int(rng.integers(0, 14)),
+        str(rng.choice(MODES)),
+        str(rng.choice(["saturate", "wrap"])),
+    )
+    of_coefficients = (int(rng.integers(4, 16)), str(rng.choice(MODES)))
+    sums = None
+    if rng.random() < 0.7:
+        room = int(rng.integers(-2, 3)) + data[0]
+        sums = (room, data[1] + int(rng.integers(0, 14)), str(rng.choice(MODES)), str(rng.choice(["saturate", "wrap"])))
+        if rng.random() < 0.2:  # an accumulator of 64 bits
+            sums = (63 - data[1] - of_coefficients[0], data[1] + of_coefficients[0], *sums[2:])
+    found = WordFormats(
+        FixedFormat(*data),
+        FixedFormat(8, *of_coefficients),
+        None if sums is None else FixedFormat(*sums),
+    )
+    return found, plain.words(plain.fixed(*of_coefficients), data, sums)
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+def test_each_integer_is_that_of_a_plain_loop(structure):
+    rng = np.random.default_rng(STRUCTURES.index(structure))
+    compiled = 0
+    for _ in range(30):
+        words, arithmetic = random_words(rng)
+        b, a = random_filter(rng, int(rng.integers(1, 6)))
+        system = LinearSystem.from_coefficients(b, a, structure)
+        u = rng.uniform(-4, 4, (30, 1))
+        found = run_words(system, u, words)
+        expected = slowly(structure, b, a, [Fraction(x) for x in u[:, 0]], arithmetic)
+        assert [int(y) * found.unit for y in found.states[:, -1]] == expected, (words, b, a)
+        pairs = found.outputs(1)[:, 0]
+        assert [Fraction(x) + Fraction(y) for x, y in pairs.tolist()] == expected
+        compiled += integer_program(system.as_filter(), words).is_short
+    assert compiled > 20
+
+
+@pytest.mark.parametrize("given", CONTROLLERS, ids=str)
+def test_each_integer_of_a_controller_is_that_of_a_plain_loop(given):
+    system, settings = controller_of(given)
+    rng = np.random.default_rng(8)
+    for _ in range(15):
+        words, arithmetic = random_words(rng)
+        e = rng.uniform(-1.5, 1.5, (40, 1))
+        found = run_words(system, e, words)
+        expected = plain.pid(settings, [Fraction(x) for x in e[:, 0]], arithmetic)
+        assert [int(y) * found.unit for y in found.states[:, -1]] == expected, words
+
+
+def test_long_words_run_on_integers_of_python(monkeypatch):
+    """Data of 50 bits; and the compiled loops give what Python's integers give, with overflow in sums of 64 bits."""
+    rng = np.random.default_rng(3)
+    b, a = random_filter(rng, 4)
+    system = LinearSystem.from_coefficients(b, a)
+    u = rng.uniform(-3, 3, (20, 1))
+    long = WordFormats(FixedFormat(9, 45), FixedFormat(4, 30), FixedFormat(14, 75))
+    assert not integer_program(system.as_filter(), long).is_short
+    data, sums = (9, 45, "nearest", "raise"), (14, 75, "nearest", "raise")
+    arithmetic = plain.words(plain.fixed(30, "nearest"), data, sums)
+    found = run_words(system, u, long)
+    expected = slowly("direct form II transposed", b, a, [Fraction(x) for x in u[:, 0]], arithmetic)
+    assert [int(y) * found.unit for y in found.states[:, -1]] == expected
+    for overflow in ("saturate", "wrap"):
+        words = WordFormats(
+            FixedFormat(1, 30, overflow=overflow), FixedFormat(2, 28), FixedFormat(5, 58, overflow=overflow)
+        )
+        made = integer_program(system.as_filter(), words)
+        assert made.is_short
+        assert made.words.accumulator.precision == 63
+        inputs, start = integers_of(u * 40, words.data), np.zeros(system.n + 1, np.int64)
+        by_loops = words_module.run_integers(made, inputs, start)
+        assert (by_loops == words_module.run_integers(made, inputs.astype(object), start)).all()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_numbers_are_rounded_to_integers_as_by_the_format(mode):
+    fmt = FixedFormat(3, 4, mode, "saturate")
+    values = np.concatenate([np.arange(-300, 300) / 32, np.random.default_rng(0).uniform(-9, 9, 200)])
+    rounded = [plain.limited(4, 3, "saturate")(plain.fixed(4, mode)(Fraction(x))) for x in values]
+    assert [int(n) * fmt.unit for n in integers_of(values, fmt)] == rounded
+    assert [int(n) * fmt.unit for n in integers_of([Fraction(x) for x in values], fmt)] == rounded
+
+
+def test_a_smoother_in_integers_stops_three_below_its_step():
+    """y += 1097/4096 (u - y) in 16 bits with floor: 1097 · 3 < 4096, so a difference of 3 moves nothing."""
+    words = WordFormats(FixedFormat(15, 0, "down"), FixedFormat(3, 12))
+    found = run_words(LinearSystem.smoother("1097/4096"), np.full((200, 1), 512), words)
+    assert found.states[-1].tolist() == [509, 509]
+    assert found.states[-100:, 1].tolist() == [509] * 100
+
+
+def test_overflow_names_operation_and_step():
+    system = LinearSystem.from_coefficients([1], [1, "-0.9"], "direct form I")
+    words = WordFormats(FixedFormat(2, 5), FixedFormat(1, 8))
+    with pytest.raises(OverflowError, match="overflow in a sum, operation 3 of 3, at step 2"):
+        run_words(system, np.full((9, 1), 3.0), words)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((FixedFormat(0, 15), 0), "got 0 bits for coefficients"),
+        ((FixedFormat(0, 15), FixedFormat(1, 14), FixedFormat(9, 8)), "got sums with 8 fraction bits and data with 15"),
+        ((FixedFormat(0, 15, "stochastic"),), "got stochastic rounding for the data"),
+    ],
+)
+def test_formats_of_words_that_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        WordFormats(*arguments)
+
+
+def test_other_formats_are_refused():
+    with pytest.raises(TypeError, match="got data 16"):
+        WordFormats(16)
+    with pytest.raises(TypeError, match="got coefficients 'Q14'"):
+        WordFormats(FixedFormat(0, 15), "Q14")
+
+
+def test_a_coefficient_beyond_its_range_is_named():
+    system = LinearSystem.from_coefficients(["0.5"], [1, "-1.9", "0.95"])
+    with pytest.raises(OverflowError, match=r"got a1 = -1.9, beyond the range of FixedFormat"):
+        run_words(system, np.zeros((3, 1)), WordFormats(FixedFormat(4, 15), FixedFormat(0, 15)))
+
+
+def test_shifted_numbers_are_rounded_in_every_mode():
+    rounded = {
+        "down": math.floor,
+        "up": math.ceil,
+        "chop": int,
+        "even": round,
+        "nearest": lambda x: math.floor(abs(x) + Fraction(1, 2)) * (-1 if x < 0 else 1),
+        "odd": lambda x: math.floor(x) if math.floor(x) % 2 else math.ceil(x),
+    }
+    for code, mode in enumerate(MODES):
+        for n in range(-40, 41):
+            assert words_module._shifted.py_func(n, -2, code) == 4 * n
+            for shift in range(4):
+                expected = rounded[mode](Fraction(n, 2**shift))
+                assert words_module._shifted.py_func(n, shift, code) == expected, (mode, n, shift)
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+@pytest.mark.parametrize("wide", [False, True])
+def test_no_run_is_beyond_its_guarantee(structure, wide):
+    """In formats whose guarantee exists, none overflows; and the errors come within a hundredth of the bounds."""
+    rng = np.random.default_rng([wide, STRUCTURES.index(structure)])
+    shares, proved = [], 0
+    for _ in range(12):
+        b, a = random_filter(rng, int(rng.integers(1, 5)))
+        system = LinearSystem.from_coefficients(b, a, structure)
+        u = np.clip(rng.uniform(-2, 2, (150, 1)), -1, 1)
+        mode = str(rng.choice(MODES))
+        sums = FixedFormat(int(rng.integers(5, 9)), 20, mode, str(rng.choice(["raise", "wrap"]))) if wide else None
+        words = WordFormats(FixedFormat(int(rng.integers(4, 8)), 12, mode), FixedFormat(6, 16), sums)
+        try:
+            bound = WordGuarantee(system, 1.0).errors(words)[0]
+        except OverflowError:
+            continue
+        found, true = run_words(system, u, words).outputs(1), system.outputs(u)
+        error = np.abs((found - true).sum(axis=-1)).max()
+        assert error <= bound
+        shares.append(error / bound)
+        proved += 1
+    assert proved >= 6
+    assert max(shares) > 0.01
+
+
+def test_the_range_is_proved_where_the_worst_input_just_fits():
+    """y = u + y/2 reaches 2 for inputs within 1, and errors of half a unit each double to two units of 1/64 at most."""
+    system = LinearSystem.from_coefficients([1], [1, "-0.5"], "direct form I")
+    bound = WordGuarantee(system, 1.0).errors(WordFormats(FixedFormat(2, 6), FixedFormat(2, 8)))
+    assert bound[0] == pytest.approx(1 / 64 + 1 / 64, rel=1e-9)  # inputs off by 1/128 and products by 1/128, doubled
+    with pytest.raises(OverflowError, match=r"a sum, operation 3 of 3, may reach 2.03125, beyond the 1 integer bits"):
+        WordGuarantee(system, 1.0).errors(WordFormats(FixedFormat(1, 6), FixedFormat(2, 8)))

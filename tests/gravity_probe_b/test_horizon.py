@@ -1,0 +1,178 @@
+"""A bound block by block, against the bound of the same steps at once; the stored bounds of Gravity Probe B."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tabulated import by_header
+
+from gpbnb import FloatFormat
+from gpbnb.arithmetic.rational import exact
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
+from gpbnb.report.gravity_probe_b import horizon
+from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
+from gpbnb.report.gravity_probe_b.model import YEAR
+
+STEPS = 50
+
+
+def constants() -> LinearModel:
+    """Two constants without process noise, whose gain falls for ever, and a cycle of three measurements."""
+    return LinearModel(
+        Phi=exact([["1", "0.1"], ["0", "1"]]),
+        H=np.array([exact([["1", "0.5"]]), exact([["0.3", "-1"]]), exact([["0", "1"]])]),
+        Q=exact([["0", "0"], ["0", "0"]]),
+        R=exact([["2"]]),
+        x0=exact(["0", "0"]),
+        P0=exact([["3", "1"], ["1", "2"]]),
+    )
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.HUNG])
+@pytest.mark.parametrize("block", [3, 7, STEPS])
+def test_blocks_give_the_bound_of_all_steps_at_once(block: int, form: Form) -> None:
+    fmt, within = FloatFormat(2, 24), limits(2, 1, state=[10, 20], innovation=5)
+    found = guarantee(constants(), fmt, within, form, most=STEPS, horizon=STEPS)
+    assert found.steps == STEPS
+    blocks = list(bounds_in_blocks(constants(), fmt, [within], [found.bound], STEPS, form, block, window=STEPS))
+    done, (last,) = blocks[-1]
+    assert done == STEPS
+    assert np.allclose(last.worst, found.bound, rtol=1e-6, atol=0)
+    assert np.allclose(last.parts.sum(axis=1), last.worst, rtol=1e-9, atol=0)
+    worst = [bounds[0].worst for _, bounds in blocks]
+    assert all((a <= b).all() for a, b in pairwise(worst))
+
+
+def test_a_bound_above_the_assumed_error_ends_it() -> None:
+    fmt, within = FloatFormat(2, 24), limits(2, 1, state=[10, 20], innovation=5)
+    with pytest.raises(ArithmeticError, match="exceeds the assumed"):
+        list(bounds_in_blocks(constants(), fmt, [within], [[1e-9, 1e-9]], STEPS))
+
+
+def test_a_covariance_that_loses_definiteness_ends_it() -> None:
+    model = replace(constants(), R=exact([["1e-12"]]), P0=exact([["1e4", "0"], ["0", "1e4"]]))
+    fmt, within = FloatFormat(2, 11), limits(2, 1, state=[10, 20], innovation=5)
+    run = Run(model.rounded(fmt), fmt, Form.INNOVATION, range(1, 4))
+    run.take(fmt.array(np.zeros((3, 1))))
+    assert run.indefinite
+    assert not run.stopped
+    with pytest.raises(ArithmeticError, match="the filter stopped or its covariance lost definiteness by step 3"):
+        next(bounds_in_blocks(model, fmt, [within], [[9, 9]], 3))
+
+
+def test_stored_bounds_of_gravity_probe_b() -> None:
+    rows = horizon.load()
+    assert {row.states for row in rows} == {"absolute", "deviation"}
+    for states in ("absolute", "deviation"):
+        each = [row for row in rows if row.states == states]
+        assert all(a.steps < b.steps <= YEAR for a, b in pairwise(each))
+        bounds = np.array([row.bounds for row in each])
+        assert (np.diff(bounds, axis=0) >= 0).all()
+        assert each[-1].steps == YEAR
+    last = {row.states: np.array(row.bounds) for row in rows}
+    narrower = np.array(horizon.DEVIATION) < horizon.ABSOLUTE
+    assert narrower.sum() == 2  # drift and rate of one axis
+    assert (last["deviation"][narrower] < last["absolute"][narrower] / 3).all()
+
+
+def test_the_table_has_the_last_row_of_each_choice_of_states(monkeypatch: pytest.MonkeyPatch) -> None:
+    bounds = (0.125, 0.25, 0.0625, 0.375, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0)
+    rows = [
+        horizon.HorizonRow(50, 8640 * days, states, bounds, ())
+        for states in ("absolute", "deviation")
+        for days in (3, 9000)
+    ]
+    monkeypatch.setattr(horizon, "load", lambda: tuple(rows))
+    table = horizon.table()
+    assert table.title == "Gravity Probe B in binary64"
+    assert [row["states"] for row in by_header(table)] == ["drift itself", "deviations from the predicted drift"]
+    assert by_header(table)[0] == {
+        "states": "drift itself",
+        "days": "9000",
+        "drift φ2, mas": "0.12",
+        "drift φ3, mas": "0.25",
+        "drift rate 2, mas/yr": "0.062",
+        "drift rate 3, mas/yr": "0.38",
+        "bits": "49",
+    }
+    assert horizon.bits(rows[0], tolerance=0.125) == 52
+
+
+def test_the_first_cycle_of_gravity_probe_b_again() -> None:
+    first = {row.states: row for row in horizon.load()[:2]}
+    assert {row.steps for row in first.values()} == {2340}
+    done, found = next(horizon.gravity_probe_b_bounds(53))
+    assert done == 2340
+    for name, each in zip(("absolute", "deviation"), found, strict=True):
+        assert np.allclose(each.worst, first[name].bounds, rtol=1e-5, atol=0)
+
+
+def test_a_saved_run_continues_with_the_same_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(horizon, "SAVE_EVERY", 2)
+    fmt, within = FloatFormat(2, 24), limits(2, 1, state=[10, 20], innovation=5)
+    given = constants(), fmt, [within], [np.full(2, 1.0)], STEPS, Form.INNOVATION, 7, 8
+    whole = list(bounds_in_blocks(*given))
+    saved = tmp_path / "state.pickle"
+    interrupted = bounds_in_blocks(*given, saved)
+    assert [next(interrupted)[0] for _ in range(3)] == [7, 14, 21]  # saved after the second block
+    rest = list(bounds_in_blocks(*given, saved))
+    assert [done for done, _ in rest] == [21, 28, 35, 42, 49, 50]
+    for (_, (again,)), (_, (once,)) in zip(rest, whole[2:], strict=True):
+        assert (again.worst == once.worst).all()
+        assert (again.last == once.last).all()
+
+
+def test_the_rows_are_those_of_absolute_states_and_then_of_deviations(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    absolute, deviation = (horizon.HorizonBounds(size * np.ones(10), np.ones(10), np.ones((10, 4))) for size in (5, 2))
+    asked = []
+
+    def bounds(precision: int, steps: int, saved: Path | None) -> list[object]:
+        asked.append((precision, steps, saved and saved.name))
+        return [(steps, [absolute, deviation])]
+
+    monkeypatch.setattr(horizon, "gravity_probe_b_bounds", bounds)
+    file = horizon.SWEEP.recompute(tmp_path)
+    assert [row[:4] for row in horizon.SWEEP.load(file).rows] == [
+        ("53", str(YEAR), "absolute", "5"),
+        ("53", str(YEAR), "deviation", "2"),
+    ]
+    assert capsys.readouterr().err.count(f"{YEAR}/{YEAR}") == 1
+    horizon.year_of_bounds(24, None, 3)
+    assert asked == [(53, YEAR, "state_53.pickle"), (24, 3, None)]
+    assert capsys.readouterr().err == ""
+
+
+def test_a_stored_row_comes_out_again() -> None:
+    rows = horizon.first_cycle(53, np.random.default_rng(0))
+    assert rows == list(horizon.SWEEP.load().rows[:2])
+
+
+def test_there_are_rows_for_each_hundredth_of_a_year_and_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that goes on keeps the lines before the saved state, and waits for the next hundredth after the last."""
+    part, none = YEAR // 100, horizon.HorizonBounds(np.ones(10), np.ones(10), np.ones((10, 4)))
+    steps = [1, part, part + 1, 2 * part, 2 * part + 1, 3 * part]
+
+    def bounds(precision: int, last: int, saved: Path) -> list[object]:
+        saved.touch()
+        return [(done, [none, none]) for done in steps if begin <= done <= last]
+
+    monkeypatch.setattr(horizon, "gravity_probe_b_bounds", bounds)
+
+    def found(last: int) -> list[int]:
+        return [int(row[1]) for row in horizon.year_of_bounds(24, tmp_path, last)]
+
+    begin = 0
+    assert found(part + 1) == [1, 1, part + 1, part + 1]
+    begin = part + 1  # the state was saved before the last line
+    assert found(3 * part) == [1, 1, part + 1, part + 1, 2 * part + 1, 2 * part + 1, 3 * part, 3 * part]

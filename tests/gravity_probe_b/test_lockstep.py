@@ -1,0 +1,238 @@
+"""Many records through one gain get the digits of single runs, each in its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from fractions import Fraction
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.records import pairs_as_floats, update_largest
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
+from gpbnb.report.gravity_probe_b import threshold
+from gpbnb.report.gravity_probe_b.lockstep import REFERENCE, error_rows, run_lockstep
+from gpbnb.report.gravity_probe_b.threshold import (
+    FORMS,
+    SIMPLE_CELLS,
+    STATES,
+    SimpleYear,
+    YearCell,
+    compute,
+    lockstep,
+    rows,
+    sample,
+)
+from gpbnb.report.gravity_probe_b.year import MODELS, model
+from gpbnb.report.gravity_probe_b.year import simulation as year_simulation
+
+STEPS, COUNT = 300, 5
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return np.stack([SimpleYear("absolute").simulation(record).measurements(STEPS) for record in range(COUNT)], axis=-1)
+
+
+@pytest.mark.parametrize("form", [form for form in Form if form is not Form.UD], ids=str)
+@pytest.mark.parametrize(
+    "fmt",
+    [
+        FloatFormat(2, 24),
+        FloatFormat(2, 33, Rounding.CHOP),
+        FloatFormat(2, 53),
+        FloatFormat(10, 8),
+        FloatFormat(10, 11),
+        None,
+    ],
+    ids=str,
+)
+def test_every_record_gets_the_digits_of_a_run_of_its_own(fmt, form, measured):
+    told = model(MODELS[0], 10 if fmt is not None and fmt.base == 10 else 2)
+    many = Run(told, fmt, form, (), records=COUNT)
+    estimates = np.concatenate([many.carry(measured[:170], 4), many.carry(measured[170:], 4)])
+    for record in range(COUNT):
+        one = Run(told, fmt, form, (1, STEPS))
+        one.take(measured[:, :, record])
+        assert (many.x[:, record] == one.x[:, 0]).all()
+        assert (many.P == one.P).all()
+        first, last = one.checkpoints().x[:, :4].astype(float)
+        # The conversion of a decimal number has an error of one rounding.
+        np.testing.assert_allclose(estimates[[0, -1], :, record], [first, last], rtol=3e-16, atol=0)
+    assert many.steps == STEPS
+    assert len({tuple(each) for each in many.x.reshape(10, COUNT, -1)[:, :, 0].T.tolist()}) == COUNT
+
+
+def test_a_filter_that_stops_leaves_no_numbers():
+    """A state that grows by 1e60 a step has a variance of 1e360 after the third."""
+    growing = LinearModel([["1e60", 0], [0, 1]], [[0, 1]], np.zeros((2, 2)), [[1]], [1, 1], np.eye(2))
+    many, z = Run(growing, FloatFormat(2, 24), Form.HUNG, (), records=2), np.ones((9, 1, 2))
+    before, after = many.carry(z[:2], 2), many.carry(z[2:], 2)
+    assert np.isfinite(before).all()
+    assert np.isnan(after).all()
+    assert (many.stopped, many.steps) == (3, 2)
+    largest = np.zeros((2, 2))
+    update_largest(after, np.zeros_like(after), largest)
+    assert np.isinf(largest).all()
+
+
+def test_what_does_not_fit_is_refused(measured):
+    told = model(MODELS[0], 2)
+    with pytest.raises(ValueError, match="any but UD"):
+        Run(told, REFERENCE, Form.UD, (), records=2)
+    with pytest.raises(ValueError, match="at least one record"):
+        Run(told, REFERENCE, Form.HUNG, (), records=0)
+    many = Run(told, REFERENCE, Form.HUNG, (), records=2)
+    with pytest.raises(ValueError, match=r"needed \(steps, 2, 2\)"):
+        many.carry(measured, 4)
+    with pytest.raises(ValueError, match=r"needed \(p, 2, 10\)"):
+        many.use_measurement_matrices(np.zeros((3, 2, 9)))
+
+
+def test_measurement_matrices_may_be_replaced(measured):
+    told = model(MODELS[0], 2)
+    H = told.to_float()["H"]
+    many, other = (Run(told, FloatFormat(2, 30), Form.INNOVATION, (), records=COUNT) for _ in range(2))
+    expected = many.carry(measured, 4)
+    assert (len(H) > STEPS) is True
+    other.use_measurement_matrices(H[:STEPS])
+    assert (other.carry(measured, 4) == expected).all()
+    changed = Run(told, FloatFormat(2, 30), Form.INNOVATION, (), records=COUNT)
+    changed.use_measurement_matrices(np.zeros_like(H[:1]))  # nothing is measured
+    assert (changed.carry(measured, 4) == 0).all()
+
+
+# -- the sweep ------------------------------------------------------------------------------------
+
+
+def test_record_0_is_the_year_of_one_record(measured):
+    assert (measured[:, :, 0] == year_simulation(MODELS[0]).measurements(STEPS)).all()
+    assert SimpleYear("deviation").simulation(0).start[2:4] == threshold.DEVIATION
+    with pytest.raises(ValueError, match="needed one of absolute, deviation"):
+        SimpleYear("other")
+
+
+SMALL = YearCell("", "deviation", 2, "nearest", "hung", (20, 24), 3, 2)
+
+
+def test_errors_are_those_of_every_step():
+    steps = 5000
+    found = compute(SMALL, steps=steps)
+    for i, precision in enumerate(SMALL.precisions):
+        for j in range(2):
+            z = SimpleYear("deviation").simulation(3 + j).measurements(steps)
+            estimates = []
+            for fmt, form in ((FloatFormat(2, precision), FORMS["hung"]), (REFERENCE, Form.INNOVATION)):
+                run = Run(model(MODELS[0], 2), fmt, form, range(1, steps + 1))
+                run.take(z)
+                estimates.append(run.X[:, :4, 0])
+            error = np.abs(estimates[0] - estimates[1])
+            assert np.array(found["largest"])[i, :, j].tolist() == error.max(axis=0).tolist()
+            assert np.abs(found["end"])[i, :, j].tolist() == error[-1].tolist()
+    assert found["indefinite"] == [0, 0]
+    lines = rows(SMALL, found)
+    assert [line[:6] for line in lines] == [
+        ("deviation", "2", "nearest", "hung", str(t), str(r)) for t in (20, 24) for r in (3, 4)
+    ]
+    assert lines[0][:6] == SMALL.key
+    one = found["largest"][1][2][1], found["largest"][1][3][1]
+    assert lines[3][7] == f"{max(one):.6g}"
+
+
+def test_an_interrupted_cell_goes_on(tmp_path):
+    expected = compute(SMALL, steps=10_000)
+    whole = lockstep(SMALL, 10_000)
+    whole.advance()
+    whole.save(tmp_path / "some.npz")
+    again = lockstep(SMALL, 10_000)
+    again.restore(tmp_path / "some.npz")
+    assert again.block == 1
+    while not again.finished:
+        again.advance()
+    result = again.result()
+    assert {name: result[name] for name in ("largest", "end")} == {name: expected[name] for name in ("largest", "end")}
+    other = lockstep(SMALL, 20_000)
+    other.restore(tmp_path / "some.npz")
+    other.restore(tmp_path / "none.npz")
+    assert other.block == 0
+
+
+def test_measurements_reference_and_formats_are_timed_apart(monkeypatch):
+    """A clock goes on by 1, 10, 100, 1000 and 10000 seconds during the parts of a block, which has three formats."""
+    readings = iter([0, 1, 11, 111, 1111, 11111])
+    clock = SimpleNamespace(process_time=lambda: next(readings))
+    monkeypatch.setattr("gpbnb.report.gravity_probe_b.lockstep.time", clock)  # not that of pytest and coverage.py
+    whole = lockstep(dataclasses.replace(SMALL, precisions=(20, 22, 24)), 100)
+    whole.advance()
+    assert whole.seconds.tolist() == [1, 10, 100, 1000, 10000]
+
+
+@pytest.mark.parametrize(("blocks", "saved"), [(1, [1, 2, 3]), (2, [2]), (3, [3]), (4, [])])
+def test_a_cell_is_saved_after_every_so_many_blocks(blocks, saved, tmp_path, monkeypatch):
+    whole, seen = lockstep(SMALL, 10_000), []  # three blocks
+    monkeypatch.setattr(whole, "advance", lambda: setattr(whole, "block", whole.block + 1))
+    monkeypatch.setattr(whole, "save", lambda file: seen.append(whole.block))
+    run_lockstep(whole, tmp_path, blocks)
+    assert seen == saved
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_sample_is_one_record_computed_alone(monkeypatch):
+    lines = rows(SMALL, compute(SMALL, steps=300))
+    monkeypatch.setattr(threshold, "compute", lambda cell: compute(cell, steps=300))
+    found = {sample(SMALL, np.random.default_rng(seed))[0] for seed in range(20)}
+    assert found == set(lines)
+
+
+def test_rows_have_the_larger_error_of_both_drifts_and_of_both_rates():
+    """Of two formats and two records; `end` has signs, and a filter that stopped has no numbers."""
+    largest = [[[1, 20], [10, 2], [3, 40], [30, 4]], [[math.nan, 1], [5, 1], [6, 1], [7, 1]]]
+    end = [[[-0.5, 0.25], [0.125, -8], [0.75, -6], [-7, 0.5]], [[math.nan, 0], [2, 0], [3, 0], [4, 0]]]
+    assert error_rows([("a", "24"), ("b", "53")], 7, {"largest": largest, "end": end}) == [
+        ("a", "24", "7", "10", "30", "0.5", "7"),
+        ("a", "24", "8", "20", "40", "8", "6"),
+        ("b", "53", "7", "inf", "7", "inf", "4"),
+        ("b", "53", "8", "1", "1", "0", "0"),
+    ]
+
+
+def test_the_cells_are_distinct_and_cover_the_threshold():
+    records = [
+        (*head, str(cell.first + i)) for cell in SIMPLE_CELLS for head in cell.heads() for i in range(cell.count)
+    ]
+    assert sorted(records) == sorted(row[: threshold.SWEEP.key] for row in threshold.SWEEP.load().rows)
+    heads = [(*head, cell.first) for cell in SIMPLE_CELLS for head in cell.heads()]
+    assert len(set(heads)) == len(heads)
+    nearest = {
+        (states, base): {
+            t for cell in SIMPLE_CELLS if (cell.states, cell.base) == (states, base) for t in cell.precisions
+        }
+        for states in STATES
+        for base in (2, 10)
+    }
+    assert nearest["absolute", 2] >= set(range(28, 37))
+    assert nearest["deviation", 2] >= set(range(22, 31))
+    assert nearest["absolute", 10] & nearest["deviation", 10] >= {8, 9, 10, 11}
+    assert {cell.rounding for cell in SIMPLE_CELLS} == {"nearest", "chop"}
+    near = [cell for cell in SIMPLE_CELLS if cell.base == 2 and cell.rounding == "nearest"]
+    assert all(cell.count >= 100 for cell in near)
+    assert all(cell.count >= 30 for cell in SIMPLE_CELLS)
+    assert dataclasses.replace(SMALL, first=5).key[-1] == "5"
+
+
+def test_pairs_of_any_exponent_become_the_nearest_floats_or_nearly() -> None:
+    """Powers up to 10**22 are exact: within them, one rounding; beyond them, another for the power."""
+    exponents = [-40, -24, -23, -22, -21, -1, 0, 1, 21, 22, 23, 24, 40]
+    pairs = np.array([[123456789, e] for e in exponents]).reshape(-1, 1, 1, 2)
+    out = np.empty((len(exponents), 1, 1))
+    pairs_as_floats.py_func(pairs, out)
+    for found, e in zip(out.ravel(), exponents, strict=True):
+        exactly = 123456789 * Fraction(10) ** e
+        roundings = 1 if abs(e) <= 22 else 3
+        assert abs(Fraction(float(found)) / exactly - 1) <= Fraction(roundings, 2**53), e

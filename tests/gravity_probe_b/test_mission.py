@@ -1,0 +1,199 @@
+"""gravity_probe_b.mission: the known signal against the sky, and a filter that finds out what the signal shows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.filters.forms import Form
+from gpbnb.filters.run import Run
+from gpbnb.filters.simulation import BLOCK
+from gpbnb.report.gravity_probe_b import mission, threshold
+from gpbnb.report.gravity_probe_b.lockstep import Lockstep
+from gpbnb.report.gravity_probe_b.mission import PARAMETERS, STATES, Mission
+
+YEAR = np.linspace(0, 3_153_600, 2001).astype(np.int64)
+
+
+def test_every_number_has_its_source():
+    assert len({each.name for each in PARAMETERS}) == len(PARAMETERS)
+    assert all(each.source for each in PARAMETERS)
+    assert sum(each.source.startswith("ours") for each in PARAMETERS) < len(PARAMETERS) * 2 / 3
+
+
+def test_noises_keep_the_variances_of_pointing_and_of_flicker():
+    """A Gauss-Markov process of variance v has noise v (1 - phi²) per step; numbers are stored in four digits."""
+    model = Mission().model(10)
+    variances = dict.fromkeys((4, 5), mission._VALUE["pointing, standard deviation"] ** 2)
+    variances |= dict.fromkeys((10, 11, 12), mission._VALUE["1/f readout noise per decade of time constants"] ** 2)
+    Phi, Q = model.Phi[0], model.Q[0]
+    for state, variance in variances.items():
+        assert 0 < Phi[state, state] < 1
+        kept = float(Phi[state, state]) ** 2 * variance + float(Q[state, state])
+        assert kept == pytest.approx(variance, rel=2e-4)
+
+
+def test_annual_aberration_is_the_ellipse_of_the_star_s_latitude():
+    both, orbit = (Mission(annual=annual).known_signal(YEAR) for annual in (True, False))
+    ellipse = (both - orbit) / 20.5
+    axes = np.sqrt(np.linalg.eigvalsh(np.cov(ellipse.T)) * 2)
+    ra, dec, tilt = (math.radians(each) for each in (343.259, 16.841, 23.44))
+    latitude = math.asin(math.sin(dec) * math.cos(tilt) - math.cos(dec) * math.sin(tilt) * math.sin(ra))
+    # Two thousand samples of a year.
+    assert axes == pytest.approx([math.sin(latitude), 1], rel=2e-3)
+
+
+def test_the_orbit_moves_the_star_north_and_south_only():
+    steps = np.arange(1, 2000)
+    signal = Mission(annual=False).known_signal(steps)
+    drift = np.outer(steps * 10 / (365 * 86400), [6.6061, 0.0392])
+    assert np.abs(signal[:, 0] - drift[:, 0]).max() == pytest.approx(5.2, rel=1e-4)
+    assert signal[:, 1] == pytest.approx(drift[:, 1], abs=1e-15)
+
+
+def test_the_earth_hides_the_star_for_a_third_of_each_orbit():
+    mission = Mission()
+    _, orbit = mission.phases(np.arange(1, 5860))  # ten orbits
+    hidden = 1 - mission.visible(orbit).mean()
+    assert hidden == pytest.approx(2 * math.asin(6378 / 7020) / (2 * math.pi), abs=2e-3)
+    H = mission.matrices(0, 2)
+    assert (H[:, 0].any(axis=1) == mission.visible(mission.phases(np.arange(1, BLOCK + 1))[1])).all()
+    assert Mission(occultation=False).matrices(0, 2).any(axis=(1, 2)).all()
+
+
+def test_the_scale_factor_and_the_roll_phase_multiply_the_rolled_signal():
+    """For a signal (N, E) of up to 26 arcsec: Nc + Es and Ec - Ns, where c and s have errors of 2**-13."""
+    mission = Mission(occultation=False)
+    H, (north, east) = mission.matrices(300, 2)[:, 0], mission.known_signal(300 * BLOCK + 1 + np.arange(BLOCK)).T
+    c, s = H[:, 0], H[:, 1]
+    assert np.ptp(c) == np.ptp(s) == 2
+    assert H[:, 6] == pytest.approx(north * c + east * s, abs=52 * 2.0**-13)
+    assert H[:, 7] == pytest.approx((east * c - north * s) * mission.roll_phase, abs=52 * 2.0**-13)
+
+
+def test_the_telescope_measures_pointing_and_the_gyro_the_drift_as_well():
+    """With the cosine and sine of the roll phase, and a bias each; the telescope knows nothing of drift and signal."""
+    mission = Mission(occultation=False)
+    H = mission.matrices(5, 2)
+    turn, _ = mission.phases(5 * BLOCK + 1 + np.arange(BLOCK))
+    states = [state for state, _ in STATES]
+    c, s, one = np.cos(turn), np.sin(turn), np.ones(BLOCK)
+    gyro = {0: c, 1: s, 4: c, 5: s, 8: one, 9: one}
+    telescope = {4: c, 5: s, 9: one}
+    for row, columns in ((0, gyro), (1, telescope)):
+        for at in [*range(6), 8, 9, *(range(6, len(states)) if row else ())]:
+            assert H[:, row, at] == pytest.approx(columns.get(at, 0 * one), abs=2.0**-13), (row, states[at])
+
+
+@pytest.mark.parametrize("base", [2, 10])
+def test_matrices_are_held_exactly_by_every_format_of_the_sweep(base):
+    H = Mission().matrices(300, base)
+    fmt = FloatFormat(2, 20) if base == 2 else FloatFormat(10, 7)
+    given = [Fraction(round(h * 10**4), 10**4) if base == 10 else Fraction(h) for h in H[::400].ravel()]
+    assert [fmt.round(each) for each in given] == given
+    model = Mission().model(base)
+    for entry in (*model.Phi.ravel(), *model.Q.ravel(), *model.R.ravel(), *model.P0.ravel()):
+        assert fmt.round(entry) == entry
+
+
+def test_decimals_are_the_same_on_the_fast_way():
+    mission, fmt = Mission(), FloatFormat(10, 8)
+    fast, slow = (Run(mission.model(10), fmt, Form.INNOVATION, ()) for _ in range(2))
+    H = mission.matrices(0, 10)[:50]
+    fast.use_measurement_matrices(H, 4)
+    slow.use_measurement_matrices(np.rint(H * 1e4) / 1e4)
+    assert (fast.matrices.H == slow.matrices.H).all()
+    assert (fast.matrices.HT == slow.matrices.HT).all()
+
+
+def test_while_the_star_is_hidden_no_estimate_learns():
+    mission = replace(Mission(), flicker=False)
+    run = Run(mission.model(2), FloatFormat(2, 30), Form.INNOVATION, ())
+    H = mission.matrices(0, 2)
+    hidden = H[~H.any(axis=(1, 2))][:20]
+    run.use_measurement_matrices(hidden)
+    assert (run.carry(np.zeros((20, 2, 1)), 4) == 0).all()
+
+
+def test_the_filter_finds_scale_and_roll_phase_by_the_aberration():
+    mission = Mission(deviations=True, quiet=10.0)
+    lockstep = Lockstep("a trial", mission, [FloatFormat(2, 40)], Form.HUNG, range(4), 2 * BLOCK)
+    while not lockstep.finished:
+        lockstep.advance()
+    reference = lockstep.reference
+    deviation = np.sqrt(np.diagonal(reference.P))
+    start = np.sqrt(mission.model(2).P0.diagonal().astype(float))
+    for name in ("scale factor k", "roll-phase offset δ"):
+        at = [state for state, _ in STATES].index(name)
+        assert (
+            deviation[at] < start[at] / 5
+        )  # within a day, beside 1/f noise that is eight times the white one at 600 s
+        # Four records: a difference of five standard deviations is a fault.
+        assert np.abs(reference.x[at] - lockstep.truth[:, at]).max() < 5 * deviation[at]
+    assert lockstep.largest.max() < 0.1
+
+
+def test_the_sweep_changes_one_choice_at_a_time():
+    usual = mission.SETTINGS["mission"]
+    fields = list(vars(usual))
+    for name, setting in mission.SETTINGS.items():
+        changed = [field for field in fields if getattr(setting, field) != getattr(usual, field)]
+        assert len(changed) == (name != "mission")
+    assert mission.SETTINGS["steps and roll as flown"].steps == 15_768_000
+    cell = threshold.MISSION_CELLS[0]
+    assert cell.year.deviations
+    found = threshold.rows(cell, threshold.compute(replace(cell, count=2), steps=500))
+    assert next(row[:7] for row in found) == cell.key
+    assert len(found) == 2 * len(cell.precisions)
+
+
+def test_a_sample_is_one_record_of_one_format(monkeypatch):
+    asked = set()
+    monkeypatch.setattr(threshold, "compute", lambda cell: asked.add((cell.precisions, cell.first, cell.count)))
+    monkeypatch.setattr(threshold, "rows", lambda cell, result: [])
+    cell = replace(threshold.MISSION_CELLS[0], precisions=(20, 24), first=5, count=3)
+    for seed in range(40):
+        threshold.sample(cell, np.random.default_rng(seed))
+    assert asked == {((precision,), record, 1) for precision in (20, 24) for record in (5, 6, 7)}
+
+
+def test_every_cell_of_the_sweep_can_be_computed():
+    heads = [(*head, cell.first) for cell in threshold.MISSION_CELLS for head in cell.heads()]
+    assert len(set(heads)) == len(heads)
+    records = [
+        (*head, str(cell.first + i))
+        for cell in threshold.MISSION_CELLS
+        for head in cell.heads()
+        for i in range(cell.count)
+    ]
+    assert sorted(records) == sorted(row[: threshold.MISSION_SWEEP.key] for row in threshold.MISSION_SWEEP.load().rows)
+    for cell in threshold.MISSION_CELLS:
+        found = threshold.lockstep(replace(cell, count=1), 1)
+        assert str(found.runs[0].form) == {"hung": "Hung (1984)", "innovation": "innovation"}[cell.form]
+        assert [run.fmt.precision for run in found.runs] == list(cell.precisions)
+
+
+def test_measurements_are_whole_multiples_of_their_resolution(monkeypatch):
+    given = Mission()
+    H, truth = given.matrices(0, 2), np.array(given.start)
+    fine, _ = given.measurements(0, 0, truth, H, 200)
+    assert mission._VALUE["resolution of measurements"] == 1
+    monkeypatch.setitem(mission._VALUE, "resolution of measurements", 0.25)
+    coarse, _ = given.measurements(0, 0, truth, H, 200)
+    assert np.array_equal(coarse * 4, np.rint(coarse * 4))
+    assert not np.array_equal(coarse, np.rint(coarse))
+    assert np.abs(coarse - fine).max() == 0.5
+
+
+def test_the_filter_learns_the_roll_phase():
+    early, late = (mission.roll_phase_after(blocks) for blocks in (1, 6))
+    assert early.days == pytest.approx(4096 * 10 / 86400)
+    # A milliradian before the first measurement.
+    assert late.deviation < early.deviation < 206
+    assert 0 < early.error < 4 * early.deviation
+    assert 0 < late.error < 4 * late.deviation

@@ -1,0 +1,49 @@
+"""gpbnb.report.gravity_probe_b.summary: the table of answers on the front page and in the README."""
+
+from __future__ import annotations
+
+import ast
+import json
+from pathlib import Path
+
+import pytest
+from tabulated import by_header
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.report.gravity_probe_b import summary
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def glued(page, key):
+    for cell in json.loads((ROOT / "book" / f"{page}.ipynb").read_text(encoding="utf-8"))["cells"]:
+        for output in cell.get("outputs", []):
+            if output.get("metadata", {}).get("scrapbook", {}).get("name") == key:
+                return ast.literal_eval("".join(output["data"]["application/papermill.record/text/plain"]))
+    raise KeyError(key)
+
+
+def test_the_answers_are_those_that_the_chapters_derive():
+    printed, formula, one, simple, real, flown, proved, single, double = summary.find()
+    assert printed.decimal == (glued("year", "digits_first"), glued("year", "digits_second")) == (9, 17)
+    assert formula.decimal == (glued("kalman", "goal_first"), glued("kalman", "goal_second"))
+    assert one.bits == glued("year", "bits_observed")
+    assert (simple.bits, simple.deviation) == (glued("mission", "mission_bits"), glued("mission", "mission_deviation"))
+    assert (real.bits, real.deviation) == (glued("mission", "real_absolute"), glued("mission", "real_deviation"))
+    assert (flown.bits, flown.deviation) == (None, glued("mission", "timed_bits"))
+    assert (proved.bits, proved.deviation) == (glued("guarantee", "gpb_bits"), glued("guarantee", "gpb_bits_deviation"))
+    assert (single.bits, single.meaning, double.bits, double.meaning) == (24, "too few", 53, "ample")
+    assert f"all {glued('mission', 'mission_records')} within" in simple.meaning
+
+
+def test_every_row_has_both_bases_by_equal_unit_roundoff():
+    for row in by_header(summary.table()):
+        if row["bits"] != "–":
+            pairs = zip(row["bits"].split(" or "), row["decimal digits"].split(" or "), strict=True)
+            for bits, decimal in pairs:
+                assert float(bits) == pytest.approx(summary.binary_digits(float(decimal)), abs=0.2)
+    assert FloatFormat(10, 9).unit_roundoff == pytest.approx(2.0 ** -summary.binary_digits(9))
+
+
+def test_the_readme_shows_the_table():
+    assert summary.table().markdown() in (ROOT / "README.md").read_text(encoding="utf-8")

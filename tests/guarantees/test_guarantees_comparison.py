@@ -1,0 +1,87 @@
+"""gpbnb.report.guarantees.comparison: published numbers beside ours."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.bounds.linear import error_coefficients
+from gpbnb.report.guarantees import comparison
+from gpbnb.report.guarantees.published import fixif_longitudinal
+from tests.plain_structures import floating
+
+
+def numbered():
+    return [each for each in comparison.rows() if each.published is not None]
+
+
+def test_no_bound_of_ours_is_larger_than_a_published_one():
+    for each in numbered():
+        ours = each.ours()
+        assert ours == pytest.approx(each.published, rel=1e-8) or ours < each.published, each.program
+
+
+def test_a_number_is_missing_only_with_a_reason_and_every_row_has_its_source():
+    for each in comparison.rows():
+        assert each.source
+        assert each.note
+    assert len(comparison.table().body) == len(comparison.rows())
+
+
+def test_the_lead_lag_controller_is_that_of_the_program_in_a_plain_loop():
+    r, system, fmt = floating(2, 24, "nearest"), comparison.lead_lag(), comparison.SINGLE
+    bound, rng, worst = comparison.output_errors(system, fmt, 1.0)[0], np.random.default_rng(2), Fraction(0)
+    u = np.concatenate([np.ones(600), rng.uniform(-1, 1, 600)])
+    found = system.outputs(u.reshape(-1, 1), fmt)[:, 0, 0]
+    A = [Fraction(each) for each in ("0.499", "-0.05", "0.010")]
+    a = [r(each) for each in A]
+    x0 = x1 = e0 = e1 = Fraction(0)
+    for value, given in zip(found, u, strict=True):
+        yc = r(Fraction(float(given)))
+        x0 = r(r(a[0] * x0) + r(r(a[1] * x1) + yc))
+        x1 = r(r(a[2] * x0) + x1)
+        assert Fraction(float(value)) == x1
+        e0 = A[0] * e0 + A[1] * e1 + Fraction(float(given))
+        e1 = A[2] * e0 + e1
+        worst = max(worst, abs(x1 - e1))
+    # roundings to nearest partly cancel in sums over about a thousand steps, the time in which the controller forgets
+    assert 0 < float(worst) <= bound < 1000 * float(worst)
+
+
+def test_every_printed_digit_of_fixif_is_ours():
+    given = fixif_longitudinal()
+    ours = error_coefficients(given["A"], given["B"], given["C"], given["D"], given["input_bound"])
+    assert [round(float(each), 6) for each in ours] == given["published_E"]
+
+
+@pytest.mark.parametrize(("digits", "steps"), [(53, 60), (24, 60)])
+def test_the_second_order_filter_stays_within_range_and_bound_in_a_plain_loop(digits, steps):
+    """Inputs with the signs of the reversed impulse response drive the output to its largest size."""
+    r, coefficients = floating(2, digits, "nearest"), [Fraction(each) for each in ("0.7", "-1.3", "1.1", "1.4", "-0.7")]
+
+    def run(rounded, inputs):
+        c = [rounded(each) for each in coefficients]
+        E0 = E1 = S0 = S1 = Fraction(0)
+        found = []
+        for E in map(rounded, inputs):
+            total = rounded(c[0] * E)
+            for a, b in zip(c[1:], (E0, E1, S0, S1), strict=True):
+                total = rounded(total + rounded(a * b))
+            E1, E0, S1, S0 = E0, E, S0, total
+            found.append(total)
+        return found
+
+    def exactly(x):
+        return x
+
+    response = run(exactly, [Fraction(k == 0) for k in range(steps)])
+    worst = [Fraction(int(np.sign(float(each))) or 1) for each in reversed(response)]
+    peak = comparison.rows()[1].ours()
+    assert 0.999 * peak < float(run(exactly, worst)[-1]) <= peak
+    bound = comparison.output_errors(comparison.second_order_filter(), comparison.FloatFormat(2, digits), 1.0)[0]
+    rng = np.random.default_rng(1)
+    for inputs in (worst, [Fraction(float(each)) for each in rng.uniform(-1, 1, steps)]):
+        off = max(abs(a - b) for a, b in zip(run(r, inputs), run(exactly, inputs), strict=True))
+        assert 0 < float(off) <= bound < 100 * float(off)

@@ -1,0 +1,134 @@
+"""Definitions, given data and missing pages: rows of data, whose given values are those that the package uses."""
+
+from fractions import Fraction
+
+import pytest
+from alterations import altered
+
+from gpbnb.report.inversion import example as inverse
+from gpbnb.report.ledger import load_statements, topics
+from gpbnb.report.ledger.checks import TOPICS
+from gpbnb.report.ledger.checks.kalman import example as year
+from gpbnb.report.ledger.checks.rolling.registry import SIX, TEN
+from gpbnb.report.ledger.finding import Verdict
+from gpbnb.report.ledger.formula import Number, Undefined, Words
+from gpbnb.report.ledger.html import chapter
+from gpbnb.report.ledger.statements import statement
+from gpbnb.report.ledger.unjudged import load_unjudged, read_unjudged
+from gpbnb.report.rolling.theory import PERIOD
+
+UNJUDGED = {key: finding for findings in load_unjudged().values() for key, finding in findings.items()}
+HEAD = "id,topic,verdict,recomputed,note"
+SECTION_12 = {"n": year.N, "m": year.M}
+USED = {
+    "hung1984.II.s11-4.matrix-a": {"A": inverse.MATRIX},
+    "hung1982.III.s11-4.matrix-a": {"A": inverse.MATRIX},
+    "hung1984.II.s12.example-sampling": {
+        "interval": (year.STEP, "s"),
+        "duration": (Fraction(year.YEAR, 365 * 86400), "year"),
+    },
+    "hung1984.II.s12.example-n-m": SECTION_12,
+    "hung1982.III.s12.example-n-m-and-sampling": {"interval": (year.STEP, "s"), **SECTION_12},
+    "hung1984.III.s4.sample-1-t": {"T": (PERIOD, "seconds")},
+    "hung1984.III.s4.sample-1-places": {"places": SIX.precision},
+    "hung1984.III.s4.sample-2-places": {"places": TEN.precision},
+}
+"""The values that the package uses for the given data of the examples."""
+NOT_USED = {"hung1982.II.nine-groups", "savage2016.main.stitle.date"}
+"""Numbers with which nothing is computed: the groups of a lost diagram, and the date of a document."""
+IN_WORDS = {"six": 6, "ten": 10}
+
+
+def printed_values(given):
+    """The values that a statement prints, by their names; a quantity with a unit is a pair."""
+    values = {}
+    for part in given.parts:
+        if isinstance(part, Number):
+            values[part.label] = (part.value, part.unit)
+        elif isinstance(part, Words):
+            values[part.label] = IN_WORDS[part.printed]
+        else:
+            (link,) = part.links({}, Fraction)
+            values[str(link.left)] = (link.symbol, link.right)
+    return values
+
+
+def used_values(key):
+    """Those that the package uses, in the same form."""
+    values = {}
+    for name, value in USED[key].items():
+        if name == "A":
+            values[name] = ("==", [[Fraction(entry) for entry in row] for row in value])
+        else:
+            values[name] = ("==", value) if name in SECTION_12 else value
+    return values
+
+
+@pytest.mark.parametrize("key", USED)
+def test_a_given_value_is_the_one_that_the_package_uses(key):
+    assert printed_values(statement(key)) == used_values(key)
+
+
+@pytest.mark.parametrize("key", USED)
+def test_an_altered_given_value_is_another_one(key):
+    found = 0
+    for name, other in altered(statement(key)):
+        try:
+            assert printed_values(other) != used_values(key), name
+        except (Undefined, ValueError):
+            continue
+        found += 1
+    assert found
+
+
+def test_each_given_number_is_compared_with_the_package():
+    numbers = {key for key in UNJUDGED if statement(key).kind in ("number", "example", "table")}
+    assert numbers == {*USED, *NOT_USED}
+
+
+def test_each_row_is_the_finding_on_its_statement():
+    owner = topics()
+    for topic, findings in load_unjudged().items():
+        for key, finding in findings.items():
+            assert owner[key] == topic
+            assert TOPICS[topic].run(statement(key)) == finding
+
+
+def test_an_alteration_of_an_unjudged_statement_is_not_judged_right():
+    verdicts = {
+        TOPICS[topic].run(other).verdict
+        for topic, findings in load_unjudged().items()
+        for key in findings
+        for _, other in altered(statement(key))
+    }
+    assert verdicts == {Verdict.GIVEN, Verdict.UNVERIFIABLE}
+
+
+def test_each_id_is_that_of_a_statement():
+    assert set(UNJUDGED) <= {each.id for each in load_statements()}
+
+
+def test_a_note_names_the_chapter_by_its_present_title(tmp_path):
+    path = tmp_path / "list.csv"
+    path.write_text(f"{HEAD}\na,rolling,unverifiable,,see the <chapter>\n", encoding="utf-8")
+    assert read_unjudged(path)["rolling"]["a"].note == f"see the {chapter('rolling')}"
+    assert chapter("rolling") in UNJUDGED["hung1984.III.s1.figure-iii-2"].note
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (["a,rounding,verified,,why"], "got 'a' with verdict 'verified' in list.csv; needed each id once"),
+        (
+            ["a,rounding,given,,why", "a,kalman,given,,why"],
+            "got 'a' with verdict 'given' in list.csv; needed each id once",
+        ),
+        (["a,rounding,given,,"], "list.csv, a: got verdict 'given' without a note"),
+        (["a,rounding,unverifiable,$x,why"], "list.csv, a: got recomputed='\\$x' with an unpaired"),
+    ],
+)
+def test_a_bad_row_is_named(tmp_path, lines, message):
+    path = tmp_path / "list.csv"
+    path.write_text("\n".join((HEAD, *lines)) + "\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=message):
+        read_unjudged(path)

@@ -1,0 +1,300 @@
+"""The pictures that a reader can move: what is drawn against the package's own numbers, by keyboard and on a phone."""
+
+from __future__ import annotations
+
+import math
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.forms import Form
+from gpbnb.report.calculators.page import show
+from gpbnb.report.gravity_probe_b import year
+from gpbnb.report.pictures import views
+from gpbnb.report.rolling import theory
+
+from . import axe
+from . import browser as tools
+
+ADDRESSES = {"numberline": "book/rounding.html", "year": "book/year.html", "roll": "book/calculators.html"}
+PICTURES = pytest.mark.parametrize("picture", views.PICTURES, ids=lambda each: each.id)
+RULES = dict(zip(("to nearest", "chopped"), Rounding.documented(), strict=True))
+READ = """id => {
+    const box = document.querySelector(`#calculator-${id} .calculator-drawing`), svg = box.querySelector("svg");
+    const number = (node, name) => Number(node.getAttribute(name));
+    const all = (selector) => [...svg.querySelectorAll(selector)];
+    const center = (selector) => all(selector).map(c => [number(c, "cx"), number(c, "cy")]);
+    return {
+        texts: all("text").map(t => [number(t, "x"), number(t, "y"), t.textContent]),
+        boxes: all("text").map(t => { const b = t.getBBox(); return [b.x, b.y, b.x + b.width, b.y + b.height] }),
+        numbers: all("line.number").map(l => number(l, "x1")), curves: all("path.curve").map(p => p.getAttribute("d")),
+        teeth: svg.querySelector(".teeth")?.getAttribute("d"), rounded: center(".rounded"), here: center(".here"),
+        given: svg.querySelector(".given")?.getAttribute("d"), turned: center(".turned"), circles: center("circle"),
+        step: svg.querySelector(".step")?.getAttribute("d"), ulp: svg.querySelector(".ulp")?.getAttribute("d"),
+        limits: all(".limit").map(l => number(l, "y1")),
+        said: box.getAttribute("aria-label"), width: number(svg, "width"), height: number(svg, "height"),
+        state: document.querySelector(`#calculator-${id}`).dataset.state,
+    };
+}"""
+
+
+@pytest.fixture(scope="module", params=tools.SIZES)
+def pages(request, open_page):
+    """The pages with the pictures, opened when they are asked for, on a desktop and on a phone."""
+    opened = {}
+
+    def at(picture):
+        if picture not in opened:
+            manager = open_page(ADDRESSES[picture], request.param, shared=True)
+            opened[picture] = manager, manager.__enter__()
+        return opened[picture][1]
+
+    yield at
+    for manager, _ in opened.values():
+        manager.__exit__(None, None, None)
+
+
+def type_in(page, picture, **given):
+    """Enter numbers by the keyboard alone."""
+    for name, value in given.items():
+        field = page.locator(f"#calculator-{picture}-{name}")
+        field.focus()
+        if field.evaluate("e => e.tagName") == "SELECT":
+            for _ in range(field.locator("option").count()):
+                page.keyboard.press("ArrowUp")
+            while field.evaluate("e => e.selectedOptions[0].textContent") != value:
+                page.keyboard.press("ArrowDown")
+        else:
+            page.keyboard.press("Control+a")
+            page.keyboard.type(value)
+    return page.evaluate(READ, picture)
+
+
+def points(path):
+    return [tuple(map(float, each.split())) for each in path[1:].split("L")]
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize(
+    ("base", "t", "x"),
+    [
+        ("10", "1", "2.4"),
+        ("10", "2", "1.05"),
+        ("10", "2", "9.96"),
+        ("2", "1", "3"),
+        ("16", "3", "1e-6"),
+        ("10", "12", "123456.7890125"),
+        ("10", "1", "1"),
+        ("2", "3", "7.999999"),
+    ],
+)
+def test_a_number_is_rounded_as_the_package_rounds_it(pages, base, t, x, rule):
+    found = type_in(pages("numberline"), "numberline", base=base, t=t, chop=rule, x=x)
+    fmt = FloatFormat(int(base), int(t), RULES[rule])
+    exact = Fraction(x)
+    kept = fmt.round(exact)
+    error = abs(kept - exact) / exact
+    assert f"{show(float(exact))} becomes" in found["said"]
+    assert f"= {show(float(kept))}: a relative error of {show(float(error))}, " in found["said"]
+    assert found["said"].endswith(f"which is {show(float(error / fmt.unit_roundoff))} β.")
+    # The marks are the numbers of the format around the rounded one, in proportion.
+    marks, (place, _) = found["numbers"], found["rounded"][0]
+    assert [marks[0], marks[-1]] == pytest.approx([44, found["width"] - 14])
+    (at,) = [i for i, mark in enumerate(marks) if abs(mark - place) < 1e-6]
+    tiny = Fraction(1, 10**30)
+    numbers = [kept]
+    for _ in range(at):
+        numbers.insert(0, FloatFormat(int(base), int(t), Rounding.DOWN).round(numbers[0] * (1 - tiny)))
+    for _ in range(len(marks) - 1 - at):
+        numbers.append(FloatFormat(int(base), int(t), Rounding.UP).round(numbers[-1] * (1 + tiny)))
+    assert numbers[0] <= exact <= numbers[-1]
+    scale = (marks[-1] - marks[0]) / float(numbers[-1] - numbers[0])
+    assert marks == pytest.approx([marks[0] + float(each - numbers[0]) * scale for each in numbers], abs=1e-2)
+    tip = float(found["given"][1:].split()[0])
+    assert tip == pytest.approx(marks[0] + float(exact - numbers[0]) * scale, abs=0.1)
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize(("base", "t"), [("10", "1"), ("10", "2"), ("2", "4"), ("16", "2")])
+def test_the_saw_tooth_is_the_error_of_the_package(pages, base, t, rule):
+    found = type_in(pages("numberline"), "numberline", base=base, t=t, chop=rule, x="1.5")
+    fmt = FloatFormat(int(base), int(t), RULES[rule])
+    beta = float(fmt.unit_roundoff)
+    (zero,) = [y - 4 for _, y, text in found["texts"] if text == "0"]
+    (one,) = [y - 4 for x, y, text in found["texts"] if text == "1" and x == 38]
+    left, right = 44, found["width"] - 14
+    seen = []
+    for px, py in points(found["teeth"]):
+        m = int(base) ** ((px - left) / (right - left))
+        error = (zero - py) / (zero - one) * beta
+        # A tenth of a pixel across may be a step of the saw: the error near the point is compared.
+        near = np.linspace(px - 0.06, px + 0.06, 13)
+        numbers = [Fraction(int(base) ** ((p - left) / (right - left))) for p in near]
+        errors = [float(abs(fmt.round(n) - n) / n) for n in numbers if 1 <= n <= int(base)]
+        assert min(errors) - 0.01 * beta <= error <= max(errors) + 0.01 * beta, m
+        seen.append(error)
+    assert max(seen) > 0.49 * beta
+    (here,) = found["here"]
+    exact = Fraction(3, 2)
+    assert (zero - here[1]) / (zero - one) * beta == pytest.approx(
+        float(abs(fmt.round(exact) - exact) / exact), abs=0.01 * beta
+    )
+
+
+def test_dragging_moves_the_number(pages):
+    page = pages("numberline")
+    type_in(page, "numberline", base="10", t="1", chop="to nearest", x="2.4")
+    svg = page.locator("#calculator-numberline svg")
+    svg.scroll_into_view_if_needed()
+    box = svg.bounding_box()
+    page.mouse.move(box["x"] + 60, box["y"] + 200)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 44 + (box["width"] - 58) / 2, box["y"] + 200)
+    page.mouse.up()
+    moved = float(page.locator("#calculator-numberline-x").input_value())
+    assert moved == pytest.approx(10**0.5, rel=0.02)
+
+
+def runs(chop):
+    rule = Rounding.documented()[chop]
+    chosen = [run for run in year.load() if run.case.model == year.MODELS[0] and run.case.base == 2]
+    return {r.case.precision: r for r in chosen if r.case.form is Form.HUNG and r.case.rounding is rule}
+
+
+@pytest.mark.parametrize("quantity", ["rate", "drift"])
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("t", ["14", "25", "53"])
+def test_a_year_shows_the_stored_run(pages, t, rule, quantity):
+    found = type_in(
+        pages("year"), "year", t=t, chop=rule, quantity=f"drift {'angle' if quantity == 'drift' else 'rate'}"
+    )
+    stored = runs(list(RULES).index(rule))
+    bits = max(each for each in stored if each <= int(t))
+    run = stored[bits]
+    assert (f"No run with {t} bits is stored" in found["said"]) == (bits != int(t))
+    assert f"With {bits} bits" in found["said"]
+    errors = np.abs(getattr(run, quantity)).max(axis=1)
+    assert f"it is {show(float(f'{errors[-1]:.3g}'))} mas" in found["said"]
+    days = [step * 10 / 86400 for step in run.steps]
+    above = np.flatnonzero(errors > 1)
+    if not above.size:
+        assert "stays below 1 mas" in found["said"]
+    else:
+        assert f"and day {show(days[above[0]])}" in found["said"]
+        assert ("still does at the end" in found["said"]) == (above[-1] == len(errors) - 1)
+    # The circles, by the labels of the axes.
+    circles = [(x, y) for x, y in found["circles"]]
+    shown = [(day, error) for day, error in zip(days, errors, strict=True) if error > 0]
+    assert len(circles) == len(shown)
+    (limit,) = found["limits"]
+    slope = (circles[0][1] - circles[-1][1]) / math.log10(shown[-1][1] / shown[0][1])
+    for (x, y), (day, error) in zip(circles, shown, strict=True):
+        assert y == pytest.approx(limit - slope * math.log10(error), abs=0.25)
+        share = math.log(day / days[0]) / math.log(days[-1] / days[0])
+        assert x == pytest.approx(58 + share * (found["width"] - 72), abs=1e-3)
+    step, ulp = (float(found[name][1:].split()[0]) for name in ("step", "ulp"))
+    decade = (found["width"] - 72) / -math.floor(math.log10(8192 * 2.0**-53))
+    assert (step - ulp) / decade == pytest.approx(math.log10(6606 / 3153600 / 2.0 ** (13 - bits)), abs=0.01)
+
+
+@pytest.mark.parametrize("period", ["20", "77.5", "1e6"])
+@pytest.mark.parametrize("phase", ["1", "31", "36000"])
+def test_roll_and_deroll_show_the_numbers_of_the_theory(pages, period, phase):
+    found = type_in(pages("roll"), "roll", period=period, phase=phase)
+    seconds, angle = float(period), math.radians(float(phase) / 3600)
+    density = float(theory.flicker_density(theory.LEVEL, 1 / seconds, theory.INTERVAL))
+    rolled = theory.drift_error_rolled(theory.LEVEL, seconds, interval=theory.INTERVAL)
+    unrolled = theory.drift_error_unrolled(theory.LEVEL, at_rest=True)
+    across = theory.phase_error_cost(theory.DRIFTS, angle)[1]
+    numbers = [float(each) for each in said_numbers(found["said"])]
+    expected = [seconds, density, unrolled, rolled, unrolled / rolled, float(phase), float(across)]
+    assert numbers[: len(expected)] == pytest.approx(expected, rel=6e-4)
+    (here,), (turned,) = found["here"], found["turned"]
+    low = 1 / theory.YEAR
+    share = math.log(1 / seconds / low) / math.log(0.05 / low)
+    assert here[0] == pytest.approx(58 + share * (found["width"] - 72), abs=0.1)
+    share = math.log(float(phase)) / math.log(36000)
+    assert turned[0] == pytest.approx(58 + share * (found["width"] - 72), abs=0.1)
+    (limit,) = found["limits"]
+    assert (turned[1] < limit) == (across > 1)
+
+
+def said_numbers(text):
+    """The numbers of a sentence, with powers of ten as written for people."""
+    plain = re.sub(
+        r"\u00a0×\u00a010([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)",
+        lambda m: "e" + m[1].translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")),
+        text,
+    )
+    return re.findall(r"\d+(?:\.\d+)?(?:e-?\d+)?", plain.partition(". ")[2])
+
+
+@PICTURES
+def test_each_slider_obeys_the_arrow_keys(pages, picture):
+    page = pages(picture.id)
+    type_in(page, picture.id, **picture.start)
+    for each in picture.inputs:
+        if each.choices:
+            continue
+        before = page.evaluate(READ, picture.id)["said"]
+        page.locator(f"#calculator-{picture.id}-{each.name}-slider").focus()
+        for _ in range(3):
+            page.keyboard.press("ArrowRight")
+        assert page.evaluate(READ, picture.id)["said"] != before
+
+
+@PICTURES
+@pytest.mark.parametrize("typed", ["", "x", "-1", "1e999", "0,5"])
+def test_a_wrong_number_is_refused_and_the_drawing_grows_old(pages, picture, typed):
+    page = pages(picture.id)
+    type_in(page, picture.id, **picture.start)
+    name = next(each.name for each in picture.inputs if not each.choices)
+    found = type_in(page, picture.id, **{name: typed}) if typed else None
+    if not typed:
+        page.locator(f"#calculator-{picture.id}-{name}").fill("")
+        found = page.evaluate(READ, picture.id)
+    assert found["state"] == "waiting"
+    assert found["said"].startswith("Figure of earlier numbers")
+    assert page.locator(f"#calculator-{picture.id}-{name}-error").text_content().startswith("Got ")
+    assert type_in(page, picture.id, **picture.start)["state"] == "computed"
+    assert page.faults == []
+
+
+@PICTURES
+def test_the_words_of_a_drawing_fit_and_do_not_collide(pages, picture):
+    page = pages(picture.id)
+    found = type_in(page, picture.id, **picture.start)
+    boxes = found["boxes"]
+    assert all(
+        x0 >= -0.5 and y0 >= 0 and x1 <= found["width"] + 0.5 and y1 <= found["height"] for x0, y0, x1, y1 in boxes
+    )
+    words = [text for *_, text in found["texts"]]
+    for i, (a0, b0, a1, b1) in enumerate(boxes):
+        for j, (c0, d0, c1, d1) in enumerate(boxes[:i]):
+            assert min(a1, c1) <= max(a0, c0) or min(b1, d1) - max(b0, d0) < 4, (words[i], words[j])
+
+
+@PICTURES
+def test_axe_finds_nothing_in_a_picture(pages, picture):
+    page = pages(picture.id)
+    type_in(page, picture.id, **picture.start)
+    assert axe.violations(page, within=f"#calculator-{picture.id}") == []
+
+
+@PICTURES
+def test_paper_and_a_page_without_script_show_the_still_figure(open_page, picture):
+    with open_page(ADDRESSES[picture.id]) as page:
+        still, live = page.locator(".picture-still img"), page.locator(f"#calculator-{picture.id}")
+        assert not still.is_visible()
+        assert live.is_visible()
+        page.emulate_media(media="print")
+        assert still.is_visible()
+        assert not live.is_visible()
+        assert still.evaluate("async e => { await e.decode(); return e.naturalWidth }") > 600
+        page.emulate_media(media="screen")
+        live.evaluate("e => { e.hidden = true }")
+        assert still.is_visible()

@@ -1,0 +1,187 @@
+"""The site around the chapters: search, order of pages, print, addresses, descriptions, and what a page weighs."""
+
+from __future__ import annotations
+
+import re
+from html import unescape
+
+import pytest
+
+from . import browser as tools
+
+PAGES = [each for each in tools.pages() if each.startswith("book/")]
+REFERENCE = ("book/api.html", "book/api/")
+HEAVIEST = 1_500_000  # bytes of a page with its pictures, scripts, styles and fonts
+on_a_desktop = pytest.mark.parametrize(
+    "page", [(each, "desktop") for each in tools.opened()], ids="-".join, indirect=True
+)
+RESULTS = """() => [...document.querySelectorAll("#search-results li")].map((each) => ({
+  page: new URL(each.querySelector("a").href).pathname.slice(1),
+  snippet: each.querySelector("p.context")?.textContent ?? "",
+}))"""
+
+
+@pytest.fixture
+def search(open_page):
+    """Search for words; return the results with a snippet, once all of them are there."""
+
+    def search(words):
+        with open_page(f"search.html?q={words}", shared=True) as page:
+            page.wait_for_function("document.querySelector('.search-summary')?.textContent.includes('found')")
+            pages = "[...document.querySelectorAll('#search-results li')].filter(e => !e.querySelector('span'))"
+            page.wait_for_function(f"{pages}.every(e => e.querySelector('p.context'))")
+            assert page.faults == []
+            return page.evaluate(RESULTS)
+
+    return search
+
+
+def rank(page):
+    return 2 if page.startswith((*REFERENCE, "_modules/")) else 1 if page.startswith("book/ledger-") else 0
+
+
+@pytest.mark.parametrize(("words", "number"), [("6606", "6606"), ("3153600", "3153600"), ("3,153,600", "3153600")])
+def test_the_search_finds_a_number(search, words, number):
+    found = search(words)
+    assert len(found) > 1
+    assert rank(found[0]["page"]) == 0
+    chapters = [each["snippet"] for each in found if rank(each["page"]) == 0]
+    assert [each for each in chapters if number not in each.replace(",", "")] == []
+
+
+@pytest.mark.parametrize("words", ["precision", "bound", "tolerance", "required_precision"])
+def test_the_search_shows_chapters_first_and_modules_last(search, words):
+    ranks = [rank(each["page"]) for each in search(words)]
+    assert {0, 2} <= set(ranks)
+    assert ranks == sorted(ranks)
+
+
+@pytest.mark.parametrize("words", ["covariance", "deroll", "stagnation"])
+def test_a_snippet_can_be_read(search, words):
+    """No TeX, no code, and it begins with a sentence and ends with a whole word."""
+    snippets = [each["snippet"] for each in search(words) if rank(each["page"]) == 0]
+    assert len(snippets) > 2
+    for snippet in snippets:
+        assert not re.search(r"\\\w|import |\s\s", snippet), snippet
+        assert words in snippet.lower(), snippet
+        assert len(snippet) < 260
+
+
+def neighbour(address, way):
+    """The page to which the link at the foot of a page leads."""
+    text = (tools.HTML / address).read_text(encoding="utf-8")
+    link = re.search(rf'<a class="{way}"\s+href="([^"]+)"', text)
+    return f"book/{link[1]}" if link else None
+
+
+def test_the_next_page_leads_through_the_book_and_past_the_reference():
+    read = ["book/index.html"]
+    while following := neighbour(read[-1], "right-next"):
+        assert following not in read
+        assert neighbour(following, "left-prev") == read[-1]
+        read.append(following)
+    assert set(read) == {each for each in PAGES if not each.startswith(REFERENCE)}
+
+
+def test_pages_of_modules_have_no_next_page():
+    modules = [each for each in PAGES if each.startswith(REFERENCE)]
+    assert len(modules) > 100
+    assert [each for each in modules if neighbour(each, "right-next") or neighbour(each, "left-prev")] == []
+
+
+def test_the_reference_stands_last_and_lists_its_modules_on_its_own_page_alone():
+    for address in ("book/index.html", "book/kalman.html"):
+        text = (tools.HTML / address).read_text(encoding="utf-8")
+        listed = re.findall(r'<li class="toctree-l1[^>]*><a class="reference internal" href="([^"]+)"', text)
+        assert listed[-1] == "api.html"
+        assert "api/gpbnb.filters.run.html" not in text
+
+
+def test_folded_code_is_opaque_as_soon_as_it_is_opened_for_a_print(open_page):
+    """A browser prints the first moment of an animation."""
+    with open_page("book/wordlength.html") as page:
+        page.emulate_media(media="print", reduced_motion="no-preference")
+        seen = page.evaluate(
+            """() => {
+              window.dispatchEvent(new Event("beforeprint"));
+              const folded = [...document.querySelectorAll("article details.hide > :not(summary)")];
+              return folded.map((e) => [getComputedStyle(e).opacity, e.getAnimations().length, e.checkVisibility()]);
+            }"""
+        )
+        assert len(seen) > 5
+        assert {tuple(each) for each in seen} == {("1", 0, True)}
+
+
+def test_headings_of_parts_are_lighter_than_those_of_sections(open_page):
+    with open_page("book/wordlength.html", shared=True) as page:
+        weight = "e => Number(getComputedStyle(e).fontWeight)"
+        size = "e => parseFloat(getComputedStyle(e).fontSize)"
+        section, part = page.locator("article h2").first, page.locator("article h3").first
+        assert part.evaluate(weight) < section.evaluate(weight)
+        assert part.evaluate(size) < section.evaluate(size)
+
+
+def description(address):
+    text = (tools.HTML / address).read_text(encoding="utf-8")
+    found = re.search(r'<meta name="description" content="([^"]*)">', text)
+    return unescape(found[1]) if found else ""
+
+
+def test_a_description_can_be_read_alone():
+    """It consists of whole sentences, and speaks of no figure, no other chapter, and nothing that went before."""
+    told = {each: description(each) for each in PAGES if not each.startswith("book/api/")}
+    assert [each for each, text in told.items() if not text.endswith((".", "?"))] == []
+    leaning = re.compile(
+        r"^(This (?!page|book)|That|Those|It|They|Here|Each|The (figure|table|formula|previous))\b|\bFig\.|∎"
+    )
+    assert {each: text for each, text in told.items() if leaning.search(text) and "book/ledger-" not in each} == {}
+    assert len(set(told.values())) == len(told)
+
+
+def test_a_description_of_the_ledger_names_its_document():
+    assert "Hung (1984)" in description("book/ledger-1984-3.html")
+
+
+LOADED = """async () => {
+  for (const picture of document.images) picture.loading = "eager";
+  await Promise.all([...document.images].map((picture) => picture.decode().catch(() => {})));
+  const all = [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")];
+  return all.map((each) => [new URL(each.name).pathname.slice(1), each.decodedBodySize]);
+}"""
+
+
+@on_a_desktop
+def test_no_page_loads_more_than_it_uses(page):
+    loaded = dict(page.evaluate(LOADED))
+    assert all(loaded.values())
+    names = " ".join(loaded)
+    assert ("mathjax" in names) == (page.locator(".math").count() > 0)
+    assert "fontawesome" not in names
+    fonts = [name for name in loaded if name.endswith((".woff", ".woff2", ".ttf")) and "mathjax" not in name]
+    assert fonts == []
+    assert ("searchindex" in names) == page.url.endswith("search.html")
+
+
+@on_a_desktop
+def test_no_page_is_heavier_than_its_limit(page):
+    if "search.html" in page.url:
+        pytest.skip("the page of results loads the index")
+    loaded = dict(page.evaluate(LOADED))
+    assert sum(loaded.values()) <= HEAVIEST, sorted(loaded.items(), key=lambda each: -each[1])[:8]
+
+
+@on_a_desktop
+def test_every_icon_is_drawn(page):
+    """An icon is a mask over a coloured box: without a picture it would be a filled square."""
+    icons = page.locator(".fa-solid, .fas").evaluate_all(
+        """all => all.map((e) => [e.className, getComputedStyle(e, "::before")])
+          .map(([name, style]) => [name, style.maskImage.startsWith('url("data:'), parseFloat(style.width)])"""
+    )
+    assert len(icons) > 3
+    assert [name for name, drawn, _ in icons if not drawn] == []
+
+
+def test_no_template_of_the_theme_is_shipped():
+    texts = {path: path.read_text(encoding="utf-8") for path in tools.HTML.rglob("*.html")}
+    assert [path.name for path, text in texts.items() if re.search(r"\{%-? |\{\{ ?\w+\(", text)] == []
+    assert [path.name for path, text in texts.items() if "<title>" not in text] == []

@@ -1,0 +1,444 @@
+"""Generated C code: bit for bit as its emulation, without a warning; its operations; refusals."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import benchmarks.code
+from benchmarks import code_batch
+from benchmarks.code import cases, installed, models, run, settings_of
+from benchmarks.code_batch import Case, compare
+from gpbnb import (
+    BINARY16,
+    BINARY32,
+    BINARY64,
+    DECIMAL32,
+    FixedFormat,
+    FloatFormat,
+    Form,
+    LinearModel,
+    LinearSystem,
+    WordFormats,
+    guarantee,
+    limits,
+    write_code,
+)
+from gpbnb.bounds.system import output_errors
+from gpbnb.filters.design import FilterDesign
+from gpbnb.filters.program import steps_in_python
+from gpbnb.filters.run import Run
+from gpbnb.filters.settled import settled_filter, settled_gain
+from gpbnb.filters.tracing import kalman_program, without_exact
+from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.c_files import FLAGS
+from gpbnb.wordlength.c_source import places
+from gpbnb.wordlength.code import model_coefficients, prepared
+
+CASES = list(cases())
+needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang")
+
+
+def slice_of(seed, count):
+    """Combinations of each kind of format and each kind of filter, drawn with a seed."""
+    rng = np.random.default_rng(seed)
+    small = [case for case in CASES if "ten states" not in case.label]
+    kinds = dict.fromkeys((case.kind, isinstance(case.given, LinearModel)) for case in small)
+    for kind in kinds:
+        mine = [case for case in small if (case.kind, isinstance(case.given, LinearModel)) == kind]
+        yield from (mine[i] for i in rng.choice(len(mine), min(count, len(mine)), replace=False))
+
+
+@needs_compiler
+@pytest.mark.parametrize("case", [*slice_of(1, 2)], ids=lambda case: f"{case.kind} {case.label}")
+def test_code_has_the_digits_of_its_emulation(case):
+    settings = settings_of(installed(), sanitize=False)
+    (found,) = compare([case], 10_000, settings)
+    assert found.faults == ()
+    assert found.builds == len(settings)
+
+
+def built(folder, flags=FLAGS):
+    """Compile and run the test of the code in a folder; return its exit status and what it says."""
+    compiler = installed()[0]
+    command = [compiler, *flags.split(), "-O2", "-o", "run", "test_filter.c", "filter.c"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    done = subprocess.run(["./run"], cwd=folder, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        (" * r", " + r", "step 1: number"),
+        ("_OK;\n}", "_OK + 3;\n}", "step 1: status 3"),
+        ("{\n    const", "{\n    int unused;\n    const", "unused variable"),
+    ],
+)
+def test_the_filter_of_a_batch_that_is_at_fault_is_named(old, new, fault, monkeypatch):
+    def write(given, fmt, form, folder, name, **settings):
+        paths = write_code(given, fmt, form, folder, name, **settings)
+        if given.name == "bad":
+            text = paths[1].read_text()
+            assert old in text
+            paths[1].write_text(text.replace(old, new, 1))
+
+    monkeypatch.setattr(code_batch, "write_code", write)
+    filters = [replace(BIQUAD, name=name) for name in ("good", "bad", "good too")]
+    settings = settings_of(installed()[:1])
+    found = compare([Case("", each.name, each, BINARY32, "direct form I") for each in filters], 50, settings)
+    assert [each.counts for each in found] == [(3, 150, 750), (0, 0, 0), (3, 150, 750)]
+    assert [len(each.faults) for each in found] == [0, len(settings), 0]
+    assert all(fault in each for each in found[1].faults)
+
+
+def test_every_bit_of_every_step_is_compared(tmp_path):
+    case = Case("", "", BIQUAD, BINARY32, "direct form I")
+    written = code_batch._written(case, "f0", tmp_path, 300, 0)
+    written.expected[6, 4] = 0
+    rows = np.zeros(300, [("status", "i4"), ("row", "f4", 5)])
+    rows["row"] = written.expected
+    for step, number in ((300, np.nextafter(written.expected[299, 4], np.float32(1))), (7, -0.0)):
+        wrong = rows.copy()
+        wrong["row"][step - 1, 4] = number
+        wrong.tofile(tmp_path / "f0.out")
+        assert code_batch._difference(tmp_path, written) == f"step {step}: number 4 differs"
+    rows[:-1].tofile(tmp_path / "f0.out")
+    assert code_batch._difference(tmp_path, written) == "299 steps in place of 300"
+    rows.tofile(tmp_path / "f0.out")
+    assert code_batch._difference(tmp_path, written) == ""
+
+
+@needs_compiler
+def test_a_comparison_resumes_where_it_ended(tmp_path, monkeypatch):
+    file = tmp_path / "code.csv"
+    first = [outcome for found in run(0.002, 20, file=file) for outcome in found]
+    assert len(first) == 4
+    file.write_text("".join(file.read_text().splitlines(keepends=True)[:3]))
+    left = []
+    monkeypatch.setattr(benchmarks.code, "compare", lambda batch, *rest: left.extend(batch) or compare(batch, *rest))
+    again = [outcome for found in run(0.002, 20, file=file) for outcome in found]
+    assert [each.label for each in left] == [first[3].case.label]
+    assert [(each.case.label, each.counts) for each in again] == [(each.case.label, each.counts) for each in first]
+
+
+BIQUAD = FilterDesign(["0.1", "0.2", "0.1"], [1, "-1.2", "0.5"], name="a low-pass section")
+
+
+@needs_compiler
+def test_another_order_of_operations_fails_the_test_that_comes_with_the_code(tmp_path):
+    write_code(BIQUAD, BINARY32, "direct form I", tmp_path)
+    assert built(tmp_path)[0] == 0
+    source = (tmp_path / "filter.c").read_text()
+    products = re.findall(r"const float (r\d+) = (\w+ \* r\d+);", source)
+    sums = re.findall(r"const float (r\d+) = (r\d+) \+ (r\d+);", source)
+    (first, a, b), (second, c, d) = sums[:2]
+    assert c == first
+    assert len(products) == 5
+    changed = source.replace(f"{first} = {a} + {b};", f"{first} = {b} + {d};").replace(
+        f"{second} = {c} + {d};", f"{second} = {first} + {a};"
+    )
+    later = next(line for line in source.splitlines() if f"const float {d} =" in line)
+    changed = changed.replace(f"{later}\n", "", 1).replace(
+        f"    const float {first} =", f"{later}\n    const float {first} ="
+    )
+    (tmp_path / "filter.c").write_text(changed)
+    status, text = built(tmp_path)
+    assert status == 1
+    assert re.search(r"step \d+: number \d+ differs", text)
+
+
+def test_statements_are_those_of_the_program():
+    found = prepared(BIQUAD, BINARY32, "direct form II transposed")
+    assert found.step.program.operations.tolist() == BIQUAD.system().as_filter().program.operations.tolist()
+
+
+# -- the operations of a covariance ----------------------------------------------------------------------------------
+
+
+def numbers(run, x, P):
+    """An estimate and a covariance, or its factors, as the program of a step orders them."""
+    upper = run.form is Form.UD
+    n = len(x)
+    return [*x[:, 0], *(P[i, j] for i in range(n) for j in range(n) if not upper or i <= j)]
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 12), FloatFormat(10, 5, "chop"), FixedFormat(8, 20)], ids=str)
+@pytest.mark.parametrize("form", Form, ids=str)
+def test_traced_operations_have_the_digits_of_the_compiled_step(form, fmt):
+    for model in models().values():
+        run = Run(model, fmt, form, range(1, 8))
+        z = np.random.default_rng(3).uniform(-1, 1, (7, model.m)).round(2)
+        whole, coefficients = kalman_program(model.n, model.m, form), model_coefficients(run)
+        shorter = without_exact(whole, coefficients)
+        assert len(shorter.operations) < len(whole.operations)
+        x = y = numbers(run, run.exactly(run.x), run.exactly(run.P))
+        run.take(z)
+        for k, measured in enumerate(fmt.array(z).to_fractions().tolist()):
+            c = coefficients[k % len(coefficients)]
+            x = steps_in_python(whole, fmt.round, c, x, measured)
+            y = steps_in_python(shorter, fmt.round, c, y, measured)
+            assert x == y == numbers(run, run.exactly(run.X)[k], run.exactly(run.C)[k])
+
+
+def blind(form):
+    """A filter whose second state no sensor sees and no noise moves, and one variance of which is zero."""
+    Q, P0 = np.diag([0.25, 0.0, 0.5]), np.diag([1.0, 2.0, 0.0])
+    return LinearModel(np.diag([0.5, 1, 0]), [[1, 0, 0], [0, 0, 1]], Q, np.diag([0.5, 1]), [0, 1, 0], P0, "blind")
+
+
+@needs_compiler
+@pytest.mark.parametrize("fmt", [BINARY32, FixedFormat(8, 23, "even", "raise")], ids=str)
+@pytest.mark.parametrize("form", Form, ids=str)
+def test_what_is_chosen_by_a_zero_is_chosen_in_the_code(form, fmt):
+    (found,) = compare([Case("", "", blind(form), fmt, form)], 50, settings_of(installed()[:1]))
+    assert found.faults == ()
+
+
+@needs_compiler
+def test_a_zero_pivot_stops_the_code_in_the_step_that_stops_the_emulation(tmp_path):
+    fmt = FixedFormat(4, 11, "down", "saturate")
+    model = LinearModel([["0.5"]], [["1/64"]], [[0]], [["1/2048"]], [1], [[1]], "fades")
+    run = Run(model, fmt, "innovation", ())
+    run.take(np.zeros((50, 1)))
+    write_code(model, fmt, "innovation", tmp_path, inputs=np.zeros((50, 1)))
+    assert built(tmp_path)[0] == 0
+    vectors = (tmp_path / "filter_vectors.txt").read_text().splitlines()
+    assert run.indefinite
+    assert [line.split()[0] for line in vectors[: run.indefinite]] == ["0"] * (run.indefinite - 1) + ["1"]
+
+
+@needs_compiler
+def test_an_overflow_ends_the_code_in_the_step_that_ends_the_emulation(tmp_path):
+    growing = LinearSystem([["1.5"]], [[1]])
+    for fmt in (BINARY32, BINARY64, FixedFormat(4, 11), WordFormats(FixedFormat(4, 11), 12, FixedFormat(6, 20))):
+        write_code(growing, fmt, None, tmp_path, inputs=np.ones((3000, 1)))
+        assert built(tmp_path)[0] == 0
+        last = (tmp_path / "filter_vectors.txt").read_text().splitlines()[-1]
+        assert last.startswith("-2 ")
+        assert "_OVERFLOW = 3" in (tmp_path / "filter.h").read_text()
+
+
+@needs_compiler
+def test_a_zero_has_no_sign(tmp_path):
+    system = LinearSystem([["-0.5"]], [[0]], x0=[1])
+    write_code(system, BINARY32, None, tmp_path, inputs=np.zeros((400, 1)))
+    assert built(tmp_path)[0] == 0
+    assert (tmp_path / "filter_vectors.txt").read_text().splitlines()[-1].split()[-1] == "0x0p+0"
+
+
+# -- constant gain ---------------------------------------------------------------------------------------------------
+
+
+def test_a_constant_gain_is_that_of_the_riccati_equation():
+    model = models()["one state"]  # P = 0.9025 p + 0.25, p = P R / (P + R)
+    K = settled_gain(model)[0, 0]
+    V = K / (1 - K) / 2
+    assert abs(V - (Fraction("0.9025") * V / (2 * V + 1) + Fraction(1, 4))) < Fraction(1, 2**60)
+    filter_ = settled_filter(model)
+    z = np.ones((200, 1))
+    assert filter_.outputs(z)[-1, 0, 0] == pytest.approx(float(K / (1 - Fraction("0.95") * (1 - K))), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("model", "message"),
+    [
+        (models()["a cycle of three"], "which changes from step to step; needed a model that never changes"),
+        (
+            LinearModel([[1]], [[1]], [[0]], [[1]], [0], [[1]], "a mean"),
+            "whose gain does not settle within 100000 steps",
+        ),
+    ],
+)
+def test_a_gain_that_does_not_settle_is_refused(model, message):
+    with pytest.raises(ValueError, match=message):
+        settled_filter(model)
+
+
+# -- the header ------------------------------------------------------------------------------------------------------
+
+
+def header(path):
+    """The first comment of a header, in one line."""
+    return " ".join(re.sub(r"^ \* ?", "", path.read_text().split("*/")[0], flags=re.M).split())
+
+
+def test_a_header_states_the_bound(tmp_path):
+    within = limits(2, 1, measurement=1)
+    path = write_code(BIQUAD, BINARY32, None, tmp_path, within=within)[0]
+    (bound,) = output_errors(BIQUAD.system(), BINARY32, within.measurement)
+    assert f"each output stays within {bound:.3g} of that of the exact filter" in header(path)
+    path = write_code(models()["one state"], BINARY32, "Joseph", tmp_path, within=limits(1, 1, state=9, innovation=9))[
+        0
+    ]
+    found = guarantee(models()["one state"], BINARY32, limits(1, 1, state=9, innovation=9), Form.JOSEPH)
+    assert f"rounding moves the estimates by at most {found.bound[0]:.3g}, for ever" in header(path)
+    path = write_code(LinearSystem.pid(1, "0.1"), BINARY32, None, tmp_path, within=limits(1, 1, measurement=1))[0]
+    assert "No bound: the system as given is not stable" in header(path)
+
+
+def test_a_header_names_the_order_and_the_format(tmp_path):
+    words = WordFormats(FixedFormat(0, 15, "down", "wrap"), FixedFormat(1, 14), FixedFormat(2, 29))
+    text = header(write_code(BIQUAD, words, None, tmp_path)[0])
+    assert (
+        "data of 16 bits with 15 after the point (rounded down, wrapped around); a number n stands for n / 2**15"
+        in text
+    )
+    assert "in the order in which gpbnb emulates the filter and bounds its errors" in text
+    assert "-ffast-math" not in text
+    assert "never with -ffast-math" in header(write_code(BIQUAD, BINARY64, None, tmp_path)[0])
+
+
+def test_a_name_cannot_end_a_comment(tmp_path):
+    named = FilterDesign([1], [1, "0.5"], name="x */ int y; /* \\\n ??/ ü")
+    text = write_code(named, BINARY32, None, tmp_path)[0].read_text()
+    assert text.count("*/") == text.count("/*")
+    assert "int y; / * \\ ? ?" not in text.split("*/")[1]
+
+
+# -- refusals --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "fmt", "form", "message"),
+    [
+        (BIQUAD, FloatFormat(2, 24), None, "no type; needed BINARY32, which rounds ties to even"),
+        (BIQUAD, FloatFormat(2, 19), None, "no type; needed BINARY32, which has more digits"),
+        (BIQUAD, BINARY16, None, "got BINARY16, for which C99 has no type"),
+        (BIQUAD, DECIMAL32, None, "no type; needed BINARY32 or BINARY64, or fixed point"),
+        (BIQUAD, FixedFormat(1, 63), None, "got data of 65 bits; needed at most 64"),
+        (BIQUAD, WordFormats(FixedFormat(0, 15), 12, FixedFormat(30, 40)), None, "got sums of 71 bits"),
+        (BIQUAD, FixedFormat(4, 11, "stochastic"), None, "stochastic rounding"),
+        (BIQUAD, BINARY32, "ladder", "got structure 'ladder'"),
+        (LinearSystem.smoother("0.5"), BINARY32, "lattice", "for a LinearSystem, which has its structure; needed None"),
+        (
+            models()["one state"],
+            WordFormats(FixedFormat(4, 11)),
+            "Joseph",
+            "needed BINARY32, BINARY64 or a FixedFormat",
+        ),
+        (models()["one state"], BINARY32, "Potter", "got the Potter form"),
+        (models()["one state"], FixedFormat(4, 11, "stochastic"), "UD", "stochastic rounding"),
+    ],
+)
+def test_what_has_no_code_is_refused(given, fmt, form, message, tmp_path):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        write_code(given, fmt, form, tmp_path / "code")
+    assert not (tmp_path / "code").exists()
+
+
+@pytest.mark.parametrize("name", ["", "1st", "a-b", "while", "../x", "x" * 32, None, "filtré"])
+def test_a_name_that_c_does_not_take_is_refused(name, tmp_path):
+    with pytest.raises(ValueError, match="got name"):
+        write_code(BIQUAD, BINARY32, None, tmp_path, name=name)
+
+
+def test_other_objects_are_refused(tmp_path):
+    with pytest.raises(TypeError, match="got a dict; needed a LinearSystem, a FilterDesign or a LinearModel"):
+        write_code({}, BINARY32, None, tmp_path)
+    with pytest.raises(TypeError, match="got the format 32"):
+        write_code(BIQUAD, 32, None, tmp_path)
+
+
+def test_names_that_are_none_in_c_are_numbered():
+    assert [str(each) for each in places(("x[0]", "P[0][1]"), 2, "c")] == ["x[0]", "P[0][1]"]
+    for names in (("a b",), ("int",), ("r3",), ("a", "a"), ("a", "a[0]"), ()):
+        assert [str(each) for each in places(names, len(names) or 2, "c")] == [
+            f"c[{i}]" for i in range(len(names) or 2)
+        ]
+
+
+@needs_compiler
+def test_fast_math_is_refused_by_the_compiler(tmp_path):
+    write_code(BIQUAD, BINARY32, None, tmp_path)
+    command = [installed()[0], "-std=c99", "-ffast-math", "-c", "filter.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "-ffast-math changes the order of operations; define FILTER_FAST_MATH" in done.stderr
+
+
+@needs_compiler
+@pytest.mark.skipif(not shutil.which("make"), reason="no make")
+def test_two_filters_in_one_folder_do_not_share_a_name(tmp_path):
+    write_code(BIQUAD, BINARY32, None, tmp_path, name="low")
+    write_code(models()["one state"], FixedFormat(8, 23), "UD", tmp_path, name="kalman")
+    command = [installed()[0], *FLAGS.split(), "-Werror", "-shared", "-fPIC", "-o", "both", "low.c", "kalman.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    done = subprocess.run(["make", "CC=" + installed()[0]], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert "100 steps with the digits of the emulation" in done.stdout
+
+
+# -- the command -----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def asked(tmp_path):
+    """A command line for a low-pass section that starts with a step, and the folder for its code."""
+    model = tmp_path / "low-pass.toml"
+    model.write_text('b = ["0.1", "0.2", "0.1"]\na = [1, "-1.2", "0.5"]\nstructure = "direct form I"\n')
+    simulated = ["--simulate", "step", "--steps", "20", "--basis", "emulation"]
+    return [str(model), *simulated, "--code", str(tmp_path / "code")], tmp_path / "code"
+
+
+@pytest.mark.parametrize(
+    ("options", "fmt"),
+    [
+        (["--tolerance", "0.001"], "BINARY32"),
+        (["--tolerance", "1e-9"], "BINARY64"),
+        (["--tolerance", "0.01", "--format", "fixed 3.12"], "data of 16 bits with 12 after the point"),
+    ],
+)
+def test_the_command_writes_code_in_the_format_that_meets_the_tolerance(options, fmt, asked, capsys):
+    arguments, folder = asked
+    assert main([*arguments, *options]) == 0
+    assert f"low-pass, direct form I, in {fmt}" in header(folder / "filter.h").replace("fixed point, ", "")
+    assert str(folder / "filter.c") in capsys.readouterr().out
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("options", "fmt"),
+    [
+        ([], "ties away from zero, which must not overflow"),
+        (["--mixed", "--rounding", "floor"], "sums of"),
+        (["--basis", "guarantee", "--rounding", "even"], "ties to even"),
+    ],
+)
+def test_the_command_writes_code_in_the_fixed_point_that_it_finds(options, fmt, asked, capsys):
+    arguments, folder = asked
+    arguments = [each for each in arguments if each not in ("--basis", "emulation")]
+    assert main([*arguments, "--tolerance", "0.005", "--fixed", *options]) == 0
+    assert fmt in header(folder / "filter.h")
+    assert re.search("each output stays within|No bound: ", header(folder / "filter.h"))
+    assert built(folder)[0] == 0
+    word, fraction = re.search(r"data of (\d+) bits with (\d+) after", header(folder / "filter.h")).groups()
+    said = capsys.readouterr().out
+    assert (
+        f"{fraction} fraction bits in a word of {word} bits" in said or f"data of {word} bits with {fraction}" in said
+    )
+
+
+def test_the_command_writes_no_code_if_the_tolerance_is_missed(asked, capsys):
+    arguments, folder = asked
+    assert main([*arguments, "--tolerance", "1e-6", "--format", "BINARY16"]) == 1
+    assert "no code, since no format meets the tolerance" in capsys.readouterr().err
+    assert not folder.exists()
+
+
+def test_the_command_writes_no_code_for_a_format_without_a_type(asked, capsys):
+    arguments, folder = asked
+    assert main([*arguments, "--tolerance", "1", "--format", "BINARY16"]) == 2
+    assert "got BINARY16, for which C99 has no type" in capsys.readouterr().err
+    folder.write_text("")
+    assert main([*arguments, "--tolerance", "1"]) == 2
+    assert "which is a file; needed a folder" in capsys.readouterr().err

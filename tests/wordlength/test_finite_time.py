@@ -1,0 +1,276 @@
+"""Bounds over a number of steps, for systems that keep their errors, against emulations that share no code with them.
+
+The emulations are plain loops over fractions, rounded by :mod:`tests.plain_structures`.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb import (
+    FixedFormat,
+    FloatFormat,
+    LinearModel,
+    LinearSystem,
+    WordFormats,
+    limits,
+    linalg,
+    required_fraction_bits,
+    required_precision,
+)
+from gpbnb.bounds.system import output_errors
+from gpbnb.bounds.words import WordGuarantee
+from gpbnb.wordlength.judging import judge
+from tests.plain_structures import fixed, floating
+
+TENTH = Fraction(1, 10)
+CLOCK = LinearSystem.sum(running=True, name="clock")
+TWICE = LinearSystem([[1, 1], [0, 1]], [[0], ["0.3"]], [[1, 0]], name="position from acceleration")
+LOOSE = LinearSystem.pid(2, "0.3", "0.7", limits=(-3, 3), name="PI that keeps its errors")
+
+
+def clock(round_, inputs):
+    """Largest error of t += u, for rounded inputs."""
+    t, true, worst = Fraction(0), Fraction(0), Fraction(0)
+    for u in inputs:
+        t, true = round_(t + round_(u)), true + u
+        worst = max(worst, abs(t - true))
+    return worst
+
+
+def twice(round_, inputs):
+    """Largest error of p += v; v += 0.3 u, with the output p before the step."""
+    scale, p, v, exact_p, exact_v, worst = round_(Fraction(3, 10)), *[Fraction(0)] * 5
+    for u in inputs:
+        worst = max(worst, abs(p - exact_p))
+        p, v = round_(p + v), round_(v + round_(scale * round_(u)))
+        exact_p, exact_v = exact_p + exact_v, exact_v + Fraction(3, 10) * u
+    return worst
+
+
+def loose(round_, inputs):
+    """Largest error of a limited PID whose integral has no leak."""
+    Kp, Ki, Kd = (round_(Fraction(each)) for each in ("2", "0.3", "0.7"))
+
+    def run(r, kp, ki, kd):
+        i = last = Fraction(0)
+        for u in inputs:
+            e = r(u)
+            i = r(i + r(ki * e))
+            v = r(r(r(kp * e) + i) + r(kd * r(e - last)))
+            last = e
+            yield min(max(v, Fraction(-3)), Fraction(3))
+
+    exactly = run(lambda x: x, Fraction(2), Fraction(3, 10), Fraction(7, 10))
+    return max(abs(a - b) for a, b in zip(run(round_, Kp, Ki, Kd), exactly, strict=True))
+
+
+def inputs_of(rng, steps, kind):
+    """Inputs of size 1 at most, exact, that push rounding errors in one direction or in many."""
+    if kind == "constant":
+        return [TENTH * 9] * steps
+    if kind == "random":
+        return [Fraction(float(each)) for each in rng.uniform(-1, 1, steps)]
+    return [Fraction(float(each)) for each in rng.uniform(0.5, 1, steps)]
+
+
+def test_two_hundred_tenths_need_no_more_than_the_17_bits_that_4040_unit_roundoffs_give():
+    """Each of 200 sums is at most 20, its rounding 20 units, and storing a tenth 200 times adds 20: 4040 with both."""
+    assert 4040 * Fraction(1, 2**17) < Fraction(5, 100)
+    for basis, asked in (
+        ("bound", {"z": np.full((200, 1), 0.1)}),
+        ("guarantee", {"within": limits(1, 1, measurement=0.1)}),
+    ):
+        found = required_precision(CLOCK, 200, 0.05, basis=basis, **asked)
+        assert found.precision is not None
+        assert found.precision <= 17
+        assert found.ends
+        kind = "proved for this run of 200 steps" if basis == "bound" else "guaranteed for 200 steps"
+        assert str(found).endswith(kind)
+        observed = clock(floating(2, found.precision, "nearest"), [TENTH] * 200)
+        assert observed <= Fraction(5, 100)
+    for digits in (17, 24, 53):
+        bound = output_errors(CLOCK, FloatFormat(2, digits), 0.1, 200)[0]
+        assert float(clock(floating(2, digits, "nearest"), [TENTH] * 200)) <= bound < 4040 * 2.0**-digits
+
+
+@pytest.mark.parametrize("mode", ["nearest", "even", "chop", "up", "down"])
+@pytest.mark.parametrize(("system", "emulated"), [(CLOCK, clock), (TWICE, twice), (LOOSE, loose)])
+@pytest.mark.parametrize("digits", [8, 11, 24])
+def test_no_emulation_exceeds_the_bound_over_its_steps(system, emulated, mode, digits):
+    rng, round_, shares = np.random.default_rng(5), floating(2, digits, mode), []
+    for steps in (1, 2, 30, 80):
+        bound = output_errors(system, FloatFormat(2, digits, mode), 1.0, steps)[0]
+        for kind in ("constant", "random", "positive"):
+            observed = float(emulated(round_, inputs_of(rng, steps, kind)))
+            assert observed <= bound
+            if bound:
+                shares.append(observed / bound)
+    # Directed roundings of positive numbers have one sign and average half a unit (2). The bound takes each number as
+    # large as the largest of all steps (3 for a position) and up to the next power of two (2), and inputs as 1 (1.1).
+    # Roundings to nearest partly cancel: among 80, about one in the root of 80 is left (9).
+    assert max(shares) > (1 / (2 * 3 * 2 * 1.2) if mode in ("chop", "up", "down") else 1 / (3 * 2 * 9 * 1.2))
+
+
+def test_a_bound_grows_with_its_steps_and_that_of_a_stable_system_stays_below_that_for_ever():
+    fmt, stable = FloatFormat(2, 24), LinearSystem([["0.9"]], [["0.1"]])
+    for system in (CLOCK, TWICE, LOOSE):
+        bounds = [output_errors(system, fmt, 1.0, steps)[0] for steps in (3, 30, 300)]
+        assert bounds == sorted(set(bounds))
+    ever = output_errors(stable, fmt, 1.0)[0]
+    bounds = [output_errors(stable, fmt, 1.0, steps)[0] for steps in (3, 30, 3000)]
+    assert bounds[0] < bounds[1] < ever
+    assert bounds[2] == pytest.approx(ever, rel=0.01)
+
+
+def test_a_stable_system_is_bounded_for_ever_and_another_only_for_its_steps():
+    within = limits(1, 1, measurement=1)
+    stable = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 200, 1e-3, basis="guarantee", within=within)
+    assert not stable.ends
+    assert str(stable).endswith("guaranteed for ever")
+    judged = judge(CLOCK, FloatFormat(2, 24), 200, 1e-3, basis="guarantee", within=within)
+    assert judged.ends
+    assert "guaranteed for 200 steps" not in str(judged).split(":")[0]
+    assert str(judged).endswith("guaranteed for 200 steps")
+    assert judged.ratio == pytest.approx(output_errors(CLOCK, FloatFormat(2, 24), 1.0, 200)[0] / 1e-3)
+
+
+def test_a_bound_over_steps_that_no_precision_meets_names_the_cause():
+    found = required_precision(LinearSystem([[2]], [[1]]), 200, 1e-3, basis="bound", z=np.full((200, 1), 0.1))
+    assert found.precision is None
+    assert "no precision up to 53 digits" in str(found)
+    assert "A has an eigenvalue of size 2, mostly in state 0, so that errors add up with every" in str(found)
+    with pytest.raises(OverflowError, match="largest gain over 5000 steps is beyond the range of float64; take fewer"):
+        output_errors(LinearSystem([[2]], [[1]]), FloatFormat(2, 24), 1.0, 5000)
+    with pytest.raises(ValueError, match="needed at most 1048576 where no bound holds for ever"):
+        output_errors(CLOCK, FloatFormat(2, 24), 1.0, 2**21)
+
+
+def test_a_turn_without_damping_is_bounded_although_its_balls_grow():
+    turn = LinearSystem([["3/5", "-4/5"], ["4/5", "3/5"]], [[1], [0]], [[1, 0]])
+    bound = output_errors(turn, FloatFormat(2, 24), 1.0, 1500)[0]
+    c, s = (floating(2, 24, "nearest")(Fraction(each)) for each in ("3/5", "4/5"))
+    r, x, y, true_x, true_y, worst = floating(2, 24, "nearest"), *[Fraction(0)] * 4, Fraction(0)
+    for k in range(200):
+        worst = max(worst, abs(x - true_x))
+        u = Fraction((-1) ** k)
+        x, y = r(r(r(c * x) - r(s * y)) + u), r(r(s * x) + r(c * y))
+        true_x, true_y = (3 * true_x - 4 * true_y) / 5 + u, (4 * true_x + 3 * true_y) / 5
+    assert 0 < float(worst) <= output_errors(turn, FloatFormat(2, 24), 1.0, 200)[0] < bound
+
+
+# -- sums ------------------------------------------------------------------------------------------------------------
+
+
+def added(order, terms, round_, block=32):
+    """Sum in some order with every addition rounded; written without the package."""
+
+    def row(values):
+        total = values[0]
+        for each in values[1:]:
+            total = round_(total + each)
+        return total
+
+    if order == "left":
+        return row(terms)
+    if order == "blocked":
+        return row([row(terms[i : i + block]) for i in range(0, len(terms), block)])
+    if order == "pairwise":
+        if len(terms) == 1:
+            return terms[0]
+        half = len(terms) // 2
+        return round_(added(order, terms[:half], round_) + added(order, terms[half:], round_))
+    while len(terms) > 1:
+        rest = terms[len(terms) // 2 * 2 :]
+        terms = [round_(terms[i] + terms[i + 1]) for i in range(0, len(terms) - 1, 2)] + rest
+    return terms[0]
+
+
+@pytest.mark.parametrize("order", ["left", "pairwise", "blocked", "tree"])
+@pytest.mark.parametrize("count", [2, 7, 64, 100])
+def test_sums_are_those_of_plain_loops_and_within_their_bounds(order, count):
+    rng, fmt, round_ = np.random.default_rng(count), FloatFormat(2, 11), floating(2, 11, "nearest")
+    system = LinearSystem.sum(count, order, block=8)
+    rows = rng.uniform(-1, 1, (20, count))
+    rows[10:] = np.abs(rows[10:])
+    bound = output_errors(system, fmt, 1.0)[0]
+    found, worst = system.outputs(rows, fmt)[:, 0, 0], 0.0
+    for value, row in zip(found, rows, strict=True):
+        terms = [round_(Fraction(float(each))) for each in row]
+        assert Fraction(float(value)) == added(order, terms, round_, 8)
+        worst = max(worst, abs(float(Fraction(float(value)) - sum(map(Fraction, row.tolist())))))
+    assert worst <= bound < 60 * worst
+    if order != "tree":
+        ones = fmt.array(np.ones((count, 1)))
+        products = linalg.matmul(fmt.array(rows), ones, order=order, block=8)
+        assert np.array_equal(found, products.to_float()[:, 0])
+
+
+def test_a_tree_of_1024_numbers_stays_below_the_published_bound():
+    """SATIRE prints 11 · 1024 · 2**-53 for numbers within 1: ten levels, and storing as if a number lost a whole unit.
+
+    A number within 1 loses half a unit when it is stored, so 10.5 remain.
+    """
+    published = 1.2505552149377763e-12
+    assert published == 11 * 1024 * 2.0**-53
+    bound = output_errors(LinearSystem.sum(1024, "tree"), FloatFormat(2, 53), 1.0)[0]
+    assert bound == pytest.approx(10.5 * 1024 * 2.0**-53, rel=1e-7)
+    assert bound < published
+    assert output_errors(LinearSystem.sum(1024, "pairwise"), FloatFormat(2, 53), 1.0)[0] == pytest.approx(bound)
+
+
+def test_blocks_of_running_sums_add_up():
+    system, round_ = LinearSystem.sum(4, "pairwise", running=True), floating(2, 9, "chop")
+    rows, total, true, worst = np.random.default_rng(2).uniform(0, 1, (50, 4)), Fraction(0), Fraction(0), Fraction(0)
+    for row in rows:
+        terms = [Fraction(float(each)) for each in row]
+        total = round_(total + added("pairwise", [round_(each) for each in terms], round_))
+        true += sum(terms)
+        worst = max(worst, abs(total - true))
+    found = system.outputs(rows, FloatFormat(2, 9, "chop"))
+    assert Fraction(float(found[-1, 0, 0])) == total
+    assert float(worst) <= output_errors(system, FloatFormat(2, 9, "chop"), 1.0, 50)[0] < 8 * float(worst)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"count": 1}, "got the sum of one input; needed at least two, or running=True"),
+        ({"count": 0}, "count"),
+        ({"count": 4, "order": "random"}, "needed one of 'left', 'pairwise', 'blocked', 'tree'"),
+        ({"count": 4, "block": 0}, "block"),
+    ],
+)
+def test_sums_that_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        LinearSystem.sum(**arguments)
+
+
+# -- fixed point, and Kalman filters ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("system", "emulated"), [(CLOCK, clock), (TWICE, twice)])
+@pytest.mark.parametrize("mode", ["nearest", "down"])
+def test_words_have_a_bound_over_their_steps(system, emulated, mode):
+    inputs = [Fraction(9, 10)] * 40
+    words = WordFormats(FixedFormat(12, 10, mode))
+    bound = WordGuarantee(system, 1.0, 40).errors(words)[0]
+    observed = float(emulated(fixed(10, mode), inputs))
+    assert observed <= bound < 12 * observed
+    found = required_fraction_bits(system, np.full((40, 1), 0.9), 0.05, "guarantee", mode)
+    assert found.fmt is not None
+    assert found.steps == 40
+    assert "by guarantee for 40 steps" in str(found)
+    assert float(emulated(fixed(found.fmt.fraction_bits, mode), inputs)) <= 0.05
+
+
+def test_a_kalman_filter_that_never_settles_has_a_guarantee_over_its_steps():
+    """The second state is not observed and keeps its errors."""
+    lost = LinearModel([[1, 0], [0, 1]], [[1, 0]], [["0.01", 0], [0, 0]], [[1]], [0, 0], np.eye(2))
+    found = required_precision(lost, 30, 1e-3, basis="guarantee", within=limits(2, 1, 10, 10))
+    assert found.precision is not None
+    assert found.ends
+    assert str(found).endswith("guaranteed for 30 steps")

@@ -1,0 +1,574 @@
+"""gpbnb.wordlength.precision: the smallest precision that meets a tolerance is that, and says what it rests on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
+from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.bounded_run import emulate_with_bound
+from gpbnb.bounds.guarantee import limits
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.missing import real_numbers, without_missing
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import form_named
+from gpbnb.filters.run import Run, reference
+from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
+from gpbnb.filters.system import LinearSystem, unobserved
+from gpbnb.wordlength import precision
+from gpbnb.wordlength.precision import required_precision
+from gpbnb.wordlength.requirement import listed
+
+STEPS = 60
+MODEL = LinearModel(
+    [["0.99", "0.1"], [0, "0.97"]], [[1, "0.3"]], [["1e-3", 0], [0, "2e-3"]], [["0.4"]], [3, -1], [[2, 0], [0, 1]]
+)
+Z = Simulation(MODEL, (3.0, -1.0), 0, fine_resolution(MODEL)).measurements(STEPS)
+
+
+@cache
+def true():
+    return reference(MODEL, Z, range(1, STEPS + 1))
+
+
+def error(fmt):
+    return np.abs(emulate(MODEL, Z, fmt, Form.INNOVATION, range(1, STEPS + 1), true()).state)
+
+
+@pytest.mark.parametrize("rounding", list(Rounding.documented()))
+@pytest.mark.parametrize("base", [2, 10, 16])
+def test_the_smallest_precision_meets_the_tolerance_and_one_less_does_not(base, rounding):
+    tolerance = 1e-4
+    found = required_precision(MODEL, STEPS, tolerance, base, rounding)
+    assert found.fmt.base == base
+    assert found.fmt.rounding is rounding
+    t = found.fmt.precision
+    ratios = dict(found.tried)
+    assert list(ratios) == sorted(ratios)
+    assert ratios[t] <= 1
+    assert ratios[t + 1] <= 1
+    assert ratios[t - 1] > 1
+    for digits in (t - 1, t, t + 1):  # here at every step, there at sixteen a decade
+        seen = error(FloatFormat(base, digits, rounding)).max() / tolerance
+        assert ratios[digits] <= seen <= 3 * ratios[digits]
+    assert (found.basis, found.steps) == ("emulation", STEPS)
+    assert str(found).startswith(arithmetic(FloatFormat(base, t, rounding)))
+    assert str(found).endswith("of the tolerance, observed in 60 steps")
+
+
+def test_errors_of_storing_the_model_count():
+    """With few digits, most of the error: the transition itself is off."""
+    found = required_precision(MODEL, STEPS, 1e-3, 10, z=Z)
+    alone = np.abs(emulate(MODEL, Z, found.fmt, Form.INNOVATION).state).max()
+    assert dict(found.tried)[found.fmt.precision] * 1e-3 != alone
+    assert error(found.fmt).max() <= 3e-3
+
+
+def errors_in(model, z, base, options):
+    """Largest error of each state in so many digits; None where the run is lost."""
+    form, rounding = options.get("form", Form.INNOVATION), options.get("rounding", Rounding.NEAREST)
+    checkpoint_steps = range(1, len(z) + 1)
+    true = reference(model, z, checkpoint_steps)
+
+    @cache  # for all tolerances
+    def largest(digits):
+        fmt = FloatFormat(base, digits, rounding)
+        try:
+            if options.get("basis") == "bound":
+                return emulate_with_bound(model, z, fmt, form, checkpoint_steps).state.max(axis=0)
+            history = emulate(model, z, fmt, form, checkpoint_steps, true)
+        except ValueError:
+            return None
+        return None if history.indefinite or history.stopped else np.abs(history.state).max(axis=0)
+
+    return largest
+
+
+def upward(largest, tolerance, base):
+    """The slow way: every precision from 2 up, until two in succession meet the tolerance."""
+    met = []
+    for digits in range(2, {2: 53, 10: 18, 16: 13}[base] + 1):
+        errors = largest(digits)
+        met.append(errors is not None and bool((errors <= tolerance).all()))
+        if met[-2:] == [True, True]:
+            return digits - 1, met
+    return (digits if met[-1] else None), met
+
+
+MODELS = {
+    "damped": (MODEL, Z),
+    "tracker": (
+        LinearModel([[1, "0.1"], [0, 1]], [[1, 0]], [["1e-4", 0], [0, "1e-2"]], [[4]], [0, 0], 100 * np.eye(2)),
+    )
+    * 2,
+    "units far apart": (
+        LinearModel([[1, 0], ["1e-3", 1]], [[0, 1]], [["1e-6", 0], [0, 0]], [["1e-4"]], [1, 1], [["1e6", 0], [0, 1]]),
+    )
+    * 2,
+}
+
+
+@pytest.mark.parametrize("name", list(MODELS))
+@pytest.mark.parametrize(
+    ("base", "options"),
+    [
+        (2, {}),
+        (2, {"rounding": Rounding.CHOP}),
+        (2, {"form": Form.UD}),
+        (2, {"basis": "bound"}),
+        (10, {"form": Form.HUNG}),
+        (16, {"form": Form.JOSEPH, "basis": "bound"}),
+    ],
+)
+def test_bisection_finds_what_trying_each_precision_finds(name, base, options):
+    model, z = MODELS[name]
+    if z is model:
+        z = Simulation(model, tuple(model.x0.astype(float)), 0, fine_resolution(model)).measurements(40)
+    largest = errors_in(model, z, base, options)
+    for tolerance in (1e-1, 1e-4, 1e-7):
+        found = required_precision(model, len(z), tolerance, base, z=z, **options)
+        digits, met = upward(largest, tolerance, base)
+        assert (found.fmt.precision if found.fmt else None) == digits
+        assert all(met[t - 2] == (ratio <= 1) for t, ratio in found.tried if t - 2 < len(met))
+        assert len(found.tried) <= 11  # of up to 52
+
+
+def test_a_lucky_precision_does_not_count(monkeypatch):
+    """Below a threshold some meet the tolerance by luck, never two in succession: they are passed over."""
+    rng = np.random.default_rng(8)
+    passed = 0
+    for _ in range(200):
+        threshold = int(rng.integers(2, 55))
+        lucky = {t for t in rng.integers(2, 54, 6).tolist() if t < threshold}
+        lucky -= {t + 1 for t in lucky}
+        monkeypatch.setattr(
+            precision.Emulated,
+            "error",
+            lambda self, fmt, least=threshold, by_luck=lucky: (
+                (0.5 if fmt.precision in by_luck or fmt.precision >= least else 2.0, "")
+            ),
+        )
+        found = required_precision(MODEL, 4, 1.0, 2, z=Z[:4])
+        expected = min(53 if threshold > 53 else threshold - (threshold - 1 in lucky), 53)
+        if threshold > 53 and 53 not in lucky:
+            assert found.fmt is None
+            continue
+        assert found.fmt.precision == expected
+        passed += any(t < expected and ratio <= 1 for t, ratio in found.tried)
+    assert passed > 10  # some of them were tried
+
+
+def test_the_bound_asks_for_more_digits_and_holds():
+    tolerance = 1e-4
+    by_bound = required_precision(MODEL, STEPS, tolerance, 2, basis="bound", z=Z)
+    by_emulation = required_precision(MODEL, STEPS, tolerance, 2, z=Z)
+    assert by_emulation.fmt.precision < by_bound.fmt.precision <= by_emulation.fmt.precision + 12
+    found = emulate_with_bound(MODEL, Z, by_bound.fmt, Form.INNOVATION)
+    assert found.state.max() <= tolerance
+    assert np.abs(found.history.state).max() <= found.state.max()
+    assert str(by_bound).endswith("proved for this run of 60 steps")
+
+
+def test_a_tolerance_for_each_state():
+    first = required_precision(MODEL, STEPS, (1e-6, math.inf), 2, z=Z).fmt
+    second = required_precision(MODEL, STEPS, (math.inf, 1e-2), 2, z=Z).fmt
+    assert second.precision < first.precision
+    assert np.abs(error(first))[:, 0].max() < 3e-6
+    assert required_precision(MODEL, STEPS, (1e-6, 1e-2), 2, z=Z).fmt == first
+    # An infinite bound of a state that does not matter is no number of any kind.
+    tried = precision.survey(MODEL, Z, (1e-6, math.inf), range(2, 30), basis="bound")
+    assert math.isinf(tried[0][1])
+    assert not any(math.isnan(ratio) for _, ratio in tried)
+
+
+def test_a_survey_is_what_the_search_sees():
+    for basis in ("emulation", "bound"):
+        found = required_precision(MODEL, STEPS, (1e-4, math.inf), z=Z, basis=basis)
+        digits = [t for t, _ in found.tried]
+        assert precision.survey(MODEL, Z, (1e-4, math.inf), digits, basis=basis) == found.tried
+
+
+def test_a_bar_for_those_who_wait(capsys):
+    required_precision(MODEL, STEPS, 1e-4, z=Z)
+    assert capsys.readouterr().err == ""
+    found = required_precision(MODEL, STEPS, 1e-4, z=Z, progress=True)
+    assert f"{len(found.tried)}run" in capsys.readouterr().err.replace(" ", "")
+
+
+@pytest.mark.parametrize(("model", "base", "most"), [(MODEL, 2, 53), (LinearSystem([["0.9"]], [["0.1"]]), 16, 13)])
+def test_no_precision_may_be_enough(model, base, most):
+    found = required_precision(model, 3, 1e-30, base, z=Z[:3])
+    assert found.fmt is None
+    assert found.tried[-1][0] == most
+    assert str(found) == (
+        f"no precision up to {most} digits, the most with compiled loops in base {base}, rounded nearest, meets the "
+        "tolerance in a run of 3 steps"
+    )
+
+
+def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
+    """One state, R far below P: with few digits a variance comes out as zero, whatever the error of the state."""
+    given = LinearModel([[1]], [[1]], [[0]], [["1e-6"]], [1], [[1]])
+    found = required_precision(given, 3, 10.0, 10, form=Form.HUNG)
+    t = found.fmt.precision
+    assert t > 5
+    assert all(math.isinf(ratio) for digits, ratio in found.tried if digits < t)
+
+
+@pytest.mark.parametrize(("form", "steps"), [("innovation", 300), ("UD", 300), ("symmetrized", 60)])
+def test_an_answer_holds_in_every_step(form, steps):
+    """A constant-velocity tracker whose largest error in 15 bits falls between the steps of a logarithmic scale."""
+    Q = [["1/10000", "3/2000"], ["3/2000", "3/100"]]
+    given = LinearModel([[1, "0.1"], [0, 1]], [[1, 0]], Q, [["0.5"]], [0, 0], [[100, 0], [0, 10]])
+    z = simulated_measurements(given, steps, 0)
+    tolerance = np.array([0.01, 0.1])
+    found = required_precision(given, steps, tolerance, z=z, form=form)
+    every = range(1, steps + 1)
+    true = reference(given, z, every)
+    for digits, ratio in found.tried:
+        history = emulate(given, z, FloatFormat(2, digits), form, every, true)
+        if not history.indefinite and not history.stopped:
+            assert (np.abs(history.state) / tolerance).max() == pytest.approx(ratio, rel=1e-12, abs=0)
+
+
+def test_masked_inputs_are_refused():
+    system = LinearSystem([["0.9"]], [["0.1"]])
+    masked = np.ma.masked_array(np.ones((5, 1)), mask=np.eye(5, 1))
+    with pytest.raises(ValueError, match="some are masked; needed a number for each"):
+        required_precision(system, 5, 1e-3, z=masked)
+
+
+def test_stochastic_rounding_is_searched_as_far_as_it_has_loops():
+    # Not a model of a filter, for which all forms would be compiled with random rounding.
+    found = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 5, 1e-30, z=np.ones((5, 1)), rounding="stochastic")
+    assert found.fmt is None
+    assert found.tried[-1][0] == 29
+    assert "no precision up to 29 digits" in str(found)
+
+
+def test_a_seed_selects_the_random_roundings_of_a_run():
+    """The model and the measurements are rounded at random, too."""
+    formats = [FloatFormat(2, 9, Rounding.STOCHASTIC, seed=seed) for seed in (1, 1, 2)]
+    first, again, other = (emulate(MODEL, Z, fmt, "symmetrized").state for fmt in formats)
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_a_seed_selects_the_random_roundings_of_a_compiled_run():
+    """The inverse of R is computed in compiled loops; those of a step take long to compile with random rounding."""
+    two = LinearModel(MODEL.Phi, np.eye(2), MODEL.Q, [["0.7", "0.3"], ["0.3", "1.1"]], MODEL.x0, MODEL.P0)
+    seen = []
+    for seed in (1, 1, 2):
+        run = Run(two, FloatFormat(2, 9, Rounding.STOCHASTIC, seed=seed), Form.HUNG_SECOND_GAIN, ())
+        drawn = int(run.tag.mode.state[1])
+        inverse, measured = run.exactly(run.matrices.RI), run.exactly(run.pack_measurements(Z[:30].reshape(-1, 2)))
+        seen.append((drawn, inverse.tolist(), measured.tolist()))
+        assert drawn > 0
+    assert seen[0] == seen[1]
+    assert seen[0][1] != seen[2][1]
+    assert seen[0][2] != seen[2][2]
+
+
+def squares(fmt, z):
+    return [x * x for x in z]
+
+
+@pytest.mark.parametrize("given", [LinearSystem([["0.9"]], [["0.1"]]), squares], ids=["system", "function"])
+def test_an_answer_with_random_rounding_comes_out_again(given):
+    z = np.round(np.sin(np.arange(8.0)), 3).reshape(-1, 1)
+    first, again = (required_precision(given, 8, 1e-3, z=z, rounding="stochastic") for _ in range(2))
+    assert first == again
+
+
+def test_its_own_measurements_are_seeded():
+    assert required_precision(MODEL, 5, 1e-3, seed=1) == required_precision(MODEL, 5, 1e-3, seed=1)
+    assert required_precision(MODEL, 5, 1e-3, seed=1).tried != required_precision(MODEL, 5, 1e-3, seed=2).tried
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"tolerance": 0}, "got tolerance 0; needed an error above 0"),
+        ({"tolerance": (1.0, -1.0)}, "got tolerance"),
+        ({"tolerance": math.nan}, "got tolerance nan"),
+        ({"tolerance": (math.inf, math.inf)}, "one finite"),
+        ({"base": 3}, "got base 3; needed one with compiled loops"),
+        ({"basis": "hope"}, "got basis 'hope'; needed one of 'emulation', 'bound', 'guarantee', 'probable'"),
+        ({"basis": "guarantee"}, 'got basis "guarantee" without limits; needed within='),
+        ({"tolerance": (1.0,)}, r"got tolerance \(1.0,\) of shape \(1,\); .*: one number, or 2 in a row"),
+        ({"tolerance": ((1.0, 1.0),)}, r"of shape \(1, 2\)"),
+        ({"tolerance": "small"}, "got tolerance 'small'; needed an error above 0 for each of the 2 states"),
+        ({"tolerance": None}, "got tolerance None"),
+        ({"form": "square"}, "got form 'square'; needed one of 'hung', .*'ud', .*or a member of Form"),
+        ({"steps": 0}, "got 0 steps; needed a whole number, at least 1"),
+        ({"steps": 2.5}, "got 2.5 steps; needed a whole number"),
+        ({"z": np.where(np.arange(60) == 7, np.inf, 1.0)[:, None]}, "got inf for measurement 0 of step 8; .*or NaN"),
+        ({"z": 3.0}, "got a single number; needed one measurement for each of the 60 steps"),
+        (
+            {"z": Z[:5]},
+            r"got 5 measurements of shape \(1,\); needed one measurement for each of the 60 steps, of shape \(1,\)",
+        ),
+        ({"z": Z[:, 0], "basis": "bound"}, r"got 60 measurements of shape \(\); .*write z.reshape\(-1, 1\)"),
+    ],
+)
+def test_what_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        required_precision(**({"model": MODEL, "steps": STEPS, "tolerance": 1e-3} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"tolerance": -1.0}, "got tolerance -1.0"),
+        ({"basis": "hope"}, "got basis 'hope'"),
+        ({"base": 3}, "got base 3"),
+        ({"form": 2}, "got form 2"),
+        ({"precisions": [10, 54, 60]}, r"got \[54, 60\] digits of base 2; needed at most 53"),
+        ({"z": Z[:0]}, "got 0 measurements"),
+        ({"z": Z[:, 0]}, "write z.reshape"),
+        ({"z": Z * math.inf}, "inf for measurement 0 of step 1"),
+    ],
+)
+def test_what_a_survey_refuses(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        precision.survey(**({"model": MODEL, "z": Z, "tolerance": 1e-3, "precisions": [10]} | arguments))
+
+
+def test_a_survey_of_what_is_neither_model_nor_function_says_what_is_needed():
+    with pytest.raises(TypeError, match="got a model int; needed a LinearModel, NonlinearModel or LinearSystem"):
+        precision.survey(3, Z, 1e-3, [10])
+
+
+def test_an_answer_says_why_fewer_digits_were_refused():
+    """A state without a variance, in which no run can go on; and a Q of rank one, which few bits make indefinite."""
+    known = LinearModel(MODEL.Phi, MODEL.H, [[0, 0], [0, 0]], MODEL.R, MODEL.x0, [[2, 0], [0, 0]])
+    found = required_precision(known, 5, 1e-3, z=Z[:5])
+    assert found.fmt is None
+    assert "in 53 digits a computed variance was not positive at step 1; " in str(found)
+    thin = Fraction("0.35") * np.array([[Fraction(1, 2500), Fraction(1, 50)], [Fraction(1, 50), Fraction(1)]])
+    single = LinearModel(MODEL.Phi, MODEL.H, thin, MODEL.R, MODEL.x0, MODEL.P0, repair=False)
+    with pytest.raises(ValueError, match=r"; it misses that by no more than roundings may: .* to its diagonal, \d"):
+        single.rounded(FloatFormat(2, 24, Rounding.NEAREST))
+    ratios = precision.survey(single, Z, 1e-3, range(2, 54), basis="bound")
+    refused = {digits for digits, ratio in ratios if math.isinf(ratio)}
+    assert 24 in refused
+    repaired = LinearModel(MODEL.Phi, MODEL.H, thin, MODEL.R, MODEL.x0, MODEL.P0)
+    ratios = precision.survey(repaired, Z, 1e-3, range(2, 54), basis="bound")
+    finite = [digits for digits, ratio in ratios if math.isfinite(ratio)]
+    assert finite == list(range(finite[0], 54))
+    assert required_precision(MODEL, STEPS, 1e-3, z=Z).why == ""
+
+
+ALMOST_KNOWN = LinearModel([[1]], [["0.59"]], [[0]], [["1e-18"]], [0], [[10**4]], "a sensor far better than the prior")
+
+
+@pytest.mark.parametrize("form", ["innovation", "symmetrized", "compensated"])
+def test_one_variance_of_zero_is_not_definite(form):
+    """The gain of a precise sensor is rounded to 1, which leaves its state no variance; the other keeps its own."""
+    model = LinearModel(np.eye(2), [[1, 0]], np.zeros((2, 2)), [["1e-18"]], [0, 0], [[10**4, 0], [0, 1]])
+    assert emulate(model, np.ones((3, 1)), FloatFormat(2, 11), form_named(form)).indefinite == 1
+
+
+def test_an_answer_that_higher_precisions_miss_is_refused():
+    """50 and 51 bits keep this filter's variance positive, 52 and 53 do not."""
+    found = required_precision(ALMOST_KNOWN, 100, 0.1)
+    ratios = dict(found.tried)
+    assert ratios[50] <= 1
+    assert ratios[51] <= 1
+    assert ratios[53] == math.inf
+    assert found.fmt is None
+    assert found.precision is None
+    assert found.irregular == (50, 51)
+    assert "50, 51 digits meet it, but 52, 53 do not" in str(found)
+    assert "reliably" in str(found)
+    other = found.advice.split()[2]
+    assert required_precision(ALMOST_KNOWN, 100, 0.1, form=other).precision == int(found.advice.split()[-2])
+
+
+def test_an_answer_lies_above_every_precision_that_misses():
+    model = LinearModel(
+        [[1, "0.1"], [0, 1]], [["-0.09", "-0.26"]], [["1e-8", 0], [0, "1e-8"]], [["1e-23"]], [0, 0], 10**4 * np.eye(2)
+    )
+    found = required_precision(model, 100, 1e-3)
+    missed = [digits for digits, ratio in found.tried if not ratio <= 1]
+    assert found.irregular  # bisection alone would have stopped at one of these
+    assert found.precision == max(missed) + 1
+    assert set(range(found.irregular[0], 54)) <= {digits for digits, _ in found.tried}
+
+
+def test_three_or_more_numbers_in_a_row_are_a_range():
+    assert listed([2, 5, 6, 7, 8, 11, 12]) == "2, 5–8, 11, 12"
+
+
+def test_the_precisions_of_processors_are_always_tried():
+    tried = {digits for digits, _ in required_precision(MODEL, STEPS, 1e-1, z=Z).tried}
+    assert {24, 53} <= tried
+
+
+def test_names_of_forms_and_roundings_are_taken():
+    by_name = required_precision(MODEL, 20, 1e-4, form="ud", rounding="chop", z=Z[:20])
+    assert by_name == required_precision(MODEL, 20, 1e-4, form=Form.UD, rounding=Rounding.CHOP, z=Z[:20])
+    assert by_name.precision == by_name.fmt.precision
+
+
+def in_other_units(model, states, measurements):
+    """The same filter with state i in units of 2**-states[i], and measurements likewise."""
+    x, y = (np.array([Fraction(2) ** power for power in powers]) for powers in (states, measurements))
+    return LinearModel(
+        model.Phi * np.multiply.outer(x, 1 / x),
+        model.H * np.multiply.outer(y, 1 / x),
+        model.Q * np.multiply.outer(x, x),
+        model.R * np.multiply.outer(y, y),
+        model.x0 * x,
+        model.P0 * np.multiply.outer(x, x),
+    )
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD, Form.HUNG])
+@pytest.mark.parametrize("basis", ["emulation", "bound"])
+@pytest.mark.parametrize("unit", [-40, 30])
+def test_answers_do_not_depend_on_units(basis, form, unit):
+    """Powers of two change no rounding, hence no answer: here a simulation in coarse steps did."""
+    other = in_other_units(MODEL, (unit, unit - 3), (unit + 5,))
+    tolerance = np.array([1e-4, 3e-4])
+    asked = {"basis": basis, "form": form}
+    first = required_precision(MODEL, STEPS, tolerance, **asked)
+    second = required_precision(other, STEPS, tolerance * 2.0 ** np.array([unit, unit - 3]), **asked)
+    assert first.fmt is not None
+    assert first.tried == second.tried
+
+
+@pytest.mark.parametrize("basis", ["guarantee", "probable"])
+def test_guarantees_do_not_depend_on_units(basis):
+    tolerance, state, innovation = np.array([1e-3, 1e-3]), np.array([100.0, 100.0]), np.array([20.0])
+    scale = 2.0 ** np.array([-40, -43])
+    other = in_other_units(MODEL, (-40, -43), (-35,))
+    first = required_precision(MODEL, 1, tolerance, basis=basis, within=limits(2, 1, state, innovation))
+    within = limits(2, 1, state * scale, innovation * 2.0**-35)
+    second = required_precision(other, 1, tolerance * scale, basis=basis, within=within)
+    assert first.fmt is not None
+    assert first.fmt == second.fmt
+    assert [ratio <= 1 for _, ratio in first.tried] == [ratio <= 1 for _, ratio in second.tried]
+
+
+def test_a_missing_measurement_changes_nothing_but_the_prediction():
+    """NaN, a mask, and a row of zeros in H give the same run; two sensors with correlated noise, one of them silent."""
+    two = LinearModel(MODEL.Phi, [[1, "0.3"], [0, 1]], MODEL.Q, [["0.4", "0.1"], ["0.1", "0.5"]], MODEL.x0, MODEL.P0)
+    z = Simulation(two, (3.0, -1.0), 0, fine_resolution(two)).measurements(12)
+    silent = np.zeros((12, 2), dtype=bool)
+    silent[3, 0] = silent[7] = True
+    with_nan = np.where(silent, np.nan, z)
+    by_nan = required_precision(two, 12, 1e-4, z=with_nan)
+    assert by_nan == required_precision(two, 12, 1e-4, z=np.ma.MaskedArray(z, silent))
+    assert by_nan != required_precision(two, 12, 1e-4, z=z)
+    replaced, filled = without_missing(two, with_nan)
+    assert np.array_equal(filled, np.where(silent, 0, z))
+    found = reference(replaced, filled, [3, 4, 8])
+    assert not found.K[1][:, 0].any()
+    assert not found.K[2].any()
+    alone = LinearModel(two.Phi, two.H[0][1:], two.Q, two.R[0][1:, 1:], found.x[0], (found.P[0] + found.P[0].T) / 2)
+    step = reference(alone, z[3:4, 1:], [1])
+    assert step.x[0].astype(float) == pytest.approx(found.x[1].astype(float), rel=1e-14)
+    assert step.P[0].astype(float) == pytest.approx(found.P[1].astype(float), rel=1e-14)
+    history, again = emulate(two, with_nan, FloatFormat(2, 24)), emulate(replaced, filled, FloatFormat(2, 24))
+    assert np.array_equal(history.state, again.state)
+    within = limits(2, 2, state=100, innovation=20)
+    with pytest.raises(ValueError, match='got missing measurements and basis "guarantee"'):
+        required_precision(two, 12, 1e-4, basis="guarantee", within=within, z=with_nan)
+
+
+WHOLE, WITH_INPUTS = np.round(Z[:12] * 4), replace(MODEL, d=["0.5"])
+GAPS = (np.arange(12) % 5 == 2).reshape(-1, 1)
+
+
+def answers_for(z):
+    """The answers by each basis, for a filter with and without inputs, and the errors of a run."""
+    models, bases = (MODEL, WITH_INPUTS), ("emulation", "bound")
+    found = [required_precision(model, 12, 1e-3, basis=basis, z=z) for model in models for basis in bases]
+    return found, emulate(MODEL, z, FloatFormat(2, 9), checkpoint_steps=[12]).state.tolist()
+
+
+def answers_for_system(z):
+    """The answer for a system, and the estimate of the reference."""
+    return required_precision(LinearSystem([["0.5"]], [[1]]), 12, 1e-3, z=z), reference(MODEL, z, [12]).x.tolist()
+
+
+@pytest.fixture(scope="module")
+def expected():
+    """What float64 gives for the numbers, whole and with gaps."""
+    masked = np.ma.masked_array(WHOLE, GAPS)
+    return {False: answers_for(WHOLE), True: answers_for(masked), "system": answers_for_system(WHOLE)}
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.longdouble, np.int8, np.uint64, object, "U9"])
+@pytest.mark.parametrize("masked", [False, True], ids=["whole", "masked"])
+def test_measurements_of_any_type_are_read_exactly(dtype, masked, expected):
+    """The same numbers in another type give the same answer, for a filter with and without inputs, and for a system."""
+    z = WHOLE.astype(dtype)
+    assert all(float(a) == b for a, b in zip(z.ravel(), WHOLE.ravel(), strict=True))
+    assert answers_for(np.ma.masked_array(z, GAPS) if masked else z) == expected[masked]
+    if not masked:
+        assert answers_for_system(z) == expected["system"]
+
+
+def test_a_measurement_that_only_longdouble_holds_is_not_rounded_to_float64():
+    fine = np.longdouble(1) + np.finfo(np.longdouble).eps
+    if fine == np.float64(fine):
+        pytest.skip("longdouble is float64 on this processor")
+    z = np.array([[fine], [1]])
+    answers = [required_precision(MODEL, 2, 1e-3, z=each) for each in (z, [[Fraction(*fine.as_integer_ratio())], [1]])]
+    assert answers[0] == answers[1]
+    assert real_numbers(z)[0, 0] == Fraction(*fine.as_integer_ratio()) != 1
+    with pytest.raises(ValueError, match="measurements: entry 1, 0: got nan; needed a finite number"):
+        required_precision(MODEL, 2, 1e-3, z=np.array([[fine], [np.nan]], dtype=np.longdouble))
+    by_nan = required_precision(MODEL, 2, 1e-3, z=np.array([[1], [np.nan]], dtype=np.longdouble))
+    assert by_nan == required_precision(MODEL, 2, 1e-3, z=[[1], [math.nan]])
+
+
+@pytest.mark.parametrize(
+    ("Phi", "H", "text"),
+    [
+        ([["1.1"]], [[0]], "eigenvalue of size 1.1"),
+        (
+            [[1, "0.1"], [0, 1]],
+            [[0, 1]],
+            "eigenvalue of size 1 or more",
+        ),  # a position of which only the speed is measured
+        ([[1, "0.1"], [0, 1]], [[1, 0]], ""),
+        ([["0.9", 0], [0, 1]], [[0, 1]], ""),
+        ([["0.9", 0], [0, 1]], [[1, 0]], "eigenvalue of size 1 or more"),
+        # the difference of two equal states is not observed, and decays if both do
+        ([[2, 0], [0, 2]], [[1, 1]], "eigenvalue of size 2"),
+        ([["1/2", 0], [0, "1/2"]], [[1, 1]], ""),
+    ],
+)
+def test_a_part_of_the_state_that_no_measurement_observes_is_found_exactly(Phi, H, text):
+    found = unobserved(exact(Phi), exact(H))
+    assert (text in found) if text else found == ""
+
+
+@pytest.mark.parametrize("basis", ["emulation", "guarantee", "probable"])
+def test_an_unobserved_state_that_grows_is_the_cause_where_there_is_no_answer(basis):
+    model = LinearModel([["1.1"]], [[0]], [[1]], [[1]], [0], [[1]])
+    within = None if basis == "emulation" else limits(1, 1, state=10, innovation=10)
+    found = required_precision(model, 4000, 1e-3, z=np.zeros((4000, 1)), basis=basis, within=within)
+    assert found.precision is None
+    cause = (
+        "no measurement observes a part of the state that does not decay, with an eigenvalue of size 1.1, mostly in "
+        "state 0"
+    )
+    if basis == "emulation":
+        assert str(found).endswith(f"; {cause}, so that its errors never decay")
+    else:
+        evidence = "by a guarantee for ever" if basis == "guarantee" else "by three times the probable error"
+        instead = 'ask with basis "bound" for a number of steps instead'
+        assert str(found) == f"no precision meets the tolerance {evidence}: {cause}; {instead}"

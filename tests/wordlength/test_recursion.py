@@ -1,0 +1,236 @@
+"""The precision of recursions written as functions."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb import FloatFormat, LinearSystem, required_precision
+from gpbnb.bounds.guarantee import limits
+from gpbnb.filters.array_run import ArrayRun
+from gpbnb.filters.forms import Form
+from gpbnb.filters.simulation import simulated_measurements
+from gpbnb.wordlength import examples
+from gpbnb.wordlength.precision import survey
+
+Z = np.random.default_rng(3).standard_normal(200)
+
+
+def smoother(fmt, z):
+    old, new, x, estimates = fmt.array("0.9"), fmt.array("0.1"), fmt.array(0), []
+    for value in z:
+        estimates.append(x)
+        x = old * x + new * value
+    return estimates
+
+
+@pytest.mark.parametrize("base", [2, 10, 16])
+def test_a_function_gets_the_answer_of_the_same_linear_system(base):
+    system = LinearSystem([["0.9"]], [["0.1"]])
+    by_function = required_precision(smoother, 200, 1e-3, base=base, z=Z)
+    by_system = required_precision(system, 200, 1e-3, base=base, z=Z.reshape(-1, 1))
+    assert [digits for digits, _ in by_function.tried] == [digits for digits, _ in by_system.tried]
+    ratios = [[ratio for _, ratio in each.tried] for each in (by_function, by_system)]
+    assert np.allclose(*ratios, rtol=1e-9, atol=1e-9)
+    assert by_function.precision == by_system.precision
+    assert by_function.basis == "emulation"
+
+
+def test_a_kalman_filter_written_as_a_function_gets_the_answer_of_its_model():
+    tracker = examples.tracker()
+    z = simulated_measurements(tracker, 60)
+
+    def written(fmt, z):
+        if fmt.precision > 53:  # the array run has no loops for the reference
+            return _tracked(fmt, z, tracker)
+        run, found = ArrayRun(tracker, fmt, Form.INNOVATION, ()), []
+        for value in z:
+            run.take(value[np.newaxis])
+            found.append(run.x)
+        return found
+
+    asked = {"steps": 60, "tolerance": 0.01, "z": z}
+    a, b = (required_precision(each, **asked) for each in (written, tracker))
+    assert a.precision == b.precision
+    # the reference of the model has the digits of double-double
+    assert [digits for digits, _ in a.tried] == [digits for digits, _ in b.tried]
+    assert np.allclose([x for _, x in a.tried], [y for _, y in b.tried], rtol=1e-9)
+
+
+def _tracked(fmt, z, model):
+    Phi, H, Q, R = (fmt.array(getattr(model, letter)[0]) for letter in ("Phi", "H", "Q", "R"))
+    x, P, found = fmt.array(model.x0), fmt.array(model.P0), []
+    for value in z:
+        P = Phi @ P @ Phi.T + Q
+        K = P @ H.T / (H @ P @ H.T + R)
+        P = P - K @ (H @ P)
+        ahead = Phi @ x
+        x = ahead + K @ (value - H @ ahead)
+        found.append(x)
+    return np.stack(found)
+
+
+def test_the_survey_has_the_ratios_of_the_search():
+    found = required_precision(smoother, 200, 1e-3, z=Z)
+    precisions = [digits for digits, _ in found.tried]
+    assert survey(smoother, Z, 1e-3, precisions) == found.tried
+
+
+def test_a_function_without_inputs_and_several_outputs():
+    def rotation(fmt):
+        c, s, one = fmt.array("0.8"), fmt.array("0.6"), fmt.array([1, 0])
+        found = [one]
+        for _ in range(99):
+            x, y = found[-1]
+            found.append(np.stack([c * x - s * y, s * x + c * y]))
+        return np.stack(found)
+
+    both = required_precision(rotation, 100, 1e-3)
+    first = required_precision(rotation, 100, [1e-3, np.inf])
+    assert both.precision >= first.precision > 10
+
+
+def test_a_function_that_stops_in_few_digits():
+    """In three bits 0.57 and 0.42 round to 0.625 and 0.4375."""
+
+    def rest(fmt, z):
+        return [np.sqrt((1 - x) - y) for x, y in z]
+
+    assert survey(rest, [["0.57", "0.42"]], 1e-2, [3])[0][1] == np.inf
+    found = required_precision(rest, 1, 1e-2, z=[["0.57", "0.42"]])
+    assert dict(found.tried)[found.precision] <= 1
+    assert found.precision > 3
+
+
+REFUSED = [
+    (
+        lambda fmt, z: z.to_float(),
+        TypeError,
+        "got to_float.. of a FloatArray in a function whose precision is searched",
+    ),
+    (lambda fmt, z: np.cumsum(Z), TypeError, "got a ndarray from the function; needed arrays of the format"),
+    (lambda fmt, z: (x for x in z), TypeError, "got a generator from the function"),
+    (lambda fmt, z: [*z[:199], 0.1], TypeError, "got a list from the function"),
+    (lambda fmt, z: [1.0] * 200, TypeError, "got a list from the function"),
+    (
+        lambda fmt, z: FloatFormat(2, 300).array(z),
+        TypeError,
+        "got a conversion from .*precision=237.* to .*precision=300",
+    ),
+    (lambda fmt, z: FloatFormat(2, 300).array(Z), TypeError, "got a FloatArray in .*300"),
+    (lambda fmt, z: z[:50], ValueError, r"got outputs of shape \(50, 1\) from the function; needed \(200,\)"),
+    (lambda fmt, z: [x * 0.1 for x in z], ValueError, "got the operand 0.1; needed a number that .* holds exactly"),
+    (lambda fmt, z: z * (1 if fmt.precision < 300 else 2), ValueError, "got a function whose reference in 237 digits"),
+]
+
+
+@pytest.mark.parametrize(("run", "kind", "message"), REFUSED)
+def test_functions_that_leave_the_format_are_refused(run, kind, message):
+    with pytest.raises(kind, match=message):
+        required_precision(run, 200, 1e-3, z=Z)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"basis": "bound"}, 'got basis "bound" of a function'),
+        ({"form": "UD"}, "got the UD form; needed none"),
+        ({"within": limits(1, 1, state=1, innovation=1)}, "got limits for a function"),
+        ({"z": Z[:5]}, r"got inputs of shape \(5,\); needed one row for each of the 200 steps"),
+        ({"tolerance": [1, 1]}, "got tolerance"),
+        ({"base": 3}, "got base 3"),
+    ],
+)
+def test_options_that_a_function_cannot_have_are_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        required_precision(**{"model": smoother, "steps": 200, "tolerance": 1e-3, "z": Z} | options)
+
+
+def test_a_linear_system_has_no_forms():
+    with pytest.raises(ValueError, match="got the UD form; needed none"):
+        required_precision(LinearSystem([["0.9"]], [["0.1"]]), 200, 1e-3, form="UD", z=Z.reshape(-1, 1))
+
+
+def muller(steps):
+    """A recurrence that tends to 5 in exact arithmetic; a rounding error grows twentyfold a step and leads to 100."""
+
+    def run(fmt):
+        x = [fmt.array(4), fmt.array("4.25")]
+        while len(x) < steps:
+            x.append(108 - (815 - 1500 / x[-2]) / x[-1])
+        return x
+
+    return run
+
+
+def muller_error(fmt, steps):
+    """The largest error of the recurrence, with each operation rounded on its own, against its closed form."""
+    x = [fmt.round(4), fmt.round("4.25")]
+    while len(x) < steps:
+        ahead = fmt.round(815 - fmt.round(1500 / x[-2]))
+        x.append(fmt.round(108 - fmt.round(ahead / x[-1])))
+    exact = [Fraction(3 ** (k + 1) + 5 ** (k + 1), 3**k + 5**k) for k in range(steps)]
+    return max(abs(a - b) for a, b in zip(x, exact, strict=True))
+
+
+@pytest.mark.parametrize(("base", "answer"), [(10, 44), (2, 140), (16, 36)])
+def test_mullers_recurrence_needs_more_digits_than_compiled_loops_have(base, answer):
+    """Digits that a limit of 53 bits or 18 decimal digits would deny."""
+    found = required_precision(muller(32), 32, 1e-3, base=base)
+    assert found.precision == answer
+    tried = dict(found.tried)
+    for digits in (answer - 1, answer, answer + 1):
+        error = muller_error(FloatFormat(base, digits), 32)
+        assert (error <= Fraction(1, 1000)) == (digits >= answer)
+        assert tried[digits] == pytest.approx(float(error * 1000), rel=1e-9)
+    assert survey(muller(32), None, 1e-3, [answer - 1, answer], base=base) == tuple(
+        (digits, tried[digits]) for digits in (answer - 1, answer)
+    )
+
+
+def test_the_answer_names_the_limit_that_ended_the_search():
+    found = required_precision(muller(32), 32, 1e-3, base=10, largest=40)
+    assert found.precision is None
+    assert str(found) == (
+        "no precision up to 40 digits, where largest=40 ends the search, meets the tolerance in a run of 32 steps"
+    )
+    assert str(required_precision(muller(46), 46, 1e-3, base=10)).startswith(
+        "no precision up to 60 digits, where largest=60"
+    )
+    met = {digits: muller_error(FloatFormat(10, digits), 46) <= Fraction(1, 1000) for digits in range(58, 66)}
+    least = min(digits for digits in range(58, 65) if met[digits] and met[digits + 1])
+    assert required_precision(muller(46), 46, 1e-3, base=10, largest=70).precision == least > 60
+
+
+def test_without_digits_for_its_reference_a_function_is_refused_with_the_limit_to_raise():
+    with pytest.raises(ValueError, match=r"in 72 digits of base 10 .* that in 108; .* try largest=144") as caught:
+        required_precision(muller(50), 50, 1e-3, base=10)
+    assert "If errors only grow" in str(caught.value)
+    assert required_precision(muller(50), 50, 1e-3, base=10, largest=144).precision > 60
+
+
+def test_an_answer_below_the_limit_of_compiled_loops_is_found_without_trying_more():
+    assert max(digits for digits, _ in required_precision(smoother, 200, 1e-3, z=Z).tried) == 53
+    found = required_precision(smoother, 200, 1e-3, z=Z, largest=12)
+    assert max(digits for digits, _ in found.tried) <= 12
+    assert found.precision == required_precision(smoother, 200, 1e-3, z=Z).precision
+
+
+def test_a_model_ends_at_the_compiled_loops_or_below():
+    system, z = LinearSystem([["0.9"]], [["0.1"]]), Z.reshape(-1, 1)
+    found = required_precision(system, 200, 1e-30, z=z, rounding="even")
+    assert str(found).startswith("no precision up to 52 digits, the most with compiled loops in base 2, rounded even, ")
+    assert "up to 9 digits, where largest=9 ends" in str(required_precision(system, 200, 1e-30, z=z, largest=9))
+    for model, measured in ((system, z), (examples.tracker(), None)):
+        with pytest.raises(ValueError, match=r"got largest=54 for a model; needed at most 53, .* function of a format"):
+            required_precision(model, 200, 1e-3, z=measured, largest=54)
+    for wrong in (1, 2.5, "20"):
+        with pytest.raises(ValueError, match=r"got .* largest; needed a whole number, at least 2"):
+            required_precision(smoother, 200, 1e-3, z=Z, largest=wrong)
+
+
+def test_a_function_that_stops_in_its_reference_says_so():
+    with pytest.raises(
+        ZeroDivisionError, match=r"the function stops in its reference of 237 digits: .* division by zero"
+    ):
+        required_precision(lambda fmt, z: 1 / (z - z), 200, 1e-3, z=Z)

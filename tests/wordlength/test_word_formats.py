@@ -1,0 +1,99 @@
+"""Formats of data, coefficients and sums in fixed point, found one by one, against a loop over integers."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import floor
+
+import numpy as np
+import pytest
+
+from gpbnb import FixedFormat, LinearSystem, WordFormats, required_fraction_bits
+from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.blocks import MOST_COEFFICIENT_BITS, required_word_formats
+from gpbnb.wordlength.fixed_point import words_error
+
+ALPHA = Fraction(1097, 4096)
+STEP = [512] * 200
+
+
+def largest_error(fraction, bits):
+    """Largest error of y += alpha (u - y) with data of some fraction bits, floored products, and a short alpha."""
+    unit, alpha = Fraction(1, 2**fraction), ALPHA
+    while (alpha / 2) >= 1:
+        alpha /= 2
+    scale = Fraction(1)
+    while alpha * scale < 2 ** (bits - 1):
+        scale *= 2
+    short = Fraction(floor(alpha * scale + Fraction(1, 2))) / scale
+    y, true, worst = Fraction(0), Fraction(0), Fraction(0)
+    for u in STEP:
+        y += floor(short * (u - y) / unit) * unit
+        true += ALPHA * (u - true)
+        worst = max(worst, abs(y - true))
+    return worst
+
+
+def test_the_integer_smoother_ends_three_below_its_step():
+    system = LinearSystem.smoother("1097/4096")
+    words = WordFormats(FixedFormat(15, 0, "floor"), FixedFormat(1, 14), FixedFormat(17, 14))
+    error = words_error(system, np.array(STEP, float).reshape(-1, 1), 1.0)(words).ratio
+    assert error == pytest.approx(float(largest_error(0, 13)))
+    assert largest_error(0, 13) > Fraction(29, 10)
+
+
+def test_the_smoother_needs_what_a_plain_loop_over_integers_needs():
+    system, z = LinearSystem.smoother("1097/4096"), np.array(STEP, float).reshape(-1, 1)
+    for tolerance in (3, 0.5):
+        found = required_word_formats(system, z, tolerance, rounding="floor")
+        words = found.words
+        assert words is not None
+        assert isinstance(words.coefficients, int)
+        assert largest_error(words.data.fraction_bits, MOST_COEFFICIENT_BITS) <= tolerance
+        if words.data.fraction_bits:
+            assert largest_error(words.data.fraction_bits - 1, MOST_COEFFICIENT_BITS) > tolerance
+        assert found.ratio <= 1
+        assert words.accumulator.integer_bits <= words.data.integer_bits + 8
+
+
+@pytest.mark.parametrize("basis", ["emulation", "guarantee"])
+def test_no_format_of_a_biquad_can_be_lowered(basis):
+    system = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"])
+    z = np.sign(np.sin(np.arange(150.0) ** 1.3)).reshape(-1, 1) + 0.25
+    found = required_word_formats(system, z, 0.01, basis)
+    words, error = found.words, words_error(system, z, 0.01, basis)
+    assert words is not None
+    assert found.ratio == error(words).ratio <= 1
+    shorter = WordFormats(words.data, words.coefficients - 1, words.sums)
+    assert error(shorter).ratio > 1
+    assert words.sums.fraction_bits == words.data.fraction_bits or (
+        error(
+            WordFormats(
+                words.data,
+                words.coefficients,
+                FixedFormat(
+                    words.sums.integer_bits, words.sums.fraction_bits - 1, words.sums.rounding, overflow="wrap"
+                ),
+            )
+        ).ratio
+        > 1
+    )
+
+
+def test_the_command_answers_in_fraction_bits(tmp_path, capsys):
+    model = tmp_path / "biquad.toml"
+    model.write_text("b = [0.01, 0.02, 0.01]\na = [1, -1.6, 0.7]\nstructure = 'direct form I'\n")
+    asked = [str(model), "--tolerance", "0.01", "--simulate", "step", "--steps", "80", "--fixed"]
+    assert main([*asked, "--basis", "emulation", "--mixed"]) == 0
+    printed = capsys.readouterr().out
+    system = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"], "direct form I")
+    z = np.ones((80, 1))
+    assert printed.startswith(f"{required_fraction_bits(system, z, 0.01)}\n")
+    assert str(required_word_formats(system, z, 0.01)) in printed
+    for more, message in (
+        (["--digits", "9"], "got --fixed with --digits"),
+        (["--basis", "bound"], "got --fixed with --basis bound or probable"),
+        (["--basis", "guarantee", "--measurement", "1"], "got --fixed and --measurement"),
+    ):
+        assert main([*asked, *more]) == 2
+        assert message in capsys.readouterr().err

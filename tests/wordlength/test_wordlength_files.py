@@ -1,0 +1,94 @@
+"""Files as spreadsheets and editors write them are read, or refused with the file, the line and the cure."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from gpbnb import read_model
+from gpbnb.wordlength.models import read_measurements
+
+MODEL = 'name = "Füllstand °C"\nA = [[0.5]]\nB = [[1]]\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("1\nNaN\n3\n", [[1], [math.nan], [3]]),
+        ("1,NAN\nnan,2\n", [[1, math.nan], [math.nan, 2]]),
+        ("tilt (°),°/s\n1,2\n", [[1, 2]]),
+        ("°C,[m],(s),µm,%\n1,2,3,4,5\n", [[1, 2, 3, 4, 5]]),
+        ("\ufefftilt\n1\n", [[1]]),
+        ("\ufeff1\n2\n", [[1], [2]]),
+        ("time,range\ns,m\n1,2\n", [[1, 2]]),
+        (",range\n1,2\n", [[1, 2]]),
+        ("# a remark\nrange\n\n1\n", [[1]]),
+        ('"a, b",c\r\n1,\r\n,2\r\n', [[1, math.nan], [math.nan, 2]]),
+        (" 1 , 2 \n", [[1, 2]]),
+    ],
+)
+def test_measurements_are_read(text, rows, tmp_path):
+    path = tmp_path / "z.csv"
+    path.write_bytes(text.encode())
+    np.testing.assert_array_equal(read_measurements(path), rows)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"1;2\n3;4\n", "z.csv, line 1: got semicolons between the cells; needed commas, and a point as decimal mark"),
+        (b"tilt;rate\n1,5;2\n", "z.csv, line 1: got semicolons between the cells"),
+        (b"1\t2\n", "z.csv, line 1: got tabs between the cells; needed commas"),
+        (
+            "1\n2\n3 °\n".encode("latin-1"),
+            "z.csv, line 3: got the byte 0xb0, which is not UTF-8; needed a file in UTF-8",
+        ),
+        ("tilt (°)\n1\n".encode("utf-16"), "z.csv, line 1: got the byte 0xff, which is not UTF-8"),
+        (
+            b"1,2,\n3,4,\n",
+            "z.csv, line 1: got an empty cell in column 3 of this row and every other; needed numbers; remove the "
+            "comma at the end of each row, or write nan where a measurement is missing",
+        ),
+        (
+            b"1,2\n3,4,\n",
+            "z.csv, line 2: got 3 cells; needed 2, as in the rows above; remove the comma at the end of the lo",
+        ),
+        (
+            b"1,2,\n3,4\n",
+            "z.csv, line 2: got 2 cells; needed 3, as in the rows above; remove the comma at the end of the lo",
+        ),
+        (b"1,2\n3,4,5\n", "z.csv, line 2: got 3 cells; needed 2, as in the rows above"),
+        (
+            b'range\n""\n""\n',
+            "z.csv, line 2: got an empty cell in column 1 of this row and every other; needed numbers; write nan where",
+        ),
+        (b"1_0\n", "z.csv, line 1: got '1_0'; needed a number"),
+        (b"1\nrange\n", "z.csv, line 2: got 'range'; needed a number"),
+        (b"0x10\n1\n", "z.csv, line 1: got '0x10'; needed a number"),
+        (b"1.5V\n1\n", "z.csv, line 1: got '1.5V'; needed a number"),
+        (b"range\n", "z.csv: got no rows of numbers"),
+        (b"", "z.csv: got no rows of numbers"),
+    ],
+)
+def test_measurements_are_refused_with_line_and_cure(content, message, tmp_path):
+    path = tmp_path / "z.csv"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
+        read_measurements(path)
+
+
+def test_a_model_file_may_begin_with_a_byte_order_mark(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_bytes(MODEL.encode("utf-8-sig"))
+    assert read_model(path).name == "Füllstand °C"
+    path.write_bytes(MODEL.encode("latin-1"))
+    with pytest.raises(
+        ValueError, match=r"^model\.toml, line 1: got the byte 0xfc, which is not UTF-8; needed a file in"
+    ):
+        read_model(path)
+    path.write_bytes(b"# one\n" + "# °\n".encode("latin-1"))
+    with pytest.raises(ValueError, match=r"^model\.toml, line 2: got the byte 0xb0"):
+        read_model(path)

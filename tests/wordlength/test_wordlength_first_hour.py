@@ -1,0 +1,207 @@
+"""Mistakes of a first hour: each is refused in a line that says what came and what to do, or is no mistake at all."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gpbnb import (
+    BINARY16,
+    BINARY32,
+    FixedFormat,
+    FloatFormat,
+    LinearModel,
+    LinearSystem,
+    emulate,
+    guarantee,
+    limit_cycles,
+    limits,
+    read_model,
+    required_fraction_bits,
+    required_precision,
+    survey_records,
+)
+from gpbnb.names import format_parts
+from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.models import read_measurements
+
+WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
+SYSTEM = LinearSystem([["0.9"]], [["0.1"]])
+TOML = "Phi=[[1,1],[0,1]]\nH=[[1,0]]\nQ=[[1,0],[0,1]]\nR=[[1]]\nx0=[0,0]\nP0=[[1,0],[0,1]]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("# time; a remark\n1\n", [[1]]),
+        ('"a; b",c\n1,2\n', [[1, 2]]),
+        ("Na,K\n1,2\n", [[1, 2]]),
+    ],
+)
+def test_a_file_is_read(text, rows, tmp_path):
+    (tmp_path / "z.csv").write_text(text)
+    np.testing.assert_array_equal(read_measurements(tmp_path / "z.csv"), rows)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1,5;2,5\n", "z.csv, line 1: got semicolons between the cells; needed commas, and a point as decimal mark"),
+        ("1,5;2,5;3,5\n1;2;3\n", "z.csv, line 1: got semicolons"),
+        ("1,2\n3;4,5\n", "z.csv, line 2: got semicolons"),
+        # taken for a header, a missing first measurement would move all others by a step
+        ("N/A\n1\n", "z.csv, line 1: got 'N/A'; needed a number such as .*; write nan, or leave the cell empty, where"),
+        ("None,null\n1,2\n", "z.csv, line 1: got 'None'; needed a number"),
+        ("1\nNA\n", "z.csv, line 2: got 'NA'; needed a number such as .*; write nan, or leave"),
+    ],
+)
+def test_a_file_is_refused(text, message, tmp_path):
+    (tmp_path / "z.csv").write_text(text)
+    with pytest.raises(ValueError, match=message):
+        read_measurements(tmp_path / "z.csv")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "m.toml").write_text(TOML)
+    (tmp_path / "s.toml").write_text("A=[['0.9']]\nB=[['0.1']]\n")
+    (tmp_path / "z.csv").write_text("1\n2\n3\n")
+    (tmp_path / "timed.csv").write_text("t (s),z (m)\n0,1\n1,2\n2,3\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("m.toml --measurements timed.csv", "timed.csv: got 2 columns; needed 1, one for each measurement; remove "),
+        ("s.toml --measurements timed.csv", "timed.csv: got 2 columns; needed 1, one for each input; remove others"),
+        ("m.toml --measurements z.csv --steps 5", "z.csv: got 3 rows and --steps 5; needed one row for each step"),
+        ("s.toml --measurements z.csv --steps 2", "z.csv: got 3 rows and --steps 2; needed one row for each step"),
+        ("m.toml --report {long}.html", "got --report {long}.html, which cannot be written: File name too long"),
+        (
+            "m.toml --format binary128",
+            "got --format BINARY128, which has no compiled loops; needed one of BINARY16, BINARY32",
+        ),
+        ("m.toml --form sqrt", "got form 'sqrt'; needed one of 'hung',"),
+    ],
+)
+def test_a_command_is_refused(arguments, message, folder, capsys):
+    long = "a" * 300
+    assert main([*arguments.format(long=long).split(), "--tolerance", "1", "--basis", "emulation"]) == 2
+    assert message.format(long=long) in capsys.readouterr().err
+
+
+def test_the_names_of_forms_in_a_refusal_include_cholesky():
+    with pytest.raises(ValueError, match="'cholesky'"):
+        required_precision(WALK, 3, 1, form="sqrt")
+
+
+@pytest.mark.parametrize(
+    ("name", "fmt"),
+    [
+        ("float32", "BINARY32"),
+        ("double", "BINARY64"),
+        ("half", "BINARY16"),
+        ("single", "BINARY32"),
+        ("Float64", "BINARY64"),
+    ],
+)
+def test_formats_have_the_names_of_c_and_numpy(name, fmt):
+    assert format_parts(name) == fmt
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (
+            {"Phi": [[1, "0.1"], [0]]},
+            r"Phi: got nested lists with parts of shapes \(1,\), \(2,\); needed parts",
+        ),
+        (
+            {"outputs": ["y"]},
+            r"outputs unknown; .* for a Kalman filter, with B, u, .*, states, measurements, ",
+        ),
+        ({"Phi": None, "phi": 1}, "needed Phi"),
+    ],
+)
+def test_a_model_is_refused(given, message):
+    entries = {"Phi": [[1, 1], [0, 1]], "H": [[1, 0]], "Q": np.eye(2), "R": [[1]], "x0": [0, 0], "P0": np.eye(2)}
+    with pytest.raises((ValueError, TypeError), match=message):
+        read_model({name: each for name, each in {**entries, **given}.items() if each is not None})
+
+
+@pytest.mark.parametrize("order", [["a"], [0.5], [True], 3])
+def test_an_order_that_is_no_order_is_refused(order):
+    with pytest.raises(ValueError, match=r"got order .*; needed each of 0 to 0 once, or one of"):
+        read_model({"sos": [[1, 2, 1, 1, -1, 0.5]], "order": order})
+
+
+def test_a_digital_filter_has_named_inputs_and_outputs():
+    given = {"b": [1], "a": [1, "-0.5"], "inputs": ["gyro (°/s)"], "outputs": ["rate (°/s)"]}
+    system = read_model(given)
+    assert (system.input_names, system.output_names) == (("gyro (°/s)",), ("rate (°/s)",))
+    with pytest.raises(ValueError, match='input "gyro"'):
+        required_precision(system, 1, 1, z=[[math.nan]])
+    with pytest.raises(ValueError, match="states unknown; needed b and a, or sos, and perhaps structure, pairing, "):
+        read_model({**given, "states": ["x"]})
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda: guarantee(SYSTEM, BINARY32, limits(1, 1, measurement=1)),
+            "got a LinearSystem; needed a LinearModel",
+        ),
+        (lambda: guarantee(None, BINARY32, limits(1, 1, 1, 1)), "got a NoneType; needed a LinearModel"),
+        (lambda: limits(1, 1, "a", 1), "got 'a' on the state; needed numbers"),
+        (lambda: limits(0, 1, 1, 1), "got 0 states; needed a whole number, at least 1"),
+        (
+            lambda: survey_records(WALK, 3, 1, BINARY16, steps=5),
+            "got formats FloatFormat.*; needed a list",
+        ),
+        (lambda: survey_records(WALK, None, 1, [BINARY16]), "got records None; needed"),
+        (lambda: limit_cycles(SYSTEM, FixedFormat(2, 5)), "got words FixedFormat.*; needed WordFormats"),
+        (lambda: limit_cycles(WALK, FixedFormat(2, 5)), "got a LinearModel; needed a LinearSystem"),
+        (
+            lambda: required_fraction_bits(WALK, [[1]], 1),
+            "got a LinearModel; needed a LinearSystem or a function",
+        ),
+        (lambda: required_precision(lambda: 1, 5, 1), "got a function that does not take .*fmt.*: .*; needed f.fmt."),
+        (lambda: required_precision(lambda f, z: 1, 5, 1), "got a function that does not take .*; needed f.fmt.* z="),
+        (lambda: FloatFormat(2, 8, emin=-5, emax=5, subnormal="no"), "subnormal: got 'no'; needed True or False"),
+    ],
+)
+def test_a_call_is_refused(call, message):
+    with pytest.raises((ValueError, TypeError), match=message):
+        call()
+
+
+def test_an_error_of_the_function_itself_stays():
+    def run(fmt, z):
+        return fmt.array(z, 1, 2, 3, 4)
+
+    with pytest.raises(TypeError, match="positional arguments but"):
+        required_precision(run, 2, 1, z=[[1], [2]])
+
+
+def test_an_overflow_names_the_numbers_that_are_too_large():
+    with pytest.raises(OverflowError, match=r"^measurements: entry \[1, 0\]: got a result of about 2\*\*"):
+        emulate(WALK, [[1], [1e6]], BINARY16)
+    found = judge(WALK, BINARY16, 2, 1, z=[[1.0], [1e6]])
+    assert "measurements: entry [1, 0]: got a result" in str(found)
+    large = LinearSystem([["0.5"]], [["0.25"]], C=[[3]], state_names=["level"])
+    assert "coefficient C1_1: got a result of about 3" in str(judge(large, FixedFormat(0, 15), 2, 1, z=[[0], [0]]))
+    sections = LinearSystem.from_coefficients([1, 2, 1], [1, "-1.5", "0.75"])
+    assert "coefficient b0: got a result of about 1" in str(judge(sections, FixedFormat(0, 15), 2, 1, z=[[0], [0]]))
+
+
+def test_a_format_too_small_for_the_model_misses_by_a_guarantee_as_by_emulation():
+    wide = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [["1e6"]])
+    found = judge(wide, BINARY16, 2, 1, basis="guarantee", within=limits(1, 1, 10, 10))
+    assert not found.met
+    assert found.why.startswith("overflow: P0: entry [0, 0]: got a result of about 2**19; needed at most 65504")

@@ -1,0 +1,270 @@
+"""gpbnb.wordlength.options and running: what is refused before anything is computed, and what happens to files."""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import get_args
+
+import numpy as np
+import pytest
+
+import gpbnb
+from gpbnb import BFLOAT16, BINARY32, FixedFormat, FloatFormat, LinearSystem, limits
+from gpbnb.arithmetic.kernels.backends import Compiled
+from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.filters.simulation import simulated_inputs
+from gpbnb.report import ledger_options
+from gpbnb.report.ledger.render import FORMATS
+from gpbnb.wordlength import options, running
+from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.report import Question, study
+from gpbnb.wordlength.requirement import Basis
+
+SYSTEM = 'A = [[0.875]]\nB = [[0.125]]\ninputs = ["sensor (V)"]\noutputs = ["level (V)"]\n'
+FILTER = "Phi = [[1]]\nH = [[1]]\nQ = [[0.01]]\nR = [[1]]\nx0 = [0]\nP0 = [[1]]\n"
+REPORT = SimpleNamespace(text="12 bits", mixed="", met=True, to_html=lambda: "<p>new</p>", to_json=lambda: "{}")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    (tmp_path / "filter.toml").write_text(FILTER)
+    (tmp_path / "z.csv").write_text("1\n2\n")
+    return tmp_path
+
+
+@pytest.fixture
+def computed(monkeypatch):
+    """Questions that were computed; none of them takes time."""
+    asked = []
+    monkeypatch.setattr(running, "study", lambda question, *_: asked.append(question) or REPORT)
+    return asked
+
+
+def test_the_light_lists_are_those_of_the_library():
+    assert get_args(Basis) == options.BASES
+    assert FilterLimits._fields == options.QUANTITIES
+    assert tuple(FORMATS) == ledger_options.FORMATS
+    for kind in options.SIGNALS:
+        assert simulated_inputs(kind, 1, 3, 2).shape == (3, 2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--tolerance", "1_0"], "got --tolerance 1_0; needed numbers with commas between: 0.01,inf"),
+        (["--tolerance", "٣"], "got --tolerance ٣; needed numbers"),
+        (["--steps", "1_0"], "got --steps 1_0; needed a whole number"),
+        (["--base", "7"], "got --base 7; needed one of 2, 10, 16"),
+        (["--rounding", "sideways"], "got rounding 'sideways'; needed"),
+        (["--form", "square"], "got form 'square'; needed"),
+        (["--format", "bf17"], "got format 'bf17'; needed one of BINARY16, "),
+        (["--format", "Q15", "--digits", "9"], "got --format and --digits; needed --format alone"),
+        (["--emin", "-5"], "got one of --emin and --emax; needed both"),
+        (["--simulate", "sine", "--measurements", "{z}"], "got --simulate and --measurements; needed one of them"),
+        (["--level", "2"], "got --level without --simulate; needed --simulate with one of step, sine, noise"),
+        (["--state", "5"], "got --state without a basis that uses limits; needed --basis guarantee or probable"),
+        (["--measurements", "{absent}"], "absent.csv, which cannot be read: No such file or directory; needed a file"),
+        (["--report", "{absent}/a.html"], "is in no folder that exists; needed a file in a folder"),
+        (["--report", "{folder}"], "is a folder; needed a file in a folder"),
+        (["--report", "{folder}/a.json"], "needed the name of an HTML file; JSON is written beside it"),
+        (["--report", "{z}", "--measurements", "{z}"], "which are one file; needed a file for each purpose"),
+        (["--report", "{folder}/proc/a.html"], "is in no folder that exists"),
+    ],
+)
+def test_an_option_is_refused_before_anything_is_read_or_imported(arguments, message, folder, capsys, monkeypatch):
+    monkeypatch.setattr(running, "answer", lambda *_: pytest.fail("something was computed"))
+    names = {"z": folder / "z.csv", "absent": folder / "absent.csv", "folder": folder}
+    given = [each.format(**names) for each in arguments]
+    tolerance = [] if "--tolerance" in given else ["--tolerance", "1"]
+    assert main([str(folder / "system.toml"), *tolerance, *given]) == 2
+    shown = capsys.readouterr()
+    assert message in shown.err
+    assert shown.out == ""
+
+
+@pytest.mark.parametrize("option", ["--report", "--certificate"])
+def test_a_device_or_pipe_is_refused_and_stays(option, folder, capsys, computed):
+    # Replacing /dev/null by a page, as root, would harm every program on the machine.
+    os.mkfifo(folder / "pipe.html")
+    os.symlink(folder / "pipe.html", folder / "link.html")
+    for name in ("pipe.html", "link.html"):
+        given = [str(folder / "system.toml"), "--tolerance", "1", "--basis", "guarantee", "--measurement", "1"]
+        assert main([*given, option, str(folder / name)]) == 2
+        assert f"{name} is a device or pipe; needed a file in a folder" in capsys.readouterr().err
+        assert stat.S_ISFIFO((folder / "pipe.html").stat().st_mode)
+    assert computed == []
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused(folder, capsys, monkeypatch, computed):
+    def full(dir):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(options.tempfile, "TemporaryFile", full)
+    given = [str(folder / "system.toml"), "--tolerance", "1", "--simulate", "step", "--report", str(folder / "a.html")]
+    assert main(given) == 2
+    assert "its folder cannot be written to: No space left on device; needed a folder" in capsys.readouterr().err
+    assert computed == []
+
+
+@pytest.mark.parametrize("before", [None, "old"])
+def test_a_full_disk_leaves_the_answer_and_no_empty_page(folder, capsys, monkeypatch, computed, before):
+    page, json = folder / "a.html", folder / "a.json"
+    if before:
+        page.write_text(before)
+
+    def partly(path, content):
+        path.touch()
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_bytes", partly)
+    given = [str(folder / "system.toml"), "--tolerance", "1", "--simulate", "step", "--report", str(page)]
+    assert main(given) == 2
+    shown = capsys.readouterr()
+    assert shown.out == "12 bits\n"
+    assert f"got --report {page}, which could not be written: [Errno 28] No space left on device" in shown.err
+    assert not json.exists()
+    assert (page.read_text() if before else page.exists()) == (before or False)
+    assert sorted(each.suffix for each in folder.iterdir()) == sorted(
+        [".toml", ".toml", ".csv", *[".html"] * bool(before)]
+    )
+
+
+def test_a_report_is_written_whole(folder, computed):
+    given = [str(folder / "system.toml"), "--tolerance", "1", "--simulate", "step", "--report", str(folder / "a.html")]
+    assert main(given) == 0
+    assert ((folder / "a.html").read_text(), (folder / "a.json").read_text()) == ("<p>new</p>", "{}\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name", "value"),
+    [
+        (["--format", "bfloat16"], "fmt", BFLOAT16),
+        (["--format", "FP8_E4M3", "--rounding", "floor"], "fmt", "FP8_E4M3 down"),
+        (["--format", "Q15"], "fmt", FixedFormat(0, 15)),
+        (["--format", "fixed 4.12", "--rounding", "chop"], "fmt", FixedFormat(4, 12, "chop")),
+        (["--digits", "24"], "fmt", FloatFormat(2, 24)),
+        (["--digits", "7", "--base", "10", "--emin", "-9", "--emax", "9"], "fmt", FloatFormat(10, 7, emin=-9, emax=9)),
+        (["--emin", "-9", "--emax", "12"], "emin", -9),
+        (["--emin", "-9", "--emax", "12"], "emax", 12),
+        ([], "fmt", None),
+    ],
+)
+def test_each_format_is_the_one_that_is_named(folder, computed, arguments, name, value):
+    assert main([str(folder / "system.toml"), "--tolerance", "1", "--simulate", "step", *arguments]) == 0
+    (question,) = computed
+    if value == "FP8_E4M3 down":
+        assert (question.fmt.largest, question.fmt.rounding.value) == (448, "down")
+    else:
+        assert getattr(question, name) == value
+
+
+def test_every_named_format_is_taken(folder, computed):
+    taken = [name for name in gpbnb.NAMED_FORMATS if isinstance(getattr(gpbnb, name).backend, Compiled)]
+    for name in taken:
+        assert main([str(folder / "system.toml"), "--tolerance", "1", "--simulate", "step", "--format", name]) == 0
+    assert [question.fmt for question in computed] == [getattr(gpbnb, name) for name in taken]
+
+
+def test_a_format_without_compiled_loops_is_not_offered(folder, computed, capsys):
+    """Refused before anything is computed, in any spelling, by a message and a help that name only what is taken."""
+    refused = []
+    for name in (*gpbnb.NAMED_FORMATS, "float128"):
+        status = main([str(folder / "system.toml"), "--tolerance", "1", "--simulate", "step", "--format", name])
+        if status == 2:
+            refused.append(name)
+            message = capsys.readouterr().err
+            assert "which has no compiled loops; needed one of BINARY16, " in message
+            assert "BINARY128, BF" not in message.partition("needed")[2]
+    assert refused == ["BINARY128", "DECIMAL128", "float128"]
+    help_text = " ".join(options.parser().format_help().split())
+    assert "BINARY64, BFLOAT16" in help_text
+    assert "DECIMAL64, IBM_HEX32" in help_text
+
+
+def test_simulated_inputs_are_those_of_a_converter_of_16_bits():
+    step = simulated_inputs("step", (2, 0.5), 4, 2)
+    assert step.tolist() == [[2, 0.5]] * 4
+    sine = simulated_inputs("sine", 3, 200, 1)[:, 0]
+    assert np.abs(sine - 3 * np.sin(2 * np.pi * np.arange(1, 201) / 100)).max() <= 4 / 2**17 * (1 + 1e-9)
+    assert abs(sine).max() == 3
+    noise = simulated_inputs("noise", 0.1, 40_000, 1)
+    assert noise.std() == pytest.approx(0.1, rel=4 / np.sqrt(2 * 40_000))  # four standard errors
+    assert np.array_equal(noise, simulated_inputs("noise", 0.1, 40_000, 1, seed=0))
+    for given, unit in ((sine, 4 / 2**16), (noise, 0.125 / 2**16)):
+        assert not (given / unit % 1).any()
+    for kind, level, message in (
+        ("ramp", 1, 'got inputs \'ramp\'; needed "step", "sine" or "noise"'),
+        ("step", 0, "got level 0; needed a finite number above 0, or one for each of the 2 inputs"),
+        ("step", [1, 2, 3], "needed a finite number above 0, or one for each of the 2 inputs"),
+        ("step", np.inf, "got level inf; needed a finite number above 0"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            simulated_inputs(kind, level, 3, 2)
+
+
+def test_a_system_runs_with_simulated_inputs(folder, capsys):
+    given = [str(folder / "system.toml"), "--tolerance", "1e-3", "--simulate", "sine", "--level", "2", "--steps", "50"]
+    assert main([*given, "--basis", "emulation"]) == 0
+    system = LinearSystem([["0.875"]], [["0.125"]])
+    expected = study(Question(system, 1e-3, simulated_inputs("sine", 2, 50, 1), bases=["emulation"]))
+    assert capsys.readouterr().out.strip() == expected.text
+    assert main([str(folder / "filter.toml"), *given[1:]]) == 2
+    assert "got --simulate sine for a Kalman filter; needed none" in capsys.readouterr().err
+    assert main([str(folder / "system.toml"), "--tolerance", "1"]) == 2
+    assert "got a linear system without inputs; needed --measurements" in capsys.readouterr().err
+
+
+def test_a_judged_format_meets_the_tolerance_where_a_search_finds_fewer_digits(folder, capsys):
+    system, u = LinearSystem([["0.875"]], [["0.125"]]), simulated_inputs("noise", 1, 60, 1)
+    ratio = judge(system, BINARY32, 60, 1e-3, z=u).ratio
+    found = dict(gpbnb.required_precision(system, 60, 1e-3, rounding="even", z=u).tried)
+    assert ratio == found[24]
+    assert judge(system, BFLOAT16, 60, 1e-3, z=u).ratio > 1
+    given = [str(folder / "system.toml"), "--tolerance", "1e-3", "--simulate", "noise", "--steps", "60"]
+    assert main([*given, "--format", "binary32"]) == 0
+    assert capsys.readouterr().out == f"BINARY32 meets the tolerance: {ratio:.2g} of it, observed in 60 steps\n"
+    assert main([*given, "--format", "bfloat16"]) == 1
+    assert "BFLOAT16 misses the tolerance: " in capsys.readouterr().out
+    assert main([*given, "--format", "fixed -3.20"]) == 1
+    assert "misses the tolerance, observed in 60 steps: " in capsys.readouterr().out
+    bounds = [
+        judge(system, BINARY32, 60, 1e-3, basis=basis, z=u, within=limits(1, 1, measurement=9))
+        for basis in ("bound", "guarantee", "probable")
+    ]
+    assert bounds[0].ratio > ratio
+    assert bounds[1].ratio > bounds[2].ratio
+    assert str(bounds[1]).endswith("of it, guaranteed for ever")
+
+
+@pytest.mark.parametrize("module", ["gpbnb.wordlength", "gpbnb", "gpbnb.ledger"])
+def test_help_and_refusals_import_nothing_that_computes(module, tmp_path):
+    """They took a second or two of imports."""
+    code = """
+import runpy, sys
+sys.argv = ["x", *sys.argv[2:]]
+try:
+    runpy.run_module(MODULE, run_name="__main__", alter_sys=True)
+except SystemExit as end:
+    heavy = {"numba", "scipy", "sympy", "matplotlib", "flint"} & set(sys.modules)
+    print(sorted(heavy), end.code)
+"""
+    for arguments, status in ((["--help"], 0), (["--no-such-option"], 2), (["--version"], 0)):
+        done = subprocess.run(
+            [sys.executable, "-c", code.replace("MODULE", repr(module)), "x", *arguments],
+            capture_output=True,
+            text=True,
+            cwd=Path(gpbnb.__file__).parents[1],
+        )
+        assert done.stdout.splitlines()[-1] == f"[] {status}", done.stderr
+    with pytest.raises(SystemExit, match="0"):
+        main(["--version"])
+    assert isinstance(options.parser(), argparse.ArgumentParser)

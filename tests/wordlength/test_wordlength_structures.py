@@ -1,0 +1,208 @@
+"""Digital filters by the command, from files and from SciPy; fraction bits of systems and functions."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from gpbnb import FixedFormat, LinearSystem, required_precision
+from gpbnb.bounds.words import WordGuarantee
+from gpbnb.filters.design import SIDE_BY_SIDE, FilterDesign
+from gpbnb.filters.structures import STRUCTURES
+from gpbnb.filters.words import WordFormats, run_words
+from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.fixed_point import required_fraction_bits, with_fraction_bits
+from gpbnb.wordlength.models import read_model, read_structures
+
+SOS = signal.butter(4, 0.1, output="sos")
+B, A = signal.butter(4, 0.1)
+
+
+@pytest.fixture
+def filters(tmp_path):
+    """A file with sections, and a file with an impulse."""
+    (tmp_path / "sections.toml").write_text(f"sos = {SOS.tolist()}\n", encoding="utf-8")
+    (tmp_path / "u.csv").write_text("\n".join(["1", *["0"] * 99]), encoding="utf-8")
+    return tmp_path
+
+
+def test_the_command_compares_structures(filters, capsys):
+    report = filters / "report.html"
+    arguments = [str(filters / "sections.toml"), "--tolerance", "0.001", "--measurements", str(filters / "u.csv")]
+    assert main([*arguments, "--basis", "emulation", "--report", str(report)]) == 0
+    told = capsys.readouterr()
+    answers = json.loads(report.with_suffix(".json").read_text(encoding="utf-8"))["answers"]
+    names = [each["label"] for each in answers]
+    first = "cascade of direct form II transposed"
+    assert names == [f"{name}, emulation" for name in [first, *(each for each in SIDE_BY_SIDE if each != first)]]
+    digits = {each["label"].removesuffix(", emulation"): each["digits"] for each in answers}
+    assert digits["direct form I"] > digits[first]
+    assert told.out.startswith(f"{digits[first]} bits")
+    assert "Structures and bases compared" in report.read_text(encoding="utf-8")
+
+
+def test_a_file_names_its_structure_or_all(filters):
+    text = (filters / "sections.toml").read_text(encoding="utf-8")
+    path = filters / "lattice.toml"
+    path.write_text('structure = "lattice"\n' + text, encoding="utf-8")
+    assert next(iter(read_structures(path))) == "lattice"
+    lattice = read_model(path)
+    assert lattice.as_filter().program.coefficient_names[:2] == ("k1", "k2")
+    assert read_model(path, structure="direct form I").as_filter().program.coefficient_names[:2] == ("b0", "b1")
+    path.write_text('structure = "all"\n' + text, encoding="utf-8")
+    assert list(read_structures(path)) == list(STRUCTURES)
+    assert read_structures({"A": [[0.5]], "B": [[1]]}) == {}
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"b": [1], "a": [0, 1]}, r"the mapping: got a\[0\] = 0; needed a first coefficient that is not 0"),
+        ({"b": [1]}, "the mapping: got b and a without any delay"),
+        ({"b": [[1]], "a": [1, 0.5]}, r"got b of shape \(1, 1\); needed one row"),
+        ({"b": ["x"], "a": [1, 0.5]}, "b: "),
+        ({"sos": [[1, 2, 3]]}, r"got sections of shape \(1, 3\); needed \(sections, 6\)"),
+        ({"sos": [[1, 2, 3, 1, 0, 0], [1, 2, 3, 0, 0, 0]]}, r"section 1: got a\[0\] = 0"),
+        ({"sos": [[1, 2, 3, 1, 0, 0]], "b": [1]}, "got neither or both of b and sos"),
+        ({"sos": [[1, 2, 3, 1, 0, 0]], "structure": "ladder"}, "got structure 'ladder'; needed one of 'direct form I'"),
+        ({"b": [1], "a": [1, 0.5], "pairing": "near", "structure": "cascade"}, "got pairing 'near'; needed one of"),
+        ({"b": [1, 2], "a": [1, 0.5], "order": [1], "structure": "cascade"}, r"got order \[1\]; needed each of 0 to 0"),
+        ({"b": [1], "a": [1, 0.5], "scale": True, "structure": "cascade"}, "got scale for b and a"),
+        ({"b": [1], "a": [1, -1], "structure": "lattice"}, "reflection coefficient k1 = -1"),
+        ({"b": [1], "a": [1, -2], "structure": "balanced state space"}, "whose states cannot be balanced"),
+        ({"b": [1], "a": [1, 0.5], "structure": "FIR"}, r"got structure \"FIR\" and a of 2 coefficients"),
+        ({"b": [0, 0], "a": [1, 0.5], "structure": "cascade"}, "got coefficients b that are all zero"),
+        ({"b": [1], "a": [1, 0.5], "Q": 1}, "unknown|missing"),
+    ],
+)
+def test_designs_that_are_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        read_model(given)
+
+
+def test_an_unstable_filter_has_a_cause():
+    system = LinearSystem.from_coefficients([1], [1, "-1.01"])
+    found = required_precision(system, 20, 1e-30, z=np.ones((20, 1)), basis="bound")
+    assert found.precision is None
+    assert "the system as given is not stable, since A has an eigenvalue of size 1.01" in str(found)
+    assert required_precision(system, 20, 0.01, z=np.ones((20, 1)), basis="bound").ends
+
+
+@pytest.mark.parametrize("structure", ["direct form I", "cascade", "lattice"])
+def test_systems_of_scipy_are_read_in_a_structure(structure):
+    z, p, k = signal.butter(4, 0.1, output="zpk")
+    expected = signal.lfilter(B, A, np.eye(1, 80)[0])
+    impulse = np.eye(80, 1)
+    for given in (signal.dlti(B, A, dt=1), signal.dlti(z, p, k, dt=1)):
+        found = read_model(given, structure=structure).outputs(impulse)[:, 0, 0]
+        assert found == pytest.approx(expected, abs=1e-12)  # z, p and k differ from b and a in their last digits
+    with pytest.raises(ValueError, match="needed a TransferFunction or a ZerosPolesGain"):
+        read_model(signal.StateSpace([[0.5]], [[1]], [[1]], [[0]], dt=1), structure=structure)
+
+
+def test_delays_and_leading_zeros_are_those_of_scipy():
+    """Three poles beyond the zeros, so that b begins with zeros."""
+    system = signal.dlti([0.5], [1, -0.5, 0.25], dt=1)
+    expected = signal.dimpulse(system, n=12)[1][0][:, 0]
+    for structure in STRUCTURES:
+        found = read_model(system, structure=structure).outputs(np.eye(12, 1))[:, 0, 0]
+        assert found == pytest.approx(expected, abs=1e-15), structure
+
+
+def test_a_filter_without_feedback():
+    taps = signal.firwin(9, 0.3)
+    design = FilterDesign(b=taps)
+    for name, system in {**design.systems("all"), **design.systems("FIR")}.items():
+        assert system.outputs(np.eye(12, 1))[:9, 0, 0] == pytest.approx(taps, abs=1e-15), name
+
+
+# -- sections ---------------------------------------------------------------------------------------------------------
+
+
+def test_sections_are_paired_and_ordered_as_stated():
+    near, far = [1, 0, 1, 1, 0, 0.81], [1, -1.8, 1, 1, -1, 0.5]
+    given = LinearSystem.from_sections([near, far])
+    assert given.made.coefficients[[2, 4]].tolist() == [1, pytest.approx(0.81)]
+    up = LinearSystem.from_sections([near, far], order="up")
+    assert up.made.coefficients[[4, 9]].astype(float).tolist() == [0.5, 0.81]
+    down = LinearSystem.from_sections([far, near], order="down")
+    assert down.made.coefficients[[4, 9]].astype(float).tolist() == [0.81, 0.5]
+    swapped = LinearSystem.from_sections([near, far], order=[1, 0])
+    assert swapped.made.coefficients[[4, 9]].astype(float).tolist() == [0.5, 0.81]
+    crossed = [[1, -1.8, 1, 1, 0, 0.81], [1, 0, 1, 1, -1, 0.5]]
+    paired = LinearSystem.from_sections(crossed, pairing="nearest", order="down")
+    assert paired.made.coefficients[[1, 6]].astype(float).tolist() == [0, -1.8]
+    impulse = np.eye(40, 1)
+    outputs = [each.outputs(impulse)[:, 0, 0] for each in (given, up, down, swapped, paired)]
+    for each in outputs[1:]:
+        assert each == pytest.approx(outputs[0], abs=1e-13)
+
+
+def test_scaled_sections_stay_within_one_between_them():
+    sos = np.array([[1, 2, 1, 1, -1.7, 0.8], [4, 8, 4, 1, -1.2, 0.7], [0.01, 0, 0, 1, 0.3, 0.1]])
+    impulse = np.eye(400, 1)
+    plain, scaled = (LinearSystem.from_sections(sos, scale=each) for each in (False, True))
+    assert scaled.outputs(impulse)[:, 0, 0] == pytest.approx(plain.outputs(impulse)[:, 0, 0], rel=1e-12, abs=1e-13)
+    coefficients = scaled.made.coefficients.astype(float).reshape(3, 5)[:2]
+    response = impulse[:, 0]
+    for b0, b1, b2, a1, a2 in coefficients:
+        response = signal.lfilter([b0, b1, b2], [1, a1, a2], response)
+        assert 0.5 < np.abs(response).sum() <= 1
+    powers = coefficients[:, 0] / sos[:2, 0]
+    assert np.log2(powers).tolist() == np.round(np.log2(powers)).tolist()
+
+
+# -- fraction bits ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("structure", ["direct form I", "cascade", "lattice", "state space"])
+def test_fraction_bits_of_a_system(structure):
+    u = np.random.default_rng(0).uniform(-1, 1, (300, 1))
+    system = FilterDesign(sos=SOS).system(structure)
+    like = WordFormats(FixedFormat(12, 1), FixedFormat(6, 24), FixedFormat(16, 13, overflow="wrap"))
+    observed = required_fraction_bits(system, u, 1e-3, like=like)
+    proved = required_fraction_bits(system, u, 1e-3, "guarantee", like=like)
+    assert observed.words == with_fraction_bits(like, observed.fmt.fraction_bits)
+    assert observed.words.sums.fraction_bits == observed.fmt.fraction_bits + 12
+    assert observed.fmt.fraction_bits <= proved.fmt.fraction_bits <= observed.fmt.fraction_bits + 8
+    for bits, ratio in observed.tried:
+        if math.isfinite(ratio):
+            found = run_words(system, u, with_fraction_bits(like, bits)).outputs(1) - system.outputs(u)
+            assert ratio == pytest.approx(float(np.abs(found.sum(axis=-1)).max() / 1e-3), rel=1e-9)
+    errors = WordGuarantee(system, np.abs(u).max()).errors(proved.words)
+    assert dict(proved.tried)[proved.fmt.fraction_bits] == pytest.approx(errors[0] / 1e-3)
+    assert errors[0] <= 1e-3
+
+
+def test_one_rounding_in_a_sum_saves_bits():
+    """Nine products in one sum: nine roundings of half a unit against one."""
+    u = np.ones((20, 1))
+    system = LinearSystem.from_coefficients(signal.firwin(9, 0.3), structure="FIR")
+    single, wide = (
+        required_fraction_bits(system, u, 1e-3, "guarantee", coefficient_bits=20, wide=each) for each in (False, True)
+    )
+    assert single.fmt.fraction_bits > wide.fmt.fraction_bits
+    formats = [with_fraction_bits(each.words, 12) for each in (single, wide)]
+    errors = [WordGuarantee(system, 1.0).errors(each)[0] for each in formats]
+    assert errors[0] - errors[1] == pytest.approx(8 / 2 / 2**12, rel=1e-9)
+
+
+def test_fraction_bits_of_a_function():
+    def smoother(fmt, z):
+        alpha, y, found = fmt.array("0.3"), fmt.array(0), []
+        for value in z:
+            y = y + alpha * (value - y)
+            found.append(y)
+        return found
+
+    z = np.random.default_rng(1).uniform(-1, 1, 60)
+    found = required_fraction_bits(smoother, z, 1e-3, like=FixedFormat(2, 1))
+    system = required_fraction_bits(LinearSystem.smoother("0.3"), z[:, None], 1e-3, like=FixedFormat(2, 1))
+    assert found.fmt == system.fmt
+    assert [ratio for _, ratio in found.tried] == pytest.approx([ratio for _, ratio in system.tried], rel=1e-6)
+    with pytest.raises(ValueError, match="got like=None for a function; needed a FixedFormat"):
+        required_fraction_bits(smoother, z, 1e-3)

@@ -1,0 +1,447 @@
+"""gpbnb.wordlength: what the chapter on wordlength measures, shows and tabulates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import small_filter
+from matplotlib.text import Text
+from tabulated import by_header
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.inverse import smallest_precision
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import log_spaced, reference
+from gpbnb.report.display import style
+from gpbnb.report.gravity_probe_b import model as gravity_probe_b
+from gpbnb.report.gravity_probe_b import year
+from gpbnb.report.guarantees import table as guarantees
+from gpbnb.report.integration.theory import needed_precision
+from gpbnb.report.kalman.report_bounds import coefficients
+from gpbnb.report.wordlengths import figures, study, tables
+from gpbnb.wordlength import examples, ranges
+from gpbnb.wordlength.precision import required_precision, survey
+from gpbnb.wordlength.requirement import Requirement
+
+TILT = examples.tilt()
+Z = examples.tilt_measurements(300)
+TOLERANCE = (0.01, math.inf, math.inf)
+FOUND = Requirement(FloatFormat(2, 17), "emulation", 300, ((16, 2.0), (17, 0.5), (18, 0.4)))
+NONE = replace(FOUND, fmt=None)
+
+
+# -- examples -----------------------------------------------------------------------------------------
+
+
+def test_the_models_are_what_their_docstrings_say():
+    assert (TILT.n, TILT.m) == (3, 2)
+    assert [unit for _, unit in examples.TILT_STATES] == ["°", "°/s", "°/s"]
+    assert math.sqrt(TILT.R[0, 0, 0]) == pytest.approx(0.05, rel=1e-15)
+    assert math.sqrt(TILT.R[0, 1, 1]) == 2
+    assert examples.tilt("1e-6").Q[0, 2, 2] == Fraction("1e-6")
+    assert examples.tracker("1000").x0[0] == 1000
+    assert examples.precise_tracker().R[0, 0, 0] == Fraction("1e-12")
+    for model in (examples.tracker(), examples.precise_tracker()):
+        t = model.Phi[0, 0, 1]  # between measurements; white noise of the acceleration, 0.1 m²/s³
+        assert model.Q[0].tolist() == [[t**3 / 30, t**2 / 20], [t**2 / 20, t / 10]]
+    Q, more = examples.altimeter().Q[0], examples.altimeter("1e-12").Q[0]
+    assert Q[0, 0] * Q[1, 1] == Q[0, 1] ** 2 > 0
+    assert Q[1, 1] == Fraction("0.35") ** 2 / 2500
+    assert (more - Q == np.diag([Fraction("1e-12")] * 3)).all()
+
+
+def test_measurements_begin_alike_and_are_multiples_of_their_resolution():
+    longer = examples.tilt_measurements(5000)
+    assert np.array_equal(longer[:300], Z)
+    assert np.array_equal(np.rint(longer * 4096), longer * 4096)
+    assert not np.array_equal(examples.tilt_measurements(300, seed=1), Z)
+
+
+def test_normal_numbers_are_those_of_numpy():
+    for name, kind in (("binary16", np.float16), ("binary32", np.float32), ("binary64", np.float64)):
+        low, high = examples.NORMAL_RANGE[name]
+        info = np.finfo(kind)
+        assert 2.0**low == float(info.smallest_normal)
+        assert 2.0**high <= float(info.max) < 2 * 2.0**high
+        assert examples.STANDARD[name].precision == info.nmant + 1
+
+
+def test_normal_matrix():
+    found = examples.normal_matrix(2, [1, 2, 4])
+    assert found.tolist() == [[3, 7, 21], [7, 21, 73], [21, 73, 273]]
+    with pytest.raises(ValueError, match="got degree 2 and 2 different times; needed at least 3"):
+        examples.normal_matrix(2, [1, 1, 2])
+    with pytest.raises(ValueError, match="degree of 0 or more"):
+        examples.normal_matrix(-1, [1, 2])
+
+
+# -- study --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("base", [2, 10])
+def test_printed_precision_is_the_least_that_meets_125(base):
+    tolerance, size = Fraction(1, 100), Fraction(40)
+    t = study.printed_precision(6000, 3, 2, tolerance, size, base)
+    total = sum(coefficients(6000, 3, 2)) * size
+    assert total * FloatFormat(base, t).unit_roundoff <= tolerance < total * FloatFormat(base, t - 1).unit_roundoff
+    assert study.printed_precision(6000, 3, 2, tolerance, size, base, carried=True) > t
+
+
+def test_growth_answers_for_the_first_steps():
+    model = year.model(year.MODELS[0], 2)
+    z = year.simulation(year.MODELS[0]).measurements(12)
+    tolerance = [1] * 4 + [math.inf] * 6
+    (found,) = study.required_precision_by_steps(model, z, tolerance, [12], form=Form.UD)
+    assert found == required_precision(model, 12, tolerance, form=Form.UD, z=z)
+
+
+def test_growth_knows_nothing_of_what_comes_later():
+    """Neither a last measurement far off, nor a last Q of rank one, which few bits make indefinite."""
+    Phi, H, R, P0 = [["0.99", "0.1"], [0, "0.97"]], [[1, "0.3"]], [["0.4"]], [[2, 0], [0, 1]]
+    calm, thin = [["1e-3", 0], [0, "2e-3"]], [["1.4e-4", "7e-3"], ["7e-3", "0.35"]]
+    model, z = LinearModel(Phi, H, calm, R, [3, -1], P0), Z[:7, :1].copy()
+    z[6] = 1e6
+    later = LinearModel(Phi, H, [calm] * 6 + [thin], R, [3, -1], P0)
+    for basis in ("emulation", "bound"):
+        alone = [required_precision(model, k, 1e-4, basis=basis, z=z[:k]) for k in (2, 6)]
+        assert study.required_precision_by_steps(later, z, 1e-4, (2, 6), basis=basis) == tuple(alone)
+        assert study.required_precision_by_steps(later, z, 1e-4, (7,), basis=basis)[0].tried != alone[1].tried
+
+
+def test_growth_refuses_steps_that_were_not_measured():
+    for steps in ([0], [10, 301]):
+        with pytest.raises(ValueError, match="and 300 measurements; needed from 1 to 300 steps"):
+            study.required_precision_by_steps(TILT, Z, TOLERANCE, steps)
+
+
+def test_growth_grows():
+    found = study.required_precision_by_steps(TILT, Z, TOLERANCE, (10, 300), basis="bound")
+    assert [each.steps for each in found] == [10, 300]
+    assert found[0].fmt.precision < found[1].fmt.precision
+    assert {each.basis for each in found} == {"bound"}
+
+
+def test_years_needed_against_each_run():
+    kind = year.YearCase(year.MODELS[0], 2, 0, Rounding.NEAREST, Form.HUNG)
+    runs = [run for run in year.load() if run.case == kind._replace(precision=run.case.precision)]
+    found = dict(study.precision_by_step(runs, 1.0))
+    for run in runs:
+        worst = 0.0
+        for i, step in enumerate(run.steps.tolist()):
+            worst = max(worst, *np.abs(run.drift[i]), *np.abs(run.rate[i]))
+            assert (run.case.precision >= found[step]) >= (worst <= 1)
+            if run.case.precision == found[step]:
+                assert worst <= 1
+    assert list(found.values()) == sorted(found.values())
+    assert found[gravity_probe_b.YEAR] == 32
+    with pytest.raises(ValueError, match="got runs of 2 kinds; needed runs of one"):
+        study.precision_by_step([runs[0], replace(runs[0], case=runs[0].case._replace(base=10))], 1.0)
+
+
+def test_a_run_that_left_the_tolerance_does_not_come_back():
+    (first, *_) = year.load()
+    one = first.steps.tolist()[:3]
+    drift = np.array([[0.5, 0.0], [0.0, -2.0], [0.5, 0.0]])
+    run = replace(first, steps=first.steps[:3], drift=drift, rate=np.zeros((3, 2)))
+    assert study.precision_by_step([run], 1.0) == ((one[0], run.case.precision),)
+
+
+def test_spans_hold_every_number():
+    checkpoints = reference(TILT, Z, log_spaced(300, 16))
+    numbers = {"estimate": checkpoints.x, "gain": checkpoints.K, "covariance": checkpoints.P}
+    found = {each.name: each for each in ranges.binary_ranges(TILT, Z)}
+    for name, values in numbers.items():
+        sizes = np.abs(values.astype(float)).ravel()
+        sizes = sizes[sizes > 0]
+        assert 2.0 ** found[name].least <= sizes.min() < 2 * 2.0 ** found[name].least
+        assert 2.0 ** found[name].largest <= sizes.max() < 2 * 2.0 ** found[name].largest
+    assert found["model"][1:] == (-34, 8)  # 1e-10 and 400
+
+
+def test_update_stagnation_is_that_of_the_runs():
+    fmt, checkpoint_steps = FloatFormat(2, 12), tuple(range(1, 301))
+    (coarse, fine) = study.update_stagnation(TILT, Z, 2, [fmt, FloatFormat(2, 40)], last=200)
+    history = emulate(TILT, Z, fmt, Form.INNOVATION, checkpoint_steps, reference(TILT, Z, checkpoint_steps))
+    true = reference(TILT, Z, checkpoint_steps)
+    bias = history.state[:, 2] + true.x[:, 2].astype(float)
+    assert coarse.unchanged == pytest.approx(np.mean(np.abs(np.diff(bias[-201:])) < 1e-9), abs=1e-12)
+    assert coarse.unchanged > 0
+    assert fine.unchanged == 0
+    assert coarse.variance == pytest.approx(1 + history.covariance[-1, 2, 2] / float(true.P[-1, 2, 2]), rel=1e-12)
+    watched = np.array(sorted({*log_spaced(300, 16), *range(100, 301)})) - 1
+    assert coarse.error == np.abs(history.state[watched, 0]).max()
+    assert abs(fine.variance - 1) < 1e-6
+    # Of the last steps, each is compared with the one before it, the first of them as well.
+    steady = [bool(step) for step in np.abs(np.diff(bias)) < 1e-9]
+    for last in (next(k for k in range(1, 300) if steady[-k]), 299):
+        (found,) = study.update_stagnation(TILT, Z, 2, [fmt], last=last)
+        assert found.unchanged == sum(steady[-last:]) / last
+    assert study.bits_hiding_process_noise(TILT, Z, 2) == pytest.approx(
+        math.log2(float(true.P[-1, 2, 2]) / 1e-10), rel=1e-12
+    )
+
+
+def test_what_the_watch_of_a_state_refuses():
+    for state in (-1, 3):
+        with pytest.raises(ValueError, match="needed an index from 0 to 2"):
+            study.update_stagnation(TILT, Z, state, [FloatFormat(2, 12)])
+        with pytest.raises(ValueError, match="needed an index from 0 to 2"):
+            study.bits_hiding_process_noise(TILT, Z, state)
+    for last in (0, 300):
+        with pytest.raises(ValueError, match=f"got {last} steps to watch of 300"):
+            study.update_stagnation(TILT, Z, 2, [FloatFormat(2, 12)], last=last)
+    assert study.bits_hiding_process_noise(TILT, Z, 0) == math.inf
+    with pytest.raises(ValueError, match="NaN or infinity"):
+        ranges.binary_ranges(TILT, Z * math.nan)
+
+
+def test_largest_estimate():
+    checkpoints = reference(TILT, Z, log_spaced(300, 16))
+    assert study.largest_estimate(TILT, Z) == max(abs(x) for x in checkpoints.x.ravel())
+
+
+def test_a_companion_bounds_closely():
+    thirds, checkpoint_steps = Z / 3, log_spaced(300, 16)  # which no format of base 2 holds
+    error, bound = study.companion_run(TILT, thirds, FloatFormat(2, 20))
+    history = emulate(TILT, thirds, FloatFormat(2, 20), Form.INNOVATION, checkpoint_steps)
+    assert error == pytest.approx(np.abs(history.state).max(axis=0), rel=1e-12)
+    assert (error > 0).all()
+    assert (error <= bound).all()
+    assert (bound <= 1.001 * error).all()
+
+
+def test_a_companion_where_the_running_bound_says_nothing():
+    model, z = examples.precise_tracker(), np.full((20, 1), 1.0)
+    assert survey(model, z, 0.01, [40], basis="bound") == ((40, math.inf),)
+    found = required_precision(model, 20, 0.01, basis="bound", z=z)
+    last = max(digits for digits, ratio in found.tried if math.isinf(ratio) and digits < found.precision)
+    assert last >= 40
+    assert found.why == f"in {last} digits the bound says nothing"
+    error, bound = study.companion_run(model, z, FloatFormat(2, 40))
+    assert (error <= bound).all()
+    assert bound[0] < 0.01
+
+
+def test_what_the_inverse_refuses():
+    for matrix, kind, message in (
+        ([[1, 2, 3], [2, 1, 3]], ValueError, r"fit: got shape \(2, 3\); needed a square matrix"),
+        ([1, 2], ValueError, r"fit: got shape \(2,\); needed a square matrix"),
+        ([[2, 1], [0, 2]], ValueError, r"fit: got 1 at \[0, 1\] and 0 at \[1, 0\]; needed a symmetric matrix"),
+        ([[2, 1], [1, "-1/2"]], ValueError, r"fit: got -1/2 at \[1, 1\]; needed a positive diagonal"),
+        ([[0, 1], [1, 2]], ValueError, r"fit: got 0 at \[0, 0\]; needed a positive diagonal"),
+        ([[0, 0], [0, 0]], np.linalg.LinAlgError, "fit: got a singular matrix, which has no inverse in any precision"),
+        ([[4, 2], [2, 1]], np.linalg.LinAlgError, "fit: got a singular matrix, which has no inverse in any precision"),
+    ):
+        with pytest.raises(kind, match=message):
+            study.inverse_precision("fit", matrix, 1e-3)
+    for tolerance in (0, -1.0, math.nan, math.inf, "0.1", True, None):
+        with pytest.raises(ValueError, match="needed a relative error above 0"):
+            study.inverse_precision("fit", [[2, 1], [1, 2]], tolerance)
+
+
+def test_a_sensor_that_is_silent_is_a_row_of_zeros():
+    """Whatever stands for its measurement; and as if there were no such sensor."""
+    others = {"x0": TILT.x0, "P0": TILT.P0, "Phi": TILT.Phi, "Q": TILT.Q}
+    H, R = np.stack([TILT.H[0], TILT.H[0]]), TILT.R
+    H[1, 1] = 0
+    given, alone = LinearModel(H=H, R=R, **others), LinearModel(H=TILT.H[:, :1], R=R[:, :1, :1], **others)
+    z = Z[:2].copy()
+    states = []
+    for value in (0.0, 77.0):
+        z[1, 1] = value
+        states.append([small_filter.run(FloatFormat(2, 24), form, given, z).checkpoints().x.tolist() for form in Form])
+    assert states[0] == states[1]
+    first = reference(TILT, z, (1,))
+    after = LinearModel(alone.Phi, alone.H, alone.Q, alone.R, first.x[0], (first.P[0] + first.P[0].T) / 2)
+    assert reference(given, z, (2,)).x[0].astype(float) == pytest.approx(
+        reference(after, z[1:, :1], (1,)).x[0].astype(float), rel=1e-12
+    )
+
+
+def test_a_known_input_is_a_column_for_a_state_of_one():
+    pushes = np.round(np.sin(np.arange(50) / 7), 3)
+    step = Fraction(1, 50)
+    Phi = [[[1, step, 0], [0, 1, step * Fraction(u)], [0, 0, 1]] for u in pushes.tolist()]
+    Q = np.diag([Fraction("1e-6"), Fraction("1e-4"), Fraction(0)])
+    P0 = np.diag([Fraction(9), Fraction(1), Fraction(1, 2**60)])
+    z = Z[:50, :1]
+    found = reference(LinearModel(Phi, [[1, 0, 0]], Q, [["0.25"]], [0, 0, 1], P0), z, range(1, 51)).x.astype(float)
+    x, P, A = np.zeros(2), np.diag([9.0, 1.0]), np.array([[1, 0.02], [0, 1]])
+    for k, u in enumerate(pushes):
+        x, P = A @ x + [0, 0.02 * u], A @ P @ A.T + np.diag([1e-6, 1e-4])
+        K = P[:, 0] / (P[0, 0] + 0.25)
+        x, P = x + K * (z[k, 0] - x[0]), P - np.outer(K, P[0])
+        assert found[k, :2] == pytest.approx(x, rel=1e-9, abs=1e-12)
+    assert found[:, 2] == pytest.approx(1, abs=1e-12)
+
+
+def test_a_row_of_the_table_of_guarantees_is_as_stored():
+    """Of the filter that is cheapest to repeat; only the processor time may differ."""
+    case = next(case for case in guarantees.CASES if case.make().name == "Dyer and McReynolds")
+    (expected,) = [row for row in guarantees.load() if row.name == "Dyer and McReynolds"]
+    assert guarantees.compute(case)._replace(seconds=expected.seconds) == expected
+
+
+@pytest.mark.parametrize("halvings", [-9, 0, 13])
+def test_each_bit_of_a_guarantee_halves_its_bound(halvings):
+    case = next(case for case in guarantees.CASES if case.make().name == "a second-order section")
+    made = case.make()
+    bound = guarantees.case_guarantee(case, made, guarantees.FORMAT).bound  # in 24 bits
+    for room, more in ((1.02, 0), (0.98, 1)):
+        tolerance = room * bound / 2.0**halvings
+        assert guarantees._bits(case, made, "guarantee", tolerance, bound) == str(24 + halvings + more)
+    assert guarantees._bits(case, made, "guarantee", bound * 2.0**40, bound) != ""
+    assert guarantees._bits(case, made, "guarantee", bound / 2.0**40, bound) == ""
+
+
+def test_inverse_knows_its_condition():
+    matrix = examples.normal_matrix(2, range(11))
+    found = study.inverse_precision("fit", matrix, 1e-3)
+    plain = matrix.astype(float)
+    assert found.condition == pytest.approx(np.linalg.cond(plain, 1), rel=1e-9)
+    scale = 2.0 ** -np.round(np.log2(plain.diagonal()) / 2)
+    assert found.scaled == pytest.approx(np.linalg.cond(plain * np.outer(scale, scale), 1), rel=1e-9)
+    beta = float(FloatFormat(2, found.expected).unit_roundoff)
+    assert found.scaled * beta <= 1e-3 < 2 * found.scaled * beta
+    assert found.proved == smallest_precision(matrix, 1e-3, 2).fmt.precision
+
+
+def test_units_of_powers_of_two_change_nothing():
+    fmt, sizes = FloatFormat(2, 15), (4, 1, Fraction(1, 1024))
+    for form in Form:
+        plain = emulate(TILT, Z, fmt, form).state
+        other = emulate(study.rescaled(TILT, sizes), Z, fmt, form).state
+        assert np.array_equal(other / np.array(sizes, dtype=float), plain)
+    tens = emulate(study.rescaled(TILT, (1, 1, 1000)), Z, fmt, Form.INNOVATION).state / (1, 1, 1000)
+    assert not np.array_equal(tens, emulate(TILT, Z, fmt, Form.INNOVATION).state)
+
+
+def test_units_change_the_estimates_and_nothing_else():
+    sizes = (3, Fraction(1, 7), 10)
+    plain, other = (reference(model, Z, (300,)) for model in (TILT, study.rescaled(TILT, sizes)))
+    assert (other.x[0] / sizes).astype(float) == pytest.approx(plain.x[0].astype(float), rel=1e-25, abs=0)
+    with pytest.raises(ValueError, match="needed 3 positive numbers"):
+        study.rescaled(TILT, (1, 2))
+    with pytest.raises(ValueError, match="needed 3 positive numbers"):
+        study.rescaled(TILT, (1, 2, 0))
+
+
+# -- tables -------------------------------------------------------------------------------------------
+
+
+def test_answers():
+    table = tables.answers({"report": [("a minute", FOUND), ("an hour", NONE)]})
+    assert table.header == ("form", "a minute", "an hour")
+    assert table.body == (("report", "17", "none"),)
+    assert table.title == "1 lines of answers"
+    with pytest.raises(ValueError, match="got rows with 2 different sets"):
+        tables.answers({"a": [("x", FOUND)], "b": [("y", FOUND)]})
+
+
+def test_cells():
+    deaf = tables.update_stagnation([study.UpdateStagnation(FloatFormat(2, 12), 0.54321, 0.8765, 0.03)], 0.01)
+    assert deaf.title == "1 formats"
+    assert by_header(deaf) == [
+        {
+            "arithmetic": "12 bits",
+            "variance, computed / true": "0.543",
+            "steps without a change": "88 %",
+            "error / tolerance": "3",
+        }
+    ]
+    spans = tables.binary_ranges(
+        [ranges.BinaryRange("gain", -20, 3), ranges.BinaryRange("all", -2000, 2000), ranges.BinaryRange("x", -14, 15)]
+    )
+    assert spans.header == ("numbers", "smallest", "largest", "normal in")
+    assert spans.title == "3 kinds of numbers"
+    assert spans.body[0][:3] == ("gain", "$2^{-20}$", "$2^{3}$")
+    assert [row[-1] for row in spans.body] == [
+        "binary32, binary64, bfloat16, TF32",
+        "none",
+        "binary16, binary32, binary64, bfloat16, TF32",
+    ]
+    inverses = tables.inverse_precisions([study.InversePrecision("fit", 123.0, 45.0, 6, 7)])
+    assert inverses.title == "1 inverses"
+    assert by_header(inverses) == [
+        {
+            "matrix": "fit",
+            "condition $\\kappa_1$": "120",
+            "$\\kappa_1$, scaled": "45",
+            "bits, rule of thumb": "6",
+            "bits, proved": "7",
+        }
+    ]
+
+
+def test_ranges_of_processors():
+    """As in IEEE 754-2019, table 3.5; accelerators have the exponents of binary32."""
+    assert examples.NORMAL_RANGE == {
+        "binary16": (-14, 15),
+        "binary32": (-126, 127),
+        "binary64": (-1022, 1023),
+        "bfloat16": (-126, 127),
+        "TF32": (-126, 127),
+    }
+
+
+def test_integrator():
+    table = tables.integrator(300.0, 1000.0, {"an hour": 3600.0}, FloatFormat(2, 24))
+    needed = [str(needed_precision(300.0, 1000.0, 3600.0, 2, rounding)) for rounding in Rounding.documented()]
+    assert table.body[0][1:3] == tuple(needed)
+    best, stall = (float(cell.replace(",", "")) for cell in table.body[0][3:])
+    assert best < stall
+    assert table.title == "1 durations"
+    assert by_header(table) == [
+        {
+            "duration": "an hour",
+            "bits, rounded": "17",
+            "bits, chopped": "28",
+            "best rate with 24 bits, Hz": "1.86e+05",
+            "increments vanish at, Hz": "4.66e+06",
+        }
+    ]
+
+
+# -- figures ------------------------------------------------------------------------------------------
+
+
+def test_growth(ax):
+    points, line, *rest = figures.growth({"run": [(10, 9), (1000, 24)]}, {"bound": [(10, 20), (1000, 60)]}, ax)
+    assert points.get_xydata().tolist() == [[10, 9], [1000, 24]]
+    assert line.get_xydata().tolist() == [[10, 20], [1000, 60]]
+    assert line.get_color() == style.VALID
+    names = [each.get_text() for each in rest if isinstance(each, Text)]
+    assert names == ["bound", "binary16", "binary32", "binary64"]
+    assert ax.get_xscale() == "log"
+
+
+def test_overview(ax):
+    found = {"tilt": {"emulation": 17, "bound": 32}, "gyro": {"theory": 17}}
+    artists = figures.overview(found, ax)
+    named = {artist.get_label(): artist for artist in artists if artist.get_label() in figures.KINDS}
+    assert {name: each.get_xydata().tolist() for name, each in named.items()} == {
+        "emulation": [[17, 0]],
+        "bound": [[32, 0]],
+        "theory": [[17, 1]],
+    }
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["tilt", "gyro"]
+    assert ax.yaxis_inverted()  # the first on top
+    with pytest.raises(ValueError, match=r"got the kinds \['guess'\]; needed some of emulation"):
+        figures.overview({"tilt": {"guess": 3}}, ax)
+
+
+def test_a_turn_multiplies_the_quaternion_by_its_half_angles():
+    # Hamilton's product of (a, b, c, d) and (0, x, y, z).
+    a, b, c, d = 0.5, -0.25, 0.75, 0.125
+    for turn in examples.turns(3):
+        x, y, z = turn[1:, 0]
+        product = [-b * x - c * y - d * z, a * x + c * z - d * y, a * y + d * x - b * z, a * z + b * y - c * x]
+        assert np.array_equal(turn @ [a, b, c, d], product)
+        assert z == round(0.3 * 0.01 * 2**20) / 2**21
