@@ -1,9 +1,9 @@
-"""What the book needs of Sphinx beyond settings: MathJax from this machine, a first page, labels, links, docstrings."""
+"""What the book needs of Sphinx beyond settings: a first page, labels, links, docstrings."""
 
 import re
 from enum import Enum
-from importlib.metadata import distribution
 from pathlib import Path
+from typing import Union
 
 import pybtex.plugin
 from docutils import nodes
@@ -12,19 +12,12 @@ from pybtex.style.labels import BaseLabelStyle
 from sphinx.addnodes import start_of_file
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
-from sphinx.util.fileutil import copy_asset
+from sphinx.util.inspect import TypeAliasForwardRef
 
 from gpbnb.report.display.tables import POWER
 
-# A tenth of the 24 MB in the package: TeX input, CHTML output, and the speech rules of English.
-MATHJAX_PARTS = (
-    "tex-chtml.js",
-    "a11y",
-    "input/tex/extensions",
-    "output/chtml/fonts",
-    "sre/mathmaps/base.json",
-    "sre/mathmaps/en.json",
-)
+REFERENCE = "book/api"
+"""The pages of modules, and the page above them: nobody reads these in order."""
 
 FIRST_PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -48,16 +41,6 @@ class KeyLabels(BaseLabelStyle):
 
 class ShortNames(PlainStyle):
     default_label_style = KeyLabels
-
-
-def copy_mathjax(app: Sphinx, error: Exception | None) -> None:
-    """Copy MathJax after the build, so that Jupyter Book does not load each of its scripts on every page."""
-    if error:
-        return
-    source = Path(distribution("sphinx-mathjax-offline").locate_file("sphinx-mathjax-offline/static/mathjax"))
-    for part in MATHJAX_PARTS:
-        target = Path(app.outdir, "_static/mathjax", part)
-        copy_asset(str(source / part), str(target if (source / part).is_dir() else target.parent))
 
 
 def write_first_page(app: Sphinx, error: Exception | None) -> None:
@@ -85,7 +68,7 @@ def unfold_fields(app: Sphinx, what: str, name: str, obj: object, options: objec
 
 def hide_enum_arguments(app, what, name, obj, options, signature, returns):
     """Leave out how Python makes an Enum, which nobody calls."""
-    if what == "class" and issubclass(obj, Enum):
+    if what == "class" and isinstance(obj, type) and issubclass(obj, Enum):
         return "", None
     return None
 
@@ -182,14 +165,58 @@ def mend_listing_links(
     context["body"] = re.sub(rf'(?P<before>{link}(?P<module>[^"#/]+)\.html#)[^"]+', mended, context["body"])
 
 
+def keep_chapter_numbers(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Give Sphinx back the numbers by chapter, with which it looks for pages whose numbers have changed."""
+    env.toc_fignumbers = getattr(env, "gpbnb_numbers_by_chapter", env.toc_fignumbers)
+    return []
+
+
+def number_figures(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Number figures from 1 to the end of the book, also on pages without a chapter number."""
+    env.gpbnb_numbers_by_chapter = {page: dict(kinds) for page, kinds in env.toc_fignumbers.items()}
+    env.toc_fignumbers = {page: dict(kinds) for page, kinds in env.toc_fignumbers.items()}
+    number = 0
+    for page in pages_in_order(env, app.config.root_doc):
+        figures = env.toc_fignumbers.get(page, {}).get("figure", {})
+        names = sorted(figures, key=figures.__getitem__)
+        if names:
+            env.toc_fignumbers[page]["figure"] = {name: (number + k,) for k, name in enumerate(names, 1)}
+        number += len(names)
+    return []
+
+
+def pages_in_order(env: BuildEnvironment, page: str) -> list[str]:
+    """List a page and those below it in the order of the table of contents."""
+    return [page, *(each for child in env.toctree_includes.get(page, ()) for each in pages_in_order(env, child))]
+
+
+def skip_reference(app: Sphinx, pagename: str, templatename: str, context: dict, doctree: object) -> None:
+    """Lead the links to the previous and to the next page past the pages of modules."""
+    relations = getattr(app.builder, "relations", {})
+    for way, position in (("prev", 1), ("next", 2)):
+        target = None if pagename.startswith(REFERENCE) else relations.get(pagename, (None,) * 3)[position]
+        while target and target.startswith(REFERENCE):
+            target = relations[target][position]
+        if not target:
+            context[way] = None
+        elif context.get(way):
+            link = app.builder.get_relative_uri(pagename, target)
+            context[way] = {"link": link, "title": app.builder.render_partial(app.env.titles[target])["title"]}
+
+
 def setup(app: Sphinx) -> dict:
     pybtex.plugin.register_plugin("pybtex.style.formatting", "short_names", ShortNames)
     app.connect("autodoc-process-docstring", unfold_fields, priority=400)
+    # Without it, a signature such as "Numbers | None" stays a text, whose names are ambiguous; Sphinx 8.2 has it.
+    TypeAliasForwardRef.__or__ = TypeAliasForwardRef.__ror__ = lambda self, other: Union[self, other]  # noqa: UP007
     app.connect("autodoc-process-signature", hide_enum_arguments)
     app.connect("doctree-resolved", write_powers)
     app.connect("doctree-resolved", mend_links)
+    # Sphinx numbers the figures with the priority 500.
+    app.connect("env-get-updated", keep_chapter_numbers, priority=100)
+    app.connect("env-get-updated", number_figures, priority=900)
     app.connect("env-updated", omit_modules_without_listing)
     app.connect("html-page-context", mend_listing_links)
-    app.connect("build-finished", copy_mathjax)
+    app.connect("html-page-context", skip_reference)
     app.connect("build-finished", write_first_page, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

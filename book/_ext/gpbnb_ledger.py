@@ -33,7 +33,8 @@ class Ledger(SphinxDirective):
     ``page NAME`` is a page of the complete ledger; ``errors TOPIC`` the errors in the statements of a chapter;
     ``verdict NAME`` the statements with one verdict; ``undone NAME`` what the documents leave undone, with one verdict;
     ``printed TITLE: IDS`` some statements as printed, collapsed;
-    ``roots`` the root errors; ``claims`` the principal claims; ``counts BY`` counts by document, chapter or kind.
+    ``roots`` the root errors, and ``tree`` the same as squares; ``squares`` every statement as a square; ``claims`` the
+    principal claims; ``counts BY`` counts by document, chapter or kind.
     """
 
     required_arguments = 1
@@ -46,7 +47,7 @@ class Ledger(SphinxDirective):
             self.env.note_dependency(str(path))
         what, *detail = (" ".join(argument.split()) for argument in self.arguments)
         if what == "counts":
-            parsed = self.parse_text_to_nodes(ledger().count_table(all_rows(), detail[0]).markdown())
+            parsed = self.parse_text_to_nodes(ledger().count_table(all_rows(), detail[0]).page())
             for table in (found for node in parsed for found in node.findall(nodes.table)):
                 table["classes"].append("counts")
             return parsed
@@ -73,6 +74,10 @@ class Ledger(SphinxDirective):
                 chosen = verdict(detail)
                 items = (row for row in rows if row.statement.kind == "open")
                 return ledger().note_table((r for r in items if r.finding and r.finding.verdict is chosen), True).html
+            case "squares":
+                return ledger().squares(rows).html
+            case "tree":
+                return ledger().root_tree(rows).html
             case "roots":
                 return ledger().root_table(rows).html
             case "claims":
@@ -83,10 +88,14 @@ class Ledger(SphinxDirective):
 def count(name, rawtext, text, lineno, inliner, options=None, content=None):
     """Write a count: of ``statements``, ``roots``, statements with a ``damaged`` scan, of a document, of a verdict.
 
-    A document and a verdict may be combined, as in ``hung1984 wrong``.
+    A document and a verdict may be combined, as in ``hung1984 wrong``. ``claims`` counts the principal claims, and
+    ``claims refuted`` those with this outcome.
     """
     rows = all_rows()
-    if text == "roots":
+    if text.startswith("claims"):
+        outcomes = [*ledger().claim_outcomes(rows).values()]
+        found = outcomes.count(text.removeprefix("claims ")) if " " in text else len(outcomes)
+    elif text == "roots":
         found = len(ledger().by_root(rows))
     elif text == "damaged":
         found = len(ledger().load_legibility())

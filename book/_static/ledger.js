@@ -22,9 +22,15 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
     for (const table of tables) table.hidden = !table.querySelector("tbody tr:not([hidden])");
     count.value = `${shown} of ${rows.length} statements shown`;
   };
+  // The address leads to what is shown: it can be sent, and is there again when the reader returns.
+  const write = () => {
+    const asked = new URLSearchParams([...new FormData(form)].filter(([, value]) => value.trim())).toString();
+    history.replaceState(null, "", `${location.pathname}${asked && "?"}${asked}${location.hash}`);
+  };
   const showAll = () => {
     for (const control of form.querySelectorAll("input, select")) control.value = "";
     show();
+    write();
   };
   // A link to a hidden statement clears the filters.
   const lead = () => {
@@ -35,7 +41,10 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
   };
 
   form.addEventListener("submit", (event) => event.preventDefault());
-  form.addEventListener("input", show);
+  form.addEventListener("input", () => {
+    show();
+    write();
+  });
   form.querySelector("button").addEventListener("click", showAll);
   window.addEventListener("hashchange", lead);
   form.hidden = false;
@@ -45,4 +54,25 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
   }
   show();
   window.addEventListener("load", lead);
+}
+
+// Hundreds of squares are one stop of the keyboard: arrows go from one to the next. What a square stands for is written below.
+for (const box of document.querySelectorAll(".squares")) {
+  const all = [...box.querySelectorAll("a.square")];
+  const said = box.querySelector(".squares-said");
+  const tell = ({ target }) => {
+    if (target.matches("a.square")) said.textContent = target.getAttribute("aria-label");
+  };
+  all.forEach((square, i) => (square.tabIndex = i ? -1 : 0));
+  box.addEventListener("focusin", tell);
+  box.addEventListener("pointerover", tell);
+  box.addEventListener("keydown", (event) => {
+    const at = all.indexOf(document.activeElement);
+    const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: all.length - 1 }[event.key];
+    if (at < 0 || !all[to]) return;
+    event.preventDefault();
+    all[at].tabIndex = -1;
+    all[to].tabIndex = 0;
+    all[to].focus();
+  });
 }
