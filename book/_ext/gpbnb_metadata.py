@@ -12,35 +12,47 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from xml.sax.saxutils import escape as escape_xml
 
+import matplotlib.pyplot as plt
 from docutils import nodes
-from PIL import Image
 from sphinx.application import Sphinx
 from sphinx.config import Config
 from sphinx.errors import ConfigError
 
+from gpbnb.report.display import style
+from gpbnb.report.gravity_probe_b import answers, figures
+
 VARIABLE = "BOOK_ADDRESS"
 PREVIEW = "_static/preview.png"
-SIZE = (1200, 630)
-"""Size of the preview picture in pixels, as link previews expect it."""
-SHORTEST, LONGEST = 50, 200
+PREVIEW_SIZE = (8.0, 4.2)
+"""Width and height of the preview picture in inches."""
+PREVIEW_DPI = 150
+"""Pixels per inch: the picture has 1200 x 630 of them, as link previews expect."""
+SHORTEST, LONGEST = 50, 260
 """Characters in a description."""
-CITATION = re.compile(r"\s*\[[^\]]*\d{4}\w?\]")
+CITATION = re.compile(r"\s*\[[^\]]*[^\W\d][^\]]*\d{4}\w?\]")
+YEAR = re.compile(r"\[(\d{4}\w?)\]")
+QUESTION = "The question."
+"""How the box that opens a chapter begins."""
+
+
+def sentences(text: str) -> str:
+    """Return the first whole sentences of a paragraph, without citations, up to the first that holds a formula."""
+    kept = ""
+    text = YEAR.sub(r"(\1)", CITATION.sub("", " ".join(text.split())))
+    for sentence in re.split(r"(?<=[.?!])\s+(?![a-z])", text):  # a title within a sentence may end with a mark
+        if "\\" in sentence or len(kept) + len(sentence) > LONGEST or not sentence.endswith((".", "?", "!")):
+            break
+        kept = f"{kept} {sentence}".strip()
+    return kept
 
 
 def description(doctree: nodes.document) -> str:
-    """Return the first sentences of a page, without formulas and citations; empty if there are none."""
-    for paragraph in doctree.findall(nodes.paragraph):
-        if not isinstance(paragraph.parent, nodes.section):
-            continue
-        kept = ""
-        text = CITATION.sub("", " ".join(paragraph.astext().split()))
-        for sentence in re.split(r"(?<=[.?!:])\s+", text):
-            if "\\" in sentence or len(kept) + len(sentence) > LONGEST:
-                break
-            kept = f"{kept} {sentence}".strip()
-        if len(kept) >= SHORTEST:
-            return kept.rstrip(":")
-    return ""
+    """Return the question of a chapter, or else the first sentences of a page; empty if there are none."""
+    paragraphs = list(doctree.findall(nodes.paragraph))
+    asked = [each.astext() for each in paragraphs if each.astext().startswith(QUESTION)]
+    texts = [text.removeprefix(QUESTION) for text in asked]
+    texts += [each.astext() for each in paragraphs if isinstance(each.parent, nodes.section)]
+    return next((kept for text in texts if len(kept := sentences(text)) >= SHORTEST), "")
 
 
 def read_address(app: Sphinx, config: Config) -> None:
@@ -79,21 +91,14 @@ def add_tags(app: Sphinx, page: str, template: str, context: dict, doctree: node
 
 
 def write_preview(app: Sphinx, error: Exception | None) -> None:
-    """Make the picture of link previews from the first figure of the book, on white."""
+    """Draw the picture of link previews, the figure that opens the book, on white."""
     if error or app.builder.format != "html":
         return
-    figures = app.env.get_doctree(app.config.root_doc).findall(nodes.image)
-    names = [app.env.images[figure["uri"]][1] for figure in figures if figure["uri"] in app.env.images]
-    pictures = [Path(app.outdir, app.builder.imagedir, name) for name in names if name.endswith(".png")]
-    if not pictures:
-        return
-    with Image.open(pictures[0]) as opened:
-        figure = opened.convert("RGBA")
-    scale = min((SIZE[0] - 80) / figure.width, (SIZE[1] - 40) / figure.height)
-    figure = figure.resize((round(figure.width * scale), round(figure.height * scale)), Image.Resampling.LANCZOS)
-    canvas = Image.new("RGBA", SIZE, "white")
-    canvas.alpha_composite(figure, ((SIZE[0] - figure.width) // 2, (SIZE[1] - figure.height) // 2))
-    canvas.convert("RGB").save(Path(app.outdir, PREVIEW), optimize=True)
+    figure, axes = style.figure(height=PREVIEW_SIZE[1])
+    figure.set_size_inches(PREVIEW_SIZE)
+    figures.digits_needed(answers.find_answers(), axes[0])
+    figure.savefig(Path(app.outdir, PREVIEW), dpi=PREVIEW_DPI, facecolor="white", bbox_inches=None)
+    plt.close(figure)
 
 
 def write_sitemap(app: Sphinx, error: Exception | None) -> None:
