@@ -32,9 +32,13 @@ FLAGS = [
 SETTLED = "async () => { await window.formulasTypeset; await document.fonts.ready }"
 # What follows from a new size is done: the boxes are observed before a frame is painted.
 RESTED = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"
-# Milliseconds until the text is painted, and until every formula that is shown is typeset.
-TIMES = """() => {
-  const [text] = performance.getEntriesByName("first-contentful-paint");
+# Milliseconds until the text is painted, and until every formula that is shown is typeset. On a busy machine a page
+# may be loaded before it is painted.
+TIMES = """async () => {
+  const text = await new Promise((done) => new PerformanceObserver((list) => {
+    const [entry] = list.getEntriesByName("first-contentful-paint");
+    if (entry) done(entry);
+  }).observe({ type: "paint", buffered: true }));
   const loaded = performance.getEntriesByType("navigation")[0].loadEventEnd;
   return { text: text.startTime, complete: Math.max(window.formulas.shown?.time ?? 0, loaded) };
 }"""

@@ -8,6 +8,7 @@ from itertools import pairwise
 from urllib.parse import unquote, urljoin, urlsplit
 
 import pytest
+from PIL import Image
 
 from . import axe
 from . import browser as tools
@@ -365,4 +366,5 @@ def test_every_page_of_the_book_has_a_preview_and_an_entry_in_the_sitemap():
         page = (tools.HTML / address).read_text(encoding="utf-8")
         assert all(f'<meta property="og:{name}"' in page for name in ("title", "image")), address
         assert f"{address}</loc>" in listed
-    assert (tools.HTML / "_static" / "preview.png").is_file()
+    with Image.open(tools.HTML / "_static" / "preview.png") as preview:
+        assert preview.size == (1200, 630)
