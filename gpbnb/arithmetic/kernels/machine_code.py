@@ -1,7 +1,7 @@
-"""Make machine code only for functions that Python calls.
+"""Optimize and make machine code only for functions that Python calls.
 
-By default, numba also makes machine code for functions that are only compiled into others, and never uses it. Without
-this work, a long loop compiles in about five sixths of the time.
+By default, numba also does so for functions that are only compiled into others, where they are optimized again.
+Without this work, the loops of a filter's run compile in about five eighths of the time and run as fast.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ _RANDOM, _BITS = random.SystemRandom(), 48
 class _Library(JITCodeLibrary):  # type: ignore[misc]
     """The compiled form of a function, with machine code once its address is asked for."""
 
+    def _optimize_final_module(self) -> None:
+        """Do nothing yet: what is compiled into another function is optimized there, and need not be before."""
+
     def _finalize_final_module(self) -> None:
         if self._object_caching_enabled and self._compiled_object:  # loaded from the cache
             super()._finalize_final_module()
@@ -29,6 +32,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
         self._ensure_finalized()
         defined = {function.name for function in self._final_module.functions if not function.is_declaration}
         if name in defined and not self._codegen._engine.is_symbol_defined(name):
+            super()._optimize_final_module()
             super()._finalize_final_module()
         return int(super().get_pointer_to_function(name))
 
