@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel
-from gpbnb.arithmetic.kernels.selection import tag_of
+from gpbnb.arithmetic.kernels.selection import tag_of, wide_tag
 from gpbnb.arithmetic.kernels.tags import (
+    FARTHEST,
     LEAST,
     LIMIT,
     Binary,
@@ -37,7 +38,6 @@ from gpbnb.arithmetic.rounding import Rounding, Rules
 Array = NDArray[Any]
 Components = tuple[Array, ...]
 
-_LARGEST_EXPONENT = 2**60
 _MANY = 1000  # multiplications in a product for which a look at the range of its entries pays
 _LEAST_32, _LARGEST_32 = 2.0**-126, float(np.finfo(np.float32).max)
 
@@ -178,7 +178,7 @@ _NAMES = {
 }
 
 
-class Compiled(Backend):
+class Looped(Backend):
     """Common part of the backends with compiled loops."""
 
     count: int  # number of components
@@ -187,6 +187,7 @@ class Compiled(Backend):
     def __init__(self, rules: Rules, tag: Tag) -> None:
         super().__init__(rules)
         self.tag = tag
+        self.exact = exact(rules)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return backend, (self.rules,)
@@ -223,6 +224,13 @@ class Compiled(Backend):
         except OverflowError:
             return None
         return None if gone else tuple(part.reshape(shape) for part in out)
+
+    def compare(self, a: Components, b: Components) -> Array:
+        shape = _shape(a, b)
+        order = np.empty(math.prod(shape), np.int8)
+        x, y = (tuple(_flat(part, shape) for part in components) for components in (a, b))
+        _loops().compared(self.tag, order.size, x, y, order)
+        return order.reshape(shape)
 
     def matmul(self, a: Components, b: Components) -> Components | None:
         return self._product(self.tag, a, b)
@@ -265,6 +273,10 @@ class Compiled(Backend):
     def _seen(self, components: Components) -> Any:
         """Bring components into the form that a compiled loop expects."""
         return components[0] if self.count == 1 else components
+
+
+class Compiled(Looped):
+    """Common part of the backends whose arithmetic the loops of filters know, too."""
 
 
 class Floats(Compiled):
@@ -374,12 +386,8 @@ class Pairs(Compiled):
     dtype = np.int64
     count = 2
 
-    def __init__(self, rules: Rules, tag: Tag) -> None:
-        super().__init__(rules, tag)
-        self.exact = exact(rules)
-
     def from_exact(self, m: Array, e: Array) -> Components | None:
-        if np.any(e > _LARGEST_EXPONENT) or np.any(e < -_LARGEST_EXPONENT):
+        if np.any(e > FARTHEST) or np.any(e < -FARTHEST):
             return None
         return m.astype(np.int64), e.astype(np.int64)
 
@@ -426,13 +434,6 @@ class Pairs(Compiled):
             return np.asarray(np.abs(operands[0][0])), operands[0][1]
         return super().apply(name, *operands)
 
-    def compare(self, a: Components, b: Components) -> Array:
-        shape = _shape(a, b)
-        order = np.empty(math.prod(shape), np.int8)
-        x, y = (tuple(_flat(part, shape) for part in components) for components in (a, b))
-        _loops().compared(self.tag, order.size, x, y, order)
-        return order.reshape(shape)
-
     def to_float(self, components: Components) -> Array:
         m, e = (_flat(part, components[0].shape) for part in components)
         x, states = np.empty(m.size), np.empty(m.size, np.int8)
@@ -440,6 +441,87 @@ class Pairs(Compiled):
         if (hard := states == 2).any():
             x[hard] = self.exact.to_float((m[hard].astype(object), e[hard].astype(object)))
         return x.reshape(components[0].shape)
+
+
+class Wide(Looped):
+    """Bases 2, 10 and 16 with any range: the upper and lower part of a significand and an exponent, as int64."""
+
+    dtype = np.int64
+    count = 3
+
+    def from_exact(self, m: Array, e: Array) -> Components | None:
+        if np.any(e > FARTHEST) or np.any(e < -FARTHEST):
+            return None
+        size, split = np.asarray(abs(m)), self.tag.split
+        high = np.asarray(size >> split).astype(np.int64)
+        low = np.asarray(size & ((1 << split) - 1)).astype(np.int64)
+        return np.where(np.asarray(m < 0, dtype=bool), -high, high), low, e.astype(np.int64)
+
+    def to_exact(self, components: Components) -> Components:
+        high, low, e = (part.astype(object) for part in components)
+        size = np.asarray((abs(high) << self.tag.split) | low)
+        return np.where(components[0] < 0, -size, size), e
+
+    def from_numbers(self, values: Array, exactly: bool) -> Components | None:
+        kind, size = values.dtype.kind, values.dtype.itemsize
+        if kind == "f" and size <= 8:
+            m, e = np.frexp(values.astype(np.float64, copy=False))
+            if not np.isfinite(m).all():
+                return None
+            return self._from_integers(np.ldexp(m, 53).astype(np.int64), e.astype(np.int64) - 53, True, exactly)
+        if kind not in "iu" or (size == 8 and ((values >= 2**63) | (values <= -(2**63))).any()):
+            return None
+        return self._from_integers(values.astype(np.int64), np.zeros(values.shape, np.int64), False, exactly)
+
+    def _from_integers(self, m: Array, e: Array, twos: bool, exactly: bool) -> Components | None:
+        out, states = self._empty(m.size), np.empty(m.size, np.int8)
+        try:
+            _wide().from_integers(self.tag, m.size, _flat(m, m.shape), _flat(e, m.shape), twos, out, states)
+        except OverflowError:
+            return None
+        if (exactly and states.any()) or (hard := np.flatnonzero(states == 2)).size > m.size // 2:
+            return None
+        for i in hard:
+            p, power = int(m.flat[i]), int(e.flat[i])
+            try:
+                pair = self.kernel.from_ratio(p << max(power, 0), 1 << max(-power, 0))
+            except OverflowError:
+                return None
+            for part, value in zip(out, self.from_exact(*np.array([pair], object).T), strict=True):
+                part[i] = value[0]
+        return tuple(part.reshape(m.shape) for part in out)
+
+    def from_backend(self, other: Backend, components: Components) -> Components | None:
+        if isinstance(other, Floats):
+            return self.from_numbers(components[0], exactly=False)
+        if other.base != self.base or not isinstance(other, Looped):
+            return None
+        if isinstance(other, Pairs):
+            return self._from_integers(*components, False, False)
+        shape = components[0].shape
+        out = self._empty(math.prod(shape))
+        try:
+            _wide().converted(other.tag, self.tag, out[0].size, tuple(_flat(part, shape) for part in components), out)
+        except OverflowError:
+            return None
+        return tuple(part.reshape(shape) for part in out)
+
+    def apply(self, name: str, *operands: Components) -> Components | None:
+        if name not in ("negative", "absolute"):
+            return super().apply(name, *operands)
+        high, low, e = operands[0]
+        limits = self.rules.limits
+        if limits is not None and limits.fixed and np.any((high == self.tag.lowest[0]) & (e == self.tag.lowest[2])):
+            return None  # the opposite of the lowest number is not in the format
+        return np.asarray(-high if name == "negative" else np.abs(high)), low, e
+
+    def to_float(self, components: Components) -> Array:
+        shape = components[0].shape
+        x, states = np.empty(math.prod(shape)), np.empty(math.prod(shape), np.int8)
+        _wide().to_floats(self.tag, x.size, parts := tuple(_flat(part, shape) for part in components), x, states)
+        if (hard := states == 2).any():
+            x[hard] = self.exact.to_float(self.to_exact(tuple(part[hard] for part in parts)))
+        return x.reshape(shape)
 
 
 @lru_cache(maxsize=256)
@@ -454,7 +536,7 @@ def backend(rules: Rules) -> Backend:
     """Return the fastest backend for a format."""
     tag = tag_of(rules)
     if tag is None:
-        return exact(rules)
+        return exact(rules) if (wide := wide_tag(rules)) is None else Wide(rules, wide)
     return (Pairs if rules.base == 10 else Floats)(rules, tag)
 
 
@@ -504,3 +586,10 @@ def _radix() -> Any:
     from gpbnb.arithmetic.kernels import radix
 
     return radix
+
+
+@lru_cache(maxsize=1)
+def _wide() -> Any:
+    from gpbnb.arithmetic.kernels import wide
+
+    return wide
