@@ -452,14 +452,14 @@ class Wide(Looped):
     def from_exact(self, m: Array, e: Array) -> Components | None:
         if np.any(e > FARTHEST) or np.any(e < -FARTHEST):
             return None
-        size, split = np.asarray(abs(m)), self.tag.split
-        high = np.asarray(size >> split).astype(np.int64)
-        low = np.asarray(size & ((1 << split) - 1)).astype(np.int64)
+        size, split = abs(m), self.tag.split
+        high = np.asarray(size >> split, dtype=np.int64)
+        low = np.asarray(size & ((1 << split) - 1), dtype=np.int64)
         return np.where(np.asarray(m < 0, dtype=bool), -high, high), low, e.astype(np.int64)
 
     def to_exact(self, components: Components) -> Components:
         high, low, e = (part.astype(object) for part in components)
-        size = np.asarray((abs(high) << self.tag.split) | low)
+        size = np.asarray((abs(high) << self.tag.split) | low, dtype=object)  # NumPy makes one entry a plain int
         return np.where(components[0] < 0, -size, size), e
 
     def from_numbers(self, values: Array, exactly: bool) -> Components | None:
