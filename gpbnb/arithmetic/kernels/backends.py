@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from fractions import Fraction
-from functools import lru_cache
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ from gpbnb.arithmetic.kernels.tags import (
     ShortEven,
     Tag,
     extents_of_sums,
+)
+from gpbnb.arithmetic.kernels.tags import (
+    Wide as TwoWords,
 )
 from gpbnb.arithmetic.rounding import Rounding, Rules
 
@@ -215,6 +218,44 @@ class Looped(Backend):
             return None
         return None if gone else tuple(part.reshape(shape[1:]) for part in out)
 
+    def from_backend(self, other: Backend, components: Components) -> Components | None:
+        """Round numbers of a backend with significands of one or two words."""
+        if self.wide is None or not isinstance(other, Pairs | Wide) or other.wide is None:
+            return None
+        shape = components[0].shape
+        triples = tuple(_flat(part, shape) for part in other.in_two_words(components))
+        out, states = tuple(np.empty(triples[0].size, np.int64) for _ in triples), np.empty(triples[0].size, np.int8)
+        try:
+            _wide().converted(other.wide, self.wide, out[0].size, triples, out, states)
+        except OverflowError:
+            return None
+        hard = np.flatnonzero(states == 2)
+        m, e = other.to_exact(tuple(part.reshape(-1)[hard] for part in components))
+        fractions = {int(i): other.kernel.to_fraction(*pair) for i, pair in zip(hard, zip(m, e, strict=True), strict=True)}
+        if not self._fill(out, fractions):
+            return None
+        return self.from_two_words(tuple(part.reshape(shape) for part in out))
+
+    def _fill(self, out: Components, fractions: dict[int, Fraction]) -> bool:
+        """Put rounded Fractions at some places of components of two words; return whether none overflows."""
+        for i, value in fractions.items():
+            try:
+                m, e = self.kernel.from_ratio(value.numerator, value.denominator)
+            except OverflowError:
+                return False
+            high, low = divmod(abs(m), 1 << cast(TwoWords, self.wide).split)
+            out[0][i], out[1][i], out[2][i] = (-high if m < 0 else high), low, e
+        return True
+
+    @cached_property
+    def wide(self) -> TwoWords | None:
+        """The tag of the same format with significands of two words, if it has one; conversions use it."""
+        return wide_tag(self.rules)
+
+    @abstractmethod
+    def from_two_words(self, components: Components) -> Components | None:
+        """Return the components of numbers that :class:`Wide` holds, or None if they do not fit."""
+
     def scan(self, components: Components) -> Components | None:
         shape = components[0].shape
         out = self._empty(math.prod(shape))
@@ -323,7 +364,10 @@ class Floats(Compiled):
         return None if components is None or (exactly and not np.array_equal(components[0], x)) else components
 
     def from_backend(self, other: Backend, components: Components) -> Components | None:
-        return self.apply("round_", components) if isinstance(other, Floats) else None
+        return self.apply("round_", components) if isinstance(other, Floats) else super().from_backend(other, components)
+
+    def from_two_words(self, components: Components) -> Components | None:
+        return self.from_exact(components[0], components[2])  # with at most 53 bits, the lower word is empty
 
     def apply(self, name: str, *operands: Components) -> Components | None:
         if name in ("negative", "absolute") and not self._has_opposites(operands[0][0]):
@@ -425,7 +469,16 @@ class Pairs(Compiled):
     def from_backend(self, other: Backend, components: Components) -> Components | None:
         if isinstance(other, Pairs):
             return self.apply("round_", components)
-        return self.from_numbers(components[0], exactly=False) if isinstance(other, Floats) else None
+        if isinstance(other, Floats):
+            return self.from_numbers(components[0], exactly=False)
+        return super().from_backend(other, components)
+
+    def in_two_words(self, components: Components) -> Components:
+        """Return numbers as the components of :class:`Wide`."""
+        return components[0], np.zeros(components[0].shape, np.int64), components[1]
+
+    def from_two_words(self, components: Components) -> Components:
+        return components[0], components[2]  # with at most 18 digits, the lower word is empty
 
     def apply(self, name: str, *operands: Components) -> Components | None:
         if name == "negative":
@@ -481,30 +534,20 @@ class Wide(Looped):
             return None
         if (exactly and states.any()) or (hard := np.flatnonzero(states == 2)).size > m.size // 2:
             return None
-        for i in hard:
-            p, power = int(m.flat[i]), int(e.flat[i])
-            try:
-                pair = self.kernel.from_ratio(p << max(power, 0), 1 << max(-power, 0))
-            except OverflowError:
-                return None
-            for part, value in zip(out, self.from_exact(*np.array([pair], object).T), strict=True):
-                part[i] = value[0]
-        return tuple(part.reshape(m.shape) for part in out)
+        fractions = {int(i): Fraction(int(m.flat[i])) * Fraction(2) ** int(e.flat[i]) for i in hard}
+        return tuple(part.reshape(m.shape) for part in out) if self._fill(out, fractions) else None
 
     def from_backend(self, other: Backend, components: Components) -> Components | None:
         if isinstance(other, Floats):
             return self.from_numbers(components[0], exactly=False)
-        if other.base != self.base or not isinstance(other, Looped):
-            return None
-        if isinstance(other, Pairs):
-            return self._from_integers(*components, False, False)
-        shape = components[0].shape
-        out = self._empty(math.prod(shape))
-        try:
-            _wide().converted(other.tag, self.tag, out[0].size, tuple(_flat(part, shape) for part in components), out)
-        except OverflowError:
-            return None
-        return tuple(part.reshape(shape) for part in out)
+        return super().from_backend(other, components)
+
+    def in_two_words(self, components: Components) -> Components:
+        """Return numbers as the components of this class."""
+        return components
+
+    def from_two_words(self, components: Components) -> Components:
+        return components
 
     def apply(self, name: str, *operands: Components) -> Components | None:
         if name not in ("negative", "absolute"):

@@ -348,28 +348,37 @@ def _exactly(fmt: Any, n: Any, e: Any, m: Any, f: Any) -> Any:
 
 
 @inner
-def _of_power_of_two(fmt: Any, m: Any, k: Any) -> Any:
-    """A word times 2**k as n, more, e for :func:`rounded`, and whether that was possible."""
-    if m == _U0:
-        return wide(_U0), False, np.int64(0), True
+def _from_binary(fmt: Any, n: Any, more: Any, k: Any) -> Any:
+    """Return ``(n + f) * 2**k``, f as in :func:`rounded`, as n, `more` and e in the base, and whether that succeeded.
+
+    If there are more digits, n has at least 127 bits, and the base is a power of two.
+    """
+    if n == wide(_U0):
+        return n, False, np.int64(0), True
     if fmt.bits > 0:
-        e = k // fmt.bits
-        return wide(m) << (k - e * fmt.bits), False, e, True
-    zeros = trailing_zeros(m)
-    n, places = wide(m >> np.uint64(zeros)), -(k + zeros)
+        spare = max(length(n) - 122, 0)
+        more |= (n & ((wide(_U1) << spare) - wide(_U1))) != wide(_U0)
+        e = (k + spare) // fmt.bits
+        return (n >> spare) << (k + spare - e * fmt.bits), more, e, True
+    word = low_word(n)
+    zeros = trailing_zeros(word) if word != _U0 else 64 + trailing_zeros(high_word(n))
+    n, places = n >> zeros, -(k + zeros)
     if places <= 0:
-        if length(n) - places > 120:
-            return n, False, np.int64(0), False
-        return n << -places, False, np.int64(0), True
-    if places > _MOST_PLACES:
+        possible = length(n) - places <= 120
+        return n << (-places if possible else 0), False, np.int64(0), possible
+    # With 5**p of p log2 5 bits, the product n * 5**places takes at most 246 bits.
+    if places > 2 * _MOST_PLACES or length(n) + ((places * 1189) >> 9) + 1 > 246:
         return n, False, np.int64(0), False
-    high, low = product(n, _entry(_FIVE, places))
-    if high == wide(_U0) and length(low) <= 120:
-        return low, False, -places, True
+    first = min(places, _MOST_PLACES)
+    high, low = product(n, _entry(_FIVE, first))
+    if places > first:
+        rest = _entry(_FIVE, places - first)
+        carried, low = product(low, rest)
+        high = high * rest + carried
     size = 128 + length(high) if high != wide(_U0) else length(low)
-    k = max(((size * 1233) >> 12) + 1 - fmt.room, 0)
-    n, more = _cut(fmt, high, low, k)
-    return n, more, k - places, True
+    excess = max(((size * 1233) >> 12) + 1 - fmt.room, 0)
+    n, more = _cut(fmt, high, low, excess)
+    return n, more, excess - places, True
 
 
 @compiled
@@ -382,7 +391,7 @@ def from_integers(fmt: Any, n: int, m: Any, e: Any, twos: Any, out: Any, states:
         size = np.uint64(abs(m[i]))
         digits, more, exponent, possible = wide(size), False, e[i], True
         if twos:
-            digits, more, exponent, possible = _of_power_of_two(fmt, size, e[i])
+            digits, more, exponent, possible = _from_binary(fmt, digits, False, e[i])
         x = zero()
         states[i] = 2
         if possible:
@@ -391,17 +400,12 @@ def from_integers(fmt: Any, n: int, m: Any, e: Any, twos: Any, out: Any, states:
         out[0][i], out[1][i], out[2][i] = parts(fmt, x)
 
 
-@compiled
-def converted(source: Any, fmt: Any, n: int, a: Any, c: Any) -> None:
-    """Round numbers of one format to another of the same base; raises OverflowError."""
-    for i in range(n):
-        x = round_(fmt, number(source, a[0][i], a[1][i], a[2][i]))
-        c[0][i], c[1][i], c[2][i] = parts(fmt, x)
-
-
 @inner
 def _in_binary(fmt: Any, m: Any, e: Any) -> Any:
-    """``m * base**e`` as n * 2**k with more than 64 bits, or exactly; whether more bits follow; whether it could be."""
+    """Return ``m * base**e`` as ``(n + f) * 2**k``: n, k, whether f > 0, and whether that succeeded.
+
+    If f > 0, n has at least 127 bits.
+    """
     if fmt.bits > 0:
         return m, e * fmt.bits, False, True
     if e > 38 or e < -38:
@@ -417,6 +421,24 @@ def _in_binary(fmt: Any, m: Any, e: Any) -> Any:
     s = 128 - length(m)
     q, rest = divided((m << s) >> 1, wide(_U0), _entry(_DIVISOR, k), _RECIPROCAL[k])
     return q, _SHIFT[k] - s - 127, rest != wide(_U0), True
+
+
+@compiled
+def converted(source: Any, fmt: Any, n: int, a: Any, out: Any, states: Any) -> None:
+    """Round numbers of one format to another, in any base; states[i] is 2 if the entry needs exact arithmetic.
+
+    Raises OverflowError.
+    """
+    for i in range(n):
+        negative, m, e = number(source, a[0][i], a[1][i], a[2][i])
+        more, possible = False, True
+        if source.bits != fmt.bits and m != wide(_U0):
+            m, e, more, possible = _in_binary(source, m, e)
+            if possible:
+                m, more, e, possible = _from_binary(fmt, m, more, e)
+        x = rounded(fmt, negative, m, more, e) if possible else zero()
+        states[i] = 0 if possible else 2
+        out[0][i], out[1][i], out[2][i] = parts(fmt, x)
 
 
 @compiled

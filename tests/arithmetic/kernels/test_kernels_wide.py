@@ -116,13 +116,32 @@ def test_numbers_beyond_float64_are_refused() -> None:
     assert named.BINARY128.array("5e-324").to_float() == 5e-324
 
 
-@pytest.mark.parametrize(
-    ("source", "target"),
-    [("54 bits", "binary128"), ("binary128", "54 bits"), ("binary128", "Q0.63"), ("decimal128", "19 digits, odd")],
-)
+NARROW = {
+    "binary32": named.BINARY32,
+    "binary64": named.BINARY64,
+    "24 bits": FloatFormat(2, 24),
+    "6 hexadecimal": FloatFormat(16, 6, "chop"),
+    "Q7.8": FixedFormat(7, 8, "down"),
+    "8 digits": FloatFormat(10, 8),
+    "17 digits": FloatFormat(10, 17, "chop"),
+    "decimal64": named.DECIMAL64,
+}
+ALL = FORMATS | NARROW
+
+
+@pytest.mark.parametrize("target", ALL)
+@pytest.mark.parametrize("source", ALL)
 def test_conversion_between_formats_rounds_once(source: str, target: str) -> None:
-    x = FORMATS[source].array([Fraction(n, 97) for n in range(-96, 97)])
-    assert np.all(FORMATS[target].array(x) == FORMATS[target].array(x.to_fractions()))
+    if source == target:
+        pytest.skip("nothing is rounded")
+    tiny = [Fraction(1, 10**9), Fraction(3, 10**25)] if not isinstance(ALL[source], FixedFormat) else []
+    halves = [Fraction(2 * n + 1, 2**k) for k in (9, 25, 54) for n in (0, 6)]
+    x = ALL[source].array([*(Fraction(n, 97) for n in range(-96, 97, 5)), *tiny, *halves])
+    found, expected = ALL[target].array(x), ALL[target].array(x.to_fractions())
+    assert np.all(found == expected)
+    assert found.backend is expected.backend
+    if type(x.backend) is not type(found.backend) or ALL[source].base != ALL[target].base:
+        assert ALL[target].backend.from_backend(x.backend, x.components) is not None
 
 
 @pytest.mark.parametrize("name", ["binary128", "decimal128", "IBM, 14 digits"])
