@@ -93,6 +93,10 @@ class Backend(ABC):
     def to_float(self, components: Components) -> Array:
         """Round each entry to the nearest float64; raises OverflowError like :meth:`ExactKernel.to_float`."""
 
+    def sort_keys(self, components: Components) -> Components | None:
+        """Return keys for ``np.lexsort``, the most significant last, or None if there are none."""
+        return None
+
     def fold(self, name: str, components: Components) -> Components | None:
         """Combine the entries along the first axis from left to right; there must be at least one."""
         return None
@@ -420,6 +424,9 @@ class Floats(Compiled):
     def compare(self, a: Components, b: Components) -> Array:
         return np.asarray(np.greater(a[0], b[0]).astype(np.int8) - np.less(a[0], b[0]).astype(np.int8))
 
+    def sort_keys(self, components: Components) -> Components:
+        return components
+
     def to_float(self, components: Components) -> Array:
         return components[0].copy()
 
@@ -486,6 +493,11 @@ class Pairs(Compiled):
         if name == "absolute":
             return np.asarray(np.abs(operands[0][0])), operands[0][1]
         return super().apply(name, *operands)
+
+    def sort_keys(self, components: Components) -> Components:
+        m, e = components
+        sign = np.sign(m)
+        return m, sign * e, sign
 
     def to_float(self, components: Components) -> Array:
         m, e = (_flat(part, components[0].shape) for part in components)
@@ -557,6 +569,11 @@ class Wide(Looped):
         if limits is not None and limits.fixed and np.any((high == self.tag.lowest[0]) & (e == self.tag.lowest[2])):
             return None  # the opposite of the lowest number is not in the format
         return np.asarray(-high if name == "negative" else np.abs(high)), low, e
+
+    def sort_keys(self, components: Components) -> Components:
+        high, low, e = components
+        sign = np.sign(high)
+        return sign * low, high, sign * e, sign
 
     def to_float(self, components: Components) -> Array:
         shape = components[0].shape

@@ -166,6 +166,18 @@ def test_matrices_sums_and_comparisons_agree_with_the_exact_backend(name: str) -
     assert np.array_equal(a < a.T, slow < slow.T)
 
 
+@pytest.mark.parametrize("name", ["binary128", "decimal128", "Q16.40", "binary32", "17 digits", "6 hexadecimal"])
+def test_sorting_orders_like_fractions_and_keeps_the_order_of_equal_entries(name: str) -> None:
+    fmt = ALL[name]
+    rng = np.random.default_rng(8)
+    near = [Fraction(1, 2) + fmt.unit_roundoff * k / 2 if isinstance(fmt, FloatFormat) else Fraction(k, 2**40) for k in range(5)]
+    numbers = [*near, Fraction(0), *(Fraction(int(n), 8) for n in rng.integers(-40, 40, 31)), *(-x for x in near)]
+    x = fmt.array([numbers[i] for i in rng.permutation(len(numbers))]).reshape(6, 7)
+    fractions = x.to_fractions()
+    for axis in (0, 1, -1, None):
+        assert np.array_equal(np.argsort(x, axis=axis), np.argsort(fractions, axis=axis, kind="stable"))
+
+
 def test_the_opposite_of_the_lowest_fixed_point_number_overflows() -> None:
     lowest = FixedFormat(0, 63).array(-1)
     with pytest.raises(OverflowError, match="negation"):
