@@ -4,9 +4,9 @@ Base 10 is compared with ``decimal`` (ROUND_HALF_UP, ROUND_DOWN), bases 2 and 16
 rounding of ties away from zero, but it follows from two of its roundings: chopped to one bit more, which keeps whether
 the exact result lies at or beyond the midpoint, then away from zero.
 
-Formats whose significands take two words have rows of their own; all their roundings and ranges are compared by
-:mod:`benchmarks.wide`. Half of the operands are random. The others are hard: ties, near-ties, cancellation, far exponents, powers of the base,
-carries to a new digit. The whole comparison, a share of 1, leaves its counts in ``benchmarks/results``.
+Formats whose significands take two words have rows of their own; :mod:`benchmarks.wide` compares all their roundings
+and ranges. Half of the operands are random. The others are hard: ties, near-ties, cancellation, far exponents, powers
+of the base, carries to a new digit. The whole comparison, a share of 1, leaves its counts in ``benchmarks/results``.
 """
 
 from __future__ import annotations
@@ -291,8 +291,9 @@ def binary_oracle(job: Job) -> Callable[..., list[Any]]:
     digits = job.precision
     name = {"subtract": "sub", "multiply": "mul", "divide": "div", "round": "plus"}.get(job.operation, job.operation)
     most = 4 * digits + 1 if job.base == 16 else digits + 1
-    contexts = {bits: getattr(gmpy2.context(precision=bits, round=gmpy2.RoundToZero), name) for bits in range(1, most + 1)}
-    away = {bits: gmpy2.context(precision=bits, round=gmpy2.RoundAwayZero).plus for bits in range(1, most + 1)}
+    sizes, context = range(1, most + 1), gmpy2.context
+    contexts = {bits: getattr(context(precision=bits, round=gmpy2.RoundToZero), name) for bits in sizes}
+    away = {bits: context(precision=bits, round=gmpy2.RoundAwayZero).plus for bits in sizes}
 
     def rounded(bits: int, operands: tuple[Any, ...]) -> Any:
         if job.nearest:

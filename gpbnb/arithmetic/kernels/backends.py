@@ -234,9 +234,8 @@ class Looped(Backend):
         except OverflowError:
             return None
         hard = np.flatnonzero(states == 2)
-        m, e = other.to_exact(tuple(part.reshape(-1)[hard] for part in components))
-        fractions = {int(i): other.kernel.to_fraction(*pair) for i, pair in zip(hard, zip(m, e, strict=True), strict=True)}
-        if not self._fill(out, fractions):
+        pairs = zip(*other.to_exact(tuple(part.reshape(-1)[hard] for part in components)), strict=True)
+        if not self._fill(out, {int(i): other.kernel.to_fraction(*pair) for i, pair in zip(hard, pairs, strict=True)}):
             return None
         return self.from_two_words(tuple(part.reshape(shape) for part in out))
 
@@ -368,7 +367,9 @@ class Floats(Compiled):
         return None if components is None or (exactly and not np.array_equal(components[0], x)) else components
 
     def from_backend(self, other: Backend, components: Components) -> Components | None:
-        return self.apply("round_", components) if isinstance(other, Floats) else super().from_backend(other, components)
+        if isinstance(other, Floats):
+            return self.apply("round_", components)
+        return super().from_backend(other, components)
 
     def from_two_words(self, components: Components) -> Components | None:
         return self.from_exact(components[0], components[2])  # with at most 53 bits, the lower word is empty

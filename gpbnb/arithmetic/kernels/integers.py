@@ -75,9 +75,7 @@ for _function, _sign in (
     (operator.eq, "=="),
     (operator.ne, "!="),
 ):
-    _operator(
-        _function, types.boolean, uint128, lambda builder, a, b, sign=_sign: builder.icmp_unsigned(sign, a, b)
-    )
+    _operator(_function, types.boolean, uint128, lambda builder, a, b, sign=_sign: builder.icmp_unsigned(sign, a, b))
 
 
 @intrinsic
@@ -138,7 +136,8 @@ def _words_product(a: Any, b: Any) -> Any:
 def product(a: Any, b: Any) -> Any:
     """The product of two uint128, as its upper and lower 128 bits."""
     a1, a0, b1, b0 = high_word(a), low_word(a), high_word(b), low_word(b)
-    low, cross, other, high = _words_product(a0, b0), _words_product(a0, b1), _words_product(a1, b0), _words_product(a1, b1)
+    low, high = _words_product(a0, b0), _words_product(a1, b1)
+    cross, other = _words_product(a0, b1), _words_product(a1, b0)
     middle = wide(high_word(low)) + wide(low_word(cross)) + wide(low_word(other))
     high = high + wide(high_word(cross)) + wide(high_word(other)) + wide(high_word(middle))
     return high, joined(low_word(middle), low_word(low))

@@ -85,9 +85,7 @@ def wide_tag(rules: Rules) -> tags.Wide | None:
             return None
     room = 37 if base == 10 else 126 // bits
     saturates = limits is not None and limits.overflow == "saturate"
-    return tags.Wide(
-        bits, _CODES[rounding], precision, room, split, small, quantum, lowest, largest, saturates
-    )
+    return tags.Wide(bits, _CODES[rounding], precision, room, split, small, quantum, lowest, largest, saturates)
 
 
 def _stored(rules: Rules, number: Fraction, split: int) -> tuple[int, int, int]:

@@ -14,8 +14,8 @@ LEAST, LIMIT = 2.0**-960, 2.0**1023  # magnitudes of Binary and Hexadecimal, fro
 # Codes of rounding modes. AWAY and EVEN round to nearest, with ties away from zero or to the even last digit. ZERO, UP
 # and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to neighbours with an odd last digit.
 AWAY, EVEN, ZERO, UP, DOWN, ODD = range(6)
-# What happens below the smallest normal number of a Wide format: nothing, as there is none; its spacing is kept; numbers
-# become zero; or all numbers have one spacing.
+# What happens below the smallest normal number of a Wide format: there is none; its spacing is kept; numbers become
+# zero; or all numbers have one spacing.
 UNLIMITED, GRADUAL, ABRUPT, FIXED = range(4)
 FARTHEST = 2**60  # exponent of a Wide number
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.kernels.bits import from_bits, trailing_zeros
+from gpbnb.arithmetic.kernels.bits import from_bits, leading_zeros, trailing_zeros
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.decimal import increment
 from gpbnb.arithmetic.kernels.integers import (
@@ -190,7 +190,7 @@ def rounded(fmt: Any, negative: Any, n: Any, more: Any, e: Any) -> Any:
     if _exceeds(fmt, n, e, fmt.lowest if negative else fmt.largest):
         return _beyond(fmt, negative)
     if e < -FARTHEST:
-        raise OverflowError("got a result with an exponent below -2**60; needed one that int64 holds; scale the numbers")
+        raise OverflowError("got a result with an exponent below -2**60; needed one above; scale the numbers")
     return negative, n, e
 
 
@@ -252,6 +252,11 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
         raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
     if a[1] == wide(_U0):
         return zero()
+    if fmt.bits == 1 and fmt.split == 0:  # significands of at most 61 bits: a quotient of 63 or 64 is long enough
+        x, y = low_word(a[1]), low_word(b[1])
+        up, s = leading_zeros(x), leading_zeros(y)
+        digit, left = divided_by_word(x << (up - 1), _U0, y << s)
+        return rounded(fmt, a[0] != b[0], wide(digit), left != _U0, a[2] - b[2] - 63 - up + s)
     k = fmt.room - 1
     high, low = _enlarged(fmt, a[1], k)
     s = 128 - length(b[1])
@@ -297,6 +302,8 @@ def sqrt(fmt: Any, a: Any) -> Any:
         high, low = shifted_left(high, low, 2 * s)
     first = (high << 8) | (low >> 120)
     root = _root_of_126_bits(first)
+    if s >= 60:  # the other bits are zeros
+        return rounded(fmt, False, wide(root) >> (s - 60), wide(root) * wide(root) != first, (a[2] - k) >> 1)
     rest = (first - wide(root) * wide(root)) << 60 | ((low >> 60) & wide(_LOW_60))
     digit, rest_word = divided_by_word(high_word(rest), low_word(rest), root + root)
     rest = (wide(rest_word) << 60) | (low & wide(_LOW_60))
