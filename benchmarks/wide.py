@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.exactness import OPERATIONS, WIDE, Job, pairs, radicands
-from gpbnb.arithmetic.kernels.backends import Backend, Components, Wide, exact
+from gpbnb.arithmetic.kernels.backends import Backend, Components, TwoWords, exact
 from gpbnb.arithmetic.kernels.exact import kernel
 from gpbnb.arithmetic.kernels.selection import wide_tag
 from gpbnb.arithmetic.rounding import Limits, Rounding, Rules
@@ -61,12 +61,12 @@ def _limits(base: int, precision: int, kind: str) -> Limits | None:
     return Limits(emin, kind != "flushed", largest, -largest, "saturate" if kind == "saturating" else "raise")
 
 
-def backend(rules: Rules) -> Wide:
+def backend(rules: Rules) -> TwoWords:
     """The backend with significands of two words, also of a format that has a faster one."""
     tag = wide_tag(rules)
     if tag is None:
         raise ValueError(f"got {rules}; needed significands that two words hold")
-    return Wide(rules, tag)
+    return TwoWords(rules, tag)
 
 
 def operands(rules: Rules, operation: str, count: int, seed: tuple[int, ...]) -> list[Components]:

@@ -31,10 +31,8 @@ from gpbnb.arithmetic.kernels.tags import (
     Random,
     ShortEven,
     Tag,
+    Wide,
     extents_of_sums,
-)
-from gpbnb.arithmetic.kernels.tags import (
-    Wide as TwoWords,
 )
 from gpbnb.arithmetic.rounding import Rounding, Rules
 
@@ -224,7 +222,7 @@ class Looped(Backend):
 
     def from_backend(self, other: Backend, components: Components) -> Components | None:
         """Round numbers of a backend with significands of one or two words."""
-        if self.wide is None or not isinstance(other, Pairs | Wide) or other.wide is None:
+        if self.wide is None or not isinstance(other, Pairs | TwoWords) or other.wide is None:
             return None
         shape = components[0].shape
         triples = tuple(_flat(part, shape) for part in other.in_two_words(components))
@@ -246,18 +244,18 @@ class Looped(Backend):
                 m, e = self.kernel.from_ratio(value.numerator, value.denominator)
             except OverflowError:
                 return False
-            high, low = divmod(abs(m), 1 << cast(TwoWords, self.wide).split)
+            high, low = divmod(abs(m), 1 << cast(Wide, self.wide).split)
             out[0][i], out[1][i], out[2][i] = (-high if m < 0 else high), low, e
         return True
 
     @cached_property
-    def wide(self) -> TwoWords | None:
+    def wide(self) -> Wide | None:
         """The tag of the same format with significands of two words, if it has one; conversions use it."""
         return wide_tag(self.rules)
 
     @abstractmethod
     def from_two_words(self, components: Components) -> Components | None:
-        """Return the components of numbers that :class:`Wide` holds, or None if they do not fit."""
+        """Return the components of numbers that :class:`TwoWords` holds, or None if they do not fit."""
 
     def scan(self, components: Components) -> Components | None:
         shape = components[0].shape
@@ -482,7 +480,7 @@ class Pairs(Compiled):
         return super().from_backend(other, components)
 
     def in_two_words(self, components: Components) -> Components:
-        """Return numbers as the components of :class:`Wide`."""
+        """Return numbers as the components of :class:`TwoWords`."""
         return components[0], np.zeros(components[0].shape, np.int64), components[1]
 
     def from_two_words(self, components: Components) -> Components:
@@ -509,7 +507,7 @@ class Pairs(Compiled):
         return x.reshape(components[0].shape)
 
 
-class Wide(Looped):
+class TwoWords(Looped):
     """Bases 2, 10 and 16 with any range: the upper and lower part of a significand and an exponent, as int64."""
 
     dtype = np.int64
@@ -597,7 +595,7 @@ def backend(rules: Rules) -> Backend:
     """Return the fastest backend for a format."""
     tag = tag_of(rules)
     if tag is None:
-        return exact(rules) if (wide := wide_tag(rules)) is None else Wide(rules, wide)
+        return exact(rules) if (wide := wide_tag(rules)) is None else TwoWords(rules, wide)
     return (Pairs if rules.base == 10 else Floats)(rules, tag)
 
 

@@ -12,7 +12,7 @@ from benchmarks import wide
 from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Wide, backend
+from gpbnb.arithmetic.kernels.backends import TwoWords, backend
 from gpbnb.arithmetic.kernels.selection import wide_tag
 from gpbnb.arithmetic.rounding import Rounding, Rules
 
@@ -49,7 +49,7 @@ def test_a_wrong_rounding_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_the_format_is_stored_in_two_words(name: str) -> None:
-    assert isinstance(FORMATS[name].backend, Wide)
+    assert isinstance(FORMATS[name].backend, TwoWords)
 
 
 OTHERS = (
@@ -64,7 +64,7 @@ OTHERS = (
 @pytest.mark.parametrize("rules", OTHERS)
 def test_longer_significands_other_bases_and_random_roundings_are_not(rules: Rules) -> None:
     assert wide_tag(rules) is None
-    assert not isinstance(backend(rules), Wide)
+    assert not isinstance(backend(rules), TwoWords)
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -170,8 +170,8 @@ def test_matrices_sums_and_comparisons_agree_with_the_exact_backend(name: str) -
         lambda x: np.max(x),
     ):
         found, expected = operate(a), operate(slow)
-        assert isinstance(found.backend, Wide)
-        assert not isinstance(expected.backend, Wide)
+        assert isinstance(found.backend, TwoWords)
+        assert not isinstance(expected.backend, TwoWords)
         assert all(map(np.array_equal, found.to_pairs(), expected.to_pairs()))
     assert np.array_equal(a < a.T, slow < slow.T)
 
