@@ -188,6 +188,7 @@ class Looped(Backend):
 
     count: int  # number of components
     fuses = False  # whether it has a fused multiply-add
+    tag: Tag
 
     def __init__(self, rules: Rules, tag: Tag) -> None:
         super().__init__(rules)
@@ -512,8 +513,9 @@ class TwoWords(Looped):
 
     dtype = np.int64
     count = 3
+    tag: Wide
 
-    def from_exact(self, m: Array, e: Array) -> Components | None:
+    def from_exact(self, m: Any, e: Any) -> Components | None:
         if np.any(e > FARTHEST) or np.any(e < -FARTHEST):
             return None
         size, split = abs(m), self.tag.split
@@ -523,7 +525,8 @@ class TwoWords(Looped):
 
     def to_exact(self, components: Components) -> Components:
         high, low, e = (part.astype(object) for part in components)
-        size = np.asarray((abs(high) << self.tag.split) | low, dtype=object)  # NumPy makes one entry a plain int
+        size: Any = np.empty(e.shape, object)
+        size[...] = (abs(cast(Any, high)) << self.tag.split) | low  # NumPy makes a single entry a plain int
         return np.where(components[0] < 0, -size, size), e
 
     def from_numbers(self, values: Array, exactly: bool) -> Components | None:

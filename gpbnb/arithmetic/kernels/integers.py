@@ -27,7 +27,7 @@ _HALF_WORD = np.uint64(2**32 - 1)
 _TWO_64 = 2.0**64
 
 
-class _UInt128(types.Type):
+class _UInt128(types.Type):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__(name="uint128")
 
@@ -36,7 +36,7 @@ uint128 = _UInt128()
 
 
 @register_model(_UInt128)
-class _Model(models.PrimitiveModel):
+class _Model(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, manager: Any, numba_type: Any) -> None:
         super().__init__(manager, numba_type, _BITS)
 
