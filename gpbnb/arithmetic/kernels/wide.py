@@ -409,25 +409,25 @@ def from_integers(fmt: Any, n: int, m: Any, e: Any, twos: Any, out: Any, states:
 
 @inner
 def _in_binary(fmt: Any, m: Any, e: Any) -> Any:
-    """Return ``m * base**e`` as ``(n + f) * 2**k``: n, k, whether f > 0, and whether that succeeded.
+    """Return ``m * base**e`` as ``(n + f) * 2**k``: n, whether f > 0, k, and whether that succeeded.
 
     If f > 0, n has at least 127 bits.
     """
     if fmt.bits > 0:
-        return m, e * fmt.bits, False, True
+        return m, False, e * fmt.bits, True
     if e > 38 or e < -38:
-        return m, np.int64(0), False, False
+        return m, False, np.int64(0), False
     if e >= 0:
         high, low = product(m, _entry(_POWER, e))
         if high == wide(_U0):
-            return low, np.int64(0), False, True
+            return low, False, np.int64(0), True
         s = 128 - length(high)
         high, low = shifted_left(high, low, s)
-        return high, 128 - s, low != wide(_U0), True
+        return high, low != wide(_U0), 128 - s, True
     k = np.uint64(-e)
     s = 128 - length(m)
     q, rest = divided((m << s) >> 1, wide(_U0), _entry(_DIVISOR, k), _RECIPROCAL[k])
-    return q, _SHIFT[k] - s - 127, rest != wide(_U0), True
+    return q, rest != wide(_U0), _SHIFT[k] - s - 127, True
 
 
 @compiled
@@ -440,7 +440,7 @@ def converted(source: Any, fmt: Any, n: int, a: Any, out: Any, states: Any) -> N
         negative, m, e = number(source, a[0][i], a[1][i], a[2][i])
         more, possible = False, True
         if source.bits != fmt.bits and m != wide(_U0):
-            m, e, more, possible = _in_binary(source, m, e)
+            m, more, e, possible = _in_binary(source, m, e)
             if possible:
                 m, more, e, possible = _from_binary(fmt, m, more, e)
         x = rounded(fmt, negative, m, more, e) if possible else zero()
@@ -456,7 +456,7 @@ def to_floats(fmt: Any, n: int, a: Any, out: Any, states: Any) -> None:
         out[i], states[i] = 0.0, 0
         if m == wide(_U0):
             continue
-        m, k, more, possible = _in_binary(fmt, m, e)
+        m, more, k, possible = _in_binary(fmt, m, e)
         size = length(m)
         exponent = size - 1 + k  # of the highest bit
         if not possible or exponent < -1021 or exponent > 1022:
