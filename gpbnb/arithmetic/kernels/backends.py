@@ -1,4 +1,4 @@
-"""Backends that store an array's numbers and compute with them: as float64, pairs of int64, or Python integers.
+"""Backends that store an array's numbers and compute with them: as float64, two or three int64, or Python integers.
 
 A backend works on `components`, a tuple of arrays with the same shape, so that NumPy can reshape, slice and join all of
 them in the same way. The first array carries the sign. If a compiled backend cannot hold or compute a result, it
