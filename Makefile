@@ -93,6 +93,7 @@ format: .venv/made-for ## let ruff lay out the code and mend what it can
 exactness: .venv/made-for ## billions of operations compared with independent arithmetic, digit for digit, and more altered statements; it resumes
 	GPBNB_ALTERATIONS=more $(PY) -m pytest -q -n 2 --dist loadgroup --no-loadscope-reorder tests/ledger/test_alterations.py
 	$(PY) -m benchmarks.exactness
+	$(PY) -m benchmarks.wide
 	$(PY) -m benchmarks.processors
 	$(PY) -m benchmarks.paths
 	$(PY) -m benchmarks.code

@@ -4,8 +4,9 @@ Base 10 is compared with ``decimal`` (ROUND_HALF_UP, ROUND_DOWN), bases 2 and 16
 rounding of ties away from zero, but it follows from two of its roundings: chopped to one bit more, which keeps whether
 the exact result lies at or beyond the midpoint, then away from zero.
 
-Half of the operands are random. The others are hard: ties, near-ties, cancellation, far exponents, powers of the base,
-carries to a new digit. The whole comparison, a share of 1, leaves its counts in ``benchmarks/results``.
+Formats whose significands take two words have rows of their own; :mod:`benchmarks.wide` compares all their roundings
+and ranges. Half of the operands are random. The others are hard: ties, near-ties, cancellation, far exponents, powers
+of the base, carries to a new digit. The whole comparison, a share of 1, leaves its counts in ``benchmarks/results``.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,8 +34,11 @@ from gpbnb.arithmetic.rounding import Rounding, Rules
 from gpbnb.report.display.tables import Table
 
 PRECISIONS = {2: range(1, 54), 10: range(1, 19), 16: range(1, 14)}
+WIDE = {2: (54, 55, 63, 64, 65, 106, 112, 113), 10: (19, 20, 21, 27, 33, 34), 16: (14, 15, 27, 28)}
+"""Precisions whose significands take two words."""
 OPERATIONS = ("add", "subtract", "multiply", "divide", "sqrt", "round")
 PER_BASE_AND_ROUNDING = {2: 10_000_000, 10: 10_000_000, 16: 1_000_000}
+PER_WIDE = 1_000_000
 BATCH = 25_000
 SHOWN = 20  # mismatches
 RESULTS = Path(__file__).parent / "results"
@@ -52,6 +57,11 @@ class Job(NamedTuple):
     seed: tuple[int, ...]
 
     @property
+    def wide(self) -> bool:
+        """Whether significands take two words."""
+        return self.precision in WIDE[self.base]
+
+    @property
     def rules(self) -> Rules:
         return Rules(self.base, self.precision, Rounding.NEAREST if self.nearest else Rounding.CHOP)
 
@@ -66,8 +76,9 @@ class Outcome(NamedTuple):
 
 def jobs(share: float, seed: int) -> Iterator[Job]:
     """All batches, or a share of each."""
-    for base, precisions in PRECISIONS.items():
-        each = -(-PER_BASE_AND_ROUNDING[base] // (len(precisions) * len(OPERATIONS)))
+    families = [(base, precisions, PER_BASE_AND_ROUNDING[base]) for base, precisions in PRECISIONS.items()]
+    for base, precisions, total in [*families, *((base, precisions, PER_WIDE) for base, precisions in WIDE.items())]:
+        each = -(-total // (len(precisions) * len(OPERATIONS)))
         count = max(1, round(each * share))
         for nearest in (True, False):
             for precision in precisions:
@@ -91,8 +102,11 @@ class Draw:
         self.reach = 10**9 if self.base == 10 else int(200 / np.log2(self.base))
 
     def below(self, limit: int) -> Integers:
-        """Integers from 0 to `limit` - 1."""
-        return self.rng.integers(0, limit, self.count).astype(object)
+        """Integers from 0 to `limit` - 1, those of more than a word not quite uniform."""
+        if limit <= 2**62:
+            return self.rng.integers(0, limit, self.count).astype(object)
+        words = [self.rng.integers(0, 2**60, self.count).astype(object) for _ in range(4)]
+        return np.asarray(sum(word << (60 * i) for i, word in enumerate(words)) % limit, dtype=object)
 
     def sign(self) -> Integers:
         return 1 - 2 * self.below(2)
@@ -190,10 +204,10 @@ def _ties_of_products(d: Draw) -> tuple[Integers, ...]:
     """Factors of j and t + 1 - j digits whose product ends in half a unit."""
     m1, m2 = np.empty(d.count, object), np.empty(d.count, object)
     half = d.base // 2 if d.base > 2 else 1
+    n = d.below(d.limit)
     for i, j in enumerate(d.rng.integers(1, d.t + 1, d.count)):
-        x = int(d.rng.integers(d.base ** (int(j) - 1), d.base ** int(j)))
         k = d.t + 1 - int(j)
-        y = int(d.rng.integers(d.base ** (k - 1), d.base**k))
+        x, y = (d.base ** (size - 1) + int(n[i]) % (d.base**size - d.base ** (size - 1)) for size in (int(j), k))
         m1[i], m2[i] = x // d.base * d.base + half, y | 1
     return (*d.normalized(m1, d.gap()), *d.normalized(m2, d.gap()))
 
@@ -272,32 +286,32 @@ def _chopped_root(context: decimal.Context, a: decimal.Decimal) -> decimal.Decim
     return context.plus(wide.sqrt(a))
 
 
-def binary_oracle(job: Job) -> Callable[..., list[float]]:
-    """The operation of MPFR on lists of float64."""
+def binary_oracle(job: Job) -> Callable[..., list[Any]]:
+    """The operation of MPFR on lists of its numbers."""
     digits = job.precision
     name = {"subtract": "sub", "multiply": "mul", "divide": "div", "round": "plus"}.get(job.operation, job.operation)
-    contexts = {bits: getattr(gmpy2.context(precision=bits, round=gmpy2.RoundToZero), name) for bits in range(1, 55)}
-    away = {bits: gmpy2.context(precision=bits, round=gmpy2.RoundAwayZero).plus for bits in range(1, 55)}
-    mpfr = gmpy2.mpfr
+    most = 4 * digits + 1 if job.base == 16 else digits + 1
+    sizes, context = range(1, most + 1), gmpy2.context
+    contexts = {bits: getattr(context(precision=bits, round=gmpy2.RoundToZero), name) for bits in sizes}
+    away = {bits: context(precision=bits, round=gmpy2.RoundAwayZero).plus for bits in sizes}
 
-    def rounded(bits: int, operands: tuple[Any, ...]) -> float:
+    def rounded(bits: int, operands: tuple[Any, ...]) -> Any:
         if job.nearest:
-            return float(away[bits](contexts[bits + 1](*operands)))
-        return float(contexts[bits](*operands))
+            return away[bits](contexts[bits + 1](*operands))
+        return contexts[bits](*operands)
 
-    def base_two(*lists: list[float]) -> list[float]:
-        return [rounded(digits, tuple(mpfr(a, 53) for a in operands)) for operands in zip(*lists, strict=True)]
+    def base_two(*lists: list[Any]) -> list[Any]:
+        return [rounded(digits, operands) for operands in zip(*lists, strict=True)]
 
-    def base_sixteen(*lists: list[float]) -> list[float]:
+    def base_sixteen(*lists: list[Any]) -> list[Any]:
         results = []
         for operands in zip(*lists, strict=True):
-            exact = tuple(mpfr(a, 53) for a in operands)
-            chopped = contexts[53](*exact)
+            chopped = contexts[most](*operands)
             if chopped == 0:
-                results.append(0.0)
+                results.append(gmpy2.mpfr(0))
                 continue
             leading = (gmpy2.get_exp(chopped) - 1) % 4  # bits after the first of the first digit
-            results.append(rounded(4 * digits - 3 + leading, exact))
+            results.append(rounded(4 * digits - 3 + leading, operands))
         return results
 
     return base_two if job.base == 2 else base_sixteen
@@ -309,8 +323,13 @@ def binary_oracle(job: Job) -> Callable[..., list[float]]:
 def compare(job: Job) -> Outcome:
     """Run a batch through the kernel and the oracle."""
     backend = backends.backend(job.rules)
-    if job.operation == "round":
-        operands: list[tuple[Integers, Integers]] = [(long_numbers(job), np.zeros(job.count, object))]
+    operands: list[tuple[Integers, Integers]]
+    if job.operation == "round" and job.wide:
+        widest = job._replace(precision=WIDE[job.base][-1])
+        m1, e1, _, _ = pairs(widest._replace(operation="add"))
+        operands = [(m1, e1)]
+    elif job.operation == "round":
+        operands = [(long_numbers(job), np.zeros(job.count, object))]
     elif job.operation == "sqrt":
         operands = [radicands(job)]
     else:
@@ -318,18 +337,13 @@ def compare(job: Job) -> Outcome:
         if job.operation == "divide":
             m2 = np.where(m2 == 0, job.base ** (job.precision - 1), m2)
         operands = [(m1, e1), (m2, e2)]
-    run = _decimal if job.base == 10 else _binary
+    run = _two_words if job.wide else _decimal if job.base == 10 else _binary
     return Outcome(job, job.count, run(job, backend, operands))
 
 
 def _decimal(job: Job, backend: Any, operands: list[tuple[Integers, Integers]]) -> list[str]:
     compiled = [(m.astype(np.int64), e.astype(np.int64)) for m, e in operands]
     m, e = backend.apply("round_" if job.operation == "round" else job.operation, *compiled)
-    wide = decimal.Context(prec=60, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
-
-    def decimals(m: Any, e: Any) -> list[decimal.Decimal]:
-        return [wide.scaleb(decimal.Decimal(a), b) for a, b in zip(m.tolist(), e.tolist(), strict=True)]
-
     inputs = [decimals(m, e) for m, e in operands]
     expected = decimal_oracle(job)(*inputs)
     computed = decimals(m, e)
@@ -342,13 +356,50 @@ def _decimal(job: Job, backend: Any, operands: list[tuple[Integers, Integers]]) 
     ][:SHOWN]
 
 
+def decimals(m: Any, e: Any) -> list[decimal.Decimal]:
+    long = decimal.Context(prec=60, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
+    return [long.scaleb(decimal.Decimal(a), b) for a, b in zip(m.tolist(), e.tolist(), strict=True)]
+
+
+def _two_words(job: Job, backend: Any, operands: list[tuple[Integers, Integers]]) -> list[str]:
+    if job.operation == "round":
+        widest = backends.backend(job._replace(precision=WIDE[job.base][-1]).rules)
+        result = backend.from_backend(widest, widest.from_exact(*operands[0]))
+    else:
+        result = backend.apply(job.operation, *(backend.from_exact(m, e) for m, e in operands))
+    m, e = backend.to_exact(result)
+    numbers, oracle = (decimals, decimal_oracle) if job.base == 10 else (_mpfrs(job.base), binary_oracle)
+    inputs, computed = [numbers(*pair) for pair in operands], numbers(m, e)
+    size, least = abs(m), job.base ** (job.precision - 1)
+    normal = (size >= least) & (size < least * job.base) | ((m == 0) & (e == 0))
+    return [
+        f"{job}: {[str(x[i]) for x in inputs]}: {computed[i]}, but {value}"
+        for i, value in enumerate(oracle(job)(*inputs))
+        if computed[i] != value or not normal[i]
+    ][:SHOWN]
+
+
+def _mpfrs(base: int) -> Callable[[Integers, Integers], list[Any]]:
+    exact = gmpy2.context(precision=128)
+    bits = base.bit_length() - 1
+
+    def numbers(m: Integers, e: Integers) -> list[Any]:
+        return [
+            exact.mul_2exp(gmpy2.mpfr(a, 128), bits * b) if b >= 0 else exact.div_2exp(gmpy2.mpfr(a, 128), -bits * b)
+            for a, b in zip(m.tolist(), e.tolist(), strict=True)
+        ]
+
+    return numbers
+
+
 def _binary(job: Job, backend: Any, operands: list[tuple[Integers, Integers]]) -> list[str]:
     scale = 4 if job.base == 16 and job.operation != "round" else 1
     compiled = [np.ldexp(m.astype(np.float64), (scale * e).astype(np.int64)) for m, e in operands]
     name = "round_" if job.operation == "round" else job.operation
     (result,) = backend.apply(name, *((x,) for x in compiled))
     inputs = [x.tolist() for x in compiled]
-    expected = np.array(binary_oracle(job)(*inputs))
+    numbers = [[gmpy2.mpfr(a, 53) for a in x] for x in inputs]
+    expected = np.array([float(value) for value in binary_oracle(job)(*numbers)])
     wrong = np.flatnonzero((result != expected) | np.signbit(result) & (result == 0))
     return [
         f"{job}: {[x[i].hex() for x in inputs]}: {float(result[i]).hex()}, but MPFR {float(expected[i]).hex()}"
@@ -383,27 +434,27 @@ def main() -> int:
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
     outcomes = run(options.share, options.seed, options.processes, progress=True)
-    counts: Counter[tuple[int, bool, str]] = Counter()
-    wrong: Counter[tuple[int, bool, str]] = Counter()
+    counts: Counter[tuple[int, bool, bool, str]] = Counter()
+    wrong: Counter[tuple[int, bool, bool, str]] = Counter()
     for job, compared, mismatches in outcomes:
-        counts[job.base, job.nearest, job.operation] += compared
-        wrong[job.base, job.nearest, job.operation] += len(mismatches)
+        counts[job.base, job.wide, job.nearest, job.operation] += compared
+        wrong[job.base, job.wide, job.nearest, job.operation] += len(mismatches)
     about = (
         f"Python {platform.python_version()}, numpy {np.__version__}, numba {numba.__version__}, "
         f"decimal {decimal.__version__} (libmpdec {getattr(decimal, '__libmpdec_version__', 'unknown')}), "
         f"gmpy2 {gmpy2.version()} ({gmpy2.mpfr_version()})"
     )
-    header = ("base", "rounding", *OPERATIONS, "all", "different")
+    header = ("base", "digits", "rounding", *OPERATIONS, "all", "different")
     body = []
-    for base in PRECISIONS:
-        for nearest in (True, False):
-            row = [counts[base, nearest, name] for name in OPERATIONS]
-            different = sum(wrong[base, nearest, name] for name in OPERATIONS)
-            rounding = "nearest" if nearest else "chop"
-            body.append((str(base), rounding, *(f"{n:,}" for n in (*row, sum(row), different))))
+    for base, wide, nearest in product(PRECISIONS, (False, True), (True, False)):
+        row = [counts[base, wide, nearest, name] for name in OPERATIONS]
+        different = sum(wrong[base, wide, nearest, name] for name in OPERATIONS)
+        digits = WIDE[base] if wide else PRECISIONS[base]
+        kind = "nearest" if nearest else "chop"
+        body.append((str(base), f"{digits[0]}-{digits[-1]}", kind, *(f"{n:,}" for n in (*row, sum(row), different))))
     print(about)
     for cells in (header, *body):
-        print(f"{cells[0]:>4} {cells[1]:<8}" + "".join(f"{cell:>12}" for cell in cells[2:]))
+        print(f"{cells[0]:>4} {cells[1]:<7}{cells[2]:<8}" + "".join(f"{cell:>12}" for cell in cells[3:]))
     for text in [text for outcome in outcomes for text in outcome.mismatches][:SHOWN]:
         print(text)
     total, different = sum(counts.values()), sum(wrong.values())

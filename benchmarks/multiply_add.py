@@ -1,4 +1,4 @@
-"""A million base-10 multiply-adds, two roundings each, at 8 and 17 digits."""
+"""Multiply-adds, two roundings each: a million in 8 and 17 decimal digits, fewer in binary128 and decimal128."""
 
 from __future__ import annotations
 
@@ -6,14 +6,45 @@ import decimal
 from collections.abc import Callable
 from typing import Any
 
+import gmpy2
 import mpmath
 import numpy as np
 
 from benchmarks.timing import Row, medians, rows
+from gpbnb.arithmetic import named
 from gpbnb.arithmetic.formats import FloatFormat
 
-COUNT = 1_000_000
+COUNT, WIDE_COUNT = 1_000_000, 100_000
 REACH = {8: 8, 17: 4}
+
+
+def measure_wide() -> list[Row]:
+    """Times in significands of two words, beside lists of numbers of ``decimal`` and of MPFR with the same digits."""
+    table = []
+    integers = [np.random.default_rng(k).integers(1, 2**53, WIDE_COUNT).tolist() for k in range(3)]
+    of_decimal, of_mpfr = decimal.Context(prec=34), gmpy2.context(precision=113)
+    decimals = [[of_decimal.divide(n, 3**30) for n in row] for row in integers]
+    mpfrs = [[of_mpfr.div(gmpy2.mpfr(n), 3**30) for n in row] for row in integers]
+
+    def with_decimal() -> list[decimal.Decimal]:
+        with decimal.localcontext(of_decimal):
+            return [x * y + z for x, y, z in zip(*decimals, strict=True)]
+
+    def with_mpfr() -> list[Any]:
+        with of_mpfr:
+            return [x * y + z for x, y, z in zip(*mpfrs, strict=True)]
+
+    for fmt, peer, work, least in (
+        (named.DECIMAL128, "decimal", with_decimal, 1.0),
+        (named.BINARY128, "MPFR", with_mpfr, 0.5),
+    ):
+        name = {10: "decimal128", 2: "binary128"}[fmt.base]
+        a, b, c = (fmt.array(row) / 3**30 for row in integers)
+        if not np.all(fmt.array(work()[:1000]) == (a * b + c)[:1000]):
+            raise RuntimeError(f"gpbnb and {peer} differ")
+        times = medians({"gpbnb": lambda a=a, b=b, c=c: a * b + c, peer: work}, 9)
+        table += rows(f"10⁵ multiply-adds, {name}", times, "gpbnb", {peer: least})
+    return table
 
 
 def measure() -> list[Row]:
@@ -43,4 +74,4 @@ def measure() -> list[Row]:
         works: dict[str, Callable[[], Any]] = {"gpbnb": with_gpbnb, "decimal": with_decimal, "mpmath": with_mpmath}
         times = medians(works, 5, once=frozenset({"mpmath"}))
         table += rows(f"10⁶ multiply-adds, {precision} decimal digits", times, "gpbnb", {"decimal": REACH[precision]})
-    return table
+    return table + measure_wide()

@@ -1,4 +1,4 @@
-"""Rounding a million float64 to 11 and 24 bits, half away from zero, and to the formats of processors."""
+"""Rounding a million float64 to 11 and 24 bits, half away from zero, and to formats of processors; dividing in them."""
 
 from __future__ import annotations
 
@@ -92,6 +92,27 @@ def measure_processors(x: Any) -> list[Row]:
     return table
 
 
+def measure_division(x: Any) -> list[Row]:
+    """Quotients of numbers of a format, which the peers hold in two bytes each."""
+    table = []
+    for name, fmt in (("bfloat16", named.BFLOAT16), ("binary16", named.BINARY16)):
+        a, b = fmt.array(x), fmt.array(np.sqrt(x[::-1]))
+        works: dict[str, Callable[[], Any]] = {"gpbnb": lambda a=a, b=b: a / b}
+        try:
+            import ml_dtypes
+
+            dtype = {"bfloat16": ml_dtypes.bfloat16, "binary16": np.float16}[name]
+            narrow = a.to_float().astype(dtype), b.to_float().astype(dtype)
+            works["ml_dtypes" if name == "bfloat16" else "numpy float16"] = lambda n=narrow: n[0] / n[1]
+        except ImportError:
+            pass
+        for peer, work in works.items():
+            if peer != "gpbnb" and not np.array_equal((a / b).to_float(), work().astype(np.float64)):
+                raise RuntimeError(f"gpbnb and {peer} divide differently")
+        table += rows(f"divide 10⁶ in {name}", medians(works, 15), "gpbnb", {"ml_dtypes": 2 / 3, "numpy float16": 1.0})
+    return table
+
+
 def measure() -> list[Row]:
     """Times beside a memory copy, and beside the peers."""
     table = []
@@ -110,4 +131,4 @@ def measure() -> list[Row]:
         times = medians(works, 15)
         task = f"round 10⁶ float64 to {bits} bits"
         table += rows(task, times, "gpbnb", {"memory copy": 0.5, "gfloat": 50, "pychop": 50})
-    return table + measure_processors(x)
+    return table + measure_processors(x) + measure_division(x)

@@ -1,4 +1,4 @@
-"""Medians of wall times, measured in turns, so that a disturbance of the machine meets every library."""
+"""Medians of processor times, measured in turns, so that what else the machine does enters little."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Row(NamedTuple):
 
 
 def medians(works: dict[str, Callable[[], object]], turns: int, once: frozenset[str] = frozenset()) -> dict[str, float]:
-    """Median wall seconds of each work over `turns` turns, after one that is not counted; `once`: the slow ones.
+    """Median processor seconds of each work over `turns` turns, after one that is not counted; `once`: the slow ones.
 
     Each turn begins with another work, since a work also pays for the memory that the one before it gave back.
     """
@@ -43,9 +43,9 @@ def medians(works: dict[str, Callable[[], object]], turns: int, once: frozenset[
         for name in names[first:] + names[:first]:
             if name in once and turn:
                 continue
-            start = time.perf_counter()
+            start = time.process_time()
             works[name]()
-            times[name].append(time.perf_counter() - start)
+            times[name].append(time.process_time() - start)
     return {name: statistics.median(values) for name, values in times.items()}
 
 

@@ -74,8 +74,8 @@ class FloatFormat(Makes[FloatArray]):
     directed toward it; there is one NaN. E4M3, which has NaN and no infinity, gives NaN in its place. Elementary
     functions, remainders and sorting need finite entries, and take a negative zero for zero.
     :func:`~gpbnb.arithmetic.flags.flags` counts the exceptions of IEEE 754. Such a format computes on Python integers,
-    about a thousand times slower than compiled loops, which filters need; "saturate" has compiled loops in base 2 up to
-    52 bits, and in base 16.
+    about a thousand times slower than compiled loops. Filters have compiled loops for "saturate" in base 2 up to 52
+    bits, and in base 16.
 
     References
     ----------

@@ -439,6 +439,10 @@ def argmin(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
 @stays
 def argsort(x: Any, axis: int | None = -1) -> Any:
     """Return the indices that sort entries in ascending order; equal entries keep their order."""
+    given = x.reshape(-1) if axis is None else x
+    keys = given.backend.sort_keys(given.components) if given.ndim else None
+    if keys is not None:
+        return np.lexsort(keys, axis=-1 if axis is None else axis)
     return np.argsort(np.asarray(x.to_fractions(), dtype=object), axis=axis, kind="stable")
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray, NumberFormat
 from gpbnb.arithmetic.exits import lifted
-from gpbnb.arithmetic.kernels.backends import Compiled
+from gpbnb.arithmetic.kernels.backends import Looped
 from gpbnb.arithmetic.kernels.selection import check_order
 from gpbnb.arithmetic.rounding import Order, Rounding
 
@@ -416,7 +416,7 @@ NUMPY: dict[str, Callable[..., Any]] = {
 def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]] | None:
     """Return both factors in one array and the order of the rows; None if the backend cannot compute them."""
     backend = a.backend
-    if not isinstance(backend, Compiled):
+    if not isinstance(backend, Looped):
         return None
     factors, order = backend.pack(a.components, backend.matrix_tag), np.arange(len(a))
     try:
@@ -431,7 +431,7 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
 def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
     """Return solutions for the columns of b (n, p); None if the backend cannot compute them."""
     backend = a.backend
-    if not isinstance(backend, Compiled) or b.backend is not backend:
+    if not isinstance(backend, Looped) or b.backend is not backend:
         return None
     if (compiled := _factored(a, pivot)) is None:
         return None

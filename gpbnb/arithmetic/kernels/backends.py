@@ -1,4 +1,4 @@
-"""Backends that store an array's numbers and compute with them: as float64, pairs of int64, or Python integers.
+"""Backends that store an array's numbers and compute with them: as float64, two or three int64, or Python integers.
 
 A backend works on `components`, a tuple of arrays with the same shape, so that NumPy can reshape, slice and join all of
 them in the same way. The first array carries the sign. If a compiled backend cannot hold or compute a result, it
@@ -10,15 +10,16 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from fractions import Fraction
-from functools import lru_cache
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel
-from gpbnb.arithmetic.kernels.selection import tag_of
+from gpbnb.arithmetic.kernels.selection import tag_of, wide_tag
 from gpbnb.arithmetic.kernels.tags import (
+    FARTHEST,
     LEAST,
     LIMIT,
     Binary,
@@ -30,6 +31,7 @@ from gpbnb.arithmetic.kernels.tags import (
     Random,
     ShortEven,
     Tag,
+    Wide,
     extents_of_sums,
 )
 from gpbnb.arithmetic.rounding import Rounding, Rules
@@ -37,7 +39,6 @@ from gpbnb.arithmetic.rounding import Rounding, Rules
 Array = NDArray[Any]
 Components = tuple[Array, ...]
 
-_LARGEST_EXPONENT = 2**60
 _MANY = 1000  # multiplications in a product for which a look at the range of its entries pays
 _LEAST_32, _LARGEST_32 = 2.0**-126, float(np.finfo(np.float32).max)
 
@@ -89,6 +90,10 @@ class Backend(ABC):
     @abstractmethod
     def to_float(self, components: Components) -> Array:
         """Round each entry to the nearest float64; raises OverflowError like :meth:`ExactKernel.to_float`."""
+
+    def sort_keys(self, components: Components) -> Components | None:
+        """Return keys for ``np.lexsort``, the most significant last, or None if there are none."""
+        return None
 
     def fold(self, name: str, components: Components) -> Components | None:
         """Combine the entries along the first axis from left to right; there must be at least one."""
@@ -178,15 +183,17 @@ _NAMES = {
 }
 
 
-class Compiled(Backend):
+class Looped(Backend):
     """Common part of the backends with compiled loops."""
 
     count: int  # number of components
     fuses = False  # whether it has a fused multiply-add
+    tag: Tag
 
     def __init__(self, rules: Rules, tag: Tag) -> None:
         super().__init__(rules)
         self.tag = tag
+        self.exact = exact(rules)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return backend, (self.rules,)
@@ -214,6 +221,43 @@ class Compiled(Backend):
             return None
         return None if gone else tuple(part.reshape(shape[1:]) for part in out)
 
+    def from_backend(self, other: Backend, components: Components) -> Components | None:
+        """Round numbers of a backend with significands of one or two words."""
+        if self.wide is None or not isinstance(other, Pairs | TwoWords) or other.wide is None:
+            return None
+        shape = components[0].shape
+        triples = tuple(_flat(part, shape) for part in other.in_two_words(components))
+        out, states = tuple(np.empty(triples[0].size, np.int64) for _ in triples), np.empty(triples[0].size, np.int8)
+        try:
+            _wide().converted(other.wide, self.wide, out[0].size, triples, out, states)
+        except OverflowError:
+            return None
+        hard = np.flatnonzero(states == 2)
+        pairs = zip(*other.to_exact(tuple(part.reshape(-1)[hard] for part in components)), strict=True)
+        if not self._fill(out, {int(i): other.kernel.to_fraction(*pair) for i, pair in zip(hard, pairs, strict=True)}):
+            return None
+        return self.from_two_words(tuple(part.reshape(shape) for part in out))
+
+    def _fill(self, out: Components, fractions: dict[int, Fraction]) -> bool:
+        """Put rounded Fractions at some places of components of two words; return whether none overflows."""
+        for i, value in fractions.items():
+            try:
+                m, e = self.kernel.from_ratio(value.numerator, value.denominator)
+            except OverflowError:
+                return False
+            high, low = divmod(abs(m), 1 << cast(Wide, self.wide).split)
+            out[0][i], out[1][i], out[2][i] = (-high if m < 0 else high), low, e
+        return True
+
+    @cached_property
+    def wide(self) -> Wide | None:
+        """The tag of the same format with significands of two words, if it has one; conversions use it."""
+        return wide_tag(self.rules)
+
+    @abstractmethod
+    def from_two_words(self, components: Components) -> Components | None:
+        """Return the components of numbers that :class:`TwoWords` holds, or None if they do not fit."""
+
     def scan(self, components: Components) -> Components | None:
         shape = components[0].shape
         out = self._empty(math.prod(shape))
@@ -223,6 +267,13 @@ class Compiled(Backend):
         except OverflowError:
             return None
         return None if gone else tuple(part.reshape(shape) for part in out)
+
+    def compare(self, a: Components, b: Components) -> Array:
+        shape = _shape(a, b)
+        order = np.empty(math.prod(shape), np.int8)
+        x, y = (tuple(_flat(part, shape) for part in components) for components in (a, b))
+        _loops().compared(self.tag, order.size, x, y, order)
+        return order.reshape(shape)
 
     def matmul(self, a: Components, b: Components) -> Components | None:
         return self._product(self.tag, a, b)
@@ -265,6 +316,10 @@ class Compiled(Backend):
     def _seen(self, components: Components) -> Any:
         """Bring components into the form that a compiled loop expects."""
         return components[0] if self.count == 1 else components
+
+
+class Compiled(Looped):
+    """Common part of the backends whose arithmetic the loops of filters know, too."""
 
 
 class Floats(Compiled):
@@ -311,7 +366,12 @@ class Floats(Compiled):
         return None if components is None or (exactly and not np.array_equal(components[0], x)) else components
 
     def from_backend(self, other: Backend, components: Components) -> Components | None:
-        return self.apply("round_", components) if isinstance(other, Floats) else None
+        if isinstance(other, Floats):
+            return self.apply("round_", components)
+        return super().from_backend(other, components)
+
+    def from_two_words(self, components: Components) -> Components | None:
+        return self.from_exact(components[0], components[2])  # with at most 53 bits, the lower word is empty
 
     def apply(self, name: str, *operands: Components) -> Components | None:
         if name in ("negative", "absolute") and not self._has_opposites(operands[0][0]):
@@ -364,6 +424,9 @@ class Floats(Compiled):
     def compare(self, a: Components, b: Components) -> Array:
         return np.asarray(np.greater(a[0], b[0]).astype(np.int8) - np.less(a[0], b[0]).astype(np.int8))
 
+    def sort_keys(self, components: Components) -> Components:
+        return components
+
     def to_float(self, components: Components) -> Array:
         return components[0].copy()
 
@@ -374,12 +437,8 @@ class Pairs(Compiled):
     dtype = np.int64
     count = 2
 
-    def __init__(self, rules: Rules, tag: Tag) -> None:
-        super().__init__(rules, tag)
-        self.exact = exact(rules)
-
     def from_exact(self, m: Array, e: Array) -> Components | None:
-        if np.any(e > _LARGEST_EXPONENT) or np.any(e < -_LARGEST_EXPONENT):
+        if np.any(e > FARTHEST) or np.any(e < -FARTHEST):
             return None
         return m.astype(np.int64), e.astype(np.int64)
 
@@ -417,7 +476,16 @@ class Pairs(Compiled):
     def from_backend(self, other: Backend, components: Components) -> Components | None:
         if isinstance(other, Pairs):
             return self.apply("round_", components)
-        return self.from_numbers(components[0], exactly=False) if isinstance(other, Floats) else None
+        if isinstance(other, Floats):
+            return self.from_numbers(components[0], exactly=False)
+        return super().from_backend(other, components)
+
+    def in_two_words(self, components: Components) -> Components:
+        """Return numbers as the components of :class:`TwoWords`."""
+        return components[0], np.zeros(components[0].shape, np.int64), components[1]
+
+    def from_two_words(self, components: Components) -> Components:
+        return components[0], components[2]  # with at most 18 digits, the lower word is empty
 
     def apply(self, name: str, *operands: Components) -> Components | None:
         if name == "negative":
@@ -426,12 +494,10 @@ class Pairs(Compiled):
             return np.asarray(np.abs(operands[0][0])), operands[0][1]
         return super().apply(name, *operands)
 
-    def compare(self, a: Components, b: Components) -> Array:
-        shape = _shape(a, b)
-        order = np.empty(math.prod(shape), np.int8)
-        x, y = (tuple(_flat(part, shape) for part in components) for components in (a, b))
-        _loops().compared(self.tag, order.size, x, y, order)
-        return order.reshape(shape)
+    def sort_keys(self, components: Components) -> Components:
+        m, e = components
+        sign = np.sign(m)
+        return m, sign * e, sign
 
     def to_float(self, components: Components) -> Array:
         m, e = (_flat(part, components[0].shape) for part in components)
@@ -440,6 +506,84 @@ class Pairs(Compiled):
         if (hard := states == 2).any():
             x[hard] = self.exact.to_float((m[hard].astype(object), e[hard].astype(object)))
         return x.reshape(components[0].shape)
+
+
+class TwoWords(Looped):
+    """Bases 2, 10 and 16 with any range: the upper and lower part of a significand and an exponent, as int64."""
+
+    dtype = np.int64
+    count = 3
+    tag: Wide
+
+    def from_exact(self, m: Any, e: Any) -> Components | None:
+        if np.any(e > FARTHEST) or np.any(e < -FARTHEST):
+            return None
+        size, split = abs(m), self.tag.split
+        high = np.asarray(size >> split, dtype=np.int64)
+        low = np.asarray(size & ((1 << split) - 1), dtype=np.int64)
+        return np.where(np.asarray(m < 0, dtype=bool), -high, high), low, e.astype(np.int64)
+
+    def to_exact(self, components: Components) -> Components:
+        high, low, e = (part.astype(object) for part in components)
+        size: Any = np.empty(e.shape, object)
+        size[...] = (abs(cast(Any, high)) << self.tag.split) | low  # NumPy makes a single entry a plain int
+        return np.where(components[0] < 0, -size, size), e
+
+    def from_numbers(self, values: Array, exactly: bool) -> Components | None:
+        kind, size = values.dtype.kind, values.dtype.itemsize
+        if kind == "f" and size <= 8:
+            m, e = np.frexp(values.astype(np.float64, copy=False))
+            if not np.isfinite(m).all():
+                return None
+            return self._from_integers(np.ldexp(m, 53).astype(np.int64), e.astype(np.int64) - 53, True, exactly)
+        if kind not in "iu" or (size == 8 and ((values >= 2**63) | (values <= -(2**63))).any()):
+            return None
+        return self._from_integers(values.astype(np.int64), np.zeros(values.shape, np.int64), False, exactly)
+
+    def _from_integers(self, m: Array, e: Array, twos: bool, exactly: bool) -> Components | None:
+        out, states = self._empty(m.size), np.empty(m.size, np.int8)
+        try:
+            _wide().from_integers(self.tag, m.size, _flat(m, m.shape), _flat(e, m.shape), twos, out, states)
+        except OverflowError:
+            return None
+        if (exactly and states.any()) or (hard := np.flatnonzero(states == 2)).size > m.size // 2:
+            return None
+        fractions = {int(i): Fraction(int(m.flat[i])) * Fraction(2) ** int(e.flat[i]) for i in hard}
+        return tuple(part.reshape(m.shape) for part in out) if self._fill(out, fractions) else None
+
+    def from_backend(self, other: Backend, components: Components) -> Components | None:
+        if isinstance(other, Floats):
+            return self.from_numbers(components[0], exactly=False)
+        return super().from_backend(other, components)
+
+    def in_two_words(self, components: Components) -> Components:
+        """Return numbers as the components of this class."""
+        return components
+
+    def from_two_words(self, components: Components) -> Components:
+        return components
+
+    def apply(self, name: str, *operands: Components) -> Components | None:
+        if name not in ("negative", "absolute"):
+            return super().apply(name, *operands)
+        high, low, e = operands[0]
+        limits = self.rules.limits
+        if limits is not None and limits.fixed and np.any((high == self.tag.lowest[0]) & (e == self.tag.lowest[2])):
+            return None  # the opposite of the lowest number is not in the format
+        return np.asarray(-high if name == "negative" else np.abs(high)), low, e
+
+    def sort_keys(self, components: Components) -> Components:
+        high, low, e = components
+        sign = np.sign(high)
+        return sign * low, high, sign * e, sign
+
+    def to_float(self, components: Components) -> Array:
+        shape = components[0].shape
+        x, states = np.empty(math.prod(shape)), np.empty(math.prod(shape), np.int8)
+        _wide().to_floats(self.tag, x.size, parts := tuple(_flat(part, shape) for part in components), x, states)
+        if (hard := states == 2).any():
+            x[hard] = self.exact.to_float(self.to_exact(tuple(part[hard] for part in parts)))
+        return x.reshape(shape)
 
 
 @lru_cache(maxsize=256)
@@ -454,7 +598,7 @@ def backend(rules: Rules) -> Backend:
     """Return the fastest backend for a format."""
     tag = tag_of(rules)
     if tag is None:
-        return exact(rules)
+        return exact(rules) if (wide := wide_tag(rules)) is None else TwoWords(rules, wide)
     return (Pairs if rules.base == 10 else Floats)(rules, tag)
 
 
@@ -504,3 +648,10 @@ def _radix() -> Any:
     from gpbnb.arithmetic.kernels import radix
 
     return radix
+
+
+@lru_cache(maxsize=1)
+def _wide() -> Any:
+    from gpbnb.arithmetic.kernels import wide
+
+    return wide

@@ -15,14 +15,14 @@ from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros
 from gpbnb.arithmetic.kernels.compiling import inner
-from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, EVEN, ODD, UP, LimitedDecimal
+from gpbnb.arithmetic.kernels.integers import divided_by_word
+from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, EVEN, ODD, UP, LimitedDecimal, Wide
 
 NARROW = 9  # precision up to which the dividend fits into 64 bits
 LARGEST_EXPONENT = 2**60
 
 _U0, _U1 = np.uint64(0), np.uint64(1)
 _U5, _U10, _U50, _U100 = np.uint64(5), np.uint64(10), np.uint64(50), np.uint64(100)
-_LOW = np.uint64(2**32 - 1)
 _TWO_64 = 2.0**64
 
 POWER = np.array([10**k for k in range(20)], np.uint64)
@@ -78,31 +78,6 @@ def _wide_by_power(high: Any, low: Any, k: Any) -> Any:
     return q1, r >> s
 
 
-@inner
-def _wide_by_any(high: Any, low: Any, d: Any) -> Any:
-    """Divide a 128-bit number by d < 2**63: quotient, which must fit into 64 bits, and remainder.
-
-    Knuth, The art of computer programming 2, 4.3.1, algorithm D, in digits of 32 bits.
-    """
-    s = leading_zeros(d)
-    d <<= s
-    d1, d0 = d >> np.int64(32), d & _LOW
-    r = (high << s) | ((low >> _U1) >> (63 - s))
-    low = low << s
-    q = _U0
-    for part in (low >> np.int64(32), low & _LOW):
-        digit = r // d1
-        rest = r - digit * d1
-        while digit > _LOW or digit * d0 > ((rest << np.int64(32)) | part):
-            digit -= _U1
-            rest += d1
-            if rest > _LOW:
-                break
-        r = ((r << np.int64(32)) | part) - digit * d
-        q = (q << np.int64(32)) | digit
-    return q, r >> s
-
-
 @inner(forceinline=True)
 def _digits(n: Any) -> Any:
     """Number of decimal digits of n; 1 for zero."""
@@ -135,7 +110,7 @@ def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, neg
         outward = ((mode == UP) & (not negative)) | ((mode == DOWN) & negative)
         return np.uint64(nearest | (inexact & (outward | ((mode == ODD) & (not odd)))))
 
-    return by_mode if getattr(fmt, "instance_class", None) is LimitedDecimal else to_nearest_or_chopped
+    return by_mode if getattr(fmt, "instance_class", None) in (LimitedDecimal, Wide) else to_nearest_or_chopped
 
 
 def _within_range(fmt: Any, m: Any, e: Any) -> Any:
@@ -288,7 +263,7 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
         m = n // y
         rest = n - m * y
     else:
-        m, rest = _wide_by_any(high_product(x, _power(k)), x * _power(k), y)
+        m, rest = divided_by_word(high_product(x, _power(k)), x * _power(k), y)
     negative = (m1 < 0) != (m2 < 0)
     m += increment(fmt, m, rest + rest >= y, rest + rest == y, rest != _U0, negative)
     return number(fmt, m, e1 - e2 - k, negative)

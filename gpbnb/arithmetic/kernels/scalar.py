@@ -26,7 +26,7 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
-from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, processor, shortdecimal
+from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, processor, shortdecimal, wide
 from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
@@ -46,10 +46,17 @@ from gpbnb.arithmetic.kernels.tags import (
     Separate,
     ShortDecimal,
     ShortEven,
+    Wide,
 )
 
 _INLINE = {"forceinline": True, "no_cfunc_wrapper": True}
-_MODULES = {Decimal: decimal, ShortDecimal: shortdecimal, LimitedDecimal: decimal, DoubleDouble: doubledouble}
+_MODULES = {
+    Decimal: decimal,
+    ShortDecimal: shortdecimal,
+    LimitedDecimal: decimal,
+    DoubleDouble: doubledouble,
+    Wide: wide,
+}
 
 _BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
 
@@ -329,6 +336,8 @@ def _negative(fmt: Any, a: Any) -> Any:
         return lambda fmt, a: (0.0 - a[0], 0.0 - a[1])
     if _tag(fmt) is Double:
         return lambda fmt, a: -a
+    if _tag(fmt) is Wide:
+        return lambda fmt, a: round_(fmt, wide.opposite(a))
     return lambda fmt, a: _beyond_largest(fmt, zero(fmt) - a)
 
 
@@ -350,6 +359,8 @@ def _absolute(fmt: Any, a: Any) -> Any:
         return lambda fmt, a: a if a[0] >= 0.0 else (-a[0], -a[1])
     if _tag(fmt) is Double:
         return lambda fmt, a: abs(a)
+    if _tag(fmt) is Wide:
+        return lambda fmt, a: round_(fmt, (False, a[1], a[2]))
     return lambda fmt, a: _beyond_largest(fmt, abs(a))
 
 
@@ -378,6 +389,8 @@ def _integer(fmt: Any, n: Any) -> Any:
         return lambda fmt, n: round_(fmt, (np.int64(n), np.int64(0)))
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, n: (np.float64(n), 0.0)
+    if _tag(fmt) is Wide:
+        return lambda fmt, n: wide.integer(fmt, np.int64(n))
     return lambda fmt, n: round_(fmt, np.float64(n))
 
 
@@ -387,6 +400,8 @@ def _zero(fmt: Any) -> Any:
         return lambda fmt: (np.int64(0), np.int64(0))
     if _tag(fmt) is DoubleDouble:
         return lambda fmt: (0.0, 0.0)
+    if _tag(fmt) is Wide:
+        return lambda fmt: wide.zero()
     return (lambda fmt: np.float32(0.0)) if _free_machine(fmt) is Hardware32 else lambda fmt: 0.0
 
 
@@ -431,18 +446,47 @@ def _overloaded_settle(fmt: Any, c: Any) -> Any:
 
 
 # -- arrays ------------------------------------------------------------------------------------------
-# A pair of arrays, (significands, exponents) or (high, low), works as well as one array with a last axis of two.
+# A tuple of arrays, such as (significands, exponents) or (high, low), works as well as one array with a last axis of
+# the same length.
 
 
 @overload(load, strict=False, jit_options=_INLINE)
 def _load(fmt: Any, array: Any, index: Any) -> Any:
     if _tag(fmt) in FLOATS:
         return lambda fmt, array, index: array[index]
+    if _tag(fmt) is Wide:
+        return _load_wide(array, index)
     if isinstance(array, types.BaseTuple):
         return lambda fmt, array, index: (array[0][index], array[1][index])
     if isinstance(index, types.Integer):
         return lambda fmt, array, index: (array[index, 0], array[index, 1])
     return lambda fmt, array, index: (array[(*index, 0)], array[(*index, 1)])
+
+
+def _load_wide(array: Any, index: Any) -> Any:
+    number = wide.number
+    if isinstance(array, types.BaseTuple):
+        return lambda fmt, array, index: number(fmt, array[0][index], array[1][index], array[2][index])
+    if isinstance(index, types.Integer):
+        return lambda fmt, array, index: number(fmt, array[index, 0], array[index, 1], array[index, 2])
+    return lambda fmt, array, index: number(fmt, array[(*index, 0)], array[(*index, 1)], array[(*index, 2)])
+
+
+def _put_wide(array: Any, index: Any) -> Any:
+    parts = wide.parts
+
+    def in_three(fmt: Any, array: Any, index: Any, x: Any) -> None:
+        array[0][index], array[1][index], array[2][index] = parts(fmt, x)
+
+    def at_integer(fmt: Any, array: Any, index: Any, x: Any) -> None:
+        array[index, 0], array[index, 1], array[index, 2] = parts(fmt, x)
+
+    def at_tuple(fmt: Any, array: Any, index: Any, x: Any) -> None:
+        array[(*index, 0)], array[(*index, 1)], array[(*index, 2)] = parts(fmt, x)
+
+    if isinstance(array, types.BaseTuple):
+        return in_three
+    return at_integer if isinstance(index, types.Integer) else at_tuple
 
 
 @overload(put, strict=False, jit_options=_INLINE)
@@ -464,6 +508,8 @@ def _overloaded_put(fmt: Any, array: Any, index: Any, x: Any) -> Any:
 
     if _tag(fmt) in FLOATS:
         return of_floats
+    if _tag(fmt) is Wide:
+        return _put_wide(array, index)
     if isinstance(array, types.BaseTuple):
         return in_two
     return at_integer if isinstance(index, types.Integer) else at_tuple
@@ -471,7 +517,7 @@ def _overloaded_put(fmt: Any, array: Any, index: Any, x: Any) -> Any:
 
 @overload(lost, strict=False, jit_options=_INLINE)
 def _lost(fmt: Any, x: Any) -> Any:
-    if _tag(fmt) in PAIRS:
+    if _tag(fmt) in (*PAIRS, Wide):
         return lambda fmt, x: False
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, x: x[0] != x[0]

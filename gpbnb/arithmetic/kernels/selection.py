@@ -12,7 +12,9 @@ from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel
 from gpbnb.arithmetic.rounding import DRAW_BITS, Order, Rounding, Rules
 
-LARGEST_PRECISION = {2: 53, 10: 18, 16: 13}  # with compiled loops
+LARGEST_PRECISION = {2: 53, 10: 18, 16: 13}  # with compiled loops for filters
+_WIDEST = {2: 113, 10: 34, 16: 28}  # digits of Wide
+_UPPER = 61  # bits of the upper part of a significand of Wide
 _CODES = {
     Rounding.NEAREST: tags.AWAY,
     Rounding.EVEN: tags.EVEN,
@@ -62,6 +64,36 @@ def _decimal_tag(rules: Rules) -> tags.LimitedDecimal | None:
     return tags.LimitedDecimal(
         _CODES[rules.rounding], rules.precision, limits.emin - last, _emax(rules) - last, not limits.subnormal
     )
+
+
+def wide_tag(rules: Rules) -> tags.Wide | None:
+    """Return the tag for significands of two words, or None if they cannot hold the format."""
+    base, precision, rounding, limits, _ = rules
+    if base not in _WIDEST or precision > _WIDEST[base] or rounding not in _CODES:
+        return None
+    if limits is not None and limits.overflow not in ("raise", "saturate"):
+        return None
+    bits = 0 if base == 10 else base.bit_length() - 1
+    split = max((base**precision).bit_length() - _UPPER, 0)
+    farthest = (1 << _UPPER, 0, tags.FARTHEST)
+    small, quantum, lowest, largest = tags.UNLIMITED, 0, farthest, farthest
+    if limits is not None:
+        small = tags.FIXED if limits.fixed else tags.GRADUAL if limits.subnormal else tags.ABRUPT
+        quantum = limits.emin - precision + 1
+        lowest, largest = (_stored(rules, limit, split) for limit in (limits.lowest, limits.largest))
+        if max(lowest[2], largest[2], -quantum) > tags.FARTHEST:
+            return None
+    room = 37 if base == 10 else 126 // bits
+    saturates = limits is not None and limits.overflow == "saturate"
+    return tags.Wide(bits, _CODES[rounding], precision, room, split, small, quantum, lowest, largest, saturates)
+
+
+def _stored(rules: Rules, number: Fraction, split: int) -> tuple[int, int, int]:
+    """Three int64 for a number of a format."""
+    free = kernel(rules._replace(limits=None))
+    m, e = free.from_ratio(number.numerator, number.denominator)
+    high, low = divmod(abs(m), 1 << split)
+    return (-high if m < 0 else high), low, e
 
 
 def _float_tag(rules: Rules, hardware: bool = True) -> Any:

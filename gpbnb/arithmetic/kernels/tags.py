@@ -14,6 +14,10 @@ LEAST, LIMIT = 2.0**-960, 2.0**1023  # magnitudes of Binary and Hexadecimal, fro
 # Codes of rounding modes. AWAY and EVEN round to nearest, with ties away from zero or to the even last digit. ZERO, UP
 # and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to neighbours with an odd last digit.
 AWAY, EVEN, ZERO, UP, DOWN, ODD = range(6)
+# What happens below the smallest normal number of a Wide format: there is none; its spacing is kept; numbers become
+# zero; or all numbers have one spacing.
+UNLIMITED, GRADUAL, ABRUPT, FIXED = range(4)
+FARTHEST = 2**60  # exponent of a Wide number
 
 
 class Binary(NamedTuple):
@@ -158,6 +162,25 @@ class LimitedDecimal(NamedTuple):
     flush: bool  # whether smaller numbers become zero; otherwise they are out of range
 
 
+class Wide(NamedTuple):
+    """Significands of up to 113 bits in bases 2, 10 and 16, any rounding mode except random, and any range.
+
+    A number is ``(negative, significand, exponent)``, an array is int64 (..., 3); see
+    :mod:`gpbnb.arithmetic.kernels.wide`.
+    """
+
+    bits: int  # of a digit; 0 in base 10
+    mode: int  # AWAY to ODD
+    precision: int
+    room: int  # digits of the integers that are rounded
+    split: int  # bits of the lower part of a stored significand
+    small: int  # UNLIMITED to FIXED
+    quantum: int  # exponent of the last digit of the smallest normal number, or of all numbers
+    lowest: tuple[int, int, int]  # as stored
+    largest: tuple[int, int, int]
+    saturates: bool  # results beyond them become these; otherwise they are out of range
+
+
 def extents_of_sums(n: int, base: int, precision: int, gradual: float, low: float, high: float) -> tuple[float, float]:
     """Smallest and largest size of sums of n products other than zero, if those of the products are `low` and `high`.
 
@@ -186,4 +209,5 @@ Tag = (
     | Free
     | Mixed
     | Blocks
+    | Wide
 )

@@ -13,7 +13,7 @@ import pytest
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, backend
+from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, TwoWords, backend
 from gpbnb.arithmetic.named import BINARY16, BINARY32, BINARY64
 from gpbnb.arithmetic.rounding import Rounding, Rules
 
@@ -69,10 +69,16 @@ def same(x: Any, y: Any) -> bool:
     return x.shape == y.shape and all(bool(np.all(p == q)) for p, q in zip(x.to_pairs(), y.to_pairs(), strict=True))
 
 
-@pytest.mark.parametrize(("base", "kind"), [(2, Floats), (16, Floats), (10, Pairs), (3, Exact), (8, Exact)])
-def test_the_carrier_of_a_format(base: int, kind: type) -> None:
-    assert type(backend(Rules(base, 6, Rounding.NEAREST))) is kind
-    assert type(backend(Rules(base, 54, Rounding.NEAREST))) is Exact
+@pytest.mark.parametrize(
+    ("base", "kind", "longest", "wider"),
+    [(2, Floats, 53, 113), (16, Floats, 13, 28), (10, Pairs, 18, 34), (3, Exact, 1, 1), (8, Exact, 1, 1)],
+)
+def test_the_carrier_of_a_format(base: int, kind: type, longest: int, wider: int) -> None:
+    for precision in {6, longest}:
+        assert type(backend(Rules(base, precision, Rounding.NEAREST))) is kind
+    for precision in range(longest + 1, wider + 1):
+        assert type(backend(Rules(base, precision, Rounding.NEAREST))) is TwoWords
+    assert type(backend(Rules(base, wider + 1, Rounding.NEAREST))) is Exact
     assert pickle.loads(pickle.dumps(backend(Rules(base, 6, Rounding.CHOP)))).nearest is False
 
 

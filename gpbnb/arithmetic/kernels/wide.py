@@ -1,0 +1,471 @@
+"""Significands of two words: base 2 up to 113 bits, 16 up to 28 digits and 10 up to 34 digits, with any range.
+
+A number is ``(negative, m, e)``, ``m * base**e`` with m of 128 bits. Zero is ``(False, 0, 0)``; every other number has
+t digits, the last of which are zeros where numbers are subnormal or the spacing is fixed. An array holds three int64
+for each number: the upper bits of m with its sign, never zero unless the number is; the `split` lower bits; and e.
+
+Each operation gives an integer below 2**127 that is exact, or has more digits than t, and says whether others follow;
+:func:`rounded` rounds it once. One compiled function serves all formats, since asking for the base costs only a branch
+that the processor predicts.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from gpbnb.arithmetic.kernels.bits import from_bits, leading_zeros, trailing_zeros
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
+from gpbnb.arithmetic.kernels.decimal import increment
+from gpbnb.arithmetic.kernels.integers import (
+    divided,
+    divided_by_word,
+    high_word,
+    joined,
+    length,
+    low_word,
+    product,
+    reciprocal,
+    shifted_left,
+    to_float64,
+    wide,
+)
+from gpbnb.arithmetic.kernels.tags import ABRUPT, FARTHEST, FIXED, GRADUAL
+
+_WORD = 2**64 - 1
+_POWERS = [10**k for k in range(39)]
+_NORMAL = [p << (128 - p.bit_length()) for p in _POWERS]
+
+
+def _table(numbers: list[int]) -> Any:
+    """Upper and lower words."""
+    return np.array([[n >> 64, n & _WORD] for n in numbers], np.uint64)
+
+
+_POWER, _DIVISOR = _table(_POWERS), _table(_NORMAL)
+_SHIFT = np.array([128 - p.bit_length() for p in _POWERS], np.int64)
+_RECIPROCAL = np.array([(2**192 - 1) // d - 2**64 for d in _NORMAL], np.uint64)
+_FIVE = _table([5**k for k in range(56)])
+_MOST_PLACES = 55  # 5**55 has 128 bits
+
+_U0, _U1 = np.uint64(0), np.uint64(1)
+_LOW_60 = np.uint64(2**60 - 1)
+
+
+@inner(forceinline=True)
+def _entry(table: Any, k: Any) -> Any:
+    """A number of two words; with an unsigned index, numba need not test whether it is negative."""
+    return joined(table[np.uint64(k), 0], table[np.uint64(k), 1])
+
+
+@inner(forceinline=True)
+def zero() -> Any:
+    return False, wide(_U0), np.int64(0)
+
+
+@inner(forceinline=True)
+def _digits(fmt: Any, n: Any) -> Any:
+    """Number of digits of n; 0 for zero."""
+    count = length(n)
+    if fmt.bits == 1:
+        return count
+    if fmt.bits > 1:
+        return (count + fmt.bits - 1) // fmt.bits
+    # floor(count log10 2): the number of digits, or one less.
+    count = (count * 1233) >> 12
+    return count + np.int64(n >= _entry(_POWER, count))
+
+
+@inner(forceinline=True)
+def _raised(fmt: Any, n: Any, k: Any) -> Any:
+    """``n * base**k``, which must fit into 128 bits."""
+    return n << (k * fmt.bits) if fmt.bits > 0 else n * _entry(_POWER, k)
+
+
+@inner
+def _lowered(fmt: Any, n: Any, k: Any) -> Any:
+    """Divide n by ``base**k``, k > 0: quotient, and how the rest compares with half a unit: 0 none, 1, 2 half, 3."""
+    if fmt.bits > 0:
+        last = k * fmt.bits - 1
+        q = n >> last
+        half = wide(_U1) << last
+        rest = n - ((q >> 1) << last << 1)
+        q = q >> 1
+    else:
+        unit = _entry(_POWER, k)
+        s = _SHIFT[np.uint64(k)]
+        q, rest = divided((n >> 1) >> (127 - s), n << s, _entry(_DIVISOR, k), _RECIPROCAL[np.uint64(k)])
+        rest, half = rest >> s, unit >> 1
+    return q, np.int64(rest != wide(_U0)) + np.int64(rest >= half) + np.int64(rest > half)
+
+
+@inner
+def _cut(fmt: Any, high: Any, low: Any, k: Any) -> Any:
+    """Divide 256 bits by ``base**k``: quotient, which must fit into 128 bits, and whether there is a rest."""
+    if k == 0:
+        return low, False
+    if fmt.bits > 0:
+        s = k * fmt.bits
+        return (high << (128 - s)) | (low >> s), (low << (128 - s)) != wide(_U0)
+    high, low = shifted_left(high, low, _SHIFT[np.uint64(k)])
+    q, rest = divided(high, low, _entry(_DIVISOR, k), _RECIPROCAL[np.uint64(k)])
+    return q, rest != wide(_U0)
+
+
+@inner
+def _enlarged(fmt: Any, n: Any, k: Any) -> Any:
+    """``n * base**k`` in 256 bits, for a power below 2**128."""
+    if fmt.bits > 0:
+        return shifted_left(wide(_U0), n, k * fmt.bits)
+    return product(n, _entry(_POWER, k))
+
+
+@inner(forceinline=True)
+def number(fmt: Any, high: Any, low: Any, e: Any) -> Any:
+    """The number of three int64."""
+    return high < 0, (wide(np.uint64(abs(high))) << fmt.split) | wide(np.uint64(low)), e
+
+
+@inner(forceinline=True)
+def parts(fmt: Any, x: Any) -> Any:
+    """The three int64 of a number."""
+    negative, m, e = x
+    high = np.int64(low_word(m >> fmt.split))
+    return -high if negative else high, np.int64(low_word(m) & ((_U1 << np.uint64(fmt.split)) - _U1)), e
+
+
+@inner
+def _beyond(fmt: Any, negative: Any) -> Any:
+    """The limit that replaces a result beyond the range; raises OverflowError where there is none."""
+    if not fmt.saturates:
+        raise OverflowError("got a result beyond the range of the format; needed one within; scale the numbers")
+    limit = fmt.lowest if negative else fmt.largest
+    return number(fmt, limit[0], limit[1], limit[2])
+
+
+@inner(forceinline=True)
+def _exceeds(fmt: Any, m: Any, e: Any, limit: Any) -> Any:
+    if e != limit[2]:
+        return e > limit[2]
+    return m > number(fmt, limit[0], limit[1], limit[2])[1]
+
+
+@inner
+def rounded(fmt: Any, negative: Any, n: Any, more: Any, e: Any) -> Any:
+    """Round ``(n + f) * base**e``, where f is 0, or between 0 and 1 if there are more digits."""
+    if n == wide(_U0):
+        return zero()
+    t = fmt.precision
+    count = _digits(fmt, n)
+    drop = count - t
+    if fmt.small == FIXED:
+        drop = fmt.quantum - e
+    elif fmt.small == GRADUAL:
+        drop = max(drop, fmt.quantum - e)
+    if drop > 0:
+        if drop > count:
+            q, rest = wide(_U0), 1
+        else:
+            q, rest = _lowered(fmt, n, drop)
+        n = q
+        up = increment(fmt, low_word(q), rest >= 2, (rest == 2) & (not more), (rest != 0) | more, negative)
+        if up != _U0:
+            n = n + wide(_U1)
+        if n == wide(_U0):
+            return zero()
+        e += drop
+        count = _digits(fmt, n)
+    if count > t:  # n is a power of the base after a carry, or too large for fixed point
+        n, rest = _lowered(fmt, n, count - t)
+        if rest != 0:
+            return _beyond(fmt, negative)
+        e += count - t
+    elif count < t:
+        n = _raised(fmt, n, t - count)
+        e -= t - count
+    if fmt.small == ABRUPT and e < fmt.quantum:
+        return zero()
+    if _exceeds(fmt, n, e, fmt.lowest if negative else fmt.largest):
+        return _beyond(fmt, negative)
+    if e < -FARTHEST:
+        raise OverflowError("got a result with an exponent below -2**60; needed one above; scale the numbers")
+    return negative, n, e
+
+
+@inner
+def add(fmt: Any, a: Any, b: Any) -> Any:
+    negative, x, e = a
+    other, y, f = b
+    if x == wide(_U0):
+        return round_(fmt, b)  # the opposite of a lowest number, if it was subtracted
+    if y == wide(_U0):
+        return a
+    if e < f:
+        negative, x, e, other, y, f = other, y, f, negative, x, e
+    # The larger number gets more digits at its end, and the smaller one is cut off at the last of them.
+    d, more = e - f, False
+    k = min(d, fmt.room - fmt.precision)
+    x, e = _raised(fmt, x, k), e - k
+    if d > k:
+        k = d - k
+        if k > fmt.precision:
+            y, more = wide(_U0), True
+        else:
+            y, rest = _lowered(fmt, y, k)
+            more = rest != 0
+    if negative == other:
+        n = x + y
+    elif x >= y:
+        n = x - y
+        if more:  # then x has digits to spare
+            n = n - wide(_U1)
+    else:
+        n, negative = y - x, other
+    return rounded(fmt, negative, n, more, e)
+
+
+@inner(forceinline=True)
+def subtract(fmt: Any, a: Any, b: Any) -> Any:
+    return add(fmt, a, opposite(b))
+
+
+@inner(forceinline=True)
+def opposite(a: Any) -> Any:
+    return (not a[0]) & (a[1] != wide(_U0)), a[1], a[2]
+
+
+@inner
+def multiply(fmt: Any, a: Any, b: Any) -> Any:
+    if a[1] == wide(_U0) or b[1] == wide(_U0):
+        return zero()
+    k = max(2 * fmt.precision - fmt.room, 0)
+    high, low = product(a[1], b[1])
+    n, more = _cut(fmt, high, low, k)
+    return rounded(fmt, a[0] != b[0], n, more, a[2] + b[2] + k)
+
+
+@inner
+def divide(fmt: Any, a: Any, b: Any) -> Any:
+    if b[1] == wide(_U0):
+        raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+    if a[1] == wide(_U0):
+        return zero()
+    if fmt.bits == 1 and fmt.split == 0:  # significands of at most 61 bits: a quotient of 63 or 64 is long enough
+        x, y = low_word(a[1]), low_word(b[1])
+        up, s = leading_zeros(x), leading_zeros(y)
+        digit, left = divided_by_word(x << (up - 1), _U0, y << s)
+        return rounded(fmt, a[0] != b[0], wide(digit), left != _U0, a[2] - b[2] - 63 - up + s)
+    k = fmt.room - 1
+    high, low = _enlarged(fmt, a[1], k)
+    s = 128 - length(b[1])
+    d = b[1] << s
+    high, low = shifted_left(high, low, s)
+    n, rest = divided(high, low, d, reciprocal(d))
+    return rounded(fmt, a[0] != b[0], n, rest != wide(_U0), a[2] - b[2] - k)
+
+
+@inner
+def _root_of_126_bits(n: Any) -> Any:
+    """floor(sqrt(n)) for 2**124 <= n < 2**126, a word."""
+    s = np.uint64(math.sqrt(to_float64(n)))
+    square = wide(s) * wide(s)
+    # One step of Newton's method leaves an error of at most two.
+    if square <= n:
+        s += np.uint64(to_float64(n - square) / (2.0 * np.float64(s)))
+    else:
+        s -= np.uint64(to_float64(square - n) / (2.0 * np.float64(s)))
+    while wide(s) * wide(s) > n:
+        s -= _U1
+    while wide(s + _U1) * wide(s + _U1) <= n:
+        s += _U1
+    return s
+
+
+@inner
+def sqrt(fmt: Any, a: Any) -> Any:
+    if a[0]:
+        raise ValueError("got the square root of a negative number; needed x >= 0")
+    if a[1] == wide(_U0):
+        return zero()
+    # The root of a number with 2t + 1 or 2t + 2 digits and an even exponent has t + 1.
+    k = fmt.precision + 2 - ((a[2] - fmt.precision) & 1)
+    high, low = _enlarged(fmt, a[1], k)
+    # Shifted by an even number of bits, it has 245 or 246. The root of the first 126 comes first, then 60 bits more:
+    # Zimmermann, Karatsuba square root (1999).
+    size = 128 + length(high) if high != wide(_U0) else length(low)
+    s = (246 - size) >> 1
+    if 2 * s >= 128:
+        high, low = low << (2 * s - 128), wide(_U0)
+    else:
+        high, low = shifted_left(high, low, 2 * s)
+    first = (high << 8) | (low >> 120)
+    root = _root_of_126_bits(first)
+    if s >= 60:  # the other bits are zeros
+        return rounded(fmt, False, wide(root) >> (s - 60), wide(root) * wide(root) != first, (a[2] - k) >> 1)
+    rest = (first - wide(root) * wide(root)) << 60 | ((low >> 60) & wide(_LOW_60))
+    digit, rest_word = divided_by_word(high_word(rest), low_word(rest), root + root)
+    rest = (wide(rest_word) << 60) | (low & wide(_LOW_60))
+    whole = (wide(root) << 60) + wide(digit)
+    square = wide(digit) * wide(digit)
+    # The rest is negative if the second digit is too large.
+    while rest < square:
+        rest = rest + whole + whole - wide(_U1)
+        whole = whole - wide(_U1)
+    return rounded(fmt, False, whole >> s, rest != square, (a[2] - k) >> 1)
+
+
+@inner(forceinline=True)
+def round_(fmt: Any, x: Any) -> Any:
+    """Round ``m * base**e`` for any m of at most `room` digits."""
+    return rounded(fmt, x[0], x[1], False, x[2])
+
+
+@inner
+def compare(fmt: Any, a: Any, b: Any) -> Any:
+    if a[0] != b[0]:
+        return -1 if a[0] else 1
+    larger: Any = 0
+    if a[1] == wide(_U0) or b[1] == wide(_U0) or a[2] == b[2]:
+        larger = np.int64(a[1] > b[1]) - np.int64(a[1] < b[1])
+    else:
+        larger = 1 if a[2] > b[2] else -1
+    return -larger if a[0] else larger
+
+
+@inner(forceinline=True)
+def integer(fmt: Any, n: Any) -> Any:
+    """The integer n, rounded."""
+    return rounded(fmt, n < 0, wide(np.uint64(abs(n))), False, np.int64(0))
+
+
+# -- conversion ----------------------------------------------------------------------------------------
+
+
+@inner
+def _exactly(fmt: Any, n: Any, e: Any, m: Any, f: Any) -> Any:
+    """Whether ``n * base**e`` equals ``m * base**f``."""
+    if n == wide(_U0) or m == wide(_U0):
+        return n == m
+    d = f - e
+    if _digits(fmt, n) != _digits(fmt, m) + d:
+        return False
+    return _raised(fmt, m, d) == n if d >= 0 else _raised(fmt, n, -d) == m
+
+
+@inner
+def _from_binary(fmt: Any, n: Any, more: Any, k: Any) -> Any:
+    """Return ``(n + f) * 2**k``, f as in :func:`rounded`, as n, `more` and e in the base, and whether that succeeded.
+
+    If there are more digits, n has at least 127 bits, and the base is a power of two.
+    """
+    if n == wide(_U0):
+        return n, False, np.int64(0), True
+    if fmt.bits > 0:
+        spare = max(length(n) - 122, 0)
+        more |= (n & ((wide(_U1) << spare) - wide(_U1))) != wide(_U0)
+        e = (k + spare) // fmt.bits
+        return (n >> spare) << (k + spare - e * fmt.bits), more, e, True
+    word = low_word(n)
+    zeros = trailing_zeros(word) if word != _U0 else 64 + trailing_zeros(high_word(n))
+    n, places = n >> zeros, -(k + zeros)
+    if places <= 0:
+        possible = length(n) - places <= 120
+        return n << (-places if possible else 0), False, np.int64(0), possible
+    # With 5**p of p log2 5 bits, the product n * 5**places takes at most 246 bits.
+    if places > 2 * _MOST_PLACES or length(n) + ((places * 1189) >> 9) + 1 > 246:
+        return n, False, np.int64(0), False
+    first = min(places, _MOST_PLACES)
+    high, low = product(n, _entry(_FIVE, first))
+    if places > first:
+        rest = _entry(_FIVE, places - first)
+        carried, low = product(low, rest)
+        high = high * rest + carried
+    size = 128 + length(high) if high != wide(_U0) else length(low)
+    excess = max(((size * 1233) >> 12) + 1 - fmt.room, 0)
+    n, more = _cut(fmt, high, low, excess)
+    return n, more, excess - places, True
+
+
+@compiled
+def from_integers(fmt: Any, n: int, m: Any, e: Any, twos: Any, out: Any, states: Any) -> None:
+    """Round numbers ``m * 2**e``, or ``m * base**e`` without `twos`, of int64.
+
+    states[i] is 0 if that is exact, 1 if not, 2 if the entry needs exact arithmetic. Raises OverflowError.
+    """
+    for i in range(n):
+        size = np.uint64(abs(m[i]))
+        digits, more, exponent, possible = wide(size), False, e[i], True
+        if twos:
+            digits, more, exponent, possible = _from_binary(fmt, digits, False, e[i])
+        x = zero()
+        states[i] = 2
+        if possible:
+            x = rounded(fmt, m[i] < 0, digits, more, exponent)
+            states[i] = 0 if not more and _exactly(fmt, digits, exponent, x[1], x[2]) else 1
+        out[0][i], out[1][i], out[2][i] = parts(fmt, x)
+
+
+@inner
+def _in_binary(fmt: Any, m: Any, e: Any) -> Any:
+    """Return ``m * base**e`` as ``(n + f) * 2**k``: n, whether f > 0, k, and whether that succeeded.
+
+    If f > 0, n has at least 127 bits.
+    """
+    if fmt.bits > 0:
+        return m, False, e * fmt.bits, True
+    if e > 38 or e < -38:
+        return m, False, np.int64(0), False
+    if e >= 0:
+        high, low = product(m, _entry(_POWER, e))
+        if high == wide(_U0):
+            return low, False, np.int64(0), True
+        s = 128 - length(high)
+        high, low = shifted_left(high, low, s)
+        return high, low != wide(_U0), 128 - s, True
+    k = np.uint64(-e)
+    s = 128 - length(m)
+    q, rest = divided((m << s) >> 1, wide(_U0), _entry(_DIVISOR, k), _RECIPROCAL[k])
+    return q, rest != wide(_U0), _SHIFT[k] - s - 127, True
+
+
+@compiled
+def converted(source: Any, fmt: Any, n: int, a: Any, out: Any, states: Any) -> None:
+    """Round numbers of one format to another, in any base; states[i] is 2 if the entry needs exact arithmetic.
+
+    Raises OverflowError.
+    """
+    for i in range(n):
+        negative, m, e = number(source, a[0][i], a[1][i], a[2][i])
+        more, possible = False, True
+        if source.bits != fmt.bits and m != wide(_U0):
+            m, more, e, possible = _in_binary(source, m, e)
+            if possible:
+                m, more, e, possible = _from_binary(fmt, m, more, e)
+        x = rounded(fmt, negative, m, more, e) if possible else zero()
+        states[i] = 0 if possible else 2
+        out[0][i], out[1][i], out[2][i] = parts(fmt, x)
+
+
+@compiled
+def to_floats(fmt: Any, n: int, a: Any, out: Any, states: Any) -> None:
+    """Round numbers to the nearest float64, ties to even; states[i] is 2 if the entry needs exact arithmetic."""
+    for i in range(n):
+        negative, m, e = number(fmt, a[0][i], a[1][i], a[2][i])
+        out[i], states[i] = 0.0, 0
+        if m == wide(_U0):
+            continue
+        m, more, k, possible = _in_binary(fmt, m, e)
+        size = length(m)
+        exponent = size - 1 + k  # of the highest bit
+        if not possible or exponent < -1021 or exponent > 1022:
+            states[i] = 2
+            continue
+        m = m << (128 - size)
+        whole = np.int64(low_word(m >> 75))
+        rest = m & ((wide(_U1) << 75) - wide(_U1))
+        half = wide(_U1) << 74
+        up = rest > half or (rest == half and (more or (whole & 1) == 1))
+        x = from_bits(((exponent + 1022) << 52) + whole + np.int64(up))  # a carry leads to the next exponent
+        out[i] = -x if negative else x

@@ -1,0 +1,197 @@
+"""Significands of two words against the exact kernel: a slice of ``make exactness``, conversions, and matrices."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks import wide
+from gpbnb.arithmetic import linalg, named
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import TwoWords, backend
+from gpbnb.arithmetic.kernels.selection import wide_tag
+from gpbnb.arithmetic.rounding import Rounding, Rules
+
+FORMATS = {
+    "binary128": named.BINARY128,
+    "54 bits": FloatFormat(2, 54),
+    "64 bits, up": FloatFormat(2, 64, "up"),
+    "53 bits, even": FloatFormat(2, 53, "even"),
+    "24 bits, far": FloatFormat(2, 24, "even", emin=-16382, emax=16383),
+    "IBM, 14 digits": named.IBM_HEX64,
+    "decimal128": named.DECIMAL128,
+    "19 digits, odd": FloatFormat(10, 19, "odd"),
+    "Q16.40": FixedFormat(16, 40),
+    "Q0.63": FixedFormat(0, 63, "even", overflow="saturate"),
+}
+
+
+def test_every_rounding_and_range_agrees_with_the_exact_kernel() -> None:
+    formats = list(wide.formats())
+    counts = [wide.compare(rules, 40, 7) for rules in formats[:: len(formats) // 24 + 1]]
+    assert [text for count in counts for text in count.different] == []
+    assert min(count.compared for count in counts) > 150
+    assert sum(count.overflowed for count in counts) > 20
+
+
+def test_a_wrong_rounding_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    rules = Rules(2, 113, Rounding.EVEN)
+    assert wide.compare(rules, 300, 5).different == []
+    monkeypatch.setattr(wide, "wide_tag", lambda rules: wide_tag(rules._replace(rounding=Rounding.NEAREST)))
+    found = wide.compare(rules, 300, 5).different
+    assert any(" add " in text for text in found)
+    assert any(" multiply " in text for text in found)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_the_format_is_stored_in_two_words(name: str) -> None:
+    assert isinstance(FORMATS[name].backend, TwoWords)
+
+
+OTHERS = (
+    Rules(2, 114, Rounding.EVEN),
+    Rules(10, 35, Rounding.EVEN),
+    Rules(16, 29, Rounding.UP),
+    Rules(3, 40, Rounding.EVEN),
+    Rules(2, 60, Rounding.STOCHASTIC),
+)
+
+
+@pytest.mark.parametrize("rules", OTHERS)
+def test_longer_significands_other_bases_and_random_roundings_are_not(rules: Rules) -> None:
+    assert wide_tag(rules) is None
+    assert not isinstance(backend(rules), TwoWords)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_numbers_are_stored_and_read_without_a_change(name: str) -> None:
+    fmt = FORMATS[name]
+    ratios = [(sign * n, 10**k) for n in (1, 3, 7) for k in (1, 2, 19) for sign in (1, -1)]
+    numbers = [fmt.backend.kernel.from_ratio(*ratio) for ratio in ratios]
+    m, e = np.array([*numbers, (0, 0)], object).T
+    components = fmt.backend.from_exact(m, e)
+    assert all(part.dtype == np.int64 for part in components)
+    assert np.array_equal(np.sign(components[0]), np.sign(m))
+    assert all(map(np.array_equal, fmt.backend.to_exact(components), (m, e)))
+
+
+def values(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    far = rng.standard_normal(40) * 10.0 ** rng.integers(-40, 40, 40)
+    few = rng.integers(-99, 99, 40) / 2.0 ** rng.integers(0, 40, 40)
+    return np.concatenate([far, few, rng.uniform(-1, 1, 100), [0.0, 5e-324, 0.1, -(2.0**-60), 2.0**53 + 2, 1e22, 1e23]])
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_float64_is_rounded_like_its_fraction(name: str) -> None:
+    fmt: Any = FORMATS[name]
+    x = values(3)
+    if isinstance(fmt, FixedFormat):
+        x = x[np.abs(x) < 0.99]
+    if fmt.limits is not None:
+        x = x[(x == 0) | (np.abs(x) > 1e-70) & (np.abs(x) < 1e70)]
+    expected = fmt.array([Fraction(value) for value in x.tolist()])
+    assert np.all(fmt.array(x) == expected)
+    whole = np.array([0, 1, -1, 2**62 + 1, -(2**63) + 1]) if not isinstance(fmt, FixedFormat) else np.array([0])
+    assert np.all(fmt.array(whole) == fmt.array(whole.tolist()))
+
+
+@pytest.mark.parametrize("name", ["decimal128", "19 digits, odd", "24 bits, far"])
+def test_only_exact_operands_are_taken(name: str) -> None:
+    one: Any = FORMATS[name].array(1)
+    assert float(one + np.array([0.5, 2.0**-19, 123.0])[0]) == 1.5
+    with pytest.raises(ValueError, match="holds exactly"):
+        one + np.array([0.5, 0.1 if name != "decimal128" else 2.0**-60])
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_to_float64_is_nearest_with_ties_to_even(name: str) -> None:
+    fmt: Any = FORMATS[name]
+    x = fmt.array([Fraction(n, d) / 8 for n in range(-5, 6) for d in (1, 3, 7, 10)])
+    near = [fmt.array(Fraction(1, 2) + Fraction(k, 2**54)) for k in range(-3, 4)]
+    for array in (x, *near):
+        fractions = np.atleast_1d(array.to_fractions())
+        assert np.atleast_1d(array.to_float()).tolist() == [float(value) for value in fractions]
+
+
+def test_numbers_beyond_float64_are_refused() -> None:
+    tiny = named.BINARY128.array("1e-4000")
+    with pytest.raises(OverflowError, match="range of float64"):
+        tiny.to_float()
+    assert named.BINARY128.array("5e-324").to_float() == 5e-324
+
+
+NARROW = {
+    "binary32": named.BINARY32,
+    "binary64": named.BINARY64,
+    "24 bits": FloatFormat(2, 24),
+    "6 hexadecimal": FloatFormat(16, 6, "chop"),
+    "Q7.8": FixedFormat(7, 8, "down"),
+    "8 digits": FloatFormat(10, 8),
+    "17 digits": FloatFormat(10, 17, "chop"),
+    "decimal64": named.DECIMAL64,
+}
+ALL = FORMATS | NARROW
+
+
+@pytest.mark.parametrize("target", ALL)
+@pytest.mark.parametrize("source", ALL)
+def test_conversion_between_formats_rounds_once(source: str, target: str) -> None:
+    if source == target:
+        pytest.skip("nothing is rounded")
+    tiny = [Fraction(1, 10**9), Fraction(3, 10**25)] if not isinstance(ALL[source], FixedFormat) else []
+    halves = [Fraction(2 * n + 1, 2**k) for k in (9, 25, 54) for n in (0, 6)]
+    x = ALL[source].array([*(Fraction(n, 97) for n in range(-96, 97, 5)), *tiny, *halves])
+    found, expected = ALL[target].array(x), ALL[target].array(x.to_fractions())
+    assert np.all(found == expected)
+    assert found.backend is expected.backend
+    if type(x.backend) is not type(found.backend) or ALL[source].base != ALL[target].base:
+        assert ALL[target].backend.from_backend(x.backend, x.components) is not None
+
+
+@pytest.mark.parametrize("name", ["binary128", "decimal128", "IBM, 14 digits"])
+def test_matrices_sums_and_comparisons_agree_with_the_exact_backend(name: str) -> None:
+    fmt = FORMATS[name]
+    rng = np.random.default_rng(4)
+    a = fmt.array(rng.uniform(-1, 1, (5, 5))) / fmt.array(7)
+    slow = a.on_exact_backend()
+    for operate in (
+        lambda x: x @ x,
+        lambda x: x.sum(0),
+        lambda x: x.prod(1),
+        np.cumsum,
+        lambda x: linalg.lu(x, pivot=True)[0],
+        linalg.inv,
+        lambda x: -abs(x),
+        lambda x: np.max(x),
+    ):
+        found, expected = operate(a), operate(slow)
+        assert isinstance(found.backend, TwoWords)
+        assert not isinstance(expected.backend, TwoWords)
+        assert all(map(np.array_equal, found.to_pairs(), expected.to_pairs()))
+    assert np.array_equal(a < a.T, slow < slow.T)
+
+
+@pytest.mark.parametrize("name", ["binary128", "decimal128", "Q16.40", "binary32", "17 digits", "6 hexadecimal"])
+def test_sorting_orders_like_fractions_and_keeps_the_order_of_equal_entries(name: str) -> None:
+    fmt = ALL[name]
+    rng = np.random.default_rng(8)
+    step = fmt.unit_roundoff / 2 if isinstance(fmt, FloatFormat) else Fraction(1, 2**40)
+    near = [Fraction(1, 2) + k * step for k in range(5)]
+    numbers = [*near, Fraction(0), *(Fraction(int(n), 8) for n in rng.integers(-40, 40, 31)), *(-x for x in near)]
+    x = fmt.array([numbers[i] for i in rng.permutation(len(numbers))]).reshape(6, 7)
+    fractions = x.to_fractions()
+    for axis in (0, 1, -1, None):
+        assert np.array_equal(np.argsort(x, axis=axis), np.argsort(fractions, axis=axis, kind="stable"))
+
+
+def test_the_opposite_of_the_lowest_fixed_point_number_overflows() -> None:
+    lowest = FixedFormat(0, 63).array(-1)
+    with pytest.raises(OverflowError, match="negation"):
+        lowest.__neg__()
+    saturating = FixedFormat(0, 63, overflow="saturate")
+    assert (0 - saturating.array(-1)).to_fractions() == 1 - Fraction(1, 2**63)
