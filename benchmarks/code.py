@@ -38,11 +38,12 @@ from benchmarks.journal import Journal
 from gpbnb import BINARY32, BINARY64, FixedFormat, Form, LinearModel, LinearSystem, Rounding, WordFormats, caching
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.design import FilterDesign
+from gpbnb.filters.forms import CONSTANT_GAIN
 from gpbnb.filters.structures import STRUCTURES
 from gpbnb.report.display.tables import Table
 from gpbnb.wordlength import code
 from gpbnb.wordlength.c_files import FLAGS
-from gpbnb.wordlength.code import CONSTANT_GAIN, write_code
+from gpbnb.wordlength.code import write_code
 
 STEPS = 10_000
 COMPILERS = ("gcc", "clang")

@@ -26,7 +26,7 @@ from gpbnb.bounds.system import output_errors
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.caching import replace_file
 from gpbnb.filters.design import FilterDesign
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import CONSTANT_GAIN, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.run import Run
@@ -37,9 +37,6 @@ from gpbnb.filters.tracing import kalman_program, without_exact
 from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_words
 from gpbnb.wordlength.c_files import Described, Vectors, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeStep, checked_identifier, word_arithmetic
-
-CONSTANT_GAIN = "constant gain"
-"""Name of the form of a Kalman filter whose gain is the one that it approaches."""
 
 VECTORS = 100
 """Steps of the test vectors."""

@@ -35,11 +35,14 @@ from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.program import steps_in_python
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
+from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.tracing import kalman_program, without_exact
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.c_files import FLAGS
 from gpbnb.wordlength.c_source import places
 from gpbnb.wordlength.code import model_coefficients, prepared
+from gpbnb.wordlength.models import read_model
+from gpbnb.wordlength.precision import required_precision
 
 CASES = list(cases())
 needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang")
@@ -442,3 +445,73 @@ def test_the_command_writes_no_code_for_a_format_without_a_type(asked, capsys):
     folder.write_text("")
     assert main([*arguments, "--tolerance", "1"]) == 2
     assert "which is a file; needed a folder" in capsys.readouterr().err
+
+
+TRACKER = """
+states = ["position (m)", "speed (m/s)"]
+measurements = ["range (m)"]
+Phi = [[1, 0.1], [0, 1]]
+H = [[1, 0]]
+Q = [[1e-4, 0], [0, 1e-2]]
+R = [[4]]
+x0 = [0, 0]
+P0 = [[100, 0], [0, 100]]
+"""
+
+
+@pytest.fixture
+def tracker(tmp_path):
+    """A command line for a Kalman filter with constant gain, and the folder for its code."""
+    model = tmp_path / "tracker.toml"
+    model.write_text(TRACKER, encoding="utf-8")
+    given = [str(model), "--form", "Constant gain", "--steps", "50", "--tolerance", "0.01"]
+    return [*given, "--code", str(tmp_path / "code")], tmp_path / "code"
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("options", "texts"),
+    [
+        ([], ["in BINARY32", "never with -ffast-math"]),
+        (["--basis", "guarantee", "--measurement", "100"], ["For inputs of at most 100 in size, each output stays"]),
+        (["--fixed", "--basis", "emulation"], ["fixed point, data of ", "coefficients of "]),
+        (["--format", "fixed 7.24"], ["data of 32 bits with 24 after the point"]),
+    ],
+)
+def test_the_command_writes_a_kalman_filter_with_constant_gain(options, texts, tracker, capsys):
+    arguments, folder = tracker
+    assert main([*arguments, *options]) == 0
+    text = header(folder / "filter.h")
+    assert text.startswith("/* tracker, constant gain, in ")
+    assert all(each in text for each in texts)
+    assert "constant gain, emulation: " in capsys.readouterr().err or "guarantee" in options
+    assert built(folder)[0] == 0
+
+
+def test_a_constant_gain_is_answered_as_its_linear_system(tracker, capsys):
+    arguments, folder = tracker
+    model = read_model(arguments[0])
+    z = simulated_measurements(model, 50)
+    assert main([*arguments[:-2], "--basis", "emulation", "--report", str(folder) + ".html"]) == 0
+    expected = required_precision(settled_filter(model), 50, 0.01, z=z, basis="emulation")
+    assert capsys.readouterr().out.strip() == str(expected)
+    page = folder.with_name("code.html").read_text(encoding="utf-8")
+    assert "simulated by the model, seed 0" in page
+    assert "position (m)" in page
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        (TRACKER, ["--simulate", "step"], "its model simulates its measurements"),
+        (TRACKER, ["--mixed"], "needed --fixed with it"),
+        ('b = ["0.1"]\na = [1, "-0.5"]\n', [], "got --form constant gain for a linear system; needed none"),
+        (TRACKER.replace("R = [[4]]", "R = [[[4]], [[5]]]"), [], "changes from step to step"),
+    ],
+)
+def test_the_command_refuses_what_a_constant_gain_does_not_have(text, options, message, tracker, capsys):
+    arguments, folder = tracker
+    (folder.parent / "tracker.toml").write_text(text, encoding="utf-8")
+    assert main([*arguments, *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not folder.exists()
