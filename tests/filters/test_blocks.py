@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, FixedFormat, FloatFormat, Form, LinearModel, emulate
+from gpbnb import BINARY32, BINARY64, FixedFormat, FloatFormat, Form, LinearModel, emulate
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.run import Run, Sums
 from tests.plain_structures import floating
@@ -243,6 +243,20 @@ def test_each_block_computes_in_its_own_format_as_plain_loops_do(form, base, dig
         assert P[k].tolist() == slow.P
         if form is not Form.UD:
             assert run.exactly(run.G)[k].tolist() == slow.K
+
+
+def test_a_covariance_in_binary64_beside_binary32_is_that_of_plain_loops():
+    single, double = floating(2, 24, "even", -126), floating(2, 53, "even", -1022)
+    rounds = dict.fromkeys(BLOCKS, Rounds(single, single)) | {"covariance": Rounds(double, double)}
+    slow = Filter(FRACTIONS, Form.UD, double, rounds)
+    blocks = BlockFormats.uniform(BINARY32).with_block("covariance", BINARY64)
+    assert blocks.model == BINARY64
+    run = Run(MODEL, blocks, Form.UD, range(1, len(Z) + 1))
+    run.take(Z)
+    x, U = run.exactly(run.X), run.exactly(run.C)
+    for k, z in enumerate(Z):
+        slow.step([Fraction(each) for each in z.tolist()])
+        assert (x[k].tolist(), U[k].tolist()) == (slow.x, slow.P)
 
 
 @pytest.mark.parametrize("form", list(Form), ids=str)

@@ -120,6 +120,28 @@ def test_every_bit_of_every_step_is_compared(tmp_path):
     assert code_batch._difference(tmp_path, written) == ""
 
 
+GROWING = LinearSystem([["1.5"]], [[1]])
+
+
+def test_a_filter_that_overflows_starts_again_with_the_next_input():
+    vectors = code_batch.restarted(prepared(GROWING, FixedFormat(4, 11), None).emulate, np.ones((100, 1)))
+    assert vectors.status.tolist() == [*([0, 0, 0, 0, 0, -2] * 16), 0, 0, 0, 0]
+    states = [2048, 5120, 9728, 16640, 27008, 27008]  # 1, 2.5, 4.75, 8.125, 13.1875; then 20.78
+    assert vectors.states[:, 0].tolist() == [*(states * 16), *states[:4]]
+    assert vectors.inputs.tolist() == [[2048]] * 100
+
+
+@needs_compiler
+def test_every_step_of_a_filter_that_overflows_is_compared(monkeypatch):
+    case, settings = Case("int16", "growing", GROWING, FixedFormat(4, 11), None), settings_of(installed()[:1])
+    (found,) = compare([case], 300, settings)
+    assert (found.counts, found.faults) == ((3, 900, 1800), ())
+    main_ = code_batch._main
+    monkeypatch.setattr(code_batch, "_main", lambda batch: main_(batch).replace("status >= 2", "0"))
+    (found,) = compare([case], 300, settings)
+    assert len(found.faults) == 3
+
+
 @needs_compiler
 def test_a_comparison_resumes_where_it_ended(tmp_path, monkeypatch):
     file = tmp_path / "code.csv"
@@ -221,9 +243,8 @@ def test_a_zero_pivot_stops_the_code_in_the_step_that_stops_the_emulation(tmp_pa
 
 @needs_compiler
 def test_an_overflow_ends_the_code_in_the_step_that_ends_the_emulation(tmp_path):
-    growing = LinearSystem([["1.5"]], [[1]])
     for fmt in (BINARY32, BINARY64, FixedFormat(4, 11), WordFormats(FixedFormat(4, 11), 12, FixedFormat(6, 20))):
-        write_code(growing, fmt, None, tmp_path, inputs=np.ones((3000, 1)))
+        write_code(GROWING, fmt, None, tmp_path, inputs=np.ones((3000, 1)))
         assert built(tmp_path)[0] == 0
         last = (tmp_path / "filter_vectors.txt").read_text().splitlines()[-1]
         assert last.startswith("-2 ")
