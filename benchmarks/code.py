@@ -190,6 +190,11 @@ def cases() -> Iterator[Case]:
                 yield Case(kind, f"{label}, {CONSTANT_GAIN}", model, fmt, CONSTANT_GAIN)
     for form in Form:
         yield Case("binary32", f"ten states, {form}", large_model(), BINARY32, form)
+    for label, model in models().items():
+        for i, form in enumerate(each for each in Form if each is not Form.UD):
+            # Python's integers emulate words that are long or wrap around.
+            for kind, fmt in [*fixed(2, (16,), ("wrap",)), *fixed(8, (64,), first=i)]:
+                yield Case(kind, f"{label}, {form}", model, fmt, form)
 
 
 def installed(names: Sequence[str] = COMPILERS) -> list[str]:

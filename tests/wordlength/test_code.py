@@ -37,10 +37,12 @@ from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.tracing import kalman_program, without_exact
+from gpbnb.filters.words import integers_of, run_checked
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.c_files import FLAGS
+from gpbnb.wordlength.c_integers import Integers, Needs
 from gpbnb.wordlength.c_source import places
-from gpbnb.wordlength.code import model_coefficients, prepared
+from gpbnb.wordlength.code import _in_long_words, model_coefficients, prepared
 from gpbnb.wordlength.models import read_model
 from gpbnb.wordlength.precision import required_precision
 
@@ -214,6 +216,68 @@ def test_traced_operations_have_the_digits_of_the_compiled_step(form, fmt):
             assert x == y == numbers(run, run.exactly(run.X)[k], run.exactly(run.C)[k])
 
 
+@pytest.mark.parametrize("form", [each for each in Form if each is not Form.UD], ids=str)
+@pytest.mark.parametrize("rounding", ["nearest", "even", "chop", "up", "down", "odd"])
+def test_long_words_have_the_digits_of_the_compiled_step_and_of_fractions(rounding, form):
+    for model in models().values():
+        z = np.random.default_rng(4).uniform(-1, 1, (6, model.m))
+        short, narrow = FixedFormat(8, 20, rounding, "saturate"), FixedFormat(2, 13, rounding, "wrap")
+        for fmt in (short, FixedFormat(8, 55, rounding), narrow):
+            program = kalman_program(model.n, model.m, form)
+            coefficients, x = _in_long_words(model, fmt, form)
+            start, inputs = (integers_of(each, fmt) for each in (x, z))
+            found = run_checked(program, fmt, coefficients, start, inputs).states.tolist()
+            for k, measured in enumerate(fmt.array(z).to_fractions().tolist()):
+                try:
+                    x = steps_in_python(program, fmt.round, coefficients[k % len(coefficients)], x, measured)
+                except ZeroDivisionError:
+                    assert len(found) == k
+                    break
+                assert found[k] == [each / fmt.unit for each in x]
+            if fmt is short:
+                run = Run(model, fmt, form, range(1, 7))
+                run.take(z)
+                exact = [numbers(run, *each) for each in zip(run.exactly(run.X), run.exactly(run.C), strict=True)]
+                assert found == [[each / fmt.unit for each in row] for row in exact]
+
+
+DIVISIONS = """
+#include <inttypes.h>
+#include <stdio.h>
+{helpers}
+int main(void)
+{{
+    int64_t a, b;
+    while (scanf("%" SCNd64 "%" SCNd64, &a, &b) == 2)
+        printf("%" PRId64 "\\n", divide(a, b));
+    return 0;
+}}
+"""
+
+
+@needs_compiler
+@pytest.mark.parametrize("overflow", ["saturate", "wrap"])
+@pytest.mark.parametrize(("integer", "fraction"), [(8, 55), (63, 0), (63, -3)])
+def test_the_longest_words_are_divided_as_fractions(integer, fraction, overflow, tmp_path):
+    """Also the lowest number of 64 bits, whose negative has 65, without undefined behaviour."""
+    edges = [2**63 - 1, 2**62, 2**40 + 1, 3, 1]
+    drawn = np.random.default_rng(9).integers(-(2**63), 2**63 - 1, 12).tolist()
+    numbers = [-(2**63), *edges, *(-each for each in edges), *drawn, *(each >> 40 for each in drawn)]
+    for rounding in ("nearest", "even", "chop", "up", "down", "odd"):
+        fmt = FixedFormat(integer, fraction, rounding, overflow)
+        helpers = Integers(WordFormats(fmt), Needs(fmt.precision + abs(fraction), 63)).text("divide")
+        (tmp_path / "run.c").write_text(DIVISIONS.format(helpers=helpers))
+        command = [installed()[0], *FLAGS.split(), "-Werror", *benchmarks.code.SANITIZER.split(), "-o", "run", "run.c"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+        within = [each for each in numbers if fmt.lowest <= each * fmt.unit <= fmt.largest]
+        pairs = [(a, b) for a in within for b in within if b]
+        given = "\n".join(f"{a} {b}" for a, b in pairs)
+        done = subprocess.run(["./run"], cwd=tmp_path, input=given, capture_output=True, text=True, check=True)
+        assert done.stderr == ""
+        assert list(map(int, done.stdout.split())) == [fmt.round(Fraction(a, b)) / fmt.unit for a, b in pairs]
+
+
 def blind(form):
     """A filter whose second state no sensor sees and no noise moves, and one variance of which is zero."""
     Q, P0 = np.diag([0.25, 0.0, 0.5]), np.diag([1.0, 2.0, 0.0])
@@ -351,6 +415,15 @@ def test_a_name_cannot_end_a_comment(tmp_path):
         ),
         (models()["one state"], BINARY32, "Potter", "got the Potter form"),
         (models()["one state"], FixedFormat(4, 11, "stochastic"), "UD", "stochastic rounding"),
+        (models()["one state"], FixedFormat(8, 55), "UD", "the UD form in 64 bits with 55 after the point"),
+        (models()["one state"], FixedFormat(8, 23, "even", "wrap"), "UD", "that do not wrap around"),
+        (
+            LinearModel([[2]], [[2]], [[4]], [[8]], [0], [[4]]),
+            FixedFormat(64, -1, "even", "saturate"),
+            "Joseph",
+            "got divisors of 64 bits",
+        ),
+        (models()["one state"], FixedFormat(8, 56), "Joseph", "got data of 65 bits; needed at most 64"),
     ],
 )
 def test_what_has_no_code_is_refused(given, fmt, form, message, tmp_path):
