@@ -552,11 +552,11 @@ def _when(conditions: list[str], then: str) -> list[str]:
     """Return an if, with as many conditions in a line as fit."""
     lines, line = list[str](), "if ("
     for i, each in enumerate(conditions):
-        piece = each + (" || " if i + 1 < len(conditions) else ")")
-        if len(line) + len(piece) > 110:
+        condition = each + (" || " if i + 1 < len(conditions) else ")")
+        if len(line) + len(condition) > 110:
             lines.append(line.rstrip())
             line = "        "
-        line += piece
+        line += condition
     return [*lines, line, f"    {then}"]
 
 

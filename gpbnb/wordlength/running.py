@@ -205,11 +205,11 @@ def write_code_of(given: argparse.Namespace) -> tuple[Path, ...]:
     structure, model = next(iter(structures.items()), (None, model))
     bases = _bases(given)
     if given.fixed and isinstance(model, LinearSystem):
-        words, largest = _words_that_meet(given, model, bases)
+        words, largest = _words_within_tolerance(given, model, bases)
         return _written(given, model, words, largest, structure)
     sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
     within = _limits(model, bases, sizes)
-    fmt = _format(given) or _type_that_meets(given, model, bases, within)
+    fmt = _format(given) or _type_within_tolerance(given, model, bases, within)
     return _written(given, model, fmt, within, structure)
 
 
@@ -232,7 +232,7 @@ def _written(
     return write_code(kalman, fmt, given.form, given.code, inputs=vectors, within=within)
 
 
-def _words_that_meet(
+def _words_within_tolerance(
     given: argparse.Namespace, system: LinearSystem, bases: Sequence[Basis]
 ) -> tuple[WordFormats, FilterLimits]:
     """Return the formats that a search in fixed point finds on the first basis, and the largest inputs as limits."""
@@ -244,7 +244,7 @@ def _words_that_meet(
     return words, limits(system.n, system.m, measurement=np.abs(z).max(axis=0))
 
 
-def _type_that_meets(
+def _type_within_tolerance(
     given: argparse.Namespace, model: LinearModel | LinearSystem, bases: Sequence[Basis], within: FilterLimits | None
 ) -> FloatFormat:
     """Return binary32 if it meets the tolerance of a command line, else binary64."""

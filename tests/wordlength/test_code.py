@@ -419,7 +419,7 @@ def test_a_name_cannot_end_a_comment(tmp_path):
         (models()["one state"], FixedFormat(8, 23, "even", "wrap"), "UD", "that do not wrap around"),
         (
             LinearModel([[2]], [[2]], [[4]], [[8]], [0], [[4]]),
-            FixedFormat(64, -1, "even", "saturate"),
+            FixedFormat(64, -1, "up", "saturate"),
             "Joseph",
             "got divisors of 64 bits",
         ),
