@@ -18,14 +18,17 @@ def to_multiple(x, base, power, mode):
     """The multiple of base**power that a rounding mode gives for x."""
     p, q = x.numerator * base ** max(-power, 0), x.denominator * base ** max(power, 0)
     low, rest = divmod(p, q)
-    up = rest > 0 and {
-        "down": False,
-        "up": True,
-        "chop": x < 0,
-        "odd": low % 2 == 0,
-        "even": 2 * rest > q or (2 * rest == q and low % 2 == 1),
-        "nearest": 2 * rest > q or (2 * rest == q and x > 0),
-    }[mode]
+    up = (
+        rest > 0
+        and {
+            "down": False,
+            "up": True,
+            "chop": x < 0,
+            "odd": low % 2 == 0,
+            "even": 2 * rest > q or (2 * rest == q and low % 2 == 1),
+            "nearest": 2 * rest > q or (2 * rest == q and x > 0),
+        }[mode]
+    )
     return Fraction((low + up) * base ** max(power, 0), base ** max(-power, 0))
 
 
