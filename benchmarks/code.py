@@ -5,7 +5,7 @@ installed, without and with optimization, and run over 10,000 steps; every state
 compared. A further build runs the same steps under the sanitizer of undefined behaviour. Each build also runs the test
 program that comes with the code.
 
-The whole comparison takes half an hour on one core. It writes each finished combination to a journal in ``.cache`` and
+The whole comparison takes 40 minutes on one core. It writes each finished combination to a journal in ``.cache`` and
 resumes from it, as long as the code and the compilers stay the same. When all are done, it leaves their counts in
 ``benchmarks/results``.
 """
@@ -38,11 +38,12 @@ from benchmarks.journal import Journal
 from gpbnb import BINARY32, BINARY64, FixedFormat, Form, LinearModel, LinearSystem, Rounding, WordFormats, caching
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.design import FilterDesign
+from gpbnb.filters.forms import CONSTANT_GAIN
 from gpbnb.filters.structures import STRUCTURES
 from gpbnb.report.display.tables import Table
 from gpbnb.wordlength import code
 from gpbnb.wordlength.c_files import FLAGS
-from gpbnb.wordlength.code import CONSTANT_GAIN, write_code
+from gpbnb.wordlength.code import write_code
 
 STEPS = 10_000
 COMPILERS = ("gcc", "clang")
@@ -189,6 +190,11 @@ def cases() -> Iterator[Case]:
                 yield Case(kind, f"{label}, {CONSTANT_GAIN}", model, fmt, CONSTANT_GAIN)
     for form in Form:
         yield Case("binary32", f"ten states, {form}", large_model(), BINARY32, form)
+    for label, model in models().items():
+        for i, form in enumerate(each for each in Form if each is not Form.UD):
+            # Python's integers emulate words that are long or wrap around.
+            for kind, fmt in [*fixed(2, (16,), ("wrap",)), *fixed(8, (64,), first=i)]:
+                yield Case(kind, f"{label}, {form}", model, fmt, form)
 
 
 def installed(names: Sequence[str] = COMPILERS) -> list[str]:
@@ -209,8 +215,15 @@ def code_digest(settings: Sequence[str]) -> str:
     return hashlib.sha256("\n".join([caching.digest(sources), *about]).encode()).hexdigest()[:8]
 
 
-def run(share: float, steps: int, processes: int = 1, file: Path | None = JOURNAL) -> Iterator[list[Outcome]]:
-    """Compare a share of all combinations in batches, those in the journal first."""
+def run(
+    share: float, steps: int, processes: int = 1, file: Path | None = JOURNAL, only: str = ""
+) -> Iterator[list[Outcome]]:
+    """Compare a share of all combinations in batches, those in the journal first.
+
+    Parameters
+    ----------
+    only : text in the kind and name of each combination that is compared.
+    """
     compilers = installed()
     if not compilers:
         raise OSError(f"got no compiler; needed {' or '.join(COMPILERS)}")
@@ -219,7 +232,8 @@ def run(share: float, steps: int, processes: int = 1, file: Path | None = JOURNA
     chosen = list(cases())
     count = max(1, round(len(chosen) * share))
     # Formats repeat with a period, so that equal distances would pick few of them.
-    picked = {f"{i}, {steps}": chosen[i] for i in np.random.default_rng(0).permutation(len(chosen))[:count].tolist()}
+    drawn = np.random.default_rng(0).permutation(len(chosen))[:count].tolist()
+    picked = {f"{i}, {steps}": chosen[i] for i in drawn if only in f"{chosen[i].kind} {chosen[i].label}"}
     done = {part: journal.parts[part] for part in picked if part in journal.parts} if journal else {}
     yield [
         Outcome(picked[part], int(builds), int(steps), int(numbers), tuple(faults))
@@ -335,6 +349,7 @@ def version(compiler: str) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.code", description=__doc__.split("\n")[0])
     parser.add_argument("--share", type=float, default=1.0, help="share of all combinations, 1 for all (default)")
+    parser.add_argument("--only", default="", metavar="TEXT", help="combinations with this text in kind and name")
     parser.add_argument("--steps", type=int, default=STEPS)
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--store", action="store_true", help="store the counts after each batch, also those of a share")
@@ -345,8 +360,8 @@ def main() -> int:
         return 0
     start, outcomes = time.perf_counter(), list[Outcome]()
     total = len(list(cases()))
-    with tqdm(total=round(total * options.share), unit="combination") as bar:
-        for found in run(options.share, options.steps, options.processes):
+    with tqdm(total=None if options.only else round(total * options.share), unit="combination") as bar:
+        for found in run(options.share, options.steps, options.processes, only=options.only):
             outcomes += found
             bar.update(len(found))
             if options.store:
@@ -359,7 +374,7 @@ def main() -> int:
         f"{sum(each.numbers for each in outcomes):,} numbers agree, {different or 'no'} builds differ, "
         f"{time.perf_counter() - start:.0f} s"
     )
-    if options.share == 1 and options.steps == STEPS:
+    if options.share == 1 and options.steps == STEPS and not options.only:
         write(outcomes, total)
     return 1 if different else 0
 

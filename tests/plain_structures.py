@@ -8,27 +8,39 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from math import floor
+from math import log2
 from typing import NamedTuple
 
 ZERO = Fraction(0)
 
 
-def to_multiple(x, unit, mode):
-    """The multiple of a unit that a rounding mode gives for x."""
-    low = floor(x / unit)
-    rest = x / unit - low
-    if not rest:
-        return x
-    up = {
-        "down": False,
-        "up": True,
-        "chop": x < 0,
-        "odd": low % 2 == 0,
-        "even": rest > Fraction(1, 2) or (rest == Fraction(1, 2) and low % 2 == 1),
-        "nearest": rest > Fraction(1, 2) or (rest == Fraction(1, 2) and x > 0),
-    }[mode]
-    return (low + up) * unit
+def to_multiple(x, base, power, mode):
+    """The multiple of base**power that a rounding mode gives for x."""
+    p, q = x.numerator * base ** max(-power, 0), x.denominator * base ** max(power, 0)
+    low, rest = divmod(p, q)
+    up = (
+        rest > 0
+        and {
+            "down": False,
+            "up": True,
+            "chop": x < 0,
+            "odd": low % 2 == 0,
+            "even": 2 * rest > q or (2 * rest == q and low % 2 == 1),
+            "nearest": 2 * rest > q or (2 * rest == q and x > 0),
+        }[mode]
+    )
+    return Fraction((low + up) * base ** max(power, 0), base ** max(-power, 0))
+
+
+def exponent(x, base):
+    """The largest e for which base**e is not above the size of x, which is not zero."""
+    p, q = abs(x.numerator), x.denominator
+    e = int((p.bit_length() - q.bit_length()) / log2(base))  # roughly
+    while p * base ** max(-e - 1, 0) >= q * base ** max(e + 1, 0):
+        e += 1
+    while p * base ** max(-e, 0) < q * base ** max(e, 0):
+        e -= 1
+    return e
 
 
 def floating(base, digits, mode, emin=None, subnormal=True):
@@ -37,14 +49,10 @@ def floating(base, digits, mode, emin=None, subnormal=True):
     def r(x):
         if not x:
             return ZERO
-        e = 0
-        while Fraction(base) ** (e + 1) <= abs(x):
-            e += 1
-        while Fraction(base) ** e > abs(x):
-            e -= 1
+        e = exponent(x, base)
         if emin is not None and subnormal:
             e = max(e, emin)
-        found = to_multiple(x, Fraction(base) ** (e - digits + 1), mode)
+        found = to_multiple(x, base, e - digits + 1, mode)
         if emin is not None and not subnormal and abs(found) < Fraction(base) ** emin:
             return ZERO
         return found
@@ -54,7 +62,7 @@ def floating(base, digits, mode, emin=None, subnormal=True):
 
 def fixed(bits, mode):
     """A function that rounds to fraction bits."""
-    return lambda x: to_multiple(x, Fraction(1, 2**bits), mode)
+    return lambda x: to_multiple(x, 2, -bits, mode)
 
 
 def limited(fmt_bits, integer_bits, overflow):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.assignment import At
 from gpbnb.arithmetic.conversion import entries, exact_ratio, special_number
 from gpbnb.arithmetic.exits import check_exit, entering
-from gpbnb.arithmetic.functions import floor_divide, kept, lines, power, remainder
+from gpbnb.arithmetic.functions import DomainError, floor_divide, kept, lines, power, remainder
 from gpbnb.arithmetic.kernels.backends import Backend, Components
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
 from gpbnb.arithmetic.rounding import Rounding
@@ -27,7 +27,7 @@ MANY = 100
 """In arrays with more entries than this, equal entries are converted once; for fewer, remembering takes longer."""
 
 
-class NegativeRootError(ValueError):
+class NegativeRootError(DomainError):
     """The square root of a negative number."""
 
 
@@ -82,7 +82,30 @@ class NumberFormat(Protocol):
         """Round numbers into an array."""
 
 
-class FloatArray(NumPyProtocols):
+class ComponentArray:
+    """An array whose entries are stored in components, which are arrays of the same shape."""
+
+    __slots__ = ()
+
+    components: Components
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Length of each axis."""
+        return self.components[0].shape
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes; 0 for a single number."""
+        return self.components[0].ndim
+
+    @property
+    def size(self) -> int:
+        """Number of entries."""
+        return self.components[0].size
+
+
+class FloatArray(ComponentArray, NumPyProtocols):
     """An immutable n-dimensional array of numbers of one format. Create it with ``fmt.array``.
 
     ``+ - * / @``, ``-x``, ``abs(x)``, ``np.sqrt(x)``, sums and products are rounded after every single operation. The
@@ -246,21 +269,6 @@ class FloatArray(NumPyProtocols):
     def format(self) -> NumberFormat:
         """The format of every entry."""
         return self._format
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Length of each axis."""
-        return self.components[0].shape
-
-    @property
-    def ndim(self) -> int:
-        """Number of axes; 0 for a single number."""
-        return self.components[0].ndim
-
-    @property
-    def size(self) -> int:
-        """Number of entries."""
-        return self.components[0].size
 
     @property
     def T(self) -> FloatArray:

@@ -70,6 +70,10 @@ _MOST_DIGITS = 44  # bits of a format for which such an interval seldom contains
 _FEWEST = 2.0**-900  # sizes from here to its inverse are not rounded to fewer digits in float64
 
 
+class DomainError(ValueError):
+    """An argument at which a function has no finite real value."""
+
+
 @stays
 def elementary(name: str, *arrays: Any) -> Any:
     r"""Apply a function of :data:`ELEMENTARY` or :data:`ELEMENTARY_PAIRS` to each entry, correctly rounded.
@@ -81,7 +85,8 @@ def elementary(name: str, *arrays: Any) -> Any:
 
     Raises
     ------
-    ValueError : an entry at which the function has no finite real value, or one that is refused.
+    DomainError : an entry at which the function has no finite real value.
+    ValueError : an entry that is refused.
     OverflowError : a result beyond the range of the format; the message names the function and the entry.
 
     Examples
@@ -172,7 +177,8 @@ def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[],
 
     Raises
     ------
-    ValueError : the interval stays infinite, or contains a tie in every precision; `what` names the number.
+    DomainError : the interval stays infinite; `what` names the number.
+    ValueError : the interval contains a tie in every precision.
     """
     kernel, before, bits = fmt.kernel, ctx.prec, 128
     drawn = getattr(kernel, "count", None)
@@ -198,8 +204,9 @@ def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[],
             bits *= 2
     finally:
         ctx.prec = before
-    needed = "that is further from a tie" if finite else "for which the result is finite and real"
-    raise ValueError(f"got {what()}; needed an argument {needed}")
+    if finite:
+        raise ValueError(f"got {what()}; needed an argument that is further from a tie")
+    raise DomainError(f"got {what()}; needed an argument for which the result is finite and real")
 
 
 def _shown(value: Fraction) -> str:

@@ -151,8 +151,8 @@ def microscaling_dot(
     if a.elements.shape != b.elements.shape or a.elements.ndim != 2:
         raise ValueError(f"got blocks of shapes {a.elements.shape} and {b.elements.shape}; needed two equal vectors")
     left, right = sums.array(a.elements), sums.array(b.elements)
-    for given, held in ((a, left), (b, right)):
-        if not (exact(given.elements) == exact(held)).all():
+    for given, stored in ((a, left), (b, right)):
+        if not (exact(given.elements) == exact(stored)).all():
             raise ValueError(f"sums: got {sums}, which does not hold every element; needed more digits or range")
     total = sums.zeros(())
     for j, power in enumerate((a.exponents + b.exponents).tolist()):

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, NoReturn, cast
 import numpy as np
 
 from gpbnb.arithmetic import functions
-from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.array import ComponentArray, FloatArray
 from gpbnb.arithmetic.conversion import entries
 from gpbnb.arithmetic.exits import unseen
 from gpbnb.arithmetic.kernels.backends import Backend
@@ -309,7 +309,7 @@ def _matched(name: str, a: Any, b: Any) -> Sequence[Places]:
     return np.broadcast_arrays(x, y)
 
 
-class TracedTruth:
+class TracedTruth(ComponentArray):
     """An array of truth values that each run finds anew."""
 
     __hash__ = None  # type: ignore[assignment]
@@ -318,21 +318,6 @@ class TracedTruth:
         self.format = fmt
         #: The places of the truth values.
         self.components = (np.asarray(places),)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Length of each axis."""
-        return self.components[0].shape
-
-    @property
-    def ndim(self) -> int:
-        """Number of axes."""
-        return self.components[0].ndim
-
-    @property
-    def size(self) -> int:
-        """Number of truth values."""
-        return self.components[0].size
 
     def reshape(self, *shape: Any) -> TracedTruth:
         """Return the same truth values in another shape."""

@@ -437,7 +437,7 @@ class Certificate(NamedTuple):
 
 
 @compiled
-def meet(given: Any, at: int, c: Any, each: Any) -> None:
+def effect(given: Any, at: int, c: Any, each: Any) -> None:
     """Set `each`, (4,), to the effect of the disturbances of a step on the product c e, part by part."""
     n, g_count = given.F.shape[1], given.G.shape[2]
     each[:] = 0.0
@@ -484,7 +484,7 @@ def certify(given: Any, starts: Any, k: int, first: int, steady: bool, end: Any)
                 size += abs(c[j]) * end.scale[j]
             if size < end.small and lag >= n:  # a state that only repeats an earlier one has no disturbance of its own
                 break
-            meet(given, at, c, each)  # a sum of its own, so that no term takes part in more than n + g + lags additions
+            effect(given, at, c, each)  # a sum of its own: no term takes part in more than n + g + lags additions
             for p in range(4):
                 sums[i, p] += each[p]
             following[:] = 0.0

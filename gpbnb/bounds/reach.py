@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.bounds.envelope import ROUNDING, START, meet
+from gpbnb.bounds.envelope import ROUNDING, START, effect
 
 _U = 2.0**-53
 _UP = 1 + 2.0**-40
@@ -247,7 +247,7 @@ def onward(given: Any, first: int, lags: int, reach: Any, size: Any, b: Any) -> 
             residual, largest, asked = 0.0, 0.0, False
             for lag in range(1, lags + 1):
                 at = first + (phase - lag) % period
-                meet(given, at, c, each)  # sums of their own, so that no term takes part in more additions than allowed
+                effect(given, at, c, each)  # sums of their own: no term takes part in more additions than allowed
                 c_next[:] = 0.0
                 for j in range(n):
                     if c[j] != 0.0:

@@ -20,6 +20,7 @@ from gpbnb.arithmetic.algebra import Algebra
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.functions import DomainError
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.filters import array_steps
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
@@ -115,7 +116,7 @@ class SteppedRun(ABC):
                 return
             try:
                 K, definite = self._step(self.steps, measured)
-            except (ZeroDivisionError, OverflowError, NegativeRootError) as error:
+            except (ZeroDivisionError, OverflowError, DomainError) as error:
                 self.stopped = self.steps + 1
                 self.reason = f"{_fault(error)} at step {self.stopped}"
                 return
@@ -153,7 +154,9 @@ class SteppedRun(ABC):
 def _fault(error: Exception) -> str:
     if isinstance(error, OverflowError):
         return "overflow"
-    return "the square root of a negative number" if isinstance(error, ValueError) else "a division by zero"
+    if isinstance(error, NegativeRootError):
+        return "the square root of a negative number"
+    return "an argument outside the domain of a function" if isinstance(error, DomainError) else "a division by zero"
 
 
 class ArrayRun(SteppedRun):

@@ -13,16 +13,18 @@ state                   the predicted state and measurement, the innovation, and
 sums                    sums of products in any block, which are rounded once when they are stored
 ======================  ===========================================================================================
 
-The model is stored in a format with the most digits of the four, and without limits of its exponents.
+The model is stored in the format of the four with the most digits; without limits of its exponents, if compiled loops
+have such a format. They have none with the digits and the rounding of BINARY64, so it stores the model itself.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, cast
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.tags import Blocks
 from gpbnb.arithmetic.rounding import Rounding
 
@@ -99,7 +101,8 @@ class BlockFormats:
     def model(self) -> FloatFormat:
         """The format in which the model is stored."""
         widest = max((getattr(self, name) for name in BLOCKS), key=lambda fmt: fmt.precision)
-        return FloatFormat(widest.base, widest.precision, widest.rounding)
+        unlimited = FloatFormat(widest.base, widest.precision, widest.rounding)
+        return unlimited if isinstance(unlimited.backend, Compiled) else cast(FloatFormat, widest)
 
     def run_tag(self) -> Blocks:
         """Return the tags that select the arithmetic of each block in compiled loops."""

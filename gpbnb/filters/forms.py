@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+CONSTANT_GAIN = "constant gain"
+"""Name of the form whose gain is the one that a filter approaches; such a filter is a linear system."""
+
 
 def plain_name(name: str) -> str:
     """Return the name of a form in capitals, with underscores for blanks and hyphens."""

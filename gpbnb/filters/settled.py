@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import CONSTANT_GAIN, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.program import innovation_program
 from gpbnb.filters.run import Run
@@ -60,5 +61,10 @@ def settled_filter(model: LinearModel) -> LinearSystem:
     ValueError : as for :func:`settled_gain`.
     """
     given = np.concatenate([each.ravel() for each in (model.Phi[0], model.H[0], settled_gain(model))])
-    made = LinearFilter(innovation_program(model.n, model.m, model.n), given, f"{model.name}, constant gain")
-    return LinearSystem.from_filter(made, model.x0)
+    made = LinearFilter(innovation_program(model.n, model.m, model.n), given, f"{model.name}, {CONSTANT_GAIN}")
+    return replace(
+        LinearSystem.from_filter(made, model.x0),
+        state_names=model.state_names,
+        input_names=model.measurement_names,
+        output_names=model.state_names,
+    )

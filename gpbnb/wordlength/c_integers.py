@@ -228,15 +228,15 @@ class Integers:
                 "wide_negative(found)",
             )
             found = [
+                f"top.low = a < 0 ? ~({U})a + 1 : ({U})a;\n    top = wide_left(top, {up});",
                 "for (i = 127; i >= 0; i--) {",
                 "    rest = rest << 1 | ((i < 64 ? top.low >> i : top.high >> (i - 64)) & 1);",
                 "    found = wide_left(found, 1);\n        if (rest >= size) {\n            rest -= size;",
                 "        found.low |= 1;\n        }\n    }",
             ]
             first = [
-                f"const wide top = wide_left(wide_of(a < 0 ? -a : a), {up});",
-                f"const {U} size = ({U})(b < 0 ? -b : b) << {down};",
-                "wide found = {0, 0};",
+                "wide found = {0, 0}, top = {0, 0};",
+                f"const {U} size = (b < 0 ? ~({U})b + 1 : ({U})b) << {down};",
                 f"{U} rest = 0;",
                 "int i;",
             ]

@@ -285,6 +285,8 @@ def word_arithmetic(step: CodeStep, words: WordFormats) -> CodeWords:
             most, shift = max(most, longest + data + max(-moved, 0)), max(shift, moved)
         elif code == DIVIDE:
             most = max(most, data + abs(words.data.fraction_bits))
+            if (longest := data - words.data.fraction_bits) > 63 and words.data.fraction_bits < 0:
+                raise ValueError(f"got divisors of {longest} bits in units of 1; needed at most 63 for a type of C99")
     if max(most, shift) > LONGEST_SHIFT:
         raise ValueError(
             f"got products of {most} bits that lose up to {shift}; needed at most {LONGEST_SHIFT} of each for the "
@@ -550,11 +552,11 @@ def _when(conditions: list[str], then: str) -> list[str]:
     """Return an if, with as many conditions in a line as fit."""
     lines, line = list[str](), "if ("
     for i, each in enumerate(conditions):
-        piece = each + (" || " if i + 1 < len(conditions) else ")")
-        if len(line) + len(piece) > 110:
+        condition = each + (" || " if i + 1 < len(conditions) else ")")
+        if len(line) + len(condition) > 110:
             lines.append(line.rstrip())
             line = "        "
-        line += piece
+        line += condition
     return [*lines, line, f"    {then}"]
 
 

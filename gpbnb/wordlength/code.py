@@ -7,7 +7,7 @@ the code, if the compiler keeps the order and rounds each operation, as C99 dema
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from math import lcm
 from pathlib import Path
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.named import BINARY32, BINARY64, format_text, rounding_text
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.envelope import FilterLimits
@@ -26,7 +27,7 @@ from gpbnb.bounds.system import output_errors
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.caching import replace_file
 from gpbnb.filters.design import FilterDesign
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import CONSTANT_GAIN, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.run import Run
@@ -34,12 +35,9 @@ from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.tracing import kalman_program, without_exact
-from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_words
+from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_checked, run_words
 from gpbnb.wordlength.c_files import Described, Vectors, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeStep, checked_identifier, word_arithmetic
-
-CONSTANT_GAIN = "constant gain"
-"""Name of the form of a Kalman filter whose gain is the one that it approaches."""
 
 VECTORS = 100
 """Steps of the test vectors."""
@@ -306,11 +304,9 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: Form | str) -> Prepared:
     kind = _type_of(fmt) if isinstance(fmt, FloatFormat) else ""
     if isinstance(fmt, FixedFormat):
         _words(fmt)
-    run = Run(model, fmt, chosen, ())  # type: ignore[arg-type]
-    stored = model_coefficients(run)
-    program = without_exact(kalman_program(model.n, model.m, chosen), stored)
-    start = _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), chosen)[0]
-    step = CodeStep(program, stored, start)
+    in_loops = isinstance(fmt, FloatFormat) or isinstance(fmt.backend, Compiled)
+    stored, start = _in_loops(model, fmt, chosen) if in_loops else _in_long_words(model, fmt, chosen)
+    step = CodeStep(without_exact(kalman_program(model.n, model.m, chosen), stored), stored, start)
     arithmetic = word_arithmetic(step, _words(fmt)) if isinstance(fmt, FixedFormat) else CodeFloats(kind)
 
     def bound(within: FilterLimits) -> str:
@@ -331,7 +327,7 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: Form | str) -> Prepared:
         arithmetic,
         model.name,
         f"{chosen} form",
-        lambda z: _model_vectors(model, z, fmt, chosen),
+        lambda z: _model_vectors(model, z, fmt, chosen) if in_loops else _long_vectors(model, z, fmt, step),
         lambda steps: simulated_measurements(model, steps),
         bound,
     )
@@ -341,12 +337,40 @@ def model_coefficients(run: Run) -> NDArray[Any]:
     """Return the coefficients of each step of a cycle, (p, c), ordered as the program of a step expects."""
     given = run.matrices
     Q, R = (run.UQ, run.UR) if run.form is Form.UD else (given.Q, given.R)
-    members = [run.exactly(each) for each in (given.Phi, given.H, Q, R)]
+    one = np.asarray(run.exactly(given.identity), dtype=object)[0, 0]
+    return _coefficients([run.exactly(each) for each in (given.Phi, given.H, Q, R)], one)
+
+
+def _coefficients(members: Sequence[NDArray[Any]], one: Fraction) -> NDArray[Any]:
+    """Return the coefficients of each step of a cycle from Phi, H, Q and R, each with a cycle of its own."""
     period = lcm(*(len(each) for each in members))
     rows = [np.concatenate([each[k % len(each)].ravel() for each in members]) for k in range(period)]
     constants = np.full((period, 1), Fraction(0), dtype=object)
-    one = np.asarray(run.exactly(given.identity), dtype=object)[0, 0]
     return np.concatenate([np.array(rows, dtype=object), constants, constants + one], axis=1)
+
+
+def _in_loops(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return coefficients and first states, exact, as a run in compiled loops stores them."""
+    run = Run(model, fmt, form, ())
+    return model_coefficients(run), _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), form)[0]
+
+
+def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the same in words that are too long for compiled loops, or that wrap around.
+
+    Raises
+    ------
+    ValueError : the UD form.
+    """
+    if form is Form.UD:
+        raise ValueError(
+            f"got the UD form in {_word(fmt)}; needed another form, or words of at most 52 bits that do not "
+            "wrap around: compiled loops compute the factors of its covariances"
+        )
+    model.refuse_inputs("generated code")
+    arrays = {letter: each.to_fractions() for letter, each in model.definite_in(fmt).arrays(fmt).items()}
+    stored = _coefficients([arrays[letter] for letter in ("Phi", "H", "Q", "R")], fmt.round(1))
+    return stored, np.concatenate([arrays["x0"], arrays["P0"].ravel()])
 
 
 def _flat(x: NDArray[Any], P: NDArray[Any], form: Form) -> NDArray[Any]:
@@ -354,6 +378,24 @@ def _flat(x: NDArray[Any], P: NDArray[Any], form: Form) -> NDArray[Any]:
     n = x.shape[1]
     kept = [(i, j) for i in range(n) for j in range(n) if form is not Form.UD or i <= j]
     return np.concatenate([x[..., 0], np.stack([P[:, i, j] for i, j in kept], axis=-1)], axis=-1)
+
+
+def _long_vectors(model: LinearModel, z: Any, fmt: Any, step: CodeStep) -> Vectors:
+    model.check_measurements(z, 0)
+    inputs, start = integers_of(z, fmt), integers_of(step.start[None], fmt)[0]
+    run = run_checked(step.program, fmt, step.coefficients, start, inputs)
+    return _ended(
+        inputs.astype(np.int64), start.astype(np.int64), run.states, _statuses(len(run.states), run.indefinite)
+    )
+
+
+def _statuses(steps: int, indefinite: int | None) -> NDArray[np.int64]:
+    """Return the status of each step, given the first step in which a variance is not positive."""
+    status = np.zeros(steps, np.int64)
+    if indefinite is not None:
+        status[indefinite - 1 :] = -1
+        status[indefinite - 1 : indefinite] = 1
+    return status
 
 
 def _model_vectors(model: LinearModel, z: Any, fmt: FloatFormat | FixedFormat, form: Form) -> Vectors:
@@ -365,8 +407,4 @@ def _model_vectors(model: LinearModel, z: Any, fmt: FloatFormat | FixedFormat, f
 
     start = stored(_flat(run.x[None], run.P[None], form))
     states = np.concatenate([start[:0], *(stored(_flat(x[1:], P[1:], form)) for x, P in run.blocks(z))])
-    status = np.zeros(len(states), np.int64)
-    if run.indefinite is not None:
-        status[run.indefinite - 1 :] = -1
-        status[run.indefinite - 1 : run.indefinite] = 1
-    return _ended(stored(fmt.array(z).to_float()), start[0], states, status)
+    return _ended(stored(fmt.array(z).to_float()), start[0], states, _statuses(len(states), run.indefinite))

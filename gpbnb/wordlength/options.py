@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import gpbnb
+from gpbnb.filters.forms import CONSTANT_GAIN, plain_name
 from gpbnb.filters.named import form_named, rounding_named
 from gpbnb.names import NAMED_FORMATS, WITHOUT_LOOPS, format_parts
 from gpbnb.sweeps.numbers import plain_integer, plain_number
@@ -33,6 +34,8 @@ The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps 
 B and u (or --inputs) and known offsets b of the states and d of the measurements. A digital filter has b and a, or sos,
 and perhaps structure, such as "direct form I", "cascade of direct form II transposed", "lattice" or "all"; its
 structures are compared side by side. Numbers are read as decimals.
+With --form "constant gain", a Kalman filter is the linear system with the gain that it approaches; its inputs are the
+measurements.
 The file may name states, measurements, inputs and outputs, each with its unit: states = ["tilt (°)", "rate (°/s)"].
 The bases guarantee and probable hold for ever and need limits: --state and --innovation, or --measurement. A system
 needs --measurement.
@@ -86,8 +89,8 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("--emax", metavar="N", help="exponent of the largest number; default: unlimited")
     made.add_argument(
         "--form",
-        help='form of the covariance update of a Kalman filter, such as "innovation", "Joseph", "UD" or "Cholesky"; '
-        "default: innovation",
+        help='form of the covariance update of a Kalman filter, such as "innovation", "Joseph", "UD" or "Cholesky", or '
+        '"constant gain" for the linear system with the gain that the filter approaches; default: innovation',
     )
     _add_kinds(made)
     made.add_argument(
@@ -159,7 +162,10 @@ def read(arguments: Sequence[str] | None) -> argparse.Namespace:
     for name in ("steps", "digits", "base", "emin", "emax"):
         _replace(given, name, plain_integer, "a whole number")
     _replace(given, "rounding", lambda text: rounding_named(text).value)
-    form_named(given.form or "innovation")
+    if given.form and plain_name(given.form) == plain_name(CONSTANT_GAIN):
+        given.form = CONSTANT_GAIN
+    else:
+        form_named(given.form or "innovation")
     _replace(given, "format", format_parts)
     if given.format in WITHOUT_LOOPS:
         raise ValueError(

@@ -12,14 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray, NegativeRootError
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.exits import kept_in, lifted
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.functions import DomainError
 from gpbnb.arithmetic.search import CHECKED, Outcome, largest_by_default
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.missing import real_numbers
 from gpbnb.filters.named import whole_number
+from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.wordlength.requirement import Asked, Basis, Requirement, checked_tolerance, largest_ratio
 
 Recursion = Callable[..., Any]
@@ -28,7 +30,7 @@ Recursion = Callable[..., Any]
 SPARE_BITS = 37
 """Bits that the reference has beyond the highest precision; a second run that checks it has half as many again."""
 
-_STOPS = (ZeroDivisionError, OverflowError, NegativeRootError, np.linalg.LinAlgError)
+_STOPS = (ZeroDivisionError, OverflowError, DomainError, np.linalg.LinAlgError)
 
 SETTLED = 2.0**-20
 """Largest difference allowed between the two runs of the reference, as a share of the tolerance."""
@@ -44,6 +46,8 @@ def required_recursion_precision(run: Recursion, asked: Asked, tolerance: Any, z
         ``fmt.array("0.1")``. Pass data that the function takes from elsewhere through ``fmt.array``, too, before any
         operation: operations before that are not emulated. The function is traced once, and its operations then run in
         compiled code; see :class:`gpbnb.arithmetic.traced.TracedFunction` for what cannot be traced and runs as it is.
+        A precision in which it divides by zero, overflows, or leaves the domain of a function, as np.arcsin of a number
+        rounded to more than 1, does not suffice.
     asked : the question. Its basis can only be "emulation", where errors are differences from the same function in a
         reference with :data:`SPARE_BITS` beyond the highest precision to try, by default that of
         :func:`gpbnb.arithmetic.search.largest_by_default`. An answer that needs no more digits than compiled loops
@@ -76,7 +80,7 @@ def required_recursion_precision(run: Recursion, asked: Asked, tolerance: Any, z
     strategy = recursion_strategy(run, asked.steps, tolerance, z, base, asked.basis, largest)
     asked = asked._replace(largest=largest)
     with asked.search(CHECKED[base]) as search:
-        return asked.answer(search(strategy), untraced=strategy.run.refusal)
+        return asked.answer(search(strategy), untraced=strategy.untraced)
 
 
 def survey_recursion(
@@ -97,10 +101,15 @@ def survey_recursion(
 class EmulatedFunction:
     """Errors of a function for given inputs, against `true`, its outputs in the reference, (steps, p)."""
 
-    run: TracedFunction
+    run: TracedFunction | FixedIntervalSmoother
     z: NDArray[Any] | None
     true: NDArray[Any]
     tolerances: NDArray[np.float64]
+
+    @property
+    def untraced(self) -> str:
+        """Why the user's function cannot be traced; empty if it can. A smoother stores its model by the rounding."""
+        return self.run.refusal if isinstance(self.run, TracedFunction) else ""
 
     def error(self, fmt: FloatFormat | FixedFormat) -> Outcome:
         """Return the largest error over its tolerance, or infinity and the reason."""
@@ -135,7 +144,7 @@ def recursion_strategy(
     if inputs is not None and steps is not None and (not inputs.ndim or len(inputs) != steps):
         raise ValueError(f"got inputs of shape {inputs.shape}; needed one row for each of the {steps} steps")
     digits = max(largest, largest_by_default(base)) + math.ceil(SPARE_BITS / math.log2(base))
-    traced = TracedFunction(run)
+    traced = run if isinstance(run, FixedIntervalSmoother) else TracedFunction(run)
     short, true = (_reference(traced, FloatFormat(base, each), inputs, steps) for each in (digits, digits * 3 // 2))
     found = EmulatedFunction(traced, inputs, true, checked_tolerance(tolerance, true.shape[1], "outputs", base, basis))
     off = found.share(short - true)
@@ -148,7 +157,9 @@ def recursion_strategy(
     return found
 
 
-def _reference(run: TracedFunction, fmt: FloatFormat, z: NDArray[Any] | None, steps: int | None) -> NDArray[Any]:
+def _reference(
+    run: TracedFunction | FixedIntervalSmoother, fmt: FloatFormat, z: NDArray[Any] | None, steps: int | None
+) -> NDArray[Any]:
     try:
         return _outputs(run, fmt, z, steps)
     except _STOPS as fault:
@@ -167,7 +178,10 @@ def _float(value: Fraction) -> float:
 
 
 def _outputs(
-    run: TracedFunction, fmt: FloatFormat | FixedFormat, z: NDArray[Any] | None, steps: int | None
+    run: TracedFunction | FixedIntervalSmoother,
+    fmt: FloatFormat | FixedFormat,
+    z: NDArray[Any] | None,
+    steps: int | None,
 ) -> NDArray[Any]:
     """Return the outputs of the function, (steps, p), exact; it must compute them in the format."""
     with kept_in(fmt) as own:

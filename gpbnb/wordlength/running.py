@@ -19,13 +19,15 @@ from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.linear import filter_schedule
 from gpbnb.caching import replace_file
+from gpbnb.filters.forms import CONSTANT_GAIN
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named
+from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_inputs, simulated_measurements
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.blocks import required_word_formats
-from gpbnb.wordlength.code import write_code
+from gpbnb.wordlength.code import VECTORS, AnyFormat, write_code
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
 from gpbnb.wordlength.fixed_point import required_fraction_bits
 from gpbnb.wordlength.judging import judge
@@ -48,7 +50,7 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
     ValueError, ArithmeticError : for a reason given in :func:`gpbnb.wordlength.report.study`.
     OSError : a file cannot be read.
     """
-    model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
+    model, structures = _filter(given)
     bases = _bases(given)
     z, source = _inputs(given, model, bases)
     sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
@@ -59,17 +61,42 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
         given.steps,
         given.base or 2,
         given.rounding or "nearest",
-        given.form or "innovation",
+        _form(given),
         bases,
         None if given.fixed else _limits(model, bases, sizes),
         given.emin,
         given.emax,
         _format(given),
-        read_structures(given.model),
+        structures,
         given.mixed,
         given.fixed,
     )
     return study(asked, source, command, tell)
+
+
+def _filter(given: argparse.Namespace) -> tuple[LinearModel | LinearSystem, dict[str, LinearSystem]]:
+    """Return the filter of a command line, and its structures; with a constant gain, a linear system is its only one.
+
+    Raises
+    ------
+    ValueError : a constant gain for a linear system, or for a filter whose gain does not settle.
+    """
+    model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
+    if given.form != CONSTANT_GAIN:
+        return model, read_structures(given.model)
+    if isinstance(model, LinearSystem):
+        raise _no_form(given)
+    settled = settled_filter(model)
+    return settled, {CONSTANT_GAIN: settled}
+
+
+def _form(given: argparse.Namespace) -> str:
+    """Return the form of a Kalman filter; a filter with constant gain is a linear system, which has none."""
+    return "innovation" if given.form in (None, CONSTANT_GAIN) else str(given.form)
+
+
+def _no_form(given: argparse.Namespace) -> ValueError:
+    return ValueError(f"got --form {given.form} for a linear system; needed none: only a Kalman filter has forms")
 
 
 def _bases(given: argparse.Namespace) -> Sequence[Basis]:
@@ -88,12 +115,15 @@ def _inputs(given: argparse.Namespace, model: LinearModel | LinearSystem, bases:
     if z is not None:
         _check_rows(given, z, model)
     if isinstance(model, LinearSystem):
-        if given.form:
-            raise ValueError(
-                f"got --form {given.form} for a linear system; needed none: only a Kalman filter has forms"
-            )
+        if given.form not in (None, CONSTANT_GAIN):
+            raise _no_form(given)
         if given.mixed and not given.fixed:
             raise ValueError("got --mixed for a linear system; needed --fixed with it: only a Kalman filter has blocks")
+        if given.simulate and given.form == CONSTANT_GAIN:
+            raise _simulates_itself(given)
+        if given.form == CONSTANT_GAIN and z is None:
+            kalman = cast(LinearModel, read_model(given.model))
+            return simulated_measurements(kalman, given.steps or DEFAULT_STEPS), "simulated by the model, seed 0"
         if given.simulate:
             z = simulated_inputs(given.simulate, _level(given), given.steps or DEFAULT_STEPS, model.m)
             source = f"simulated, {given.simulate} of level {_shown(_level(given))}"
@@ -102,15 +132,24 @@ def _inputs(given: argparse.Namespace, model: LinearModel | LinearSystem, bases:
                 "got a linear system without inputs; needed --measurements, a CSV file with its inputs, or --simulate"
             )
     elif given.fixed:
-        raise ValueError("got --fixed for a Kalman filter; needed --format, such as --format Q15, to judge fixed point")
+        raise ValueError(
+            "got --fixed for a Kalman filter; needed --format, such as --format Q15, to judge fixed point, or --form "
+            '"constant gain"'
+        )
     elif given.simulate:
-        raise ValueError(f"got --simulate {given.simulate} for a Kalman filter; needed none: its model simulates them")
+        raise _simulates_itself(given)
     return z, source
+
+
+def _simulates_itself(given: argparse.Namespace) -> ValueError:
+    return ValueError(
+        f"got --simulate {given.simulate} for a Kalman filter; needed none: its model simulates its measurements"
+    )
 
 
 def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: LinearModel | LinearSystem) -> None:
     """Reject a file with other columns than the model has measurements or inputs, or with other rows than steps."""
-    kind = "input" if isinstance(model, LinearSystem) else "measurement"
+    kind = "input" if isinstance(model, LinearSystem) and given.form != CONSTANT_GAIN else "measurement"
     rows, columns = z.shape
     if columns != model.m:
         raise ValueError(
@@ -139,12 +178,12 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
         raise ValueError(f"got --certificate with {fmt}; needed floating point: the checker covers no fixed point")
     if fmt is None:
         fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
-    model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
-    chosen = next(iter(read_structures(given.model).values()), model)
+    model, structures = _filter(given)
+    chosen = next(iter(structures.values()), model)
     sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
     if isinstance(chosen, LinearModel):
         within = limits(chosen.n, chosen.m, **sizes)
-        form = form_named(given.form or "innovation")
+        form = form_named(_form(given))
         return guarantee(chosen, fmt, within, form, horizon=report.steps).certificate()
     made = filter_schedule(chosen.as_filter(), fmt)
     return from_schedule(made, limits(made.program.n, made.program.m, **sizes), report.steps).certificate()
@@ -162,20 +201,38 @@ def write_code_of(given: argparse.Namespace) -> tuple[Path, ...]:
         :func:`gpbnb.wordlength.code.write_code`.
     OSError : a file cannot be written.
     """
-    model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
-    structure, model = next(iter(read_structures(given.model).items()), (None, model))
+    model, structures = _filter(given)
+    structure, model = next(iter(structures.items()), (None, model))
     bases = _bases(given)
     if given.fixed and isinstance(model, LinearSystem):
-        words, largest = _words_that_meet(given, model, bases)
-        return write_code(model, words, None, given.code, within=largest, structure=structure)
+        words, largest = _words_within_tolerance(given, model, bases)
+        return _written(given, model, words, largest, structure)
     sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
     within = _limits(model, bases, sizes)
-    fmt = _format(given) or _type_that_meets(given, model, bases, within)
-    form = None if isinstance(model, LinearSystem) else given.form
-    return write_code(model, fmt, form, given.code, within=within, structure=structure)
+    fmt = _format(given) or _type_within_tolerance(given, model, bases, within)
+    return _written(given, model, fmt, within, structure)
 
 
-def _words_that_meet(
+def _written(
+    given: argparse.Namespace,
+    model: LinearModel | LinearSystem,
+    fmt: AnyFormat,
+    within: FilterLimits | None,
+    structure: str | None,
+) -> tuple[Path, ...]:
+    """Write the code of a filter; vectors of a Kalman filter are its first measurements, if none of them is missing."""
+    of_kalman = isinstance(model, LinearModel) or given.form == CONSTANT_GAIN
+    if not of_kalman:
+        return write_code(model, fmt, None, given.code, within=within, structure=structure)
+    kalman = cast(LinearModel, read_model(given.model, read_measurements(given.inputs) if given.inputs else None))
+    z, _ = _inputs(given, model, _bases(given))
+    if z is None:
+        z = simulated_measurements(kalman, given.steps or DEFAULT_STEPS)
+    vectors = None if np.isnan(z[:VECTORS]).any() else z[:VECTORS]
+    return write_code(kalman, fmt, given.form, given.code, inputs=vectors, within=within)
+
+
+def _words_within_tolerance(
     given: argparse.Namespace, system: LinearSystem, bases: Sequence[Basis]
 ) -> tuple[WordFormats, FilterLimits]:
     """Return the formats that a search in fixed point finds on the first basis, and the largest inputs as limits."""
@@ -187,7 +244,7 @@ def _words_that_meet(
     return words, limits(system.n, system.m, measurement=np.abs(z).max(axis=0))
 
 
-def _type_that_meets(
+def _type_within_tolerance(
     given: argparse.Namespace, model: LinearModel | LinearSystem, bases: Sequence[Basis], within: FilterLimits | None
 ) -> FloatFormat:
     """Return binary32 if it meets the tolerance of a command line, else binary64."""
@@ -196,7 +253,7 @@ def _type_that_meets(
     if z is None and isinstance(model, LinearModel):
         z = simulated_measurements(model, steps)
     for fmt in (BINARY32, BINARY64):
-        if judge(model, fmt, steps, given.tolerance, given.form or "innovation", bases[0], z, within).met:
+        if judge(model, fmt, steps, given.tolerance, _form(given), bases[0], z, within).met:
             return fmt
     raise ValueError(
         f"got --code {given.code}, and neither binary32 nor binary64 meets the tolerance; needed a larger tolerance, "

@@ -15,6 +15,7 @@ from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.functions import DomainError
 from gpbnb.arithmetic.rounding import Rounding
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
@@ -112,9 +113,9 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("division", lambda: 1 / V, ZeroDivisionError, "got a division by zero at [2] of the divisor; needed a divisor ot"),
     ("division, one", lambda: V / 0, ZeroDivisionError, "got a division by zero; needed a divisor other than zero; te"),
     ("negative root", lambda: np.sqrt(V), NegativeRootError, "got the square root of a negative number at [1]; needed"),
-    ("power", lambda: V**0.5, ValueError, "got np.float_power of -2.0 and 0.5 at [1]; needed an argument for which"),
+    ("power", lambda: V**0.5, DomainError, "got np.float_power of -2.0 and 0.5 at [1]; needed an argument for which"),
     ("power, text", lambda: V**"2", TypeError, "got the exponent '2'; needed a number, or an array of numbers"),
-    ("power, right", lambda: (-2) ** (V / 4), ValueError, "got np.float_power of -2.0 and 0.375 at [0]; needed"),
+    ("power, right", lambda: (-2) ** (V / 4), DomainError, "got np.float_power of -2.0 and 0.375 at [0]; needed"),
     ("remainder", lambda: 2 % V, ZeroDivisionError, "got a division by zero at [2] of the divisor; needed a divisor"),
     ("remainder, one", lambda: V % 0, ZeroDivisionError, "got a division by zero; needed a divisor other than zero; "),
     ("select", lambda: np.select([V > 0], [V, V]), ValueError, "select: got 1 conditions and 2 choices; needed one c"),
@@ -141,7 +142,7 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("no copy", lambda: np.array(V, copy=False), ValueError, "got copy=False; needed True or None"),
     # NumPy
     ("np.spacing", lambda: np.spacing(V), TypeError, "got np.spacing of a FloatArray; needed one of absolute, add"),
-    ("np.power", lambda: np.power(V, [1, 2, -1]), ValueError, "got np.float_power of 0.0 and -1.0 at [2]; need"),
+    ("np.power", lambda: np.power(V, [1, 2, -1]), DomainError, "got np.float_power of 0.0 and -1.0 at [2]; need"),
     ("out", lambda: np.add(V, V, out=np.zeros(3)), TypeError, "got np.add with out of a FloatArray; needed one of"),
     ("in place", lambda: operator.iadd(np.zeros(3), V), TypeError, "got np.add with out of a FloatArray; needed one"),
     ("outer", lambda: np.add.outer(V, V), TypeError, "got np.add.outer of a FloatArray; needed one of"),

@@ -9,6 +9,7 @@ import operator
 import pickle
 from dataclasses import asdict, replace
 from fractions import Fraction
+from functools import cache
 
 import ml_dtypes
 import numpy as np
@@ -52,46 +53,52 @@ def negative(x):
     return (math.copysign(1, x) if isinstance(x, float) else x) < 0
 
 
-def rounded(x: Fraction, fmt: FloatFormat, before: bool = False):
-    """The value that IEEE 754 requires for a real number other than zero, and the exceptions; by its definition."""
-    free = FloatFormat(fmt.base, fmt.precision, fmt.rounding)
-    unlimited = expected(x, free)
-    if abs(unlimited) > fmt.largest:
-        down, up = fmt.rounding is Rounding.DOWN, fmt.rounding is Rounding.UP
-        finite = fmt.rounding in (Rounding.CHOP, Rounding.ODD) or (up and x < 0) or (down and x > 0)
-        limit = fmt.largest if finite else math.nan if fmt == special(FP8_E4M3) else math.inf
-        return (limit if x > 0 else -limit), {"overflow", "inexact"}
-    found = expected(x, replace(fmt, overflow="raise"))
-    tiny = abs(x if before else unlimited) < fmt.smallest_normal
-    raised = {"inexact"} | ({"underflow"} if tiny else set()) if found != x else set()
-    return (found or (-0.0 if x < 0 else 0.0)), raised
+class Definition:
+    """What IEEE 754 requires of a format: each result, and the exceptions that it raises."""
 
+    def __init__(self, fmt: FloatFormat) -> None:
+        self.fmt, self.finite = fmt, replace(fmt, overflow="raise")
+        self.unlimited = FloatFormat(fmt.base, fmt.precision, fmt.rounding)
+        self.infinite = math.nan if fmt == special(FP8_E4M3) else math.inf
+        #: Pairs have few different results: each is rounded once.
+        self.rounded = cache(self._rounded)
 
-def required(name: str, a, b, fmt: FloatFormat):
-    """The result and the exceptions of an operation; numbers other than zero are Fractions, all others floats."""
-    infinite = math.nan if fmt == special(FP8_E4M3) else math.inf
-    if name == "subtract":
-        return required("add", a, -b, fmt)
-    if a != a or b != b:
-        return math.nan, set()
-    if name == "add":
-        if math.inf in (abs(a), abs(b)):
-            return (math.nan, {"invalid"}) if a == -b else (a if abs(a) == math.inf else b, set())
-        if a + b:
-            return rounded(Fraction(a) + Fraction(b), fmt)
-        if not a and not b and negative(a) == negative(b):
-            return a, set()
-        return (-0.0 if fmt.rounding is Rounding.DOWN else 0.0), set()
-    sign = -1.0 if negative(a) != negative(b) else 1.0
-    if name == "multiply":
-        if math.inf in (abs(a), abs(b)):
-            return (math.nan, {"invalid"}) if 0 in (a, b) else (sign * math.inf, set())
-        return rounded(Fraction(a) * Fraction(b), fmt) if a and b else (sign * 0.0, set())
-    if abs(a) == math.inf or (not a and not b):
-        return (math.nan, {"invalid"}) if abs(b) == math.inf or not a else (sign * math.inf, set())
-    if not b:
-        return sign * infinite, {"divide_by_zero"}
-    return rounded(Fraction(a) / Fraction(b), fmt) if a and abs(b) != math.inf else (sign * 0.0, set())
+    def _rounded(self, x: Fraction):
+        """The value for a real number other than zero, and the exceptions; by its definition."""
+        fmt, unlimited = self.fmt, expected(x, self.unlimited)
+        if abs(unlimited) > fmt.largest:
+            down, up = fmt.rounding is Rounding.DOWN, fmt.rounding is Rounding.UP
+            finite = fmt.rounding in (Rounding.CHOP, Rounding.ODD) or (up and x < 0) or (down and x > 0)
+            limit = fmt.largest if finite else self.infinite
+            return (limit if x > 0 else -limit), {"overflow", "inexact"}
+        found = expected(x, self.finite)
+        raised = {"inexact"} | ({"underflow"} if abs(unlimited) < fmt.smallest_normal else set())
+        return (found or (-0.0 if x < 0 else 0.0)), raised if found != x else set()
+
+    def required(self, name: str, a, b):
+        """The result and the exceptions of an operation; numbers other than zero are Fractions, all others floats."""
+        if name == "subtract":
+            return self.required("add", a, -b)
+        if a != a or b != b:
+            return math.nan, set()
+        if name == "add":
+            if math.inf in (abs(a), abs(b)):
+                return (math.nan, {"invalid"}) if a == -b else (a if abs(a) == math.inf else b, set())
+            if a + b:
+                return self.rounded(Fraction(a) + Fraction(b))
+            if not a and not b and negative(a) == negative(b):
+                return a, set()
+            return (-0.0 if self.fmt.rounding is Rounding.DOWN else 0.0), set()
+        sign = -1.0 if negative(a) != negative(b) else 1.0
+        if name == "multiply":
+            if math.inf in (abs(a), abs(b)):
+                return (math.nan, {"invalid"}) if 0 in (a, b) else (sign * math.inf, set())
+            return self.rounded(Fraction(a) * Fraction(b)) if a and b else (sign * 0.0, set())
+        if abs(a) == math.inf or (not a and not b):
+            return (math.nan, {"invalid"}) if abs(b) == math.inf or not a else (sign * math.inf, set())
+        if not b:
+            return sign * self.infinite, {"divide_by_zero"}
+        return self.rounded(Fraction(a) / Fraction(b)) if a and abs(b) != math.inf else (sign * 0.0, set())
 
 
 def special(fmt: FloatFormat) -> FloatFormat:
@@ -131,14 +138,14 @@ CASES = [
 def test_every_pair_of_words_and_every_exception(fmt, mode, name):
     """All words, infinities, NaNs and both zeros among them: values, signs of zeros, and all five counts."""
     fmt = special(replace(fmt, rounding=mode))
-    x = every(fmt)
+    x, definition = every(fmt), Definition(fmt)
     numbers = plain(x)
     assert len(x) >= 53
     with flags(fmt) as seen:
         found = plain(OPERATIONS[name](x[:, np.newaxis], x))
     counted = dict.fromkeys(asdict(seen), 0)
     for value, (a, b) in zip(found, itertools.product(numbers, repeat=2), strict=True):
-        wanted, raised = required(name, a, b, fmt)
+        wanted, raised = definition.required(name, a, b)
         assert same(value, wanted), (name, a, b, value, wanted)
         for each in raised:
             counted[each] += 1
@@ -181,9 +188,10 @@ def test_every_pair_saturated(name, operation):
     assert (slow == found[::7]).all()
     beyond = 0
     finite = replace(fmt, overflow="raise")
+    rounded = cache(lambda exact: expected(exact, finite))  # pairs have few different results
     for value, i, j in zip(found.to_fractions().tolist(), a.tolist(), b.tolist(), strict=True):
         exact = operation(numbers[i], numbers[j])
-        wanted = expected(exact, finite)
+        wanted = rounded(exact)
         beyond += wanted is None
         assert value == (wanted if wanted is not None else fmt.largest if exact > 0 else -fmt.largest)
     assert beyond > 0

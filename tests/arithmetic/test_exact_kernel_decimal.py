@@ -71,14 +71,15 @@ class TestThreeDecimalDigits:
     @pytest.mark.parametrize("gap", [50, 10**6, 10**30])
     def test_sums_of_numbers_far_apart(self, gap: int, nearest: bool) -> None:
         # The smaller operand is less than any digit of the larger: it decides only when the larger is chopped.
+        add = kernel(Rules(10, 3, ROUNDING[nearest])).add
         for m1 in self.M.tolist():
             below = (m1 - 1, E + gap) if m1 > 100 else (999, E + gap - 1)
             for m2 in self.TELLING.tolist():
                 towards = (m1, E + gap) if nearest else below
-                assert kernel(Rules(10, 3, ROUNDING[nearest])).add(m1, E + gap, m2, E) == (m1, E + gap)
-                assert kernel(Rules(10, 3, ROUNDING[nearest])).add(m2, E, m1, E + gap) == (m1, E + gap)
-                assert kernel(Rules(10, 3, ROUNDING[nearest])).add(m1, E + gap, -m2, E) == towards
-                assert kernel(Rules(10, 3, ROUNDING[nearest])).add(-m1, E + gap, m2, E) == (-towards[0], towards[1])
+                assert add(m1, E + gap, m2, E) == (m1, E + gap)
+                assert add(m2, E, m1, E + gap) == (m1, E + gap)
+                assert add(m1, E + gap, -m2, E) == towards
+                assert add(-m1, E + gap, m2, E) == (-towards[0], towards[1])
 
     def test_quotients(self, nearest: bool) -> None:
         one, other = (each.ravel() for each in np.meshgrid(self.M, self.TELLING, indexing="ij"))

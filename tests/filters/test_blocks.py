@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, FixedFormat, FloatFormat, Form, LinearModel, emulate
+from gpbnb import BINARY32, BINARY64, FixedFormat, FloatFormat, Form, LinearModel, emulate
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.run import Run, Sums
 from tests.plain_structures import floating
@@ -245,6 +245,20 @@ def test_each_block_computes_in_its_own_format_as_plain_loops_do(form, base, dig
             assert run.exactly(run.G)[k].tolist() == slow.K
 
 
+def test_a_covariance_in_binary64_beside_binary32_is_that_of_plain_loops():
+    single, double = floating(2, 24, "even", -126), floating(2, 53, "even", -1022)
+    rounds = dict.fromkeys(BLOCKS, Rounds(single, single)) | {"covariance": Rounds(double, double)}
+    slow = Filter(FRACTIONS, Form.UD, double, rounds)
+    blocks = BlockFormats.uniform(BINARY32).with_block("covariance", BINARY64)
+    assert blocks.model == BINARY64
+    run = Run(MODEL, blocks, Form.UD, range(1, len(Z) + 1))
+    run.take(Z)
+    x, U = run.exactly(run.X), run.exactly(run.C)
+    for k, z in enumerate(Z):
+        slow.step([Fraction(each) for each in z.tolist()])
+        assert (x[k].tolist(), U[k].tolist()) == (slow.x, slow.P)
+
+
 @pytest.mark.parametrize("form", list(Form), ids=str)
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 12), FloatFormat(2, 24, "even", -126, 127), FloatFormat(10, 6, "chop")])
 def test_equal_blocks_are_one_format(form, fmt):
@@ -257,14 +271,14 @@ def test_equal_blocks_are_one_format(form, fmt):
 
 def test_an_overflow_names_the_quantity_of_the_block_whose_range_it_leaves():
     narrow = FloatFormat(2, 11, "even", -14, 3)
-    wide = FloatFormat(2, 11, "even")
+    wide, sums = FloatFormat(2, 11, "even"), FloatFormat(2, 20, "even")
     for name, quantity in (
         ("covariance", "covariance"),
         ("innovation", "innovation covariance"),
         ("state", "estimate"),
     ):
         grown = LinearModel([["4"]], [["1"]], [["900"]], [["900"]], ["0"], [["1"]])
-        run = Run(grown, BlockFormats.uniform(wide).with_block(name, narrow), Form.INNOVATION, [])
+        run = Run(grown, BlockFormats.uniform(wide, sums).with_block(name, narrow), Form.INNOVATION, [])
         run.take(np.full((3, 1), 9.0) if name == "state" else np.zeros((3, 1)))
         assert run.stopped is not None
         assert quantity in run.reason

@@ -22,6 +22,7 @@ from gpbnb.filters.run import Run
 from gpbnb.wordlength.blocks import required_block_precisions
 from gpbnb.wordlength.precision import survey
 from gpbnb.wordlength.records import survey_records
+from tests.plain_structures import floating
 
 STEPS = 50
 PRECISE = mpmath.mp.clone()
@@ -29,21 +30,8 @@ PRECISE.prec = 300
 
 
 def rounding(base, digits):
-    """Round a fraction to the nearest number with some digits, ties away from zero."""
-
-    def rounded(x):
-        x = Fraction(x)
-        if not x:
-            return x
-        e = 0
-        while abs(x) * Fraction(base) ** -e >= base**digits:
-            e += 1
-        while abs(x) * Fraction(base) ** -e < base ** (digits - 1):
-            e -= 1
-        whole = (2 * abs(x) * Fraction(base) ** -e + 1) // 2
-        return (whole if x > 0 else -whole) * Fraction(base) ** e
-
-    return rounded
+    """A function that rounds to the nearest number with some digits, ties away from zero."""
+    return floating(base, digits, "nearest")
 
 
 def of_mpmath(r, function, *arguments):

@@ -292,6 +292,7 @@ def test_the_search_is_right_by_the_exact_smoother(form, bits):
     read = FixedIntervalSmoother(given, z, form)
     found = required_precision(read, steps, 0.01)
     assert found.precision == bits
+    assert "operation by operation" not in str(found)
     true = exact_track()
     for digits, ratio in dict(found.tried).items():
         try:

@@ -35,11 +35,16 @@ from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.program import steps_in_python
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
+from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.tracing import kalman_program, without_exact
+from gpbnb.filters.words import integers_of, run_checked
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.c_files import FLAGS
+from gpbnb.wordlength.c_integers import Integers, Needs
 from gpbnb.wordlength.c_source import places
-from gpbnb.wordlength.code import model_coefficients, prepared
+from gpbnb.wordlength.code import _in_long_words, model_coefficients, prepared
+from gpbnb.wordlength.models import read_model
+from gpbnb.wordlength.precision import required_precision
 
 CASES = list(cases())
 needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang")
@@ -55,13 +60,22 @@ def slice_of(seed, count):
         yield from (mine[i] for i in rng.choice(len(mine), min(count, len(mine)), replace=False))
 
 
+SLICE = [*slice_of(1, 2)]
+
+
+@pytest.fixture(scope="module")
+def compared():
+    """What became of each combination of the slice; they are compiled together, which takes a third of the time."""
+    return compare(SLICE, 10_000, settings_of(installed(), sanitize=False))
+
+
 @needs_compiler
-@pytest.mark.parametrize("case", [*slice_of(1, 2)], ids=lambda case: f"{case.kind} {case.label}")
-def test_code_has_the_digits_of_its_emulation(case):
-    settings = settings_of(installed(), sanitize=False)
-    (found,) = compare([case], 10_000, settings)
-    assert found.faults == ()
-    assert found.builds == len(settings)
+@pytest.mark.parametrize("i", range(len(SLICE)), ids=[f"{case.kind} {case.label}" for case in SLICE])
+def test_code_has_the_digits_of_its_emulation(i, compared):
+    builds = len(settings_of(installed(), sanitize=False))
+    assert compared[i].case is SLICE[i]
+    assert compared[i].faults == ()
+    assert (compared[i].builds, compared[i].steps) == (builds, builds * 10_000)
 
 
 def built(folder, flags=FLAGS):
@@ -115,6 +129,28 @@ def test_every_bit_of_every_step_is_compared(tmp_path):
     assert code_batch._difference(tmp_path, written) == "299 steps in place of 300"
     rows.tofile(tmp_path / "f0.out")
     assert code_batch._difference(tmp_path, written) == ""
+
+
+GROWING = LinearSystem([["1.5"]], [[1]])
+
+
+def test_a_filter_that_overflows_starts_again_with_the_next_input():
+    vectors = code_batch.restarted(prepared(GROWING, FixedFormat(4, 11), None).emulate, np.ones((100, 1)))
+    assert vectors.status.tolist() == [*([0, 0, 0, 0, 0, -2] * 16), 0, 0, 0, 0]
+    states = [2048, 5120, 9728, 16640, 27008, 27008]  # 1, 2.5, 4.75, 8.125, 13.1875; then 20.78
+    assert vectors.states[:, 0].tolist() == [*(states * 16), *states[:4]]
+    assert vectors.inputs.tolist() == [[2048]] * 100
+
+
+@needs_compiler
+def test_every_step_of_a_filter_that_overflows_is_compared(monkeypatch):
+    case, settings = Case("int16", "growing", GROWING, FixedFormat(4, 11), None), settings_of(installed()[:1])
+    (found,) = compare([case], 300, settings)
+    assert (found.counts, found.faults) == ((3, 900, 1800), ())
+    main_ = code_batch._main
+    monkeypatch.setattr(code_batch, "_main", lambda batch: main_(batch).replace("status >= 2", "0"))
+    (found,) = compare([case], 300, settings)
+    assert len(found.faults) == 3
 
 
 @needs_compiler
@@ -189,6 +225,68 @@ def test_traced_operations_have_the_digits_of_the_compiled_step(form, fmt):
             assert x == y == numbers(run, run.exactly(run.X)[k], run.exactly(run.C)[k])
 
 
+@pytest.mark.parametrize("form", [each for each in Form if each is not Form.UD], ids=str)
+@pytest.mark.parametrize("rounding", ["nearest", "even", "chop", "up", "down", "odd"])
+def test_long_words_have_the_digits_of_the_compiled_step_and_of_fractions(rounding, form):
+    for model in models().values():
+        z = np.random.default_rng(4).uniform(-1, 1, (6, model.m))
+        short, narrow = FixedFormat(8, 20, rounding, "saturate"), FixedFormat(2, 13, rounding, "wrap")
+        for fmt in (short, FixedFormat(8, 55, rounding), narrow):
+            program = kalman_program(model.n, model.m, form)
+            coefficients, x = _in_long_words(model, fmt, form)
+            start, inputs = (integers_of(each, fmt) for each in (x, z))
+            found = run_checked(program, fmt, coefficients, start, inputs).states.tolist()
+            for k, measured in enumerate(fmt.array(z).to_fractions().tolist()):
+                try:
+                    x = steps_in_python(program, fmt.round, coefficients[k % len(coefficients)], x, measured)
+                except ZeroDivisionError:
+                    assert len(found) == k
+                    break
+                assert found[k] == [each / fmt.unit for each in x]
+            if fmt is short:
+                run = Run(model, fmt, form, range(1, 7))
+                run.take(z)
+                exact = [numbers(run, *each) for each in zip(run.exactly(run.X), run.exactly(run.C), strict=True)]
+                assert found == [[each / fmt.unit for each in row] for row in exact]
+
+
+DIVISIONS = """
+#include <inttypes.h>
+#include <stdio.h>
+{helpers}
+int main(void)
+{{
+    int64_t a, b;
+    while (scanf("%" SCNd64 "%" SCNd64, &a, &b) == 2)
+        printf("%" PRId64 "\\n", divide(a, b));
+    return 0;
+}}
+"""
+
+
+@needs_compiler
+@pytest.mark.parametrize("overflow", ["saturate", "wrap"])
+@pytest.mark.parametrize(("integer", "fraction"), [(8, 55), (63, 0), (63, -3)])
+def test_the_longest_words_are_divided_as_fractions(integer, fraction, overflow, tmp_path):
+    """Also the lowest number of 64 bits, whose negative has 65, without undefined behaviour."""
+    edges = [2**63 - 1, 2**62, 2**40 + 1, 3, 1]
+    drawn = np.random.default_rng(9).integers(-(2**63), 2**63 - 1, 12).tolist()
+    numbers = [-(2**63), *edges, *(-each for each in edges), *drawn, *(each >> 40 for each in drawn)]
+    for rounding in ("nearest", "even", "chop", "up", "down", "odd"):
+        fmt = FixedFormat(integer, fraction, rounding, overflow)
+        helpers = Integers(WordFormats(fmt), Needs(fmt.precision + abs(fraction), 63)).text("divide")
+        (tmp_path / "run.c").write_text(DIVISIONS.format(helpers=helpers))
+        command = [installed()[0], *FLAGS.split(), "-Werror", *benchmarks.code.SANITIZER.split(), "-o", "run", "run.c"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+        within = [each for each in numbers if fmt.lowest <= each * fmt.unit <= fmt.largest]
+        pairs = [(a, b) for a in within for b in within if b]
+        given = "\n".join(f"{a} {b}" for a, b in pairs)
+        done = subprocess.run(["./run"], cwd=tmp_path, input=given, capture_output=True, text=True, check=True)
+        assert done.stderr == ""
+        assert list(map(int, done.stdout.split())) == [fmt.round(Fraction(a, b)) / fmt.unit for a, b in pairs]
+
+
 def blind(form):
     """A filter whose second state no sensor sees and no noise moves, and one variance of which is zero."""
     Q, P0 = np.diag([0.25, 0.0, 0.5]), np.diag([1.0, 2.0, 0.0])
@@ -218,9 +316,8 @@ def test_a_zero_pivot_stops_the_code_in_the_step_that_stops_the_emulation(tmp_pa
 
 @needs_compiler
 def test_an_overflow_ends_the_code_in_the_step_that_ends_the_emulation(tmp_path):
-    growing = LinearSystem([["1.5"]], [[1]])
     for fmt in (BINARY32, BINARY64, FixedFormat(4, 11), WordFormats(FixedFormat(4, 11), 12, FixedFormat(6, 20))):
-        write_code(growing, fmt, None, tmp_path, inputs=np.ones((3000, 1)))
+        write_code(GROWING, fmt, None, tmp_path, inputs=np.ones((3000, 1)))
         assert built(tmp_path)[0] == 0
         last = (tmp_path / "filter_vectors.txt").read_text().splitlines()[-1]
         assert last.startswith("-2 ")
@@ -327,6 +424,15 @@ def test_a_name_cannot_end_a_comment(tmp_path):
         ),
         (models()["one state"], BINARY32, "Potter", "got the Potter form"),
         (models()["one state"], FixedFormat(4, 11, "stochastic"), "UD", "stochastic rounding"),
+        (models()["one state"], FixedFormat(8, 55), "UD", "the UD form in 64 bits with 55 after the point"),
+        (models()["one state"], FixedFormat(8, 23, "even", "wrap"), "UD", "that do not wrap around"),
+        (
+            LinearModel([[2]], [[2]], [[4]], [[8]], [0], [[4]]),
+            FixedFormat(64, -1, "up", "saturate"),
+            "Joseph",
+            "got divisors of 64 bits",
+        ),
+        (models()["one state"], FixedFormat(8, 56), "Joseph", "got data of 65 bits; needed at most 64"),
     ],
 )
 def test_what_has_no_code_is_refused(given, fmt, form, message, tmp_path):
@@ -442,3 +548,73 @@ def test_the_command_writes_no_code_for_a_format_without_a_type(asked, capsys):
     folder.write_text("")
     assert main([*arguments, "--tolerance", "1"]) == 2
     assert "which is a file; needed a folder" in capsys.readouterr().err
+
+
+TRACKER = """
+states = ["position (m)", "speed (m/s)"]
+measurements = ["range (m)"]
+Phi = [[1, 0.1], [0, 1]]
+H = [[1, 0]]
+Q = [[1e-4, 0], [0, 1e-2]]
+R = [[4]]
+x0 = [0, 0]
+P0 = [[100, 0], [0, 100]]
+"""
+
+
+@pytest.fixture
+def tracker(tmp_path):
+    """A command line for a Kalman filter with constant gain, and the folder for its code."""
+    model = tmp_path / "tracker.toml"
+    model.write_text(TRACKER, encoding="utf-8")
+    given = [str(model), "--form", "Constant gain", "--steps", "50", "--tolerance", "0.01"]
+    return [*given, "--code", str(tmp_path / "code")], tmp_path / "code"
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("options", "texts"),
+    [
+        ([], ["in BINARY32", "never with -ffast-math"]),
+        (["--basis", "guarantee", "--measurement", "100"], ["For inputs of at most 100 in size, each output stays"]),
+        (["--fixed", "--basis", "emulation"], ["fixed point, data of ", "coefficients of "]),
+        (["--format", "fixed 7.24"], ["data of 32 bits with 24 after the point"]),
+    ],
+)
+def test_the_command_writes_a_kalman_filter_with_constant_gain(options, texts, tracker, capsys):
+    arguments, folder = tracker
+    assert main([*arguments, *options]) == 0
+    text = header(folder / "filter.h")
+    assert text.startswith("/* tracker, constant gain, in ")
+    assert all(each in text for each in texts)
+    assert "constant gain, emulation: " in capsys.readouterr().err or "guarantee" in options
+    assert built(folder)[0] == 0
+
+
+def test_a_constant_gain_is_answered_as_its_linear_system(tracker, capsys):
+    arguments, folder = tracker
+    model = read_model(arguments[0])
+    z = simulated_measurements(model, 50)
+    assert main([*arguments[:-2], "--basis", "emulation", "--report", str(folder) + ".html"]) == 0
+    expected = required_precision(settled_filter(model), 50, 0.01, z=z, basis="emulation")
+    assert capsys.readouterr().out.strip() == str(expected)
+    page = folder.with_name("code.html").read_text(encoding="utf-8")
+    assert "simulated by the model, seed 0" in page
+    assert "position (m)" in page
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        (TRACKER, ["--simulate", "step"], "its model simulates its measurements"),
+        (TRACKER, ["--mixed"], "needed --fixed with it"),
+        ('b = ["0.1"]\na = [1, "-0.5"]\n', [], "got --form constant gain for a linear system; needed none"),
+        (TRACKER.replace("R = [[4]]", "R = [[[4]], [[5]]]"), [], "changes from step to step"),
+    ],
+)
+def test_the_command_refuses_what_a_constant_gain_does_not_have(text, options, message, tracker, capsys):
+    arguments, folder = tracker
+    (folder.parent / "tracker.toml").write_text(text, encoding="utf-8")
+    assert main([*arguments, *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not folder.exists()

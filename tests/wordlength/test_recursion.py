@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gpbnb import FloatFormat, LinearSystem, required_precision
+from gpbnb.arithmetic.functions import DomainError
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.forms import Form
@@ -227,6 +228,23 @@ def test_a_model_ends_at_the_compiled_loops_or_below():
     for wrong in (1, 2.5, "20"):
         with pytest.raises(ValueError, match=r"got .* largest; needed a whole number, at least 2"):
             required_precision(smoother, 200, 1e-3, z=Z, largest=wrong)
+
+
+def angles(fmt, z):
+    """The arcsine of nearly a sum of squares that is 1, and in some precisions more."""
+    one = fmt.array("0.6") ** 2 + fmt.array("0.8") ** 2
+    return np.arcsin(one * fmt.array("0.99999")) * z
+
+
+def test_leaving_the_domain_of_a_function_is_a_lack_of_digits():
+    with pytest.raises(DomainError, match=r"got np.arcsin of 1\.000244140625; needed an argument for which"):
+        angles(FloatFormat(2, 13), FloatFormat(2, 13).array([1, 2]))
+    found = required_precision(angles, 2, 0.02, z=[1, 2])
+    assert found.precision == 14
+    assert dict(found.tried)[13] == np.inf
+    assert "in 13 digits the function stops: got np.arcsin of 1.000244140625" in str(found)
+    with pytest.raises(DomainError, match=r"the function stops in its reference of .* np.arcsin of 1.6"):
+        required_precision(lambda fmt, z: np.arcsin(z + fmt.array("0.6")), 1, 0.02, z=[1])
 
 
 def test_a_function_that_stops_in_its_reference_says_so():
