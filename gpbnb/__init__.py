@@ -43,9 +43,9 @@ __all__ = [
     "FP6_E2M3", "FP6_E3M2", "FP8_E4M3", "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32",
     "BlockFormats", "ComplexArray", "FixedFormat", "FixedIntervalSmoother", "FloatArray", "FloatFormat", "Form",
     "LinearModel", "LinearSystem", "MicroscalingFormat", "NonlinearModel", "NonlinearSystem", "Rounding",
-    "TracedFunction", "WordFormats", "emulate", "fft", "flags", "guarantee", "limit_cycles", "limits", "linalg", "microscaling_dot",
-    "peek", "read_model", "required_block_precisions", "required_fraction_bits", "required_precision",
-    "survey_records", "write_code",
+    "TracedFunction", "WordFormats", "emulate", "fft", "flags", "guarantee", "limit_cycles", "limits", "linalg",
+    "microscaling_dot", "peek", "read_model", "required_block_precisions", "required_fraction_bits",
+    "required_precision", "survey_records", "write_code",
 ]
 # fmt: on
 

@@ -245,7 +245,8 @@ class _Listing:
         self._tape, self._build, self._sizes = tape, Builder(n + p, m), sizes
         #: The different constants; the first is zero.
         self.coefficients = list(dict.fromkeys(constants.values()))
-        self._coefficients = {place: self.coefficients.index(value) for place, value in constants.items()}
+        numbers = {value: i for i, value in enumerate(self.coefficients)}
+        self._coefficients = {place: numbers[value] for place, value in constants.items()}
         self._values = dict(enumerate([*self._build.states[:n], *self._build.inputs], start=1))
         self._truths = {0: _FALSE, 1: _TRUE}
         self._loaded: dict[int, int] = {}
@@ -290,7 +291,7 @@ class _Listing:
         if call.name not in _CALLS:
             raise ValueError(
                 f"got np.{call.name} in the step, for which C has no function with the digits of the emulation; needed "
-                "+ - * /, comparisons, choices, np.sqrt, np.fmod, np.remainder, np.floor, np.ceil, np.trunc or np.rint; "
+                "+ - * /, comparisons, choices, np.sqrt, np.fmod, np.remainder, np.floor, np.ceil, np.trunc, np.rint; "
                 "write a polynomial or a table in its place"
             )
         code = _CALLS[call.name]
@@ -393,7 +394,7 @@ class _Listing:
 
     @staticmethod
     def _row(b: _Truth, row: int) -> _Truth:
-        """Return what two bits give for a truth value that is false or true: the truth value, its opposite or neither."""
+        """Return what a truth value becomes if it is false, bit 0, and if it is true, bit 1."""
         if row in (0, 3):
             return _TRUE if row == 3 else _FALSE
         return b if row == 2 else b._replace(negated=not b.negated)

@@ -38,8 +38,8 @@ from gpbnb.arithmetic.kernels.tags import DoubleDouble
 
 # fmt: off
 (
-    MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST, PRODUCT, DIVIDE, CONSTANT, CHOOSE, LESS, EQUAL, MODULO, ROOT, FLOOR, CEILING,
-    TRUNCATE, NEAREST,
+    MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST, PRODUCT, DIVIDE, CONSTANT, CHOOSE, LESS, EQUAL, MODULO, ROOT, FLOOR,
+    CEILING, TRUNCATE, NEAREST,
 ) = range(17)
 # fmt: on
 """Codes of operations. AT_LEAST and AT_MOST limit a value by a coefficient, as a controller limits its output. PRODUCT

@@ -319,8 +319,8 @@ def _of_nonlinear(system: NonlinearSystem, fmt: AnyFormat) -> Prepared:
     _checked(fmt)
     if isinstance(fmt, WordFormats):
         raise ValueError(
-            "got formats of words for a nonlinear system; needed BINARY32, BINARY64 or a FixedFormat: all operations of "
-            "its step are in one format"
+            "got formats of words for a nonlinear system; needed BINARY32, BINARY64 or a FixedFormat: all operations "
+            "of its step are in one format"
         )
     kind = _type_of(fmt) if isinstance(fmt, FloatFormat) else ""
     words = _words(fmt) if isinstance(fmt, FixedFormat) else None
