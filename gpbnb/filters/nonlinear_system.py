@@ -93,7 +93,7 @@ class NonlinearSystem:
     >>> controller(BINARY32, [0.5, 1, 1]).to_float().ravel()
     array([0.42500001, 0.875     , 0.92500001])
     >>> print(required_precision(controller, 3, 0.01, z=[0.5, 1, 1]))
-    7 bits (binary32 is enough): 0.62 of the tolerance, observed in 3 steps
+    6 bits (binary32 is enough): 0.31 of the tolerance, observed in 3 steps
     """
 
     step: Step
