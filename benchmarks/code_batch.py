@@ -225,7 +225,7 @@ def _built(folder: Path, setting: str) -> str:
     """Compile and run a batch; return what went wrong."""
     for file in (*folder.glob("*.out"), folder / "run"):
         file.unlink(missing_ok=True)
-    for command in ([*setting.split(), "-o", "run", "main.c", "filters.c"], ["./run"]):
+    for command in ([*setting.split(), "-o", "run", "main.c", "filters.c", "-lm"], ["./run"]):
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         if done.returncode or done.stderr:
             return done.stderr or done.stdout or f"exit status {done.returncode}"

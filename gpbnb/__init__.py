@@ -11,6 +11,7 @@ The public interface::
     ComplexArray, fft          complex numbers as pairs, and the fast Fourier transform
     LinearModel                a linear dynamic model for a Kalman filter
     NonlinearModel             functions of a state for an extended or unscented Kalman filter
+    NonlinearSystem            a step of your own, from state and inputs to the next state and outputs
     LinearSystem               a digital filter in any structure, a controller or an observer
     required_precision         the smallest precision that keeps a filter, or your own function, within a tolerance
     required_block_precisions  the same for each block of a Kalman filter; BlockFormats: a format for each block
@@ -41,10 +42,10 @@ __all__ = [
     "BFLOAT16", "BINARY16", "BINARY32", "BINARY64", "BINARY128", "DECIMAL32", "DECIMAL64", "DECIMAL128", "FP4_E2M1",
     "FP6_E2M3", "FP6_E3M2", "FP8_E4M3", "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32",
     "BlockFormats", "ComplexArray", "FixedFormat", "FixedIntervalSmoother", "FloatArray", "FloatFormat", "Form",
-    "LinearModel", "LinearSystem", "MicroscalingFormat", "NonlinearModel", "Rounding", "TracedFunction",
-    "WordFormats", "emulate", "fft", "flags", "guarantee", "limit_cycles", "limits", "linalg", "microscaling_dot",
-    "peek", "read_model", "required_block_precisions", "required_fraction_bits", "required_precision",
-    "survey_records", "write_code",
+    "LinearModel", "LinearSystem", "MicroscalingFormat", "NonlinearModel", "NonlinearSystem", "Rounding",
+    "TracedFunction", "WordFormats", "emulate", "fft", "flags", "guarantee", "limit_cycles", "limits", "linalg",
+    "microscaling_dot", "peek", "read_model", "required_block_precisions", "required_fraction_bits",
+    "required_precision", "survey_records", "write_code",
 ]
 # fmt: on
 

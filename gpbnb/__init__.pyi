@@ -69,6 +69,7 @@ from gpbnb.filters.emulation import emulate as emulate
 from gpbnb.filters.forms import Form as Form
 from gpbnb.filters.model import LinearModel as LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel as NonlinearModel
+from gpbnb.filters.nonlinear_system import NonlinearSystem as NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother as FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem as LinearSystem
 from gpbnb.filters.words import WordFormats as WordFormats

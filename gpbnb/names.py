@@ -30,6 +30,7 @@ HOMES = {
     "LinearSystem": "gpbnb.filters.system",
     "MicroscalingFormat": "gpbnb.arithmetic.microscaling",
     "NonlinearModel": "gpbnb.filters.nonlinear",
+    "NonlinearSystem": "gpbnb.filters.nonlinear_system",
     "Rounding": "gpbnb.arithmetic.rounding",
     "TracedFunction": "gpbnb.arithmetic.traced",
     "WordFormats": "gpbnb.filters.words",

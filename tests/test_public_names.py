@@ -25,6 +25,7 @@ HOMES = {
     "filters.blocks": "BlockFormats",
     "filters.forms": "Form",
     "filters.nonlinear": "NonlinearModel",
+    "filters.nonlinear_system": "NonlinearSystem",
     "filters.smoothing": "FixedIntervalSmoother",
     "filters.words": "WordFormats",
     "bounds.guarantee": "guarantee limits",

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedArray
 from gpbnb.arithmetic.functions import elementary, lines
 
 SLOPES: dict[str, Callable[[Any, Any], Any]] = {
@@ -82,7 +83,7 @@ class Dual(FloatArray):
     @classmethod
     def of(cls, value: Any, slope: Any) -> Dual:
         """Join an array, and its derivatives along a first axis."""
-        self = object.__new__(cls)
+        self = object.__new__(_FixedDual if isinstance(value, FixedArray) else cls)
         self.value, self.slope, self._format = value, slope, value.format
         return self
 
@@ -255,6 +256,12 @@ def _no_rule(what: str) -> TypeError:
         f"got {what} on an array that carries its derivatives; needed operations with a rule: + - * / @, powers, "
         f"sqrt, arctan2, hypot, {', '.join(SLOPES)}, comparisons and np.where; for others, give the Jacobians F and H"
     )
+
+
+class _FixedDual(Dual, FixedArray):
+    """An array in fixed point with its derivatives; as a :class:`FixedArray`, it takes operations with one first."""
+
+    __slots__ = ()
 
 
 def jacobian(function: Callable[[Any], Any], x: FloatArray) -> tuple[FloatArray, FloatArray]:

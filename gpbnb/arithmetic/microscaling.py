@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Order
@@ -52,7 +53,8 @@ class MicroscalingFormat:
 
     Parameters
     ----------
-    element : format of the elements, such as FP8_E4M3 or FP4_E2M1; they saturate.
+    element : format of the elements, such as FP8_E4M3 or FP4_E2M1, or ``FixedFormat(1, 6, "even")`` for MXINT8, whose
+        elements are two's complement from -2 to 1 63/64; they saturate.
     block : number of elements in a block, 32 in the specification.
 
     Raises
@@ -68,7 +70,7 @@ class MicroscalingFormat:
     ([4], [[0.0, -2.0, 0.0, 6.0]], [0.0, -32.0, 0.0, 96.0])
     """
 
-    element: FloatFormat
+    element: FloatFormat | FixedFormat
     block: int = 32
 
     def __post_init__(self) -> None:
@@ -76,7 +78,8 @@ class MicroscalingFormat:
             raise ValueError(f"block: got {self.block}; needed at least 1")
         if self.element.limits is None or self.element.base != 2:
             raise ValueError(f"element: got {self.element}; needed a format of base 2 with a range, such as FP4_E2M1")
-        object.__setattr__(self, "element", replace(self.element, overflow="saturate"))
+        element: Any = self.element
+        object.__setattr__(self, "element", replace(element, overflow="saturate"))
 
     def array(self, values: Any) -> ScaledBlocks:
         """Convert numbers (..., n) to blocks along the last axis.

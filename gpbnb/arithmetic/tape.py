@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Sequence
-from functools import cache
+from fractions import Fraction
+from functools import cache, partial
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -60,6 +61,11 @@ class Call(NamedTuple):
     function: Callable[..., FloatArray]
     operands: Sequence[NDArray[np.int64]]
     results: NDArray[np.int64]
+
+    @property
+    def name(self) -> str:
+        """The name of the function, as in NumPy."""
+        return str(self.function.args[0] if isinstance(self.function, partial) else self.function.__name__)
 
 
 class Constants:
@@ -169,6 +175,23 @@ class Tape:
         self._values += len(results)
         self._calls.append(Call(len(self._instructions) // 5, function, [each.ravel() for each in operands], results))
         return results.reshape(operands[0].shape)
+
+    @property
+    def calls(self) -> Sequence[Call]:
+        """The calls of functions, in their order."""
+        return tuple(self._calls)
+
+    def constants_in(self, fmt: Any) -> dict[int, Fraction]:
+        """Return the constants as a format stores them, by their places.
+
+        Raises
+        ------
+        TypeError, ValueError, OverflowError : as for :meth:`Constants.rounded`.
+        """
+        found: dict[int, Fraction] = {0: Fraction(0)}
+        for each in self._constants:
+            found.update(zip(each.places, np.ravel(each.rounded(fmt).to_fractions()).tolist(), strict=True))
+        return found
 
     @property
     def instructions(self) -> NDArray[np.intc]:

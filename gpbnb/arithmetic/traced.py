@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, NoReturn, cast
 
 import numpy as np
 
-from gpbnb.arithmetic import functions
+from gpbnb.arithmetic import functions, linalg
 from gpbnb.arithmetic.array import ComponentArray, FloatArray
 from gpbnb.arithmetic.conversion import entries
 from gpbnb.arithmetic.exits import unseen
@@ -76,13 +76,29 @@ class TracedFunction:
         """Why the function cannot be traced; empty if it can, or has not run."""
         return next((each for each in self._traces.values() if isinstance(each, str)), "")
 
-    def __call__(self, fmt: Any, *given: Any) -> Any:
-        """Run the function in a format, with numbers that are first rounded into it."""
-        arrays = [fmt.array(each) for each in given]
-        shapes = tuple(each.shape for each in arrays)
+    def recorded(self, *shapes: tuple[int, ...]) -> tuple[Tape, Any]:
+        """Return the operations for arrays of some shapes, and what the function returns, with places for numbers.
+
+        Raises
+        ------
+        ValueError : the function cannot be traced; the message says why.
+        """
+        trace = self._trace(shapes)
+        if isinstance(trace, str):
+            raise ValueError(f"got a function that cannot be traced: {trace}; needed one that can, without branches")
+        return trace.tape, trace.returned
+
+    def _trace(self, shapes: tuple[tuple[int, ...], ...]) -> _Trace | str:
         if shapes not in self._traces:
             self._traces[shapes] = self._traced(shapes)
-        trace = self._traces[shapes]
+        return self._traces[shapes]
+
+    def __call__(self, fmt: Any, *given: Any) -> Any:
+        """Run the function in a format, with numbers that are first rounded into it."""
+        if type(fmt) is TracedFormat:  # part of a function that is traced itself
+            return self.__wrapped__(fmt, *given)
+        arrays = [fmt.array(each) for each in given]
+        trace = self._trace(tuple(each.shape for each in arrays))
         if isinstance(trace, str):
             self.reason = trace
         elif fmt.rounding is Rounding.STOCHASTIC:
@@ -185,6 +201,8 @@ class TracedFormat:
         #: The tape on which operations are recorded.
         self.tape = tape
         self._recording = _Recording(tape)
+        #: What functions of ``np.linalg`` do.
+        self.algebra = linalg.NUMPY
 
     def made(self, places: Places) -> TracedArray:
         """Return an array of places."""

@@ -15,9 +15,11 @@ from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.array_run import ArrayRun, opened_run
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
-from gpbnb.filters.missing import stored_measurements, without_missing
+from gpbnb.filters.missing import stored_measurements
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named
+from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
+from gpbnb.filters.nonlinear_run import NonlinearRun, complete, nonlinear_checkpoints
 from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums, log_spaced, reference
 
 
@@ -37,7 +39,7 @@ class History:
     repairs : changes of covariances that would otherwise be indefinite, each as text.
     """
 
-    model: LinearModel
+    model: AnyModel
     fmt: FloatFormat | BlockFormats
     form: AnyForm
     steps: NDArray[np.int64]
@@ -81,7 +83,7 @@ def relative(error: NDArray[np.float64], true: NDArray[Any]) -> NDArray[np.float
     return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
 
 
-def compare_runs(run: Run | ArrayRun, true: Checkpoints) -> History:
+def compare_runs(run: Run | ArrayRun | NonlinearRun, true: Checkpoints) -> History:
     """Subtract the reference from the checkpoints of a run, at the same steps."""
     checkpoints = run.checkpoints()
     c = len(checkpoints.steps)
@@ -95,13 +97,13 @@ def compare_runs(run: Run | ArrayRun, true: Checkpoints) -> History:
         for each, other in ((checkpoints.x, true.x), (checkpoints.K, true.K), (checkpoints.P, true.P))
     )
     blocks = run.block_formats if isinstance(run, Run) else None
-    fmt, steps = blocks or cast(FloatFormat, run.fmt), np.array(checkpoints.steps, dtype=np.int64)
+    fmt, steps = blocks or cast(FloatFormat | BlockFormats, run.fmt), np.array(checkpoints.steps, dtype=np.int64)
     repairs = tuple(str(each) for each in run.repairs)
     return History(run.model, fmt, run.form, steps, x, K, P, true, run.indefinite, run.stopped, run.reason, repairs)
 
 
 def emulate(
-    model: LinearModel,
+    model: AnyModel,
     z: Any,
     fmt: FloatFormat | BlockFormats,
     form: AnyForm | str = Form.INNOVATION,
@@ -114,7 +116,7 @@ def emulate(
 
     Parameters
     ----------
-    model : a model with n states and m measurements.
+    model : a linear or nonlinear model with n states and m measurements.
     z : (steps, m), measurements; NaN or masked if missing.
     fmt : a floating-point format with at most 53 digits in base 2, 18 in base 10 or 13 in base 16; a fixed-point
         format; or one format for each block of a step, as in :class:`gpbnb.filters.blocks.BlockFormats`.
@@ -122,31 +124,39 @@ def emulate(
     checkpoint_steps : steps at which to compare; by default four per decade.
     true : the reference run to compare with. By default, it uses model and measurements as the format stores them, so
         the errors come only from the arithmetic. With a reference for the model as given, they include the errors of
-        storing the model.
+        storing the model. The reference of a nonlinear model always takes it as given, since a format stores the
+        constants within its functions.
     sums, compensated : as for :class:`~gpbnb.filters.run.Run`.
 
     Raises
     ------
     TypeError : `model` is not a model, or `fmt` is not a format.
-    ValueError : there are no measurements; a checkpoint step is beyond the run; or `sums`, `compensated` or formats for
-        blocks are combined with known inputs, or with a form without compiled loops.
+    ValueError : there are no measurements; a checkpoint step is beyond the run; `sums`, `compensated` or formats for
+        blocks are combined with known inputs, or with a form without compiled loops; or `sums` or `compensated` with a
+        nonlinear model.
     """
     form = form_named(form)
-    if not isinstance(model, LinearModel):
-        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel")
+    if not isinstance(model, LinearModel | NonlinearModel):
+        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel or a NonlinearModel")
     if not isinstance(fmt, (FloatFormat, FixedFormat, BlockFormats)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or BlockFormats")
     if not hasattr(z, "to_fractions"):
-        model, z = without_missing(model, z)
+        model, z = complete(model, z)
     if not isinstance(fmt, BlockFormats):
         fmt.restart()
     measured: Any = z if hasattr(z, "to_fractions") else stored_measurements(z, fmt)
-    model.check_measurements(measured, 0)
+    (model if isinstance(model, LinearModel) else model.noise).check_measurements(measured, 0)
     if not len(measured):
         raise ValueError("got no measurements; needed at least one step")
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     if chosen and max(chosen) > len(measured):
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
+    if isinstance(model, NonlinearModel):
+        if compensated or sums != LEFT_TO_RIGHT:
+            raise ValueError("got sums or compensated estimates for a nonlinear model; needed neither: it has no loops")
+        nonlinear = NonlinearRun(model, fmt, form, chosen)
+        nonlinear.take(measured)
+        return compare_runs(nonlinear, nonlinear_checkpoints(model, measured, chosen) if true is None else true)
     run = opened_run(model, fmt, form, chosen, False, sums, compensated)
     run.take(measured)
     if true is None:

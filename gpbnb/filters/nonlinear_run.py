@@ -33,7 +33,7 @@ from gpbnb.filters.kalman_step import corrected_by, measured_in, predicted_in
 from gpbnb.filters.missing import without_missing
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.reference import Step, agreed
-from gpbnb.filters.run import Run, reference_states
+from gpbnb.filters.run import Checkpoints, Run, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
 from gpbnb.filters.unscented import UnscentedModel, unscented_step
 
@@ -254,6 +254,13 @@ def nonlinear_reference(model: NonlinearModel, z: Any) -> list[Step]:
     ArithmeticError : results that depend on the number of bits; too many steps.
     """
     return _reference(model, tuple(map(tuple, exact(z))))
+
+
+def nonlinear_checkpoints(model: NonlinearModel, z: Any, checkpoint_steps: Sequence[int]) -> Checkpoints:
+    """Return some steps of :func:`nonlinear_reference`; `z` may be an array of a format."""
+    found = nonlinear_reference(model, z.to_fractions() if hasattr(z, "to_fractions") else z)
+    x, K, P = (np.array([found[step - 1][i] for step in checkpoint_steps], dtype=object) for i in range(3))
+    return Checkpoints(tuple(checkpoint_steps), x, K, P)
 
 
 @lru_cache(maxsize=4)

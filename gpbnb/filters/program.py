@@ -12,8 +12,8 @@ several purposes, so that they cannot disagree:
 * :mod:`gpbnb.wordlength.code` prints it as C.
 
 A step that also computes the covariance is not linear: it multiplies and divides values. :mod:`gpbnb.filters.tracing`
-lists its operations with the same codes, for C code and for :func:`steps_in_python`; the compiled functions here take
-linear programs and limits.
+lists its operations with the same codes, and :mod:`gpbnb.filters.nonlinear_system` those of a step of your own, for C
+code and for :func:`steps_in_python`; the compiled functions here take linear programs and limits.
 
 The coefficients are arguments and not part of the program, because they may change from step to step. A product with a
 zero coefficient is exact, and so is a sum with this product; the compiled kernels omit both.
@@ -21,6 +21,7 @@ zero coefficient is exact, and so is a sum with this product; the compiled kerne
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -35,19 +36,27 @@ from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import add, less, load, multiply, put, store, subtract
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 
-MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST, PRODUCT, DIVIDE, CONSTANT, CHOOSE = range(9)
+# fmt: off
+(
+    MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST, PRODUCT, DIVIDE, CONSTANT, CHOOSE, LESS, EQUAL, MODULO, ROOT, FLOOR,
+    CEILING, TRUNCATE, NEAREST,
+) = range(17)
+# fmt: on
 """Codes of operations. AT_LEAST and AT_MOST limit a value by a coefficient, as a controller limits its output. PRODUCT
 and DIVIDE take two values, CONSTANT is a coefficient. CHOOSE is its first value if the guard of the operation is not
-zero, else its second."""
+zero, else its second. LESS and EQUAL are one if they hold for two values, else zero. MODULO is the exact rest of a
+division that truncates its quotient, ROOT a square root, and the last four are the nearest whole number below, above,
+toward zero, and on either side, ties to even."""
 
 LINEAR = (MULTIPLY, ADD, SUBTRACT)
 """Codes of operations that are linear functions of their values."""
 
-_ON_TWO_VALUES = (ADD, SUBTRACT, PRODUCT, DIVIDE, CHOOSE)
+_ON_TWO_VALUES = (ADD, SUBTRACT, PRODUCT, DIVIDE, CHOOSE, LESS, EQUAL, MODULO)
 
-DIVISOR, POSITIVE, NOT_NEGATIVE = range(3)
-"""Kinds of checks. A divisor of zero ends a run; a value that should be positive, or not negative, and is not, is the
-sign of a covariance that is no longer definite."""
+DIVISOR, POSITIVE, NOT_NEGATIVE, RADICAND, IN_RANGE = range(5)
+"""Kinds of checks. A divisor of zero and a radicand below zero end a run; a value that should be positive, or not
+negative, and is not, is the sign of a covariance that is no longer definite. IN_RANGE marks a value that nothing uses,
+whose overflow ends the run nevertheless."""
 
 
 def values_of(code: int, a: int, b: int) -> tuple[int, ...]:
@@ -77,7 +86,7 @@ class Program:
     ----------
     n, m : number of states and of inputs.
     operations : (o, 3), code and two operands. MULTIPLY, AT_LEAST and AT_MOST take a coefficient and a value, CONSTANT
-        a coefficient; all others take two values.
+        a coefficient; ROOT and the codes after it take a value as second operand; all others take two values.
     outputs : (n,), the values that become the states.
     coefficients : number of coefficients.
     groups : (o,), operations whose rounding errors have the same effect on the result share a number.
@@ -171,6 +180,11 @@ class Builder:
     def append(self, code: int, a: int, b: int = 0) -> int:
         """Add an operation by its code."""
         return self._append(code, a, b)
+
+    def listed(self) -> list[tuple[int, tuple[int, int, int], int]]:
+        """Return the value, the code with its operands, and the guard of each operation."""
+        values = range(self.n + self.m, self.n + self.m + len(self._operations))
+        return list(zip(values, self._operations, self._guards, strict=True))
 
     def stored(self, value: int) -> int:
         """Store a value in the format of the data even if only sums use it."""
@@ -344,7 +358,10 @@ def advance(fmt: Any, operations: Any, outputs: Any, coefficients: Any, start: A
 def steps_in_python(
     program: Program, round_: Callable[[Any], Any], coefficients: Any, x: Sequence[Any], z: Sequence[Any]
 ) -> list[Any]:
-    """Take one step with numbers of any type, each result rounded by a function; slow and obvious."""
+    """Take one step with numbers of any type, each result rounded by a function; slow and obvious.
+
+    A ROOT takes Fractions, and rounds to formats with at most 1000 bits after the binary point.
+    """
     values = [*x, *z]
     for (code, a, b), guard in zip(
         program.operations.tolist(), program.guards or (-1,) * len(program.operations), strict=True
@@ -355,7 +372,7 @@ def steps_in_python(
         elif not chosen:
             values.append(None)
         elif code in _EXACT:
-            values.append(round_(_EXACT[code](values[a], values[b])))
+            values.append(round_(_EXACT[code](*(values[each] for each in values_of(code, a, b)))))
         elif code == MULTIPLY:
             values.append(round_(coefficients[a] * values[b]))
         elif code == CONSTANT:
@@ -365,7 +382,29 @@ def steps_in_python(
     return [values[i] for i in program.outputs]
 
 
-_EXACT = {ADD: operator.add, SUBTRACT: operator.sub, PRODUCT: operator.mul, DIVIDE: operator.truediv}
+def _root(x: Fraction) -> Fraction:
+    """Return a number that rounds as the square root does: the root itself, or one between the same long numbers."""
+    whole = math.isqrt(math.floor(x * 4**_ROOT_BITS))
+    exact = Fraction(whole, 2**_ROOT_BITS) ** 2 == x
+    return Fraction(2 * whole + (not exact), 2 ** (_ROOT_BITS + 1))
+
+
+_ROOT_BITS = 1100
+
+_EXACT: dict[int, Callable[..., Any]] = {
+    ADD: operator.add,
+    SUBTRACT: operator.sub,
+    PRODUCT: operator.mul,
+    DIVIDE: operator.truediv,
+    LESS: lambda a, b: int(a < b),
+    EQUAL: lambda a, b: int(a == b),
+    MODULO: lambda a, b: a - b * math.trunc(a / b),
+    ROOT: _root,
+    FLOOR: math.floor,
+    CEILING: math.ceil,
+    TRUNCATE: math.trunc,
+    NEAREST: round,
+}
 
 
 # -- linear functions -------------------------------------------------------------------------------------------------

@@ -235,7 +235,7 @@ class _Shortening:
     def _replace(self, o: int) -> None:
         """Find the value that operation o equals, with operands already replaced."""
         code, a, b = self.operations[o]
-        if code in (ADD, SUBTRACT, PRODUCT, DIVIDE, CHOOSE):
+        if len(values_of(code, a, b)) == 2:
             a = self.same[a]
         b = self.same[b] if code != CONSTANT else b
         guard = self.same[self.guards[o]] if self.guards[o] >= 0 else -1

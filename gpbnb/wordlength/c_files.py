@@ -22,6 +22,7 @@ class Described(NamedTuple):
     title, structure, fmt : name, structure or form, and format, in words.
     bound : what is proven about its errors, in words; may be empty.
     floating : whether it computes in floating point.
+    bounded : whether its errors can be bounded.
     """
 
     title: str
@@ -29,6 +30,7 @@ class Described(NamedTuple):
     fmt: str
     bound: str
     floating: bool
+    bounded: bool
 
 
 class Vectors(NamedTuple):
@@ -74,8 +76,8 @@ def _comment(*paragraphs: str) -> str:
 def _header(source: CodeSource, described: Described) -> str:
     name, guard = source.name, f"{source.name.upper()}_H"
     order = (
-        "Each statement of the step is one operation, rounded once, in the order in which gpbnb emulates the filter "
-        "and bounds its errors. Compilers keep this order unless told otherwise"
+        "Each statement of the step is one operation, rounded once, in the order in which gpbnb emulates the filter"
+        f"{' and bounds its errors' if described.bounded else ''}. Compilers keep this order unless told otherwise"
     )
     flags = (
         f"{order}: compile with -ffp-contract=off, and never with -ffast-math." if described.floating else f"{order}."
@@ -222,12 +224,13 @@ def _vectors(source: CodeSource, vectors: Vectors) -> str:
 def _makefile(name: str) -> str:
     return f"""CC = cc
 CFLAGS = {FLAGS} -O2
+LDLIBS = -lm
 
 test: test_{name}
 	./test_{name} {name}_vectors.txt
 
 test_{name}: test_{name}.c {name}.c {name}.h
-	$(CC) $(CFLAGS) -o $@ test_{name}.c {name}.c
+	$(CC) $(CFLAGS) -o $@ test_{name}.c {name}.c $(LDLIBS)
 
 clean:
 	rm -f test_{name}

@@ -41,6 +41,27 @@ _AWAY = {
 """When the size of a quotient grows by one; `rest` is what is left of the divisor, `size` the divisor."""
 
 
+_ROOT_GROWS = {
+    Rounding.NEAREST: "rest > found",
+    Rounding.EVEN: "rest > found",
+    Rounding.CHOP: "0",
+    Rounding.UP: "rest > 0",
+    Rounding.DOWN: "0",
+    Rounding.ODD: "rest > 0 && !(found & 1)",
+}
+"""When a square root grows by one; `rest` is what is left of its argument. No root is a tie."""
+
+_WHOLE = {
+    "floor": Rounding.DOWN,
+    "ceil": Rounding.UP,
+    "trunc": Rounding.CHOP,
+    "rint": Rounding.EVEN,
+}
+"""How each function of C finds a whole number."""
+
+LONGEST_RADICAND = 122
+"""Bits of an argument whose square root the helpers find."""
+
 _IN_WIDE = {
     "rest > half": "wide_less(half, rest)",
     "rest == half": "wide_equal(rest, half)",
@@ -55,6 +76,22 @@ _IN_WIDE = {
 def word_bits(fmt: FixedFormat) -> int | None:
     """Return the bits of the C type that holds a word, 16, 32 or 64; None if there is none."""
     return next((bits for bits in (16, 32, 64) if 1 + fmt.precision <= bits), None)
+
+
+def radicand_bits(fmt: FixedFormat) -> int:
+    """Return the bits of the integer whose root, a whole number, is the root of a word.
+
+    Raises
+    ------
+    ValueError : too many bits, or a binary point beyond the last bit.
+    """
+    bits = fmt.precision + fmt.fraction_bits
+    if fmt.fraction_bits < 0 or bits > LONGEST_RADICAND:
+        raise ValueError(
+            f"got a square root of {1 + fmt.precision} bits with {fmt.fraction_bits} after the point; needed at least "
+            f"none, and at most {LONGEST_RADICAND} together with those of the word"
+        )
+    return bits
 
 
 class Needs(NamedTuple):
@@ -107,10 +144,8 @@ class Integers:
         V, W = self.value, self.value if self.bits < 128 else "wide"
         data, sums = self.words.data, self.words.accumulator
         found = dict(_WIDE) if self.bits == 128 else {}
-        roundings = {fmt.rounding for fmt in (data, sums)}
-        for each in Rounding:
-            if each in roundings:
-                found[f"rounded_{each.value}"] = self._rounded(each)
+        for each in _UP:
+            found[f"rounded_{each.value}"] = self._rounded(each)
         for name, fmt in (("data", data), ("sums", sums)):
             found[f"in_{name}"] = self._kept(name, fmt)
         first = "sums" if self.words.sums is not None else "data"
@@ -142,6 +177,14 @@ class Integers:
             f"    return in_data(rounded_{data.rounding.value}({as_wide}, {self.words.gap}){passed});\n}}\n"
         )
         found["divide"] = self._quotient(overflow, passed)
+        found["modulo"] = _function(
+            "/* what a / b, toward zero, leaves of a; the step itself notes a divisor of zero */",
+            f"static {V} modulo({V} a, {V} b)",
+            ["return b == 0 || b == -1 ? 0 : a % b;"],
+        )
+        found["root"] = self._root(overflow, passed)
+        for name, rounding in _WHOLE.items():
+            found[f"whole_{name}"] = self._whole(name, rounding, overflow, passed)
         return found
 
     def text(self, body: str) -> str:
@@ -261,6 +304,38 @@ class Integers:
         ]
         comment = f"/* a / b, {_describe(data.rounding)}; the step itself notes a divisor of zero */"
         return _function(comment, f"static {V} divide({V} a, {V} b{overflow})", lines)
+
+    def _root(self, overflow: str, passed: str) -> str:
+        V, point, grows = self.value, self.words.data.fraction_bits, _ROOT_GROWS[self.words.data.rounding]
+        bits = self.words.data.precision + point
+        found = f"({V})found" if self.bits < 128 else "wide_of((int64_t)found)"
+        lines = [
+            "const uint64_t top = a < 0 ? 0 : (uint64_t)a;",
+            "uint64_t found = 0, rest = 0;",
+            "int i;",
+            f"for (i = {(bits + 1) // 2 * 2 - 1}; i > 0; i -= 2) {{",
+            f"    rest = rest << 1 | (i < {point} ? 0 : top >> (i - {point}) & 1);",
+            f"    rest = rest << 1 | (i <= {point} ? 0 : top >> (i - {point} - 1) & 1);",
+            "    found <<= 1;",
+            "    if (rest > 2 * found) {",
+            "        rest -= 2 * found + 1;",
+            "        found++;",
+            "    }",
+            "}",
+            *([f"if ({grows})", "    found++;"] if grows != "0" else []),
+            f"return in_data({found}{passed});",
+        ]
+        comment = f"/* square root, {_describe(self.words.data.rounding)}; the step itself notes a negative argument */"
+        return _function(comment, f"static {V} root({V} a{overflow})", lines)
+
+    def _whole(self, name: str, rounding: Rounding, overflow: str, passed: str) -> str:
+        V, point = self.value, max(self.words.data.fraction_bits, 0)
+        if self.bits == 128:
+            found = f"wide_left(rounded_{rounding.value}(wide_of(a), {point}), {point})"
+        else:
+            found = f"rounded_{rounding.value}(a, {point}) * (({V})1 << {point})"
+        comment = f"/* a whole number, {_describe(rounding)} */"
+        return _function(comment, f"static {V} whole_{name}({V} a{overflow})", [f"return in_data({found}{passed});"])
 
 
 def _function(comment: str, head: str, lines: list[str]) -> str:

@@ -15,19 +15,30 @@ from gpbnb.filters.program import (
     ADD,
     AT_LEAST,
     AT_MOST,
+    CEILING,
     CHOOSE,
     CONSTANT,
     DIVIDE,
     DIVISOR,
+    EQUAL,
+    FLOOR,
+    IN_RANGE,
+    LESS,
+    MODULO,
     MULTIPLY,
+    NEAREST,
+    NOT_NEGATIVE,
     POSITIVE,
     PRODUCT,
+    RADICAND,
+    ROOT,
     SUBTRACT,
+    TRUNCATE,
     Program,
     values_of,
 )
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.c_integers import LONGEST_SHIFT, Integers, Needs, word_bits
+from gpbnb.wordlength.c_integers import LONGEST_SHIFT, Integers, Needs, radicand_bits, word_bits
 
 _WORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
@@ -39,6 +50,10 @@ _KEYWORDS = frozenset(_WORDS.split())
 
 _NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)((?:\[\d+\])*)")
 _SIGNS = {ADD: "+", SUBTRACT: "-", PRODUCT: "*", DIVIDE: "/"}
+_COMPARISONS = {LESS: "<", EQUAL: "=="}
+_WHOLE = {FLOOR: "floor", CEILING: "ceil", TRUNCATE: "trunc", NEAREST: "rint"}
+_FUNCTIONS = {ROOT: "sqrt", MODULO: "fmod", **_WHOLE}
+_STOPS = {DIVISOR: ("== 0", "a divisor is zero"), RADICAND: ("< 0", "a square root has a negative argument")}
 
 
 class CodeStep(NamedTuple):
@@ -62,13 +77,13 @@ class CodeStep(NamedTuple):
 
     @property
     def may_stop(self) -> bool:
-        """Whether a divisor may be zero."""
-        return any(kind == DIVISOR for _, kind in self.program.checks)
+        """Whether a divisor may be zero, or the argument of a square root negative."""
+        return any(kind in _STOPS for _, kind in self.program.checks)
 
     @property
     def may_be_indefinite(self) -> bool:
         """Whether the step notes a covariance that is not definite."""
-        return any(kind != DIVISOR for _, kind in self.program.checks)
+        return any(kind in (POSITIVE, NOT_NEGATIVE) for _, kind in self.program.checks)
 
 
 class CodeNumbers(Protocol):
@@ -140,20 +155,27 @@ class CodeFloats:
             return f"{coefficient} * r{b}"
         if code in _SIGNS:
             return f"r{a} {_SIGNS[code]} r{b}"
-        return limits(code, b, coefficient)
+        if code in _FUNCTIONS:
+            operands = ", ".join(f"r{each}" for each in values_of(code, a, b))
+            return f"{_FUNCTIONS[code]}{'f' if self.number == 'float' else ''}({operands})"
+        return limits(code, a, b, coefficient)
 
     def helpers(self, body: str) -> str:
         """Return nothing: C has these operations."""
         return ""
 
     def finite(self, step: CodeStep) -> list[str]:
-        """Return conditions under which no result is infinite: an infinity reaches a state, a limit or a divisor."""
-        program = step.program
+        """Return conditions under which no result is infinite: no operation and no state hides an infinity."""
+        program, first = step.program, step.program.n + step.program.m
         found = dict.fromkeys(program.outputs.tolist())
-        for code, _, b in program.operations.tolist():
-            if code in (DIVIDE, AT_LEAST, AT_MOST):
+        found |= dict.fromkeys(value for value, kind in program.checks if kind == IN_RANGE)
+        for code, a, b in program.operations.tolist():
+            if code in (DIVIDE, MODULO, AT_LEAST, AT_MOST):
                 found[b] = None
-        return [f"isfinite(r{value})" for value in found]
+            elif code in (LESS, EQUAL, CHOOSE):
+                found |= {a: None, b: None}
+        always = (CONSTANT, LESS, EQUAL)
+        return [f"isfinite(r{i})" for i in found if i < first or program.operations[i - first, 0] not in always]
 
 
 @dataclass(frozen=True)
@@ -196,8 +218,14 @@ class CodeWords:
         program, words = step.program, self.words
         code, a, b = program.operations[o].tolist()
         overflow = ", &overflow" if self.may_overflow else ""
-        if code in (CONSTANT, CHOOSE, AT_LEAST, AT_MOST):
-            return limits(code, b, coefficient)
+        if code in (CONSTANT, CHOOSE, AT_LEAST, AT_MOST, LESS, EQUAL):
+            return limits(code, a, b, coefficient)
+        if code == MODULO:
+            return f"modulo(r{a}, r{b})"
+        if code == ROOT:
+            return f"root(r{b}{overflow})"
+        if code in _WHOLE:
+            return f"whole_{_WHOLE[code]}(r{b}{overflow})"
         if code == MULTIPLY:
             found = f"multiply({coefficient}, r{b}, {_shift(step, o, words)}{overflow})"
         elif code == PRODUCT:
@@ -229,10 +257,12 @@ class CodeWords:
         return []
 
 
-def limits(code: int, b: int, coefficient: str) -> str:
-    """Return a constant, or a value limited by one."""
+def limits(code: int, a: int, b: int, coefficient: str) -> str:
+    """Return a constant, a value limited by one, or a comparison of two values."""
     if code == CONSTANT:
         return coefficient
+    if code in _COMPARISONS:
+        return f"r{a} {_COMPARISONS[code]} r{b}"
     return f"r{b} {'<' if code == AT_LEAST else '>'} {coefficient} ? {coefficient} : r{b}"
 
 
@@ -264,7 +294,8 @@ def word_arithmetic(step: CodeStep, words: WordFormats) -> CodeWords:
 
     Raises
     ------
-    ValueError : words longer than C's types, or products with more bits than two of the longest.
+    ValueError : words longer than C's types, products with more bits than two of the longest, or square roots of words
+        with an unusual binary point.
     """
     for name, fmt in (("data", words.data), ("sums", words.accumulator)):
         if word_bits(fmt) is None:
@@ -287,6 +318,10 @@ def word_arithmetic(step: CodeStep, words: WordFormats) -> CodeWords:
             most = max(most, data + abs(words.data.fraction_bits))
             if (longest := data - words.data.fraction_bits) > 63 and words.data.fraction_bits < 0:
                 raise ValueError(f"got divisors of {longest} bits in units of 1; needed at most 63 for a type of C99")
+        elif code in _WHOLE:
+            most, shift = max(most, words.data.fraction_bits + 1), max(shift, words.data.fraction_bits)
+        elif code == ROOT:
+            most = max(most, (radicand_bits(words.data) + 3) // 2)
     if max(most, shift) > LONGEST_SHIFT:
         raise ValueError(
             f"got products of {most} bits that lose up to {shift}; needed at most {LONGEST_SHIFT} of each for the "
@@ -380,12 +415,13 @@ class CodeSource:
     @property
     def statuses(self) -> list[Status]:
         """What a step may return."""
-        name, step = self.name.upper(), self.step
+        name, step, checks = self.name.upper(), self.step, self.step.program.checks
         found = [Status(f"{name}_OK", 0, "the step is done")]
         if step.may_be_indefinite:
             found.append(Status(f"{name}_INDEFINITE", 1, "the step is done, but a variance is not positive"))
         if step.may_stop:
-            found.append(Status(f"{name}_STOPPED", 2, "a pivot is zero; the state stays as it was"))
+            reasons = [reason for kind, (_, reason) in _STOPS.items() if any(kind == each for _, each in checks)]
+            found.append(Status(f"{name}_STOPPED", 2, f"{', or '.join(reasons)}; the state stays as it was"))
         if self.arithmetic.may_overflow:
             found.append(Status(f"{name}_OVERFLOW", 3, "a number is beyond the range; the state stays as it was"))
         return found
@@ -436,10 +472,11 @@ class CodeSource:
         """Return the statements of a step, and the coefficients that they use."""
         program, value = self.step.program, self.arithmetic.value
         first, lines, used = program.n + program.m, list[str](), set[int]()
-        needed = {*program.outputs.tolist(), *(value for value, _ in program.checks)}
+        needed = {*program.outputs.tolist(), *(value for value, kind in program.checks if kind != IN_RANGE)}
         for code, a, b in program.operations.tolist():
             needed |= {*values_of(code, a, b)}
         needed |= {*program.guards} - {-1}
+        needed |= {int(each) for each in re.findall(r"\d+", " ".join(self.arithmetic.finite(self.step)))}
         for i in range(self.step.stored):
             if i in needed:
                 lines.append(f"const {value} r{i} = state->{self.states[i]};")
@@ -470,6 +507,8 @@ class CodeSource:
                 expression = self.arithmetic.operation(self.step, o, coefficient)
             declaration = "    " if guard >= 0 else f"const {value} "
             lines.append(f"{declaration}r{first + o} = {expression};")
+            if first + o not in needed:
+                lines.append(f"(void)r{first + o};")
         if inside >= 0:
             lines.append("}")
         return "\n".join(f"    {line}" for line in lines), used
@@ -485,10 +524,10 @@ class CodeSource:
     def _conditions(self) -> list[str]:
         """Return the statements that find the status of a step."""
         program, name = self.step.program, self.name.upper()
-        of_kind = {kind: [value for value, each in program.checks if each == kind] for kind in range(3)}
         lines = []
-        if of_kind[DIVISOR]:
-            lines += _when([f"r{value} == 0" for value in of_kind[DIVISOR]], f"return {name}_STOPPED;")
+        if self.step.may_stop:
+            stops = [f"r{value} {_STOPS[kind][0]}" for value, kind in program.checks if kind in _STOPS]
+            lines += _when(stops, f"return {name}_STOPPED;")
         if conditions := self.arithmetic.finite(self.step):
             lines += _when([f"!{each}" for each in conditions], f"return {name}_OVERFLOW;")
         elif self.arithmetic.may_overflow:
@@ -497,7 +536,7 @@ class CodeSource:
             signs = [
                 f"!(r{value} {'>' if kind == POSITIVE else '>='} 0)"
                 for value, kind in program.checks
-                if kind != DIVISOR
+                if kind in (POSITIVE, NOT_NEGATIVE)
             ]
             lines += _when(list(dict.fromkeys(signs)), f"status = {name}_INDEFINITE;")
         return lines

@@ -8,6 +8,7 @@ the code, if the compiler keeps the order and rounds each operation, as C99 dema
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from math import lcm
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.array import NegativeRootError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
@@ -30,6 +32,7 @@ from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
+from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_measurements
@@ -42,7 +45,10 @@ from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeStep, checked
 VECTORS = 100
 """Steps of the test vectors."""
 
-Filter = LinearSystem | LinearModel | FilterDesign
+STOPS = (OverflowError, ZeroDivisionError, NegativeRootError)
+"""Errors that end the emulation of a step, as the code ends it with its status."""
+
+Filter = LinearSystem | LinearModel | FilterDesign | NonlinearSystem
 """What code is written for."""
 
 AnyFormat = FloatFormat | FixedFormat | WordFormats
@@ -84,10 +90,11 @@ def write_code(
 
     Parameters
     ----------
-    given : a linear system in its structure, a design, or a model of a Kalman filter.
+    given : a linear system in its structure, a design, a model of a Kalman filter, or a nonlinear system, whose step is
+        a function of your own.
     fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; or a :class:`~gpbnb.filters.words.WordFormats`.
     form_or_structure : for a design, its structure; for a Kalman filter, a form with compiled loops, or "constant
-        gain"; None for a linear system, which already has a structure, or for the default.
+        gain"; None for a linear system, which already has a structure, for a nonlinear system, or for the default.
     folder : folder for the files, which is created if necessary.
     name : name of the files, and prefix of all that the header declares.
     inputs : (steps, m), inputs or measurements of the test vectors; by default 100 steps of noise, or of simulated
@@ -104,7 +111,8 @@ def write_code(
     ------
     TypeError : `given` or `fmt` is of another type.
     ValueError : a format without a type in C99; a structure or form that the filter does not have; a model with known
-        inputs; inputs that do not fit; a name that is not an identifier in C.
+        inputs; a step with a function, such as np.sin, that C's library does not round as the emulation does; inputs
+        that do not fit; a name that is not an identifier in C.
     OverflowError : a coefficient or an initial state is beyond the range of the format.
     OSError : a file cannot be written.
 
@@ -122,7 +130,12 @@ def write_code(
     vectors = found.emulate(found.inputs(VECTORS) if inputs is None else inputs)
     bound = found.bound(within) if within is not None else ""
     described = Described(
-        found.title, structure or found.structure, format_words(fmt), bound, isinstance(fmt, FloatFormat)
+        found.title,
+        structure or found.structure,
+        format_words(fmt),
+        bound,
+        isinstance(fmt, FloatFormat),
+        not isinstance(given, NonlinearSystem),
     )
     files = written_files(found.step, found.arithmetic, name, described, vectors)
     target = Path(folder)
@@ -142,13 +155,18 @@ def prepared(given: Filter, fmt: AnyFormat, form_or_structure: Form | str | None
     if isinstance(given, FilterDesign):
         structure = None if form_or_structure is None else str(form_or_structure)
         return _of_system(given.system(structure), fmt, given.usual if structure is None else structure)
-    if not isinstance(given, LinearSystem):
-        raise TypeError(f"got a {type(given).__name__}; needed a LinearSystem, a FilterDesign or a LinearModel")
-    if form_or_structure is not None:
-        raise ValueError(
-            f"got {form_or_structure!r} for a LinearSystem, which has its structure; needed None; choose the structure "
-            "in LinearSystem.from_coefficients or from_sections"
+    if not isinstance(given, LinearSystem | NonlinearSystem):
+        raise TypeError(
+            f"got a {type(given).__name__}; needed a LinearSystem, a FilterDesign, a LinearModel or a NonlinearSystem"
         )
+    if form_or_structure is not None:
+        order = "choose the structure in LinearSystem.from_coefficients or from_sections"
+        raise ValueError(
+            f"got {form_or_structure!r} for a {type(given).__name__}, which has its structure; needed None; "
+            f"{order if isinstance(given, LinearSystem) else 'its step is its structure'}"
+        )
+    if isinstance(given, NonlinearSystem):
+        return _of_nonlinear(given, fmt)
     return _of_system(given, fmt, "")
 
 
@@ -228,10 +246,6 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
         u = system_inputs(system, u)
         return _float_vectors(system, u, fmt) if isinstance(fmt, FloatFormat) else _word_vectors(system, u, _words(fmt))
 
-    def inputs(steps: int) -> NDArray[np.float64]:
-        level = 1.0 if isinstance(fmt, FloatFormat) else float(_words(fmt).data.largest) / 4
-        return np.random.default_rng(0).uniform(-level, level, (steps, system.m))
-
     def bound(within: FilterLimits) -> str:
         try:
             if isinstance(fmt, FloatFormat):
@@ -247,7 +261,13 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
             "whose coefficients are not rounded, for ever."
         )
 
-    return Prepared(step, arithmetic, system.name, structure, emulate, inputs, bound)
+    return Prepared(step, arithmetic, system.name, structure, emulate, _noise(fmt, system.m), bound)
+
+
+def _noise(fmt: AnyFormat, m: int) -> Callable[[int], NDArray[np.float64]]:
+    """Return a function that returns inputs for a number of steps, a quarter of the range of fixed point in size."""
+    level = 1.0 if isinstance(fmt, FloatFormat) else float(_words(fmt).data.largest) / 4
+    return lambda steps: np.random.default_rng(0).uniform(-level, level, (steps, m))
 
 
 def _longest(run: Callable[[int], Any], steps: int) -> tuple[int, Any]:
@@ -288,6 +308,55 @@ def _word_vectors(system: LinearSystem, u: NDArray[Any], words: WordFormats) -> 
     done, run = _longest(lambda steps: run_words(system, u[:steps], words), len(u))
     states = np.zeros((0, len(start)), np.int64) if run is None else run.states
     return _ended(stored, start, states, np.zeros(done, np.int64))
+
+
+# -- nonlinear systems ------------------------------------------------------------------------------------------------
+
+
+def _of_nonlinear(system: NonlinearSystem, fmt: AnyFormat) -> Prepared:
+    _checked(fmt)
+    if isinstance(fmt, WordFormats):
+        raise ValueError(
+            "got formats of words for a nonlinear system; needed BINARY32, BINARY64 or a FixedFormat: all operations "
+            "of its step are in one format"
+        )
+    kind = _type_of(fmt) if isinstance(fmt, FloatFormat) else ""
+    words = _words(fmt) if isinstance(fmt, FixedFormat) else None
+    program, coefficients = system.program(fmt)
+    step = CodeStep(program, coefficients, np.asarray(fmt.array(system.x0).to_fractions(), dtype=object))
+    arithmetic = CodeFloats(kind) if words is None else word_arithmetic(step, words)
+    return Prepared(
+        step,
+        arithmetic,
+        system.name,
+        "",
+        lambda u: _nonlinear_vectors(system, u, fmt, program.p),
+        _noise(fmt, system.m),
+        lambda within: "No bound: the guarantee covers linear systems only.",
+    )
+
+
+def _nonlinear_vectors(system: NonlinearSystem, u: Any, fmt: FloatFormat | FixedFormat, p: int) -> Vectors:
+    inputs, x = system.inputs_in(fmt, u), fmt.array(system.x0)
+    rows: list[Any] = []
+    try:
+        rows = list(system.states(fmt, inputs))
+    except STOPS:
+        with suppress(*STOPS):
+            for each in inputs:
+                rows.append(system.advance(fmt, x, each))
+                x = rows[-1][: system.n]
+
+    def stored(numbers: Any) -> NDArray[Any]:
+        """Return numbers of the format as the code stores them."""
+        if isinstance(fmt, FloatFormat):
+            return np.asarray(numbers.to_float())
+        return np.asarray(numbers.to_fractions() / fmt.unit, dtype=object).astype(np.int64)
+
+    given = stored(inputs)
+    start = np.append(stored(fmt.array(system.x0)), np.zeros(p, given.dtype))
+    states = np.array([stored(each) for each in rows], given.dtype).reshape(-1, len(start))
+    return _ended(given, start, states, np.zeros(len(rows), np.int64))
 
 
 # -- Kalman filters ---------------------------------------------------------------------------------------------------

@@ -245,7 +245,7 @@ def required_fraction_bits(
     elif not callable(given):
         raise TypeError(
             f"got a {type(given).__name__}; needed a LinearSystem or a function; for a LinearModel in one fixed-point "
-            "format, use emulate or guarantee"
+            "format, use emulate or guarantee; for a NonlinearModel, emulate(model, z, FixedFormat(...))"
         )
     elif isinstance(like, FixedFormat):
         strategy = _Function(given, z, tolerance, basis, like)

@@ -1,4 +1,4 @@
-"""Examples of nonlinear filters: a beacon seen in range and bearing, an attitude, and the height of an aircraft."""
+"""Nonlinear examples: a beacon seen in range and bearing, an attitude, an aircraft's height, a clipped controller."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from gpbnb.arithmetic.derivatives import jacobian
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
+from gpbnb.filters.nonlinear_system import NonlinearSystem
 
 _WIDE = FloatFormat(2, 53)
 
@@ -146,3 +147,15 @@ def _outer(turns: NDArray[np.float64], deviations: NDArray[np.float64]) -> NDArr
     for turn, deviation in zip(turns.T, deviations.tolist(), strict=True):
         found = found + np.multiply.outer(turn * deviation, turn * deviation)
     return found
+
+
+def clipped_step(fmt: Any, x: Any, u: Any) -> Any:
+    """Take a step of a PI controller whose integral x[0] and whose command stay between -1 and 1."""
+    proportional, integral = fmt.array(["0.8", "0.05"])
+    held = np.clip(x[0] + integral * u[0], -1, 1)
+    return held, np.clip(proportional * u[0] + held, -1, 1)
+
+
+def clipped_controller() -> NonlinearSystem:
+    """A PI controller with two clips, which moves a valve by the error u[0] of a level; n = m = p = 1."""
+    return NonlinearSystem(clipped_step, [0], name="a PI controller with two clips")

@@ -17,6 +17,7 @@ from gpbnb import (
     FP6_E3M2,
     FP8_E4M3,
     FP8_E5M2,
+    FixedFormat,
     FloatFormat,
     MicroscalingFormat,
     microscaling_dot,
@@ -75,6 +76,37 @@ def test_every_word_of_a_scale_is_that_of_ml_dtypes():
     assert np.isnan(np.array(255, np.uint8).view(ml_dtypes.float8_e8m0fnu).astype(np.float64))
     with pytest.raises(ValueError, match="got a scale that is NaN"):
         mx.from_bits([255], [[0]])
+
+
+def eighth_bits(value):
+    """Two's complement of 8 bits with 6 after the point, ties to even, saturated."""
+    return Fraction(min(max(round(value * 64), -128), 127), 64)
+
+
+def test_elements_of_mxint8():
+    """From -2 to 1 63/64; the scale is the largest power of two not above the largest number of the block."""
+    mx = MicroscalingFormat(FixedFormat(1, 6, "even"))
+    rng = np.random.default_rng(7)
+    given = rng.normal(size=320) * np.repeat(2.0 ** rng.integers(-150, 100, 10), 32)
+    given[:32] = np.linspace(-1.9999, 1.9999, 32)  # both ends round beyond 127/64
+    given[32:64] = np.arange(-63, 1, 2) / 64 / 2  # ties
+    found = mx.array(given)
+    for j, block in enumerate(given.reshape(10, 32).tolist()):
+        exponent = max(math.frexp(max(map(abs, block)))[1] - 1, -127)
+        assert found.exponents[j] == exponent
+        elements = [eighth_bits(Fraction(each) / Fraction(2) ** exponent) for each in block]
+        assert found.elements[j].to_fractions().tolist() == elements
+        words = [int(each * 64) % 256 for each in elements]
+        assert found.to_bits()[1][j].tolist() == words
+    assert {Fraction(-2), Fraction(127, 64)} <= {*found.elements.to_fractions().ravel().tolist()}
+    words = np.arange(256).reshape(8, 32)
+    every = mx.from_bits(np.full(8, 127), words)
+    assert every.to_fractions().tolist() == [Fraction((w + 128) % 256 - 128, 64) for w in range(256)]
+    assert every.to_bits()[1].tolist() == words.tolist()
+    total = microscaling_dot(found, found, FloatFormat(2, 1000))
+    assert total.to_fractions() == sum(each * each for each in found.to_fractions().tolist())
+    with pytest.raises(ValueError, match="which does not hold every element"):
+        microscaling_dot(found, found, FloatFormat(2, 5))
 
 
 @pytest.mark.parametrize("fused", [False, True])

@@ -12,7 +12,17 @@ import mpmath
 import numpy as np
 import pytest
 
-from gpbnb import FixedIntervalSmoother, FloatFormat, Form, LinearModel, NonlinearModel, required_precision
+from gpbnb import (
+    FixedFormat,
+    FixedIntervalSmoother,
+    FloatFormat,
+    Form,
+    LinearModel,
+    NonlinearModel,
+    emulate,
+    required_fraction_bits,
+    required_precision,
+)
 from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.array_run import opened_run
 from gpbnb.filters.blocks import BlockFormats
@@ -336,6 +346,59 @@ def test_every_digit_is_that_of_plain_loops(n, base, digits, form):
     plain = PlainFilter(MOTIONS[n], sight, given, form, rounding(base, digits))
     assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
     assert run.P.to_fractions().tolist() == plain.P
+
+
+def words(bits):
+    """Round a fraction to the nearest multiple of 2**-bits, ties away from zero."""
+    return lambda x: (1 if x > 0 else -1) * ((2 * abs(Fraction(x)) * 2**bits + 1) // 2) / Fraction(2**bits)
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD])
+def test_every_digit_in_fixed_point_is_that_of_plain_loops(form):
+    model, z, sight, given, u = case(MOTIONS[3], seed=3)
+    run = NonlinearRun(model, FixedFormat(8, 22), form, range(1, STEPS + 1))
+    run.take(z)
+    assert run.stopped is None, run.reason
+    plain = PlainFilter(MOTIONS[3], sight, given, form, words(22))
+    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
+    assert run.P.to_fractions().tolist() == plain.P
+
+
+@pytest.mark.parametrize(
+    ("fmt", "r"), [(FloatFormat(2, 20), rounding(2, 20)), (FixedFormat(8, 22), words(22))], ids=["20 bits", "fixed"]
+)
+@pytest.mark.parametrize("form", [Form.JOSEPH, Form.UD])
+def test_emulate_compares_with_the_filter_in_many_digits(form, fmt, r):
+    model, z, sight, given, u = case(MOTIONS[3], seed=3)
+    z, u, steps = z[:20], u[:20], (1, 7, 20)
+    found = emulate(model, z, fmt, form, steps)
+    run = PlainFilter(MOTIONS[3], sight, given, form, r)
+    true = PlainFilter(MOTIONS[3], sight, given, Form.INNOVATION, rounding(2, 120))
+    stored = np.array([[r(Fraction(each)) for each in row] for row in z.tolist()], dtype=object)
+    computed, exact = (list(plain_estimates(one, seen, u)) for one, seen in ((run, z), (true, stored)))
+    errors = [[float(a - b) for a, b in zip(computed[k - 1], exact[k - 1], strict=True)] for k in steps]
+    assert found.steps.tolist() == list(steps)
+    # The references differ by far less than float64 shows.
+    assert found.state == pytest.approx(np.array(errors), rel=1e-12, abs=0)
+    assert 1e-7 < found.state_norm.max() < 1e-2
+    assert found.stopped is None
+    assert max(found.gain_norm.max(), found.covariance_norm.max()) < 1e-2
+
+
+def test_emulate_refuses_what_a_nonlinear_filter_does_not_have():
+    model, z, *_ = case(MOTIONS[2], seed=3)
+    with pytest.raises(ValueError, match="got sums or compensated estimates for a nonlinear model; needed neither"):
+        emulate(model, z, FloatFormat(2, 24), compensated=True)
+    with pytest.raises(ValueError, match="got sums or compensated estimates for a nonlinear model; needed neither"):
+        emulate(model, z, FloatFormat(2, 24), sums="pairwise")
+    with pytest.raises(TypeError, match="needed a LinearModel or a NonlinearModel"):
+        emulate(model.noise.H, z, FloatFormat(2, 24))
+    with pytest.raises(TypeError, match=r"for a NonlinearModel, emulate\(model, z, FixedFormat"):
+        required_fraction_bits(model, z, 0.01, like=FixedFormat(8, 1))
+    stopped = emulate(model, z, FixedFormat(3, 20))
+    assert stopped.stopped == 1
+    assert stopped.reason == "overflow at step 1"
+    assert len(stopped.steps) == 0
 
 
 @pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD])

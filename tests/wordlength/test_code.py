@@ -448,7 +448,9 @@ def test_a_name_that_c_does_not_take_is_refused(name, tmp_path):
 
 
 def test_other_objects_are_refused(tmp_path):
-    with pytest.raises(TypeError, match="got a dict; needed a LinearSystem, a FilterDesign or a LinearModel"):
+    with pytest.raises(
+        TypeError, match="got a dict; needed a LinearSystem, a FilterDesign, a LinearModel or a NonlinearSystem"
+    ):
         write_code({}, BINARY32, None, tmp_path)
     with pytest.raises(TypeError, match="got the format 32"):
         write_code(BIQUAD, 32, None, tmp_path)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple, get_type_hints
+from typing import Any, NamedTuple, cast, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,7 +163,7 @@ def _printed_state(
     found: BoundedHistory, task: Task, x: NDArray[np.float64], K: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Evaluate (125) as printed after each step, with the least B of (122)."""
-    model, beta = found.history.model, float(task.fmt.unit_roundoff)
+    model, beta = cast(LinearModel, found.history.model), float(task.fmt.unit_roundoff)
     given = model.to_float()
     bounds, F, u = np.empty(len(x)), 0.0, 0.0
     for k in range(len(x)):

@@ -1,0 +1,198 @@
+"""Systems whose step is a function: runs, searches, and the operations of a step."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb import (
+    BINARY32,
+    BINARY64,
+    FixedFormat,
+    FloatFormat,
+    NonlinearSystem,
+    required_fraction_bits,
+    required_precision,
+)
+from gpbnb.filters.program import steps_in_python
+from tests.plain_structures import fixed, floating, limited
+from tests.step_functions import SYSTEMS, Native, clipped_controller
+
+needs = pytest.mark.parametrize
+
+
+def inputs(system, steps, level=0.25):
+    return level * np.random.default_rng(7).uniform(-1, 1, (steps, system.m))
+
+
+@needs("fmt", [(BINARY32, np.float32), (BINARY64, np.float64)], ids=["binary32", "binary64"])
+@needs("system", SYSTEMS, ids=lambda each: each.name)
+def test_runs_have_the_digits_of_the_processor(system, fmt):
+    fmt, native = fmt[0], Native(fmt[1])
+    u = inputs(system, 2000)
+    found = system.states(fmt, u).to_float()
+    x, given = native.array([float(each) for each in system.x0]), native.array(u)
+    for k, row in enumerate(given):
+        x, y = system.step(native, x, row)
+        assert x.dtype == y.dtype == native.dtype
+        assert found[k].tolist() == [*x.tolist(), *y.tolist()]
+    assert np.ptp(found, axis=0).min() > 0.001
+
+
+PLAIN = [
+    (FloatFormat(2, 12), floating(2, 12, "nearest")),
+    (FloatFormat(10, 5, "even"), floating(10, 5, "even")),
+    (FixedFormat(10, 14, "odd", "saturate"), lambda x: limited(14, 10, "saturate")(fixed(14, "odd")(x))),
+    (FixedFormat(8, 9, "up", "wrap"), lambda x: limited(9, 8, "wrap")(fixed(9, "up")(x))),
+]
+
+
+@needs("fmt", PLAIN, ids=lambda each: str(each[0]))
+@needs("system", SYSTEMS, ids=lambda each: each.name)
+def test_the_program_has_the_digits_of_the_step(system, fmt):
+    fmt, r = fmt
+    u = inputs(system, 40)
+    program, (coefficients,) = system.program(fmt)
+    found = np.asarray(system.states(fmt, u).to_fractions())
+    x = [*map(r, system.x0), *[Fraction(0)] * program.p]
+    for k, row in enumerate(u):
+        x = steps_in_python(program, r, coefficients, x, [r(Fraction(each)) for each in row])
+        assert x == found[k].tolist()
+
+
+OPERATIONS = [
+    lambda a, b, c: a + b,
+    lambda a, b, c: a - b * c,
+    lambda a, b, c: a / (abs(b) + 1),
+    lambda a, b, c: np.sqrt(abs(a)),
+    lambda a, b, c: np.fmod(a, b * b + 1),
+    lambda a, b, c: a % 2,
+    lambda a, b, c: np.where(a < b, c, -a),
+    lambda a, b, c: np.where((a <= b) ^ (b > c), a, b),
+    lambda a, b, c: np.where(~((a == b) | (c != a)) & (c >= 0), abs(c), 0),
+    lambda a, b, c: np.where((a > 0) == (b > 0), b, c),
+    lambda a, b, c: np.clip(a, -1, 2),
+    lambda a, b, c: np.minimum(np.maximum(a, b), 1),
+    lambda a, b, c: np.maximum(-1, np.minimum(2, a)) + c,
+    lambda a, b, c: np.floor(a) / 2 + np.rint(b) / 4,
+    lambda a, b, c: np.sign(a) * np.copysign(b, c),
+]
+
+
+def drawn(seed):
+    """A step of random operations on states, inputs and constants."""
+    random = np.random.default_rng(seed)
+    steps = random.integers(0, 1000, (25, 4)).tolist()
+
+    def step(fmt, x, u):
+        known = [*x, *u, *fmt.array(["0.7", "-1.5", 0, 1])]
+        for kind, *choice in steps:
+            operands = (known[each % len(known)] for each in choice)
+            known.append(OPERATIONS[kind % len(OPERATIONS)](*operands))
+        return [np.clip(each, -4, 4) for each in known[-3:]], known[-8:-3]
+
+    return NonlinearSystem(step, ["0.3", "-0.2", 0], 2)
+
+
+@needs("seed", range(40))
+def test_programs_of_random_steps(seed):
+    system, u = drawn(seed), inputs(SYSTEMS[3], 6, 1.0)
+    fmt, r = PLAIN[seed % len(PLAIN)]
+    program, (coefficients,) = system.program(fmt)
+    found = np.asarray(system.states(fmt, u).to_fractions())
+    x = [*map(r, system.x0), *[Fraction(0)] * program.p]
+    for k, row in enumerate(u):
+        x = steps_in_python(program, r, coefficients, x, [r(Fraction(each)) for each in row])
+        assert x == found[k].tolist()
+
+
+def test_a_limit_is_one_operation():
+    program, _ = SYSTEMS[0].program(BINARY32)
+    assert len(program.operations) == 13  # 5 products, 4 sums and differences, and 4 limits
+
+
+def test_one_step_and_a_run_agree():
+    system = SYSTEMS[1]
+    u = inputs(system, 5)
+    found, x = system.states(BINARY32, u), BINARY32.array(system.x0)
+    for k in range(5):
+        row = system.advance(BINARY32, x, u[k])
+        assert row.to_float().tolist() == found[k].to_float().tolist()
+        x = row[: system.n]
+    assert system(BINARY32, u.ravel()).to_float().tolist() == found[:, 2:].to_float().tolist()
+
+
+def loop(fmt, u):
+    """The same system as a loop of one's own."""
+    x, found = fmt.array([0, "0.5"]), []
+    for row in u:
+        x, y = clipped_controller(fmt, x, row.reshape(1))
+        found.append(y)
+    return np.stack(found)
+
+
+def test_searches_take_a_system():
+    u = inputs(SYSTEMS[0], 60).ravel()
+    found, expected = (required_precision(each, 60, 1e-3, z=u) for each in (SYSTEMS[0], loop))
+    assert found.precision == expected.precision > 5
+    assert found.tried == expected.tried
+    assert found.untraced == ""
+    assert (
+        required_fraction_bits(SYSTEMS[0], u, 1e-3, like=FixedFormat(2, 1)).fmt
+        == required_fraction_bits(loop, u, 1e-3, like=FixedFormat(2, 1)).fmt
+    )
+
+
+@needs(
+    ("step", "message"),
+    [
+        (lambda fmt, x, u: (np.sin(x), u), "got np.sin in the step, for which C has no function with the digits"),
+        (lambda fmt, x, u: (np.hypot(x, u), u), "got np.hypot in the step"),
+        (lambda fmt, x, u: (x.multiply_add(u, x), u), "got np.multiply_add in the step"),
+        (lambda fmt, x, u: (x // u, u), "got np.floor_divide in the step"),
+        (lambda fmt, x, u: (x if x[0] > 0 else u, u), "cannot be traced: it branches on a comparison"),
+        (lambda fmt, x, u: (x * fmt.precision, u), "cannot be traced: it asks for fmt.precision"),
+        (lambda fmt, x, u: x, "got a TracedArray from the step; needed two, the next state and the output"),
+        (lambda fmt, x, u: (x, u, u), "got 3 parts from the step; needed two"),
+        (lambda fmt, x, u: ([x, x], u), "got 2 states and 1 outputs from the step; needed 1 states"),
+        (lambda fmt, x, u: (x, u[:0]), "got 1 states and 0 outputs from the step"),
+        (lambda fmt, x, u: (x, 0.5), "got a float from the step; needed arrays of the format"),
+    ],
+)
+def test_steps_without_a_program_are_refused(step, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        NonlinearSystem(step, [1]).program(BINARY32)
+
+
+def test_what_has_no_program_runs_nevertheless():
+    branching = NonlinearSystem(lambda fmt, x, u: (x if x[0] > 0 else u, np.sin(u)), [1])
+    assert branching(BINARY64, [0.25, 0.5]).to_float().tolist() == [[np.sin(0.25)], [np.sin(0.5)]]
+
+
+@needs(
+    ("given", "kind", "message"),
+    [
+        ((3, [0]), TypeError, "got a step int; needed a function step(fmt, x, u)"),
+        ((clipped_controller, 0), ValueError, "got x0 of shape (); needed one entry for each state"),
+        ((clipped_controller, ["a"]), ValueError, "x0: "),
+        ((clipped_controller, [0], 0), ValueError, "m"),
+        ((clipped_controller, [0], 1, None), TypeError, "got name None"),
+    ],
+)
+def test_bad_systems_are_refused(given, kind, message):
+    with pytest.raises(kind, match=re.escape(message)):
+        NonlinearSystem(*given)
+
+
+@needs("u", [[[1, 2]], [], 1.0])
+def test_inputs_of_another_shape_are_refused(u):
+    with pytest.raises(ValueError, match=re.escape("needed (steps, 1)")):
+        SYSTEMS[0](BINARY32, u)
+
+
+def test_a_constant_beyond_the_range_is_refused():
+    with pytest.raises(OverflowError):
+        SYSTEMS[1].program(FixedFormat(3, 12))
