@@ -40,7 +40,7 @@ _KINDS = {MULTIPLY: "multiply", ADD: "add", SUBTRACT: "subtract"}
 _NEGLIGIBLE = 2.0**-26
 _NEARER = 16.0
 _WHOLE = 700
-"""Steps whose segments are all kept."""
+"""If errors are negligible after this many steps, the checker keeps them apart until then."""
 
 
 class _Care(NamedTuple):
@@ -99,7 +99,7 @@ def written(
         "repeat": given.repeat or 0,
         "period": max(period, 1),
         "first": first + (_extra(F[first:]) if steps is None and given.form is not None else 0),
-        "keep": _keep(F[first:], back, care) if steps is None else [steps, 0],
+        "keep": _keep(F[first:], back, care) if steps is None else steps,
         "back": back,
         "width": _texts(_width(given, known.innovation)) if steps is None and given.form is not None else [],
     }
@@ -177,16 +177,16 @@ def _extra(F: NDArray[np.float64]) -> int:
     return math.ceil(math.log(_NEARER) / rate) * len(F)
 
 
-def _keep(F: NDArray[np.float64], back: int, care: _Care) -> list[int]:
-    """Return the step until which all segments of errors are kept, and the number of steps for which they are later.
+def _keep(F: NDArray[np.float64], back: int, care: _Care) -> int:
+    """Return the number of last steps whose errors the checker keeps apart; an ellipsoid contains all older ones.
 
-    An ellipsoid contains older segments without much loss once the fast modes of the filter have decayed.
+    It contains them without much loss if they are negligible, or once the fast modes of the filter have decayed.
     """
     if back <= _WHOLE:
-        return [back, back]
+        return back
     modes = np.sort(np.abs(np.linalg.eigvals(_product(F)))) ** (1 / len(F))
     fast = modes[modes < modes[-1] ** 2]
-    return [_WHOLE, 4 + math.ceil(math.log(care.left) / math.log(max(float(fast.max(initial=0.0)), 1e-9)))]
+    return 4 + math.ceil(math.log(care.left) / math.log(max(float(fast.max(initial=0.0)), 1e-9)))
 
 
 def _width(given: Schedule, innovation: NDArray[np.float64]) -> NDArray[np.float64]:

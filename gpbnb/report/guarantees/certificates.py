@@ -33,8 +33,6 @@ COLUMNS = (
 )
 """Columns of the stored table."""
 WITHOUT = {
-    "altimeter": "the intervals that its certificate claims are too wide to be proved",
-    "ten states, UD form": "its certificate keeps too few steps of errors apart to be proved",
     "ten states, innovation form": "its gain never repeats",
     "three thousand random Kalman filters": "the tests check the certificates of the first thirty",
     "two thousand random linear filters": "attacked instead; the tests check certificates of their structure",
