@@ -533,7 +533,7 @@ class Effects:
             loop = each(lambda x, y: x - y * self.unit[self.most - 1], loop, Phi)
             both = [[x * s // unit for x in g] for g, s in zip(turned(loop), self.X, strict=True)]
         loops = [[(x << self.loops) // unit for x in row[:n]] for row in whole]
-        return loops, each(lambda x: (x << self.bits) // unit, K), errors, inputs, both
+        return loops, each(lambda x: (x << self.bits) // unit, K), errors, inputs, list(filter(any, both))
 
     def step(self, k: int, c: list[int], Phi: Any = None, HPhi: Any = None, gain: Any = None) -> Any:
         """The loop of step k + 1, and columns and slack of its errors and of the exact filter's states."""
