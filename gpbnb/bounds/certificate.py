@@ -40,18 +40,17 @@ _KINDS = {MULTIPLY: "multiply", ADD: "add", SUBTRACT: "subtract"}
 _NEGLIGIBLE = 2.0**-26
 _NEARER = 16.0
 _WHOLE = 700
-"""Steps whose segments are all kept."""
+"""If errors are negligible after this many steps, the checker keeps them apart until then."""
 
 
 class _Care(NamedTuple):
-    """How much a claim exceeds the guarantee, what is left of a mode that has decayed, and a factor of a width."""
+    """How much a claim exceeds the guarantee, and what is left of a mode that has decayed."""
 
     excess: float
     left: float
-    width: float
 
 
-_USUAL, _SLOW, _MANY = _Care(2.0**-20, 1e-2, 1.0), _Care(2.0**-10, 1e-3, _NEARER), 5_000
+_USUAL, _SLOW, _MANY = _Care(2.0**-20, 1e-2), _Care(2.0**-10, 1e-3), 5_000
 
 
 def written(
@@ -83,6 +82,7 @@ def written(
     first, period = given.first, given.steps - given.first
     care = _SLOW if first > _MANY else _USUAL
     claimed = _claimed(bound, care)
+    back = _back(F[first:], claimed, known.state) if steps is None else 0
     content = {
         "certificate": KIND,
         "name": given.origin.name,
@@ -98,12 +98,10 @@ def written(
         "steps": steps,
         "repeat": given.repeat or 0,
         "period": max(period, 1),
-        "first": first + (_extra(F[first:]) if steps is None and given.form is not None and care is _USUAL else 0),
-        "keep": _keep(F[first:], care) if steps is None else [steps, 0],
-        "back": _back(F[first:], claimed, known.state) if steps is None else 0,
-        "width": _texts(care.width * _width(given, known.innovation))
-        if steps is None and given.form is not None
-        else [],
+        "first": first + (_extra(F[first:]) if steps is None and given.form is not None else 0),
+        "keep": _keep(F[first:], back, care) if steps is None else steps,
+        "back": back,
+        "width": _texts(_width(given, known.innovation)) if steps is None and given.form is not None else [],
     }
     return json.dumps(content, indent=None, separators=(", ", ": "))
 
@@ -179,14 +177,16 @@ def _extra(F: NDArray[np.float64]) -> int:
     return math.ceil(math.log(_NEARER) / rate) * len(F)
 
 
-def _keep(F: NDArray[np.float64], care: _Care) -> list[int]:
-    """Return the step until which all segments of errors are kept, and the number of steps for which they are later.
+def _keep(F: NDArray[np.float64], back: int, care: _Care) -> int:
+    """Return the number of last steps whose errors the checker keeps apart; an ellipsoid contains all older ones.
 
-    An ellipsoid contains older segments without much loss once the fast modes of the filter have decayed.
+    It contains them without much loss if they are negligible, or once the fast modes of the filter have decayed.
     """
+    if back <= _WHOLE:
+        return back
     modes = np.sort(np.abs(np.linalg.eigvals(_product(F)))) ** (1 / len(F))
     fast = modes[modes < modes[-1] ** 2]
-    return [_WHOLE, 4 + math.ceil(math.log(care.left) / math.log(max(float(fast.max(initial=0.0)), 1e-9)))]
+    return 4 + math.ceil(math.log(care.left) / math.log(max(float(fast.max(initial=0.0)), 1e-9)))
 
 
 def _width(given: Schedule, innovation: NDArray[np.float64]) -> NDArray[np.float64]:

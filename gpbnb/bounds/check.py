@@ -48,15 +48,14 @@ import json
 import re
 from bisect import bisect_right
 from fractions import Fraction
-from itertools import product
-from math import inf, isqrt, lcm, nextafter
+from itertools import product, repeat
+from math import gcd, inf, isqrt, lcm, nextafter
 from operator import add, mul, sub
 from typing import Any
 
 KIND, ORDER = "rounding guarantee 1", "each product and sum rounded once, sums from left to right"
-NUMBERS = ("repeat", "period", "first", "back")
-QUESTION = ("name", "filter", "format", "order", "limits", "steps")
-KEYS = {"certificate", *QUESTION, "derived", "bound", "keep", "width", *NUMBERS}
+NUMBERS = ("repeat", "period", "first", "back", "keep")
+KEYS = {"certificate", "name", "filter", "format", "order", "limits", "steps", "derived", "bound", "width", *NUMBERS}
 LIMITS = {"state", "innovation", "measurement"}
 RULES = {"base", "precision", "rounding"}
 FORMATS = (RULES | {"fraction_bits", "overflow"}, RULES | {"emin", "emax", "subnormal", "largest"})
@@ -66,7 +65,6 @@ FILTERS = {
 }
 INNOVATION = "a state or an innovation may exceed its limit"
 MULTIPLY, ADD, SUBTRACT = "multiply", "add", "subtract"
-OVERFLOWS = ("raise", "saturate", "wrap")
 NUMBER = re.compile(r"-?[0-9]{1,4000}([./][0-9]{1,4000})?", re.ASCII)
 ROUNDINGS = ("nearest", "even", "chop", "up", "down", "odd")
 FORMS = ("innovation", "joseph", "hung", "hung second gain", "ud")
@@ -102,12 +100,18 @@ def size(a: Any, b: Any) -> Any:
     return sum(map(mul, map(abs, a), b))
 
 
-def times(a: Any, b: Any) -> Any:
-    return [[sum(map(mul, row, column)) for column in columns] for columns in [[*zip(*b, strict=True)]] for row in a]
-
-
 def turned(a: Any) -> Any:
     return [list(row) for row in zip(*a, strict=True)]
+
+
+def across(a: Any, b: Any) -> Any:
+    """A times b turned, which is a times b for a symmetric b."""
+    return [[sum(map(mul, row, other)) for other in b] for row in a]
+
+
+def around(a: Any, b: Any) -> Any:
+    """A b a' for a symmetric b."""
+    return across(across(a, b), a)
 
 
 def diagonal(n: int, x: Any = 1) -> Any:
@@ -124,11 +128,12 @@ class Arithmetic:
         self.powers = [b**k for k in range(2 * scale + t + 2)]
         self.tops, self.exact = [b**t * p for p in self.powers], set(self.powers)
         self.nearest, self.fixed = self.rounding in ("nearest", "even"), "overflow" in given
-        none: Any = None
-        self.policy, self.finest, self.normal, self.largest, self.lowest = "raise", 0, 0, none, none
+        self.finest, self.normal = 0, 0
+        self.largest, self.lowest = inf, inf
         if self.fixed:
-            need(whole(given["fraction_bits"]) and given["overflow"] in OVERFLOWS, "an unknown fixed-point format")
-            self.finest, self.policy = scale - given["fraction_bits"], given["overflow"]
+            known = whole(given["fraction_bits"]) and given["overflow"] in ("raise", "saturate", "wrap")
+            need(known, "an unknown fixed-point format")
+            self.finest = scale - given["fraction_bits"]
             if self.finest < 0:
                 raise OverflowError
             self.lowest = b ** (t + self.finest)
@@ -156,7 +161,7 @@ class Arithmetic:
 
     def error(self, most: int) -> int:
         """The largest error of rounding results of at most so many units."""
-        need(self.largest is None or most <= self.largest, "a number of a step may exceed the largest")
+        need(most <= self.largest, "a number of a step may exceed the largest")
         return max(self.normal, up(self.powers[self.last_place(max(most - 1, 0))], 1 + self.nearest))
 
     def fit(self, n: int, d: int = 1) -> int:
@@ -176,14 +181,8 @@ class Arithmetic:
             elif self.rounding != "chop":
                 m += {"up": n > 0, "down": n < 0, "odd": not m & 1}[self.rounding]
         m = m * p if n > 0 else -m * p
-        if self.largest is None or (self.normal <= abs(m) and -self.lowest <= m <= self.largest):
-            return m
-        if abs(m) < self.normal:
-            return 0
-        need(self.policy != "raise", "a computed number exceeds the largest of the format")
-        if self.policy == "wrap":
-            return (m + self.lowest) % (2 * self.lowest) - self.lowest
-        return self.largest if m > 0 else -self.lowest
+        need(-self.lowest <= m <= self.largest, "a computed number exceeds the largest of the format")
+        return m if abs(m) >= self.normal else 0
 
     def store(self, x: Fraction) -> int:
         return self.fit(x.numerator * self.unit, x.denominator)
@@ -410,33 +409,36 @@ class ExactCovariance:
 
     def __init__(self, stored: Stored) -> None:
         variances = [c[i][i] for c in (*stored.Q, *stored.R, stored.P0) for i in range(len(c)) if c[i][i]]
-        self.unit, self.members, self.n = stored.a.unit, [], stored.n
-        self.bits = bits = 160 + 2 * max(0, *((self.unit // x).bit_length() for x in variances))
-        for Phi, H, Q, R in map(stored.members, range(stored.cycle)):
+        self.members, self.n, unit = list[Any](), stored.n, stored.a.unit
+        self.bits = bits = 160 + 2 * max(0, *((unit // x).bit_length() for x in variances))
+        entries = [x for cycle in (stored.Phi, stored.H, stored.Q, stored.R) for c in cycle for row in c for x in row]
+        common = gcd(unit, *entries)
+        self.unit = unit // common
+        for given in map(stored.members, range(stored.cycle)):
+            Phi, H, Q, R = (each(lambda x: x // common, c) for c in given)
             scaled = [each(lambda x, p=p: x * self.unit**p << bits, c) for c, p in ((Q, 1), (R, 3))]
-            self.members.append((Phi, turned(Phi), H, turned(H), *scaled))
-        self.low = each(lambda x, y: (x << bits) // self.unit - y, stored.P0, diagonal(self.n, self.n))
+            self.members.append((turned(Phi), Phi, H, turned(H), across(H, turned(Phi)), *scaled))
+        self.low = each(lambda x, y: (x << bits) // unit - y, stored.P0, diagonal(self.n, self.n))
         self.width = diagonal(self.n, 2 * self.n)
 
     def step(self, k: int) -> tuple[Any, Any]:
         """Take step k + 1; return the gain of A, rounded down, and a bound of its distance from that of P."""
-        Phi, PhiT, H, HT, Q, R = self.members[k % len(self.members)]
+        PhiT, Phi, H, HT, HPhi, Q, R = self.members[k % len(self.members)]
         n, m, unit, bits = self.n, len(H), self.unit, self.bits
-        V = each(add, times(times(Phi, self.low), PhiT), Q)
-        W = times(H, V)
-        T, det = adjugate(each(add, times(W, HT), R))
-        X = times(T, W)
-        XT, far = turned(X), times(H, Phi)
-        seen = [times(times([row], self.width), turned([row]))[0][0] for row in far]
-        F = times(each(sub, diagonal(n, det), times(XT, H)), Phi)
+        V = each(add, around(Phi, self.low), Q)
+        W = across(H, V)
+        T, det = adjugate(each(add, across(W, H), R))
+        WT = turned(W)
+        X = across(WT, T)
+        F = across(each(sub, diagonal(n, det), across(X, HT)), PhiT)
+        seen = around(HPhi, self.width)
         below, square = det * unit**2, (det * unit) ** 2
-        self.low = each(lambda x, y, z: (x * det - y) // below - z, V, times(turned(W), X), diagonal(n, n))
-        moved = times(times(F, self.width), turned(F))
-        self.width = each(lambda x, y: x // square + y, moved, diagonal(n, 3 * n))
-        by = sum(isqrt(up(seen[t] * T[t][t] << 2 * bits, det)) + 1 for t in range(m))
+        self.low = each(lambda x, y, z: (x * det - y) // below - z, V, across(X, WT), diagonal(n, n))
+        self.width = each(lambda x, y: x // square + y, around(F, self.width), diagonal(n, 3 * n))
         T = [up(T[j][j] * unit**4 << 2 * bits, det) for j in range(m)]
+        by = sum(isqrt(up(seen[t][t] * T[t], unit**4)) + 1 for t in range(m))
         roots = [[isqrt(self.width[i][i] * x) + 1 for x in T] for i in range(n)]
-        return each(lambda x: (x * unit << bits) // det, XT), each(lambda x: up(x * by, 1 << bits) + 1, roots)
+        return each(lambda x: (x * unit << bits) // det, X), each(lambda x: up(x * by, 1 << bits) + 1, roots)
 
     def settled(self, k: int, period: int, width: Any) -> Any:
         """Gains of all steps after the first k, one for each phase, with bounds of their distances."""
@@ -459,6 +461,9 @@ class Effects:
     def __init__(self, a: Arithmetic, operations: Any, outputs: Any, limits: Any, b: list[int], bits: int) -> None:
         self.a, self.operations, self.outputs, self.n, self.b, self.bits = a, operations, outputs, len(outputs), b, bits
         (self.X, self.V, self.Z), self.known, self.caps = limits, {}, {}  # type: ignore[var-annotated]
+        both = list(map(add, self.X, b))
+        self.sizes = [b + self.V + self.X] + ([] if None in self.Z else [both + self.Z])
+        self.ends = {v: min(x for x, r in zip(both, outputs, strict=True) if r == v) for v in outputs}
         self.m, lengths = len(self.V), [[x.bit_length() for x in xs if x] or [0] for xs in (b, self.X)]
         self.loops = 64 + max(max(each) - min(each) for each in lengths)
         self.depth = [2] * (self.n + self.m)
@@ -486,17 +491,14 @@ class Effects:
         a, n, m = self.a, self.n, self.m
         off, none, errors = [0] * len(rows), [False] * len(rows), []
         for v, (kind, p, q) in enumerate(self.operations, n + m):
-            row, u = rows[v], self.unit[self.depth[v]]
-            most = size(row[n:], self.V + self.X)
-            most = most if None in self.Z else min(most, size(row, self.X + self.Z))
-            most = min(up(most, u), self.caps.get(v, up(most, u))) + up(size(row, self.b), u)
+            most = up(min([size(rows[v], sizes) for sizes in self.sizes]), self.unit[self.depth[v]])
+            most = min(most, self.caps.get(v, most))
             if kind == MULTIPLY:
                 off[v], none[v] = up(abs(c[p]) * off[q], a.unit), none[q] or not c[p]
-                exact = none[v] or (abs(c[p]) in a.exact if a.largest is None else abs(c[p]) == a.unit)
+                exact = none[v] or (abs(c[p]) in a.exact if a.largest == inf else abs(c[p]) == a.unit)
             else:
                 off[v], none[v], exact = off[p] + off[q], none[p] and none[q], none[p] or none[q] or a.fixed
-            ends = [self.X[i] + self.b[i] for i, r in enumerate(self.outputs) if r == v]
-            most = min([most + off[v], *ends])
+            most = min(most + off[v], self.ends.get(v, inf))
             error = a.error(most)
             errors.append(error if most and not exact else 0)
             off[v] += errors[-1]
@@ -513,9 +515,9 @@ class Effects:
             for r, sign in ((q, 1),) if kind == MULTIPLY else ((p, 1), (q, 1 if kind == ADD else -1)):
                 by = c[p] if kind == MULTIPLY else sign * unit[depth[v] - depth[r]]
                 effect[r] = [x + by * y for x, y in zip(effect[r], g, strict=True)]
-            column = tuple(x * unit[depth[v]] for x in g)
-            column = max(column, tuple(-x for x in column))
             if errors[v - first]:
+                column = tuple(x * unit[depth[v]] for x in g)
+                column = max(column, tuple(-x for x in column))
                 found[column] = found.get(column, 0) + errors[v - first]
         return found
 
@@ -531,12 +533,12 @@ class Effects:
             loop = each(lambda x, y: x - y * self.unit[self.most - 1], loop, Phi)
             both = [[x * s // unit for x in g] for g, s in zip(turned(loop), self.X, strict=True)]
         loops = [[(x << self.loops) // unit for x in row[:n]] for row in whole]
-        return loops, each(lambda x: (x << self.bits) // unit, K), errors, inputs, both
+        return loops, each(lambda x: (x << self.bits) // unit, K), errors, inputs, list(filter(any, both))
 
     def step(self, k: int, c: list[int], Phi: Any = None, HPhi: Any = None, gain: Any = None) -> Any:
         """The loop of step k + 1, and columns and slack of its errors and of the exact filter's states."""
         known = self.known.get(k)
-        if not known or known[0] is not c:
+        if not known or known[0] != c:
             known = self.known[k] = c, *self.fixed(c, Phi, HPhi or [[0] * self.n] * self.m)
         _, loops, K, errors, inputs, both = known
         slack = [2 + len(errors) + 2 * self.n + 3 * self.m] * self.n
@@ -552,20 +554,20 @@ class Effects:
 class ErrorSet:
     """A set that contains an error or a state: segments of the last steps, and an ellipsoid for all before."""
 
-    def __init__(self, sizes: Any, keep: Any, start: Any = None) -> None:
-        self.n, (self.whole, self.window), self.done = len(sizes), keep, 0
+    def __init__(self, sizes: Any, keep: int, start: Any = None) -> None:
+        self.n, self.keep = len(sizes), keep
         self.counts, self.x = ([1], [[v] for v in start]) if start else ([], [[] for _ in sizes])
-        self.M, self.sizes = diagonal(self.n, 0), [max(s, 1) for s in sizes]
+        self.M, self.weights = diagonal(self.n, 0), [(max(sizes) << 60) // max(s, 1) for s in sizes]
 
     def advance(self, F: Any, loops: int, segments: Any, slack: Any) -> None:
         """Move the set by the loop F, and add segments and a box."""
-        n, total, self.done = self.n, len(self.x[0]), self.done + 1
+        n, total = self.n, len(self.x[0])
         moved = [self.moved(row, 1 << loops - 1) for row in F]
         self.x = [[s >> loops for s in x] + [g[i] for g in segments] for i, x in enumerate(moved)]
         self.counts.append(len(segments))
-        self.M = each(lambda x, y: (x >> 2 * loops) + y, times(times(F, self.M), turned(F)), diagonal(n, n))
+        self.M = each(lambda x, y: (x >> 2 * loops) + y, around(F, self.M), diagonal(n, n))
         boxes = [[(s + total) * x for x in row] for s, row in zip(slack, diagonal(n), strict=True)]
-        while self.done > self.whole and len(self.counts) > self.window:
+        while len(self.counts) > self.keep:
             count = self.counts.pop(0)
             boxes += turned([x[:count] for x in self.x])
             self.x = [x[count:] for x in self.x]
@@ -574,27 +576,25 @@ class ErrorSet:
     def moved(self, row: Any, start: int = 0) -> list[int]:
         total = [start] * len(self.x[0])
         for f, x in zip(row, self.x, strict=True):
-            total = [s + f * y for s, y in zip(total, x, strict=True)] if f else total
+            total = list(map(add, total, map(mul, repeat(f), x))) if f else total
         return total
 
     def absorb(self, segments: Any) -> None:
         """Let the ellipsoid contain more segments; the numbers t of (1) are the lengths of all."""
         own, *lengths = (self.length(g) for g in ([isqrt(self.M[i][i]) for i in range(self.n)], *segments))
         total = (own + sum(lengths)) << 40
-        M = each(lambda x: x * up(total, own), self.M)
-        for length, g in zip(lengths, segments, strict=True):
-            share = up(total, length)
-            M = [[s + x * y * share for s, y in zip(row, g, strict=True)] for row, x in zip(M, g, strict=True)]
-        self.M = each(lambda x, y: (x >> 40) + y, M, diagonal(self.n, self.n))
+        shares, x = [up(total, length) for length in lengths], turned(segments)
+        added = across([list(map(mul, row, shares)) for row in x], x)
+        self.M = each(lambda x, y, z: (x * up(total, own) + y >> 40) + z, self.M, added, diagonal(self.n, self.n))
 
     def length(self, segment: Any) -> int:
-        return 1 + isqrt(sum(((x << 60) // s) ** 2 for x, s in zip(segment, self.sizes, strict=True)))
+        return 1 + isqrt(sum([x * x for x in map(mul, segment, self.weights)]))
 
     def most(self, row: Any = None) -> Any:
         """The largest size of each entry, or of a row times the vector."""
         if row is None:
             return [sum(map(abs, x)) + isqrt(self.M[i][i]) + 1 for i, x in enumerate(self.x)]
-        return sum(map(abs, self.moved(row))) + isqrt(max(0, times(times([row], self.M), turned([row]))[0][0])) + 1
+        return sum(map(abs, self.moved(row))) + isqrt(max(0, around([row], self.M)[0][0])) + 1
 
 
 def exactly(given: Any) -> Any:
@@ -609,7 +609,7 @@ class Proof:
     """The claim of a certificate; numbers of the format are in units of base**-scale."""
 
     def __init__(self, given: Any, scale: int) -> None:
-        numbers = [*(given[key] for key in NUMBERS), *given["keep"]]
+        numbers = [given[key] for key in NUMBERS]
         need(whole(*numbers) and min(numbers) >= 0, "a number that is not whole, or negative")
         self.given, self.steps = given, given["steps"]
         need(self.steps is None or (whole(self.steps) and self.steps > 0), "no number of steps")
@@ -678,7 +678,7 @@ class Proof:
             return self.effects.step(0, self.c[0])
         c = self.c[k if k < len(self.c) else self.repeat + (k - self.repeat) % self.period]
         Phi, H = self.stored.members(k)[:2]
-        return self.effects.step(k % self.stored.cycle, c, Phi, times(H, Phi), gain)
+        return self.effects.step(k % self.stored.cycle, c, Phi, across(H, turned(Phi)), gain)
 
     def seen(self, k: int) -> Any:
         """H Phi of step k + 1 in units of 2**-loops, and what it may add to the measurements of an innovation."""
@@ -686,7 +686,7 @@ class Proof:
             return [], []
         Phi, H = self.stored.members(k)[:2]
         loops = self.effects.loops
-        rows = each(lambda x: (x << loops) // self.a.unit**2, times(H, Phi))
+        rows = each(lambda x: (x << loops) // self.a.unit**2, across(H, turned(Phi)))
         return rows, [v - z - (sum(self.X) >> loops) - 1 for v, z in zip(self.V, self.Z, strict=True)]
 
     def run(self) -> None:
@@ -734,7 +734,7 @@ class Proof:
             for g in columns:
                 sums = [x + abs(sum(map(mul, row, g))) for x, row in zip(sums, rows, strict=True)]
             sums = [x + size(row, slack) + sum(most) for x, row in zip(sums, rows, strict=True)]
-            rows = each(lambda x: x >> loops, times(rows, F))
+            rows = each(lambda x: x >> loops, across(rows, turned(F)))
             if reach and lag % len(steps) == phase:
                 for x, row, limit in zip(sums, rows, limits, strict=True):
                     room = (limit << loops) - x
@@ -748,7 +748,7 @@ class Proof:
         A = [[(x << loops) // e.unit[d] for x in row[:n]] for row, d in zip(rows, depth, strict=True)]
         found, missed = self.after_many(A, 0, [(F, *near) for F, _, near in steps], self.X), (sum(self.X) >> loops) + 1
         for v, (x, row, d) in enumerate(zip(found, rows, depth, strict=True), n + e.m):
-            e.caps[v] = x + missed + up(size(row[n:], self.Z), e.unit[d])
+            e.caps[v] = x + missed + up(size(row, self.b + self.Z), e.unit[d])
         e.known.clear()
 
 

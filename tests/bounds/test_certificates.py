@@ -405,7 +405,7 @@ def test_a_name_cannot_look_like_a_verdict(tmp_path: Path) -> None:
 def test_units_do_not_change_the_verdict(power: int) -> None:
     """Lengths of segments once underflowed in float64, and the checker lost what they bound."""
     given = json.loads(original("tracker"))
-    given["keep"] = [3, 2]
+    given["keep"] = 2
     assert "may exceed" in refused(given)
     scaled = lambda x, by: [scaled(each, by) for each in x] if isinstance(x, list) else x and factor(x, by)  # noqa: E731
     for key in ("Q", "R", "P0"):
@@ -489,7 +489,7 @@ def test_signs_of_a_first_estimate_count() -> None:
         "limits": {"state": [None, None], "innovation": [None], "measurement": ["1"]},
         "derived": {"state": ["1100", "1100"], "innovation": ["1200"]},
         "bound": ["640", "640"],
-        "steps": 61, "repeat": 0, "period": 0, "first": 0, "keep": [99, 99], "back": 0, "width": [],
+        "steps": 61, "repeat": 0, "period": 0, "first": 0, "keep": 99, "back": 0, "width": [],
     }  # fmt: skip
     assert "may exceed its limit" in refused(content)
     content |= {"derived": {"state": ["40000", "1100"], "innovation": ["50000"]}, "bound": ["40000", "40000"]}

@@ -13,13 +13,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.guarantee import Guarantee, guarantee, limits
 from gpbnb.filters.forms import Form
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.table import CASES, FORMAT, case_guarantee
 from gpbnb.sweeps import Column, Sweep, as_computed
-from gpbnb.wordlength.examples import cyclic
+from gpbnb.wordlength.examples import cyclic, tracker
+from gpbnb.wordlength.precision import required_precision
 
 COMMAND = "python -m gpbnb.report.guarantees.certificates"
 SLOW = ("altimeter", "tilt filter", "ten states")
@@ -33,8 +35,6 @@ COLUMNS = (
 )
 """Columns of the stored table."""
 WITHOUT = {
-    "altimeter": "the intervals that its certificate claims are too wide to be proved",
-    "ten states, UD form": "its certificate keeps too few steps of errors apart to be proved",
     "ten states, innovation form": "its gain never repeats",
     "three thousand random Kalman filters": "the tests check the certificates of the first thirty",
     "two thousand random linear filters": "attacked instead; the tests check certificates of their structure",
@@ -60,10 +60,30 @@ def _cyclic() -> Guarantee:
     return guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(10, 2, state=100, innovation=10), Form.UD)
 
 
+def _tracker(factor: int = 1, fmt: FloatFormat = FORMAT) -> Guarantee:
+    """The tracker of the chapter, with limits that are wider by a factor."""
+    return guarantee(tracker(), fmt, limits(2, 1, state=[factor * 1000, factor * 30], innovation=factor * 8))
+
+
+def _within_a_centimetre() -> Guarantee:
+    """The tracker in the least precision that keeps its errors within 0.01."""
+    within = limits(2, 1, state=[1000, 30], innovation=8)
+    answer = required_precision(tracker(), 1, [0.01, 0.01], basis="guarantee", within=within)
+    if not isinstance(answer.fmt, FloatFormat):
+        raise ArithmeticError(f"got {answer}; needed a precision that meets the tolerance")
+    return _tracker(fmt=answer.fmt)
+
+
 def guarantees() -> dict[str, Callable[[], Guarantee]]:
     """Return functions that compute the guarantees of the book, by name."""
     found = {case.make().name: lambda case=case: case_guarantee(case, case.make(), FORMAT) for case in CASES}
-    return {**found, "ten states": _cyclic}
+    return {
+        **found,
+        "ten states": _cyclic,
+        "tracker, limits twice as wide": lambda: _tracker(2),
+        "tracker, limits four times as wide": lambda: _tracker(4),
+        "tracker within 0.01 m": _within_a_centimetre,
+    }
 
 
 def verdict(name: str, text: str) -> CheckedCertificate:
