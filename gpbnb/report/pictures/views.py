@@ -78,12 +78,13 @@ def _runs() -> list[year.Year]:
 
 
 def year_data() -> dict[str, Any]:
-    """Return the stored runs of Hung's form in binary formats: errors of rate and angle at the checkpoint steps."""
+    """Return the drift of a year and the stored runs of Hung's form in binary formats, with their errors."""
     runs = _runs()
     exponent = math.floor(math.log2(DRIFT)) + 1
     return {
         "tolerance": TOLERANCE,
         "interval": INTERVAL,
+        "drift": DRIFT,
         "step": _short(DRIFT * INTERVAL / YEAR),
         "exponent": exponent,
         "angle_bound": 2**exponent,
