@@ -18,6 +18,11 @@ from gpbnb.report.display.style import TEXT
 from gpbnb.report.display.vector import svg
 
 
+def short_number(number: float, digits: int = 6) -> float:
+    """Round a number of the data to a few digits, which no processor computes differently."""
+    return float(f"{number:.{digits}g}")
+
+
 @dataclass(frozen=True)
 class Picture:
     """A picture that notebooks display as HTML.
