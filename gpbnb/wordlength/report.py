@@ -583,6 +583,6 @@ def _curves(report: Report, unit: str, what: str) -> str:
         '<text x="4" y="17">error / tolerance</text>'
         f'<text x="340" y="329" text-anchor="middle">{html.escape(unit)}</text></svg>'
         f'<ul class="legend">{"".join(legend)}</ul><figcaption>'
-        f"Error or bound, divided by the tolerance, of {judged}. The dashed line marks the tolerance. Colour and marker stand for "
-        f"the {what}, the kind of line for the basis.</figcaption></figure>"
+        f"Error or bound, divided by the tolerance, of {judged}. The dashed line marks the tolerance. Colour and "
+        f"marker stand for the {what}, the kind of line for the basis.</figcaption></figure>"
     )

@@ -91,7 +91,7 @@ def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
     return artists
 
 
-class Part(NamedTuple):
+class StepPart(NamedTuple):
     """A part of a step: its name, its formula in the report, and how many rounded operations it makes."""
 
     name: str
@@ -99,7 +99,7 @@ class Part(NamedTuple):
     operations: int
 
 
-def step_parts(n: int, m: int) -> tuple[Part, ...]:
+def step_parts(n: int, m: int) -> tuple[StepPart, ...]:
     """Count the rounded operations of a step in the innovation form with full matrices, in the order of the step."""
     (Phi, H, Q, R), zero = coefficient_matrices((n, n), (m, n), (n, n), (m, m))
     trace = Trace(n + n * n, m, zero, zero + 1)
@@ -128,12 +128,12 @@ def step_parts(n: int, m: int) -> tuple[Part, ...]:
         "correct state": r"$x_p + Ky$",
     }
     return tuple(
-        Part(name, formula, after - before)
+        StepPart(name, formula, after - before)
         for (name, formula), (before, after) in zip(names.items(), pairwise(counts), strict=True)
     )
 
 
-def block_diagram(parts: Sequence[Part], ax: Axes) -> list[Artist]:
+def block_diagram(parts: Sequence[StepPart], ax: Axes) -> list[Artist]:
     """Draw a step as blocks: covariance and gain above, the state below; each block has its share of the roundings."""
     total = sum(part.operations for part in parts)
     artists: list[Artist] = []

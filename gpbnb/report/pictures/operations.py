@@ -30,7 +30,7 @@ _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _SIGNS = {ADD: "+", SUBTRACT: "−"}
 
 
-class Line(NamedTuple):
+class ListedValue(NamedTuple):
     """A value of a step.
 
     Parameters
@@ -47,7 +47,7 @@ class Line(NamedTuple):
     operands: tuple[int, ...]
 
 
-def listing(program: Program, coefficients: Sequence[Any]) -> list[Line]:
+def listing(program: Program, coefficients: Sequence[Any]) -> list[ListedValue]:
     """List the operations of a step that may round, after the values before the step.
 
     A product with zero or one is exact, and so is a sum with zero: the list has the operand in place of the result.
@@ -58,8 +58,8 @@ def listing(program: Program, coefficients: Sequence[Any]) -> list[Line]:
     coefficients : its coefficients; None stands for one that is neither zero nor one.
     """
     n, m = program.n, program.m
-    lines = [Line(-1, _indexed("x", k, n), "", ()) for k in range(n)]
-    lines += [Line(-1, _indexed("z", k, m), "", ()) for k in range(m)]
+    lines = [ListedValue(-1, _indexed("x", k, n), "", ()) for k in range(n)]
+    lines += [ListedValue(-1, _indexed("z", k, m), "", ()) for k in range(m)]
     place: list[int | None] = [*range(n + m)]  # of each value; None for zero
     results = {int(value): k for k, value in enumerate(program.outputs)}
     letters = iter("abcdefghijklmnopqrstuvw")
@@ -77,7 +77,7 @@ def listing(program: Program, coefficients: Sequence[Any]) -> list[Line]:
             formula = f"{made} {names[0]}" if made else f" {_SIGNS[code]} ".join(names)
             result = results.get(n + m + o)
             name = next(letters) if result is None else f"{_indexed('x', result, n)}′"
-            lines.append(Line(o, name, formula, tuple(known)))
+            lines.append(ListedValue(o, name, formula, tuple(known)))
             place.append(len(lines) - 1)
     return lines
 
@@ -94,7 +94,7 @@ def _coefficient(name: str, m: int) -> str:
 
 
 @cache
-def _lines() -> tuple[Line, ...]:
+def _lines() -> tuple[ListedValue, ...]:
     model = tracker()
     entries = [*np.ravel(model.Phi), *np.ravel(model.H)]
     program = innovation_program(model.n, model.m)
@@ -108,7 +108,7 @@ def _found() -> tuple[Guarantee, Contributions]:
     return found, contributions(found)
 
 
-def units(lines: Sequence[Line], states: Sequence[str], measurement: str) -> list[str]:
+def units(lines: Sequence[ListedValue], states: Sequence[str], measurement: str) -> list[str]:
     """Return the unit of each value: sums have that of their operands, and a product that of the sum that takes it."""
     found = ["" if line.operation >= 0 else measurement for line in lines]
     found[: len(states)] = states
