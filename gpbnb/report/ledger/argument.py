@@ -83,11 +83,11 @@ def inherited(rows: Iterable[Row]) -> dict[tuple[str, str], int]:
     return dict(found)
 
 
-def figure(rows: Iterable[Row]) -> Figure:
-    """Draw the parts as boxes, and what they pass on as arrows."""
+def figure(rows: Iterable[Row], height: float = 4.6) -> Figure:
+    """Draw the parts as boxes, and what they pass on as arrows, in a figure of this height in inches."""
     rows = list(rows)
     found, passed = stages(rows), inherited(rows)
-    fig, (ax,) = style.figure(height=4.6)
+    fig, (ax,) = style.figure(height=height)
     half = (0.6, 0.31)
     for topic, stage in found.items():
         x, y = PLACES[topic]
