@@ -1,4 +1,5 @@
-// A figure that is shown smaller than it was drawn can be enlarged: by a tap on it, or by the button that follows it.
+// A figure that is shown much smaller than it was drawn can be enlarged: by a tap on it, or by the button that follows it.
+const REDUCED = 0.8; // of its own width
 document.addEventListener("DOMContentLoaded", () => {
   const figures = [...document.querySelectorAll("article figure img, article .picture-still img")];
   const pictures = figures.filter((each) => !each.closest("a"));
@@ -11,7 +12,8 @@ document.addEventListener("DOMContentLoaded", () => {
     picture.addEventListener("click", () => button.checkVisibility() && show(picture, button));
     button.addEventListener("click", () => show(picture, button));
   }
-  const judge = () => pictures.forEach((each) => each.classList.toggle("reduced", each.clientWidth > 0 && each.clientWidth < each.naturalWidth - 1));
+  const isReduced = ({ clientWidth, naturalWidth }) => clientWidth > 0 && clientWidth < REDUCED * naturalWidth;
+  const judge = () => pictures.forEach((each) => each.classList.toggle("reduced", isReduced(each)));
   for (const each of pictures) each.addEventListener("load", judge);
   new ResizeObserver(judge).observe(document.querySelector("article") ?? document.body);
 
