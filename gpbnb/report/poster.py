@@ -114,8 +114,8 @@ def panels() -> Iterator[Panel]:
         "earlier part.",
         argument(everything, 3.9),
     )
-    binary = [run for run in observed.runs if run.case.base == 2 and run.case.form is Form.HUNG]
-    shown = [run for run in binary if run.case.precision in (18, 24, 32, 40, 53)]
+    shown = [run for run in observed.runs if run.case.base == 2 and run.case.form is Form.HUNG]
+    shown = [run for run in shown if run.case.precision in (18, 24, 32, 40, 53)]
     shown = [run for run in shown if run.case.rounding is Rounding.NEAREST]
     fig, (ax,) = style.figure(height=3.1)
     years.years(shown, "rate", ax, tolerance=1.0)

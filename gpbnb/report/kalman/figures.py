@@ -151,20 +151,16 @@ def block_diagram(parts: Sequence[StepPart], ax: Axes) -> list[Artist]:
         ax.add_patch(box)
         words = f"{part.name}\n{part.formula}\n{part.operations:,}, {100 * share:.1f} %"
         artists.append(ax.text(column, row, words, ha="center", va="center", fontsize=TEXT, linespacing=1.5))
-    arrows = [((0.45, 1), (0.55, 1)), ((1.45, 1), (1.55, 1)), ((0.45, 0), (0.55, 0)), ((1.45, 0), (1.55, 0))]
-    arrows += [((1.2, 0.7), (1.8, 0.3)), ((-0.65, 1), (-0.45, 1)), ((-0.65, 0), (-0.45, 0))]
-    arrows += [((2.45, 1), (2.65, 1)), ((2.45, 0), (2.65, 0)), ((1, -0.55), (1, -0.3))]
-    for start, end in arrows:
-        ax.annotate("", end, start, arrowprops={"arrowstyle": "->", "color": BLACK, "lw": 1.4})
-    for words, at in (
-        ("$P$", (-0.72, 1)),
-        ("$x$", (-0.72, 0)),
-        ("$P$", (2.72, 1)),
-        ("$x$", (2.72, 0)),
-        ("$z$", (1, -0.66)),
-        ("$K$", (1.6, 0.55)),
-    ):
-        artists.append(ax.text(*at, words, ha="center", va="center", fontsize=TEXT))
+    arrows = [
+        (x, row, x + length, row)
+        for row in (1, 0)
+        for x, length in ((-0.65, 0.2), (0.45, 0.1), (1.45, 0.1), (2.45, 0.2))
+    ]
+    for *start, x, y in [*arrows, (1.2, 0.7, 1.8, 0.3), (1, -0.55, 1, -0.3)]:
+        ax.annotate("", (x, y), (start[0], start[1]), arrowprops={"arrowstyle": "->", "color": BLACK, "lw": 1.4})
+    letters = (("P", -0.72, 1), ("x", -0.72, 0), ("P", 2.72, 1), ("x", 2.72, 0), ("z", 1, -0.66), ("K", 1.6, 0.55))
+    for letter, x, y in letters:
+        artists.append(ax.text(x, y, f"${letter}$", ha="center", va="center", fontsize=TEXT))
     ax.set_xlim(-0.8, 2.8)
     ax.set_ylim(-0.75, 1.35)
     ax.axis("off")
