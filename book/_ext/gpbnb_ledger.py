@@ -33,8 +33,9 @@ class Ledger(SphinxDirective):
     ``page NAME`` is a page of the complete ledger; ``errors TOPIC`` the errors in the statements of a chapter;
     ``verdict NAME`` the statements with one verdict; ``undone NAME`` what the documents leave undone, with one verdict;
     ``printed TITLE: IDS`` some statements as printed, collapsed;
-    ``roots`` the root errors, and ``tree`` the same as squares; ``squares`` every statement as a square; ``claims`` the
-    principal claims; ``counts BY`` counts by document, chapter or kind.
+    ``roots`` the root errors, and ``tree`` the same as squares; ``squares`` every statement as a square; ``argument``
+    how wrong statements pass from one part of the documents to the next; ``claims`` the principal claims;
+    ``counts BY`` counts by document, chapter or kind.
     """
 
     required_arguments = 1
@@ -78,6 +79,10 @@ class Ledger(SphinxDirective):
                 return ledger().squares(rows).html
             case "tree":
                 return ledger().root_tree(rows).html
+            case "argument":
+                from gpbnb.report.ledger.argument import chain_of_errors  # matplotlib takes a second to import
+
+                return chain_of_errors(rows).html
             case "roots":
                 return ledger().root_table(rows).html
             case "claims":

@@ -382,12 +382,18 @@ table { border-collapse: collapse; width: 100% } th, td { text-align: left; padd
   vertical-align: top; border-bottom: 1px solid var(--line); overflow-wrap: break-word }
 td:first-child { min-width: 6rem } td:last-child { overflow-wrap: anywhere }
 pre { background: var(--soft); padding: .6rem; white-space: pre-wrap; overflow-wrap: anywhere; font-size: .85rem }
-svg { display: block; width: 100%; height: auto; fill: var(--text) }
+svg { display: block; width: 100%; height: auto; fill: var(--text) } figure { margin: 0 }
 .legend { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; padding: 0; list-style: none; font-size: .9rem }
 .legend .mark { display: inline-block; width: 1.3rem; height: 1.3rem; vertical-align: middle }
 .legend i { display: inline-block; width: 1.4rem; border-top: .2rem solid; margin-right: .4rem; vertical-align: middle }
 .answer { font-size: 1.25rem; border-left: .3rem solid var(--c0); padding-left: .8rem }
 @media (max-width: 34rem) { svg { font-size: 20px } th, td { padding-right: .5rem } }
+@page { size: A4; margin: 14mm }
+@media print {
+  html { font-size: 11px } body { font-size: 11px; max-width: none; margin: 0; padding: 0 }
+  h2 { margin: 1rem 0 .4rem; break-after: avoid } th, td { padding-block: .1rem } .answer { font-size: 1.1rem }
+  tr, svg, figure, pre { break-inside: avoid } figure svg { width: 75% } .legend svg { width: 1.3rem }
+}
 """
 
 
@@ -441,7 +447,7 @@ def page(report: Report) -> str:
         f"<h2>{what}s and bases compared</h2>",
         _table((f"{what.lower()} and basis", unit, "answer"), rows),
         "<h2>Error against precision</h2>",
-        _curves(report.answers, unit, what.lower()),
+        _curves(report, unit, what.lower()),
     ]
     if report.blocks:
         columns = ("block of the filter", f"{unit}, with the others", f"{unit}, alone")
@@ -521,8 +527,20 @@ def _marker(form: int, x: float, y: float, colour: str) -> str:
     )
 
 
-def _curves(answers: Sequence[Answer], unit: str, what: str) -> str:
+def _judged(report: Report) -> str:
+    """Say which states or outputs a point of the figure judges: those with a finite tolerance."""
+    kind = "state" if report.kind == "Kalman filter" else "output"
+    kept = [name for name, most in zip(report.names, report.tolerance, strict=False) if most is not None]
+    if len(report.names) != len(report.tolerance) or not kept:
+        return f"the worst {kind}"
+    if len(kept) == 1:
+        return f"the {kind} {kept[0]}"
+    return f"the worst of the {kind}s {', '.join(kept[:-1])} and {kept[-1]}"
+
+
+def _curves(report: Report, unit: str, what: str) -> str:
     """Draw error / tolerance against precision as inline SVG; the dashed line is the tolerance."""
+    answers = report.answers
     points = [(t, r) for each in answers for t, r in each.tried if r is not None and r > 0]
     if len(points) < 2:
         return "<p>Too few precisions have a finite error for a figure.</p>"
@@ -557,12 +575,14 @@ def _curves(answers: Sequence[Answer], unit: str, what: str) -> str:
         drawn += [_marker(form, x, y, colour) for x, y in line]
         mark = f'<svg class="mark" viewBox="0 0 24 24" aria-hidden="true">{_marker(form, 12, 12, colour)}</svg>'
         legend.append(f'<li>{mark}<i style="border-top: .2rem {border} {colour}"></i>{html.escape(each.label)}</li>')
+    judged = html.escape(_judged(report))
     return (
-        '<svg viewBox="0 0 640 336" role="img" aria-label="Error divided by tolerance, against precision; one line '
-        f'for each {what} and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
+        '<figure><svg viewBox="0 0 640 336" role="img" aria-label="Error divided by tolerance, against precision, of '
+        f'{judged}; one line for each {what} and basis" font-size="12" font-family="system-ui, sans-serif">'
+        f"{''.join(drawn)}"
         '<text x="4" y="17">error / tolerance</text>'
         f'<text x="340" y="329" text-anchor="middle">{html.escape(unit)}</text></svg>'
-        f'<ul class="legend">{"".join(legend)}</ul>'
-        "<p>Error or bound, divided by the tolerance. The dashed line marks the tolerance. Colour and marker stand for "
-        f"the {what}, the kind of line for the basis.</p>"
+        f'<ul class="legend">{"".join(legend)}</ul><figcaption>'
+        f"Error or bound, divided by the tolerance, of {judged}. The dashed line marks the tolerance. Colour and "
+        f"marker stand for the {what}, the kind of line for the basis.</figcaption></figure>"
     )

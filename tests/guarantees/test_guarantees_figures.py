@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from gpbnb import FloatFormat
 from gpbnb.bounds.adversary import attack, random_errors
 from gpbnb.bounds.guarantee import guarantee, limits
-from gpbnb.report.display.style import envelope, figure
-from gpbnb.report.guarantees.figures import bound_of, draw_errors, errors_of
+from gpbnb.bounds.probable import separate_roundings
+from gpbnb.report.display.style import defects, envelope, figure
+from gpbnb.report.guarantees.figures import bound_of, draw_errors, draw_set, errors_of, reachable_corners
 from gpbnb.wordlength.examples import tracker
 
 
@@ -42,3 +44,34 @@ def test_a_band_spans_the_least_and_the_largest_value_of_each_bin() -> None:
     first, second = x[(x < 10) & (x % 3 > 0)], x[(x >= 10) & (x % 3 > 0)]
     middle = [round(float(np.exp(np.log(part).mean())), 6) for part in (first, second)]
     assert corners == {(middle[0], 1.0), (middle[0], 8.0), (middle[1], 10.0), (middle[1], 100.0)}
+
+
+def test_the_set_is_convex_and_holds_the_path_of_the_adversary() -> None:
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
+    corners = reachable_corners(found)
+    sides = np.diff(np.vstack([corners, corners[:1]]), axis=0)
+    after = np.roll(sides, -1, axis=0)
+    turns = sides[:, 0] * after[:, 1] - sides[:, 1] * after[:, 0]
+    # Each coordinate of a side is a difference of two corners, which are rounded.
+    assert (turns >= -8 * 2.0**-53 * np.abs(corners).max() * np.abs(sides).max()).all()
+    # In each direction, the set reaches as far as the roundings of all steps together.
+    each, program = separate_roundings(found), found.schedule.program
+    F, G, most = each.F[-1], each.G[-1][:, : len(program.operations)], each.limits[-1][: len(program.operations)]
+    chosen = errors_of(found, attack(found, 900, 30, states=[0], center=[750, 0], plans=1).z)
+    for angle in np.linspace(0, np.pi, 25):
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        reach, row = 0.0, direction
+        for _ in range(found.lags):
+            reach += float(np.abs(row @ G) @ most)
+            row = row @ F
+        assert (corners @ direction).max() == pytest.approx(reach, rel=1e-12)
+        assert (corners @ direction).min() == pytest.approx(-reach, rel=1e-12)
+        assert np.abs(chosen @ direction).max() <= reach
+    _, (ax,) = figure(height=4.2)
+    draw_set(ax, found, chosen, ("position (mm)", "velocity (mm/s)"), scale=1000)
+    ax.figure.canvas.draw()
+    assert defects(ax.figure) == []
+    box, boundary, path = ax.get_lines()
+    assert np.array_equal(path.get_xydata(), 1000 * chosen)
+    assert box.get_xydata().max(axis=0) == pytest.approx(1000 * found.bound)
+    assert (boundary.get_xydata().max(axis=0) <= 1000 * found.bound).all()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from drawn import colour, legend_of
@@ -110,3 +112,64 @@ def test_violations(ax):
     assert [label.get_text() for label in ax.get_xticklabels()] == ["Hung (1984)", "UD"]
     assert legend_of(ax) == ["(105)", "(108)", "(125)"]
     assert ax.get_ylabel() == "filters that violate the bound (%)"
+
+
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (3, 2), (10, 2)])
+def test_the_blocks_of_a_step_count_the_operations_of_matrix_products(n, m):
+    """An n × k times k × p product takes np(2k - 1) operations, a sum of matrices one for each entry."""
+
+    def product(rows, inner, columns):
+        return rows * columns * (2 * inner - 1)
+
+    found = [part.operations for part in figures.step_parts(n, m)]
+    covariance = 2 * product(n, n, n) + n * n
+    update = product(n, m, n) + n * n + product(n, n, n)
+    state = [product(n, n, 1), product(m, n, 1) + m, product(n, m, 1) + n]
+    assert found[:1] + found[2:] == [covariance, update, *state]
+    # The gain inverts a matrix: with one measurement by one division, with two by elimination.
+    without_inverse = product(n, n, m) + product(m, n, m) + m * m + product(n, m, m)
+    assert found[1] - without_inverse == {1: 1, 2: 15}[m]
+
+
+def test_the_block_diagram_shows_each_part_with_its_share():
+    parts = figures.step_parts(10, 2)
+    fig, (ax,) = style.figure(height=2.9)
+    words = [text.get_text() for text in figures.block_diagram(parts, ax)]
+    fig.canvas.draw()
+    assert style.defects(fig) == []
+    total = sum(part.operations for part in parts)
+    for part, text in zip(parts, words, strict=False):
+        assert text.splitlines()[0] == part.name
+        assert text.splitlines()[2] == f"{part.operations:,}, {100 * part.operations / total:.1f} %"
+
+
+def test_the_waterfall_leads_from_the_printed_digits_to_the_corrected_ones():
+    fig, (ax,) = style.figure(height=3.6)
+    bars = figures.waterfall(ax, Fraction(1, 6606), observed=10.3)
+    fig.canvas.draw()
+    assert style.defects(fig) == []
+    ends = [bar.get_x() + bar.get_width() for bar in bars]
+    # Each bar begins where the last one ended.
+    assert [bar.get_x() for bar in bars] == pytest.approx([0, *ends[:-1]])
+    # β = 1/coefficient = 0.5 × 10^(1-t), as printed and by the counts of the chapter.
+    k, n, m = 3_153_600, 10, 2
+    second = k * (3 * n + 1) + k * (k - 1) // 2 * (7 * n + 3 * m + 6)
+    coefficients = [2.6490e8, 1.2949e16, second, second * 6606]
+    assert ends[:4] == pytest.approx([1 + np.log10(each / 2) for each in coefficients], rel=1e-12)
+    last = report_bounds.coefficients(k, n, m, **report_bounds.ALL_CORRECTED)
+    assert ends[-1] == pytest.approx(1 + np.log10(float(last.second) * 6606 / 2), rel=1e-12)
+
+
+def test_the_ladder_shows_angles_and_last_places_at_their_size():
+    fig, (ax,) = style.figure(height=4.4)
+    formats = [FloatFormat(2, 24), FloatFormat(10, 9)]
+    drawn = gravity_probe_b_figures.ladder(formats, ax)
+    fig.canvas.draw()
+    assert style.defects(fig) == []
+    heights = {note.get_text(): float(note.xy[1]) for note in drawn[len(drawn) // 2 :]}
+    assert [float(line.get_ydata()[0]) for line in drawn[: len(drawn) // 2]] == list(heights.values())
+    assert heights["aberration of starlight, Earth"] == pytest.approx(20_500)
+    assert heights["geodetic drift in a step"] == pytest.approx(6606.1 / 3_153_600)
+    # 6606.1 has thirteen bits, or four digits, before the point.
+    assert heights["last place, 24 bits"] == pytest.approx(2.0**-11)
+    assert heights["last place, 9 decimal digits"] == pytest.approx(1e-5)

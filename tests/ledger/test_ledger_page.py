@@ -239,6 +239,14 @@ def test_each_table_has_a_title_and_names_its_columns():
         assert Elements(table.html).cells[: len(header)] == header
 
 
+@pytest.mark.parametrize("count", [12, 13])
+def test_a_table_of_many_statements_is_folded_below_its_title(count):
+    html = ledger.note_table(ROWS[:count]).html
+    folded = f'<details class="long-table"><summary>{count} statements</summary>\n<div class="ledger">'
+    assert html.startswith(folded) == (count > 12)
+    assert html.count("<details") == html.count("</details>")
+
+
 def test_root_errors_list_the_statements_that_they_spoil(monkeypatch):
     root = next(iter(ledger.load_roots()), None)
     if root is None:

@@ -11,17 +11,31 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.contributions import contributions
+from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.forms import Form
 from gpbnb.report.calculators.page import show
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.pictures import views
+from gpbnb.report.pictures.operations import STEP
 from gpbnb.report.rolling import theory
+from gpbnb.wordlength.examples import tracker
 
 from . import axe
 from . import browser as tools
 
-ADDRESSES = {"numberline": "book/rounding.html", "year": "book/year.html", "roll": "book/calculators.html"}
+ADDRESSES = {
+    "numberline": "book/rounding.html",
+    "year": "book/year.html",
+    "roll": "book/calculators.html",
+    "step": "book/guarantee.html",
+}
 PICTURES = pytest.mark.parametrize("picture", views.PICTURES, ids=lambda each: each.id)
+OF_NUMBERS = pytest.mark.parametrize(
+    "picture",
+    [each for each in views.PICTURES if not all(given.choices for given in each.inputs)],
+    ids=lambda each: each.id,
+)
 RULES = dict(zip(("to nearest", "chopped"), Rounding.documented(), strict=True))
 READ = """id => {
     const box = document.querySelector(`#calculator-${id} .calculator-drawing`), svg = box.querySelector("svg");
@@ -34,8 +48,10 @@ READ = """id => {
         numbers: all("line.number").map(l => number(l, "x1")), curves: all("path.curve").map(p => p.getAttribute("d")),
         teeth: svg.querySelector(".teeth")?.getAttribute("d"), rounded: center(".rounded"), here: center(".here"),
         given: svg.querySelector(".given")?.getAttribute("d"), turned: center(".turned"), circles: center("circle"),
+        marked: center("circle.curve-0"),
         step: svg.querySelector(".step")?.getAttribute("d"), ulp: svg.querySelector(".ulp")?.getAttribute("d"),
-        limits: all(".limit").map(l => number(l, "y1")),
+        limits: all(".limit").map(l => number(l, "y1")), ways: all(".way").length,
+        bars: all(".share").map(r => [number(r, "x"), number(r, "width"), number(r, "y") + number(r, "height") / 2]),
         said: box.getAttribute("aria-label"), width: number(svg, "width"), height: number(svg, "height"),
         state: document.querySelector(`#calculator-${id}`).dataset.state,
     };
@@ -223,6 +239,45 @@ def test_roll_and_deroll_show_the_numbers_of_the_theory(pages, period, phase):
     assert (turned[1] < limit) == (across > 1)
 
 
+# For each operation that rounds, those whose results its error reaches, and the arcs between them.
+REACHED = {"a": (7, 9), "b": (6, 7), "c": (5, 6), "d": (2, 1), "e": (2, 1), "x₁′": (1, 0), "x₂′": (1, 0)}
+
+
+@pytest.mark.parametrize("state", ["position", "velocity"])
+@pytest.mark.parametrize("operation", STEP.inputs[0].choices)
+def test_an_operation_shows_its_share_and_its_way(pages, operation, state):
+    page = pages("step")
+    found = type_in(page, "step", operation=operation, state=state)
+    guaranteed = guarantee(tracker(), FloatFormat(2, 24), limits(n=2, m=1, state=[1000, 30], innovation=8))
+    each = contributions(guaranteed)
+    rounding = np.flatnonzero(each.errors)
+    o, i = rounding[STEP.inputs[0].choices.index(operation)], ["position", "velocity"].index(state)
+    share = 100 * each.sums[i] / guaranteed.bound[i]
+    said = [float(number) for number in said_numbers(f". {found['said'].partition('at most ')[2]}")]
+    expected = [each.errors[o], 24, *np.abs(each.effects[:, o]), each.sums[i, o], share[o]]
+    assert said == pytest.approx(expected, rel=6e-4, abs=1e-9)
+    # The bars are in proportion, or one pixel if they were shorter.
+    lengths = np.array([width for _, width, _ in found["bars"]])
+    assert len(lengths) == len(rounding)
+    most = lengths.max()
+    assert lengths == pytest.approx(np.maximum(1, most * share[rounding] / share[rounding].max()), rel=1e-4)
+    reached, arcs = REACHED[operation.partition(" ")[0]]
+    assert len([text for _, _, text in found["texts"] if "=" in text]) == len(rounding)
+    assert found["ways"] == arcs
+    assert len(found["marked"]) == reached
+
+
+def test_a_tap_chooses_an_operation(pages):
+    page = pages("step")
+    type_in(page, "step", operation=STEP.inputs[0].choices[0], state="position")
+    touched = page.locator("#calculator-step .touch")
+    for k, words in enumerate(STEP.inputs[0].choices):
+        assert touched.nth(k).bounding_box()["height"] >= 24
+        touched.nth(k).click()
+        assert page.locator("#calculator-step-operation option:checked").text_content() == words
+        assert words in page.evaluate(READ, "step")["said"]
+
+
 def said_numbers(text):
     """The numbers of a sentence, with powers of ten as written for people."""
     plain = re.sub(
@@ -233,7 +288,7 @@ def said_numbers(text):
     return re.findall(r"\d+(?:\.\d+)?(?:e-?\d+)?", plain.partition(". ")[2])
 
 
-@PICTURES
+@OF_NUMBERS
 def test_each_slider_obeys_the_arrow_keys(pages, picture):
     page = pages(picture.id)
     type_in(page, picture.id, **picture.start)
@@ -247,7 +302,7 @@ def test_each_slider_obeys_the_arrow_keys(pages, picture):
         assert page.evaluate(READ, picture.id)["said"] != before
 
 
-@PICTURES
+@OF_NUMBERS
 @pytest.mark.parametrize("typed", ["", "x", "-1", "1e999", "0,5"])
 def test_a_wrong_number_is_refused_and_the_drawing_grows_old(pages, picture, typed):
     page = pages(picture.id)

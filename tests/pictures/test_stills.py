@@ -9,9 +9,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.bounds.contributions import contributions
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.program import Builder
 from gpbnb.report.display import style
 from gpbnb.report.gravity_probe_b import year
-from gpbnb.report.pictures import views
+from gpbnb.report.pictures import operations, views
+from gpbnb.wordlength.examples import tracker
 
 PICTURES = pytest.mark.parametrize("picture", views.PICTURES, ids=lambda each: each.id)
 
@@ -54,3 +59,30 @@ def test_the_data_of_the_year_are_the_stored_runs():
         assert data["steps"] == found.steps.tolist()
         for errors, each in zip(run["errors"], (found.rate, found.drift), strict=True):
             np.testing.assert_allclose(errors, np.abs(each).max(axis=1), rtol=5.1e-3)
+
+
+def test_the_operations_of_the_picture_are_those_that_round():
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(n=2, m=1, state=[1000, 30], innovation=8))
+    errors = contributions(found).errors
+    lines = [line for line in operations.step_data()["lines"] if line["formula"]]
+    assert [line["error"] for line in lines] == pytest.approx(errors[errors > 0], rel=1e-5)
+    assert {line["name"]: line["unit"] for line in lines} == dict(
+        zip(("a", "b", "c", "d", "e", "x₁′", "x₂′"), ("m", "m", "m", "m", "m/s", "m", "m/s"), strict=True)
+    )
+
+
+def test_a_listing_leaves_out_what_is_exact():
+    """x' = 1 x + 0 y - 2 z, y' = y: a product and a difference round; sums with zero and products with one do not."""
+    build = Builder(2, 1)
+    x, y = build.states
+    total = build.row([0, 1], [x, y])
+    outputs = [build.subtract(total, build.multiply(2, build.inputs[0])), build.multiply(0, y)]
+    program = build.finish(outputs, 3, coefficient_names=("Phi[0][0]", "H[0][1]", "K[1][0]"))
+    lines = operations.listing(program, [1, 0, 2])
+    assert [(line.name, line.formula, line.operands) for line in lines] == [
+        ("x₁", "", ()),
+        ("x₂", "", ()),
+        ("z", "", ()),
+        ("a", "K₂ z", (2,)),
+        ("x₁′", "x₁ − a", (0, 3)),
+    ]

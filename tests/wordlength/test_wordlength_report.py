@@ -84,6 +84,19 @@ def test_about_seven_powers_cover_the_ratios_and_the_tolerance(ratios, powers):
     assert all(30 <= y <= 280 for y in heights)
 
 
+def test_the_figure_names_the_states_that_it_judges():
+    """States with an infinite tolerance are not among them."""
+    names, most = ("east (m)", "north (m)", "rate (m/s)"), (0.01, None, 0.1)
+    for kept, tolerance, words in (
+        (names, most, "of the worst of the states east (m) and rate (m/s)."),
+        (names, (None, 0.5, None), "of the state north (m)."),
+        ((), most, "of the worst state."),
+    ):
+        drawn = replace(REPORT, names=kept, tolerance=tolerance).to_html()
+        assert words in text_of(drawn)
+        assert words.removesuffix(".") in drawn.partition("aria-label")[2]
+
+
 def test_the_answer_comes_first():
     assert text_of(REPORT.to_html()).startswith(
         "Wordlength for tracker Wordlength for tracker This Kalman filter needs 21 bits to keep rounding errors within "
@@ -145,7 +158,7 @@ def test_the_figure_has_its_axes_and_a_line_for_each_answer():
     drawn = REPORT.to_html().partition("<h2>Error against precision</h2>")[2]
     assert text_of(drawn).startswith(
         "10⁻¹ 10⁰ 10¹ 10² 20 21 22 error / tolerance bits innovation, emulation UD, bound "
-        "Error or bound, divided by the tolerance. The dashed line marks the tolerance. "
+        "Error or bound, divided by the tolerance, of the worst state. The dashed line marks the tolerance. "
     )
     lines = dict(
         zip(

@@ -73,6 +73,18 @@ window.gpbnbCalculators ??= (() => {
     };
   }
 
+  // Grid lines at the ticks of two scales within a box, and their labels.
+  function axes(add, x, y, { left, right, top, bottom }) {
+    for (const [at, label] of x.ticks) {
+      add("line", { class: "grid", x1: at, x2: at, y1: top, y2: bottom });
+      add("text", { x: at, y: bottom + 18, "text-anchor": "middle" }, label);
+    }
+    for (const [at, label] of y.ticks) {
+      add("line", { class: "grid", x1: left, x2: right, y1: at, y2: at });
+      add("text", { x: left - 6, y: at + 4, "text-anchor": "end" }, label);
+    }
+  }
+
   function sweep(spec, values) {
     const input = spec.inputs.find((each) => each.name === spec.figure.sweep);
     let [low, high] = input.slider;
@@ -107,16 +119,10 @@ window.gpbnbCalculators ??= (() => {
     const [low, high] = [points[0].x, points.at(-1).x].map((end) => (input.log ? Math.log10(end) : end));
     const x = scale(low, high, 58, width - 14, input.log, 70);
     const y = scale(bottom, top, height - 44, 28, true, 36);
-    for (const [at, label] of x.ticks) {
-      svg.append(element("line", { class: "grid", x1: at, x2: at, y1: 28, y2: height - 44 }));
-      svg.append(element("text", { x: at, y: height - 26, "text-anchor": "middle" }, label));
-    }
-    for (const [at, label] of y.ticks) {
-      svg.append(element("line", { class: "grid", x1: 58, x2: width - 14, y1: at, y2: at }));
-      svg.append(element("text", { x: 52, y: at + 4, "text-anchor": "end" }, label));
-    }
-    svg.append(element("text", { x: 4, y: 14 }, axis));
-    svg.append(element("text", { x: width - 14, y: height - 6, "text-anchor": "end" }, input.label));
+    const add = (name, attributes, text) => svg.appendChild(element(name, attributes, text));
+    axes(add, x, y, { left: 58, right: width - 14, top: 28, bottom: height - 44 });
+    add("text", { x: 4, y: 14 }, axis);
+    add("text", { x: width - 14, y: height - 6, "text-anchor": "end" }, input.label);
     curves.forEach(([curve], i) => {
       let path = "";
       let pen = "M";
@@ -125,9 +131,9 @@ window.gpbnbCalculators ??= (() => {
         if (drawn(value)) path += `${pen}${x.place(p.x).toFixed(1)} ${y.place(value).toFixed(1)}`;
         pen = drawn(value) ? "L" : "M";
       }
-      svg.append(element("path", { class: `curve curve-${i}`, d: path }));
+      add("path", { class: `curve curve-${i}`, d: path });
       const here = values[curve];
-      if (drawn(here)) svg.append(element("circle", { class: `curve-${i}`, cx: x.place(values[name]), cy: y.place(here), r: 5 }));
+      if (drawn(here)) add("circle", { class: `curve-${i}`, cx: x.place(values[name]), cy: y.place(here), r: 5 });
     });
     box.replaceChildren(svg);
     const said = curves.map(([curve, label]) => `${label}: ${show(points[0].values[curve])} to ${show(points.at(-1).values[curve])}`);
@@ -144,7 +150,7 @@ window.gpbnbCalculators ??= (() => {
     const svg = element("svg", { width, "aria-hidden": "true" });
     box.replaceChildren(svg);
     const add = (name, attributes, text) => svg.appendChild(element(name, attributes, text));
-    const height = spec.draw({ add, svg, width, values, data: spec.data, set, scale, show, superscript });
+    const height = spec.draw({ add, svg, width, values, data: spec.data, set, scale, axes, show, superscript });
     svg.setAttribute("height", height);
     svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     box.setAttribute("aria-label", `${spec.figure.title}. ${fill(spec.sentence, values)}`);

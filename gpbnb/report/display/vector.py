@@ -7,6 +7,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from urllib.parse import quote
 from xml.etree import ElementTree
 
 import matplotlib.pyplot as plt
@@ -64,6 +65,12 @@ def svg(fig: Figure, size: float) -> str:
     ElementTree.register_namespace("", _SVG[1:-1])
     ElementTree.register_namespace("xlink", _LINK[1:].partition("}")[0])
     return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def address(fig: Figure, size: float) -> str:
+    """Return a drawn figure as an address that holds it, for the picture of an HTML page; see :func:`svg`."""
+    fig.canvas.draw()
+    return "data:image/svg+xml," + quote(svg(fig, size).replace('"', "'"), safe=" =:/,;'()+*<>")
 
 
 def _shorten_names(root: ElementTree.Element) -> None:

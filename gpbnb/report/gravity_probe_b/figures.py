@@ -31,6 +31,7 @@ from gpbnb.report.display.style import (
     name_ends,
 )
 from gpbnb.report.gravity_probe_b.answers import Answers, decimal_digits, largest
+from gpbnb.report.gravity_probe_b.mission import PARAMETERS, YEAR_SECONDS
 from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.gravity_probe_b.year import Year
 from gpbnb.report.kalman import report_bounds
@@ -209,3 +210,30 @@ def shares(found: Sequence[Share], ax: Axes, tolerance: float = 1.0) -> list[Art
     legend(ax)
     label(ax, "bits" if found[0].fmt.base == 2 else "decimal digits", "largest error in a year (mas, mas/yr)")
     return artists
+
+
+def ladder(formats: Sequence[FloatFormat], ax: Axes) -> list[Artist]:
+    """Draw the angles of the mission on one scale, and the last place that a year's drift has in each format."""
+    given = {each.name: each.value for each in PARAMETERS}
+    drift = given["geodetic drift, predicted"]
+    steps = YEAR_SECONDS / given["time between measurements, report"]
+    angles = {
+        "aberration of starlight, Earth": 1000 * given["aberration due to the Earth's motion"],
+        "geodetic drift in a year": drift,
+        "aberration of starlight, orbit": 1000 * given["aberration due to the orbit"],
+        "frame dragging in a year": given["frame dragging, predicted"],
+        "allowed error in a year": 1.0,
+        "geodetic drift in a step": drift / steps,
+    }
+    rungs = {words: (size, BLACK) for words, size in angles.items()}
+    for fmt in formats:
+        above = math.floor(math.log(drift, fmt.base)) + 1
+        rungs[f"last place, {arithmetic(fmt)}"] = float(fmt.base) ** (above - fmt.precision), bits_colour(fmt)
+    artists: list[Artist] = []
+    for size, colour in rungs.values():
+        artists.append(ax.axhline(size, color=colour, lw=1.6, ls=":" if size == 1 else "-"))
+    ax.set_yscale("log")
+    ax.set_xticks([])
+    ax.grid(axis="x", visible=False)
+    label(ax, "", "angle (mas)")
+    return [*artists, *name_ends(ax, rungs)]

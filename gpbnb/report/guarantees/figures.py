@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gpbnb.bounds.adversary import run_against
 from gpbnb.bounds.guarantee import Guarantee
+from gpbnb.bounds.probable import separate_roundings
 from gpbnb.report.display.style import OBSERVED, OBSERVED_OTHERS, VALID, envelope, label, legend, loglog
 
 
@@ -47,3 +48,42 @@ def draw_errors(
     ax.set_ylim(1e-3 * found.bound[state], 50 * found.bound[state])  # room for the legend
     label(ax, "step", f"rounding error of the {quantity}")
     legend(ax, loc="upper left")
+
+
+def reachable_corners(found: Guarantee) -> NDArray[np.float64]:
+    """Return the corners of the set of errors that the roundings of all steps can add up to, (k, 2), in order.
+
+    It is the sum of one line segment for each operation and step, for a filter with two states and a settled gain.
+    """
+    program, each = found.schedule.program, separate_roundings(found)
+    count = len(program.operations)
+    F, G, limits = each.F[-1], each.G[-1][:, :count], each.limits[-1][:count]
+    rows, halves = np.eye(program.n), list[NDArray[np.float64]]()
+    for _ in range(found.lags):
+        halves += [*(rows @ G * limits).T]
+        rows = rows @ F
+    segments = np.array([half if (half[0], half[1]) > (0, 0) else -half for half in halves if half.any()])
+    segments = 2 * segments[np.argsort(np.arctan2(segments[:, 1], segments[:, 0]))]
+    lower = np.cumsum(np.vstack([-segments.sum(axis=0) / 2, segments]), axis=0)
+    return np.vstack([lower, -lower[1:-1]])
+
+
+def draw_set(
+    ax: Axes, found: Guarantee, chosen: NDArray[np.float64], names: tuple[str, str], scale: float = 1.0
+) -> None:
+    """Draw the set of errors of a filter with two states, its box, and the path of errors that an adversary chose.
+
+    Parameters
+    ----------
+    chosen : (steps, 2), errors. names : name and unit of each state, for the axes.
+    scale : units on the axes in a unit of the states, such as 1000 for millimetres.
+    """
+    corners = scale * reachable_corners(found)
+    across, up = scale * found.bound
+    box = [-across, across, across, -across, -across], [-up, -up, up, up, -up]
+    ax.plot(*box, color=VALID, lw=0.8, label="bound of each state")
+    ax.fill(*corners.T, facecolor=VALID, alpha=0.12)
+    ax.plot(*np.vstack([corners, corners[:1]]).T, color=VALID, label="errors that roundings can add up to")
+    ax.plot(*(scale * chosen).T, color=OBSERVED, lw=0.7, label="path of the adversary")
+    legend(ax, loc="lower left", bbox_to_anchor=(0, 1))
+    label(ax, f"error of the {names[0]}", f"error of the {names[1]}")

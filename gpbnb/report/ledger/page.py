@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import NamedTuple
 
-from gpbnb.report.display.tables import Table
+from gpbnb.report.display.tables import MOST_ROWS, Table
 from gpbnb.report.ledger.checking import Row, counts, in_reading_order
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.corrections import load_corrections
@@ -270,7 +270,7 @@ def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
         for row in rows
     ]
     classes = "ledger-undone" if left_undone else ""
-    return Html(f"{len(rows)} statements", _wrapped(("Statement", "Verdict", "Evidence"), lines, classes))
+    return _folded(f"{len(rows)} statements", _wrapped(("Statement", "Verdict", "Evidence"), lines, classes), len(rows))
 
 
 def root_table(rows: Iterable[Row]) -> Html:
@@ -309,7 +309,8 @@ def claim_table(rows: Iterable[Row]) -> Html:
             f'<tr><th scope="row">{escape(claim.text)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
             f"<td><p>{escape(claim.consequence)} {chapter_link(owner[key])}</p>{printed}</td></tr>"
         )
-    return Html(f"{len(lines)} claims", _wrapped(("Claim", "Outcome", "What follows"), lines, "ledger-claims"))
+    table = _wrapped(("Claim", "Outcome", "What follows"), lines, "ledger-claims")
+    return _folded(f"{len(lines)} claims", table, len(lines))
 
 
 def _link(row: Row) -> str:
@@ -413,6 +414,13 @@ def _root(finding: Finding) -> str:
 
 def _root_link(finding: Finding) -> str:
     return f'<a href="errata.html#root-{escape(finding.root)}">{typeset(load_roots()[finding.root].title)}</a>'
+
+
+def _folded(title: str, table: str, count: int) -> Html:
+    """Fold a table of many rows below its title, as tables of notebooks are."""
+    if count > MOST_ROWS:
+        table = f'<details class="long-table"><summary>{escape(title)}</summary>\n{table}\n</details>'
+    return Html(title, table)
 
 
 def _wrapped(header: Sequence[str], lines: Sequence[str], classes: str = "") -> str:

@@ -8,14 +8,18 @@ from dataclasses import asdict, dataclass
 from html import escape
 from importlib.resources import files
 from typing import Any
-from urllib.parse import quote
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 from gpbnb.report.calculators.page import Input, Runtime, input_field
 from gpbnb.report.display.style import TEXT
-from gpbnb.report.display.vector import svg
+from gpbnb.report.display.vector import address
+
+
+def short_number(number: float, digits: int = 6) -> float:
+    """Round a number of the data to a few digits, which no processor computes differently."""
+    return float(f"{number:.{digits}g}")
 
 
 @dataclass(frozen=True)
@@ -85,10 +89,9 @@ class Picture:
     def still_address(self) -> str:
         """Return the still figure as an address that holds it."""
         figure = self.still()
-        figure.canvas.draw()
-        text = svg(figure, TEXT)
+        found = address(figure, TEXT)
         plt.close(figure)
-        return "data:image/svg+xml," + quote(text.replace('"', "'"), safe=" =:/,;'()+*<>")
+        return found
 
     def __repr__(self) -> str:
         return f"<picture: {self.title}>"

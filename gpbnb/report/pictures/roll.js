@@ -13,7 +13,7 @@ function compute({ period, phase }, data) {
   return { period, phase, density, rolled, unrolled, gain: unrolled / rolled, along: error[0], across: error[1], size: Math.hypot(...error) };
 }
 
-function draw({ add, width, values, data, scale, show }) {
+function draw({ add, width, values, data, scale, axes, show }) {
   const { period, density, phase } = values;
   const [left, right, top, bottom] = [58, width - 14, 30, 230];
   const [low, high] = [1 / data.year, 0.5 / data.interval];
@@ -21,14 +21,7 @@ function draw({ add, width, values, data, scale, show }) {
   const x = scale(Math.log10(low), Math.log10(high), left, right, true, 60);
   const y = scale(Math.floor(Math.log10(least)), Math.ceil(Math.log10(most)), bottom, top, true, 34);
   add("text", { x: 4, y: 14 }, "Density of the readout noise (mas²/Hz)");
-  for (const [at, label] of x.ticks) {
-    add("line", { class: "grid", x1: at, x2: at, y1: top, y2: bottom });
-    add("text", { x: at, y: bottom + 18, "text-anchor": "middle" }, label);
-  }
-  for (const [at, label] of y.ticks) {
-    add("line", { class: "grid", x1: left, x2: right, y1: at, y2: at });
-    add("text", { x: left - 6, y: at + 4, "text-anchor": "end" }, label);
-  }
+  axes(add, x, y, { left, right, top, bottom });
   add("text", { x: right, y: bottom + 36, "text-anchor": "end" }, "frequency (Hz)");
   const point = (f) => `${x.place(f).toFixed(1)} ${y.place(densityOf(f, data)).toFixed(1)}`;
   const points = Array.from({ length: 61 }, (_, i) => point(low ** (1 - i / 60) * high ** (i / 60)));
@@ -50,14 +43,7 @@ function draw({ add, width, values, data, scale, show }) {
   const ends = [across(1), across(data.most_phase)].map(Math.log10);
   const error = scale(Math.floor(ends[0]), Math.ceil(ends[1]), below, above, true, 34);
   add("text", { x: 4, y: above - 16 }, "False drift across the true one (mas a year)");
-  for (const [at, label] of turn.ticks) {
-    add("line", { class: "grid", x1: at, x2: at, y1: above, y2: below });
-    add("text", { x: at, y: below + 18, "text-anchor": "middle" }, label);
-  }
-  for (const [at, label] of error.ticks) {
-    add("line", { class: "grid", x1: left, x2: right, y1: at, y2: at });
-    add("text", { x: left - 6, y: at + 4, "text-anchor": "end" }, label);
-  }
+  axes(add, turn, error, { left, right, top: above, bottom: below });
   add("text", { x: right, y: below + 36, "text-anchor": "end" }, "error of the phase (arcseconds)");
   const limit = error.place(data.tolerance);
   add("line", { class: "limit", x1: left, x2: right, y1: limit, y2: limit });

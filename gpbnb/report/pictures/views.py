@@ -18,7 +18,8 @@ from gpbnb.report.gravity_probe_b import figures, year
 from gpbnb.report.gravity_probe_b.model import YEAR as STEPS
 from gpbnb.report.gravity_probe_b.summary import DRIFT
 from gpbnb.report.measurement import YEAR
-from gpbnb.report.pictures.picture import Picture
+from gpbnb.report.pictures.operations import STEP
+from gpbnb.report.pictures.picture import Picture, short_number
 from gpbnb.report.rolling import theory
 
 TOLERANCE = 1
@@ -78,13 +79,14 @@ def _runs() -> list[year.Year]:
 
 
 def year_data() -> dict[str, Any]:
-    """Return the stored runs of Hung's form in binary formats: errors of rate and angle at the checkpoint steps."""
+    """Return the drift of a year and the stored runs of Hung's form in binary formats, with their errors."""
     runs = _runs()
     exponent = math.floor(math.log2(DRIFT)) + 1
     return {
         "tolerance": TOLERANCE,
         "interval": INTERVAL,
-        "step": _short(DRIFT * INTERVAL / YEAR),
+        "drift": DRIFT,
+        "step": short_number(DRIFT * INTERVAL / YEAR),
         "exponent": exponent,
         "angle_bound": 2**exponent,
         "steps": [int(step) for step in runs[0].steps],
@@ -92,15 +94,13 @@ def year_data() -> dict[str, Any]:
             {
                 "t": run.case.precision,
                 "chop": int(run.case.rounding is Rounding.CHOP),
-                "errors": [[_short(error, 3) for error in np.abs(each).max(axis=1)] for each in (run.rate, run.drift)],
+                "errors": [
+                    [short_number(error, 3) for error in np.abs(each).max(axis=1)] for each in (run.rate, run.drift)
+                ],
             }
             for run in runs
         ],
     }
-
-
-def _short(number: float, digits: int = 6) -> float:
-    return float(f"{number:.{digits}g}")
 
 
 def _year_still() -> Figure:
@@ -139,10 +139,10 @@ MOST_PHASE = 36000
 def roll_data() -> dict[str, Any]:
     """Return the noise level, the drifts, the error without rolling, and the length of the record."""
     return {
-        "level": _short(theory.LEVEL),
+        "level": short_number(theory.LEVEL),
         "year": YEAR,
         "interval": theory.INTERVAL,
-        "unrolled": _short(theory.drift_error_unrolled(theory.LEVEL, at_rest=True)),
+        "unrolled": short_number(theory.drift_error_unrolled(theory.LEVEL, at_rest=True)),
         "drifts": theory.DRIFTS,
         "tolerance": TOLERANCE,
         "most_phase": MOST_PHASE,
@@ -185,4 +185,4 @@ DEROLL = Picture(
     "factors of about fifty thousand and four hundred thousand.",
 )
 
-PICTURES = (NUMBER_LINE, A_YEAR, DEROLL)
+PICTURES = (NUMBER_LINE, A_YEAR, DEROLL, STEP)

@@ -24,7 +24,7 @@ function compute({ t, chop, quantity }, data) {
   return { t, chop, quantity, bits: run.t, ulp, errors: run.errors, end: errors.at(-1), unit, name, stored, when, place };
 }
 
-function draw({ add, width, values, data, scale, show, superscript }) {
+function draw({ add, width, values, data, scale, axes, show, superscript }) {
   const { quantity, bits, chop, ulp } = values;
   const [left, right, top, bottom] = [58, width - 14, 30, 270];
   const every = data.runs.flatMap((run) => run.errors[quantity]).filter((error) => error > 0);
@@ -32,14 +32,7 @@ function draw({ add, width, values, data, scale, show, superscript }) {
   const days = data.steps.map((step) => (step * data.interval) / 86400);
   const x = scale(Math.log10(days[0]), Math.log10(days.at(-1)), left, right, true, 60);
   add("text", { x: 4, y: 14 }, `Error of the ${values.name} (${values.unit})`);
-  for (const [at, label] of x.ticks) {
-    add("line", { class: "grid", x1: at, x2: at, y1: top, y2: bottom });
-    add("text", { x: at, y: bottom + 18, "text-anchor": "middle" }, label);
-  }
-  for (const [at, label] of y.ticks) {
-    add("line", { class: "grid", x1: left, x2: right, y1: at, y2: at });
-    add("text", { x: left - 6, y: at + 4, "text-anchor": "end" }, label);
-  }
+  axes(add, x, y, { left, right, top, bottom });
   add("text", { x: right, y: bottom + 36, "text-anchor": "end" }, "days");
   const curve = (errors) => {
     let path = "";
@@ -63,7 +56,7 @@ function draw({ add, width, values, data, scale, show, superscript }) {
   const low = Math.log10(data.angle_bound) - 53 * Math.log10(2);
   const ladder = scale(Math.floor(low), 0, left, right, true, 60);
   const line = bottom + 110;
-  add("text", { x: 4, y: line - 46 }, "Last place of 6606 mas, and one step (mas)");
+  add("text", { x: 4, y: line - 46 }, `Last place of ${data.drift} mas, and one step (mas)`);
   add("line", { class: "line", x1: left, x2: right, y1: line, y2: line });
   for (const [at, label] of ladder.ticks) {
     add("line", { class: "line", x1: at, x2: at, y1: line, y2: line + 5 });

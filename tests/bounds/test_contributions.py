@@ -1,0 +1,106 @@
+"""What each operation adds to a guarantee, against exact steps into which an error is put by hand."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.contributions import contributions
+from gpbnb.bounds.guarantee import PARTS, guarantee, limits
+from gpbnb.filters.forms import Form
+from gpbnb.filters.program import steps_in_python
+from gpbnb.report.guarantees import published
+from gpbnb.wordlength.examples import cyclic, tracker
+
+TRACKER = tracker(), limits(n=2, m=1, state=[1000, 30], innovation=8)
+
+
+def cases():
+    yield "tracker", *TRACKER, FloatFormat(2, 24), Form.INNOVATION
+    yield "chopped", *TRACKER, FloatFormat(10, 7, Rounding.CHOP), Form.INNOVATION
+    yield "Hung's form", *TRACKER, FloatFormat(2, 24), Form.HUNG
+    yield (
+        "a period",
+        cyclic(2, 1, cycle=3, decay=0.6),
+        limits(2, 1, state=100, innovation=10),
+        FloatFormat(2, 24),
+        Form.UD,
+    )
+    yield (
+        "Nile",
+        published.nile_local_level(),
+        limits(1, 1, state=1500, innovation=1200),
+        FloatFormat(2, 24),
+        Form.INNOVATION,
+    )
+
+
+@pytest.fixture(scope="module", params=cases(), ids=lambda case: case[0])
+def found(request):
+    _, model, within, fmt, form = request.param
+    return guarantee(model, fmt, within, form)
+
+
+def followed(found, operation, steps):
+    """Put an error of one into an operation of the last step of a period, and follow it through exact steps."""
+    given, program = found.schedule, found.schedule.program
+    seen = -1
+
+    def disturbed(value):
+        nonlocal seen
+        seen += 1
+        return value + (seen == operation)
+
+    x, period = [Fraction(0)] * program.n, given.steps - given.first
+    for step in range(steps):
+        row = given.coefficients[given.first + (period - 1 + step) % period]
+        exact = [Fraction(float(high)) + Fraction(float(low)) for high, low in row]
+        exact = exact if step < 3 else [Fraction(float(each)) for each in exact]
+        x = steps_in_python(program, disturbed, exact, x, [Fraction(0)] * program.m)
+        x = x if step < 3 else [Fraction(float(each)) for each in x]
+        yield [float(each) for each in x]
+
+
+def test_each_share_is_the_error_followed_through_exact_steps(found):
+    given = contributions(found)
+    period = found.schedule.steps - found.schedule.first
+    for operation, error in enumerate(given.errors):
+        path = np.array(list(followed(found, operation, found.lags)))
+        assert given.effects[:, operation] == pytest.approx(path[0], rel=1e-12, abs=1e-15)
+        if period == 1:  # else the errors of other steps are others
+            assert given.sums[:, operation] == pytest.approx(error * np.abs(path).sum(axis=0), rel=1e-6, abs=1e-30)
+
+
+def test_the_shares_add_up_to_less_than_the_settled_bound(found):
+    period = found.schedule.steps - found.schedule.first
+    settled = found.history[-period:].max(axis=0)
+    assert (contributions(found).sums.sum(axis=1) <= settled * (1 + 1e-9)).all()
+
+
+def test_the_shares_of_the_tracker_are_nearly_its_whole_bound():
+    """Its bound is largest after the gain has settled, and hardly anything but these roundings adds to it."""
+    model, within = TRACKER
+    found = guarantee(model, FloatFormat(2, 24), within)
+    rounding = found.parts[:, PARTS.index("roundings of the estimate")]
+    assert contributions(found).sums.sum(axis=1) == pytest.approx(rounding, rel=2e-3)  # the gain still changes a little
+
+
+def test_an_error_is_half_a_unit_of_the_largest_result():
+    """A position of up to 1000 m has ten bits before its point; the last of 24 stands for 2**-14 m."""
+    model, within = TRACKER
+    errors = contributions(guarantee(model, FloatFormat(2, 24), within)).errors
+    assert errors[12] == pytest.approx(0.5 * 2.0 ** (math.floor(math.log2(1000)) - 23), rel=1e-9)
+    assert errors[13] == pytest.approx(0.5 * 2.0 ** (math.floor(math.log2(30)) - 23), rel=1e-9)
+    # Products with 1 and with 0, and sums with 0, are exact.
+    assert [int(o) for o in np.flatnonzero(errors == 0)] == [0, 3, 4, 5, 6, 7, 8]
+
+
+def test_a_filter_that_never_settles_is_refused():
+    ended = guarantee(published.elaenia_gold(), FloatFormat(2, 24), limits(1, 1, state=2000, innovation=100))
+    with pytest.raises(ValueError, match=r"got a guarantee for .* steps: .*; needed one that holds for ever"):
+        contributions(ended)

@@ -1,0 +1,53 @@
+"""The report file of the command, in a browser: on paper, on a phone, in both colour schemes."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from pathlib import Path
+
+import pytest
+
+from gpbnb.wordlength.__main__ import main
+
+from . import axe
+from . import browser as tools
+
+MODEL = Path(__file__).resolve().parents[2] / "book" / "_static" / "tracker.toml"
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        assert main([str(MODEL), "--tolerance", "0.01", "--report", str(folder / "report.html")]) == 0
+    with tools.serve(folder) as base, tools.launch() as browser:
+        page = browser.new_page(viewport=tools.SIZES["desktop"])
+        page.goto(f"{base}report.html", wait_until="load")
+        yield page
+
+
+def test_it_prints_on_two_pages(report):
+    printed = report.pdf(format="A4")
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 2
+
+
+def test_the_figure_names_the_states_and_tells_the_forms_apart(report):
+    assert "position (m) and velocity (m/s)" in report.locator("figcaption").text_content()
+    marks = report.locator(".legend .mark path").evaluate_all("all => all.map(p => p.getAttribute('d'))")
+    words = [text.partition(",")[0].strip() for text in report.locator(".legend li").all_text_contents()]
+    assert len(dict(zip(words, marks, strict=True))) == len(set(marks)) == 3
+
+
+@pytest.mark.parametrize("size", tools.SIZES)
+def test_it_fits_the_window_and_axe_finds_nothing(report, size):
+    report.set_viewport_size(tools.SIZES[size])
+    assert report.evaluate("document.documentElement.scrollWidth") <= tools.SIZES[size]["width"]
+    report.evaluate(axe.script())
+    for scheme in ("light", "dark"):
+        report.emulate_media(color_scheme=scheme)
+        found = report.evaluate("async () => (await axe.run()).violations.map(v => v.id)")
+        assert found == []
+    report.set_viewport_size(tools.SIZES["desktop"])
+    report.emulate_media(color_scheme="light")
