@@ -2,7 +2,8 @@
 
 Operands are those of :mod:`benchmarks.exactness`: random, ties, near-ties, cancellations, carries. In a format with a
 range, a third of the pairs lies at its lower end, where numbers are subnormal or become zero, and a third at its upper
-end. Where the exact kernel overflows, the loop must give no result, or the limit if the format saturates.
+end. Where the exact kernel overflows, the loop must give no result, or the limit if the format saturates. The counts of
+a whole comparison are left in ``benchmarks/results``.
 """
 
 from __future__ import annotations
@@ -11,17 +12,19 @@ import argparse
 import sys
 from collections.abc import Iterator
 from fractions import Fraction
+from itertools import product
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from benchmarks.exactness import OPERATIONS, WIDE, Job, pairs, radicands
+from benchmarks.exactness import OPERATIONS, RESULTS, WIDE, Job, pairs, radicands
 from gpbnb.arithmetic.kernels.backends import Backend, Components, TwoWords, exact
 from gpbnb.arithmetic.kernels.exact import kernel
 from gpbnb.arithmetic.kernels.selection import wide_tag
 from gpbnb.arithmetic.rounding import Limits, Rounding, Rules
+from gpbnb.report.display.tables import Table
 
 ROUNDINGS = [rounding for rounding in Rounding if rounding is not Rounding.STOCHASTIC]
 RANGES = ("none", "subnormal", "flushed", "saturating", "short", "fixed")
@@ -163,12 +166,26 @@ def compare(rules: Rules, count: int, seed: int) -> Count:
     return Count(rules, compared, overflowed, different)
 
 
+def write(counts: list[Count]) -> None:
+    """Write what was compared in each base and rounding to ``benchmarks/results``."""
+    body = []
+    for base, rounding in product(WIDE, ROUNDINGS):
+        mine = [count for count in counts if (count.rules.base, count.rules.rounding) == (base, rounding)]
+        numbers = [(count.compared, count.overflowed, len(count.different)) for count in mine]
+        body.append((str(base), rounding.value, *(f"{sum(column):,}" for column in zip(*numbers, strict=True))))
+    table = Table("results compared", ("base", "rounding", "compared", "overflows", "different"), tuple(body))
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / "wide.md").write_text(f"{table.markdown()}\n", encoding="utf-8")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.wide", description=__doc__.split("\n")[0])
     parser.add_argument("--count", type=int, default=COUNT, help="results of each operation in each format")
     parser.add_argument("--seed", type=int, default=754)
     options = parser.parse_args()
     counts = [compare(rules, options.count, options.seed) for rules in tqdm(list(formats()))]
+    if options.count >= COUNT:
+        write(counts)
     for text in [text for count in counts for text in count.different][:20]:
         print(text)
     compared, overflowed = sum(count.compared for count in counts), sum(count.overflowed for count in counts)
