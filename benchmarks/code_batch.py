@@ -4,7 +4,7 @@ A program has two translation units, since starting a compiler takes longer than
 of all filters, whose static names receive the name of the filter if there are several. The other holds the tests that
 come with the code, and for each filter a loop that writes status, states and outputs of every step as binary numbers.
 Python compares these bit for bit. After a step that overflows, or has a zero pivot, the filter starts again with the
-next input, because no run would be long otherwise: in some formats, roundings alone drive a filter beyond its range.
+next input. Smaller inputs would not help: in some formats, roundings alone drive a filter beyond its range.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class _Written(NamedTuple):
 
 
 def level_of(case: Case) -> float:
-    """Size of the inputs: small enough that few words overflow, so that runs do not end early."""
+    """Size of the inputs: small enough that few words overflow, so that filters seldom start again."""
     return 0.25 if case.kind in ("binary32", "binary64") else 1.0
 
 

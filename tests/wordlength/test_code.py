@@ -131,6 +131,12 @@ def test_every_bit_of_every_step_is_compared(tmp_path):
     assert code_batch._difference(tmp_path, written) == ""
 
 
+@needs_compiler
+def test_a_comparison_may_take_only_combinations_with_a_text():
+    found = [outcome for batch in run(1, 20, file=None, only="binary64 smoother") for outcome in batch]
+    assert [(each.case.kind, each.case.label, each.faults) for each in found] == [("binary64", "smoother", ())]
+
+
 GROWING = LinearSystem([["1.5"]], [[1]])
 
 
