@@ -10,7 +10,6 @@ It needs gfloat, which ``make bench`` installs, takes a few seconds, and leaves 
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Iterator
 from dataclasses import replace

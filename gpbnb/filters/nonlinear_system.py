@@ -125,7 +125,11 @@ class NonlinearSystem:
         return len(self.x0)
 
     def __call__(self, fmt: Any, u: Any) -> FloatArray:
-        """Return the outputs of a run in a format, (steps, p).
+        """Return the outputs of a run in a format, (steps, p); the parameters are those of :meth:`states`."""
+        return self.states(fmt, u)[:, self.n :]
+
+    def states(self, fmt: Any, u: Any) -> FloatArray:
+        """Return state and output after each step of a run in a format, (steps, n + p).
 
         Parameters
         ----------
@@ -137,10 +141,6 @@ class NonlinearSystem:
         ValueError, TypeError : inputs of another shape; a step that does not return states (n,) and outputs (p,).
         OverflowError, ZeroDivisionError, NegativeRootError : an operation has no result in the format.
         """
-        return self.states(fmt, u)[:, self.n :]
-
-    def states(self, fmt: Any, u: Any) -> FloatArray:
-        """Return state and output after each step, (steps, n + p); see :meth:`__call__`."""
         found: FloatArray = self._whole_run(fmt, self.inputs_in(fmt, u))
         return found
 

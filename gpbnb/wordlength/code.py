@@ -1,8 +1,9 @@
 """C99 code of a filter that agrees with the emulation digit for digit: source, test vectors and a Makefile.
 
 The statements are those of the list of operations that is emulated and bounded, see :mod:`gpbnb.filters.program` and
-:mod:`gpbnb.filters.tracing`, one for each operation, in the same order. So what is computed about a filter holds for
-the code, if the compiler keeps the order and rounds each operation, as C99 demands.
+:mod:`gpbnb.filters.tracing`, or of the traced step of a nonlinear system, see :mod:`gpbnb.filters.nonlinear_system`:
+one for each operation, in the same order. So what is computed about a filter holds for the code, if the compiler keeps
+the order and rounds each operation, as C99 demands.
 """
 
 from __future__ import annotations

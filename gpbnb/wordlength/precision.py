@@ -75,7 +75,8 @@ def required_precision(
     ----------
     model : a Kalman filter; a linear system, whose inputs are `z`; anything that
         :func:`gpbnb.wordlength.models.read_model` reads, such as a ``scipy.signal.dlti``; or a function of a format and
-        `z`, written with arrays of the format; or a
+        `z`, written with arrays of the format, such as a
+        :class:`gpbnb.filters.nonlinear_system.NonlinearSystem` or a
         :class:`gpbnb.filters.smoothing.FixedIntervalSmoother`; or a nonlinear filter, which only the basis
         "emulation" covers. See
         :func:`gpbnb.wordlength.system.required_system_precision` for systems and

@@ -369,6 +369,16 @@ def test_constants_must_be_exact_where_the_function_demands_it():
     assert traced.reason == ""
 
 
+def test_a_traced_function_may_be_part_of_another():
+    inner = TracedFunction(lambda fmt, z: z / np.linalg.norm(z) + fmt.array("0.1"))
+    outer = TracedFunction(lambda fmt, z: inner(fmt, z) * 3)
+    for fmt in (BINARY32, FloatFormat(10, 5)):
+        z = fmt.array([1, -3, 7])
+        length = np.sqrt((z[0] * z[0] + z[1] * z[1]) + z[2] * z[2])
+        assert numbers(outer(fmt, z)) == numbers((z / length + fmt.array("0.1")) * 3)
+    assert outer.reason == inner.reason == ""
+
+
 def test_a_trace_belongs_to_shapes_and_takes_new_numbers():
     calls = []
 
