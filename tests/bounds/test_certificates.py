@@ -107,6 +107,24 @@ def test_models_of_cycles_and_of_some_steps_are_proved() -> None:
     assert "after 7 steps" in prove(content)
 
 
+def test_a_long_cycle_is_proved() -> None:
+    """An ellipsoid for errors of all but five steps once lost too much, after 700 steps and before the gain settles."""
+    found = guarantee(cyclic(2, 1, cycle=250, decay=0.8), FORMAT, limits(2, 1, state=100, innovation=10), Form.UD)
+    content = json.loads(found.certificate())
+    assert content["first"] > 700
+    prove(content)
+
+
+def test_a_filter_that_settles_slowly_is_proved() -> None:
+    """Its interval of covariances was once 16 times as wide, and gains of any covariance in it were too far apart."""
+    model = small(Phi=[["0.9", "0.1"], [0, 1]], H=[[1, 0]], Q=[["0.01", 0], [0, "1e-6"]], R=[["0.01"]], x0=[0, 0])
+    content = written(model, FORMAT, limits(2, 1, state=[10, 1], innovation=1))
+    assert content["first"] > 5_000
+    prove(content)
+    scale_bound("0.99")(content)
+    refused(content)
+
+
 @pytest.mark.parametrize("seed", range(30))
 def test_random_filters_are_proved(seed: int) -> None:
     """Every form, rounding, base and kind of limits; two of the filters have no bound, or no filter."""

@@ -41,6 +41,9 @@ WITHOUT = {
     "filters of one state in three to six bits": "their worst errors are known exactly",
     "Gravity Probe B over a number of steps": "not tried, because its runs have up to millions of steps",
     "filters in fixed point with a constant gain": "they are bounded for any measurements, without limits",
+    "outputs of digital filters and sums": "a certificate bounds roundings of states, not errors of outputs",
+    "least precisions of the chapter's filters": "each filter has a certificate in binary32",
+    "single steps, compared with Gappa": "Gappa bounds them, too, and a certificate is for all steps",
     "inverses of matrices": "they are not filters",
 }
 """Guarantees in the book or in stored tables that have no certificate of their own, and why."""
