@@ -219,3 +219,17 @@ def test_no_output_shows_a_name_of_the_code(path):
     kinds = ("text/markdown", "text/plain")
     texts += ["".join(output.get("data", {}).get(kind, "")) for output in shown for kind in kinds]
     assert [match[0] for text in texts for match in CODE_NAME.finditer(text)] == []
+
+
+@pytest.mark.parametrize("name", ["wordlength", "code", "nonlinear", "processors", "calculators"])
+def test_a_page_of_use_ends_with_three_exercises_whose_answers_are_folded_and_computed(name):
+    notebook = json.loads((BOOK / f"{name}.ipynb").read_text(encoding="utf-8"))
+    start = next(k for k, cell in enumerate(notebook["cells"]) if "## Exercises" in "".join(cell["source"]))
+    questions, answers = notebook["cells"][start::2], notebook["cells"][start + 1 :: 2]
+    assert [re.findall(r"(?m)^(\d)\. ", "".join(cell["source"])) for cell in questions] == [["1"], ["2"], ["3"]]
+    for cell in answers:
+        assert tags(cell) == {"hide-cell"}
+        assert cell["metadata"]["mystnb"]["code_prompt_show"] == "Show the answer"
+        (output,) = cell["outputs"]
+        assert re.search(r"\d", "".join(output["text"]))
+        assert "".join(cell["source"]).splitlines()[-1].startswith("# ")

@@ -21,7 +21,7 @@ from . import browser as tools
 
 LOOKS = {"light": ("desktop", "light"), "dark": ("desktop", "dark"), "phone": ("phone", "light")}
 STATIC = Path(__file__).resolve().parents[2] / "book" / "_static"
-COLOURS = 64
+COLOURS = 256
 
 
 def static(browser: tools.Browser, folder: Path) -> None:
@@ -47,7 +47,7 @@ def static(browser: tools.Browser, folder: Path) -> None:
 
 def _save(picture: bytes, path: Path) -> None:
     with Image.open(io.BytesIO(picture)) as opened:
-        opened.convert("RGB").quantize(COLOURS).save(path, optimize=True)
+        opened.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE).save(path, optimize=True)
 
 
 def main(arguments: list[str]) -> None:

@@ -240,7 +240,7 @@ def test_roll_and_deroll_show_the_numbers_of_the_theory(pages, period, phase):
 
 
 # For each operation that rounds, those whose results its error reaches, and the arcs between them.
-REACHED = {"a": (7, 9), "b": (6, 7), "c": (5, 6), "d": (2, 1), "e": (2, 1), "x₁′": (1, 0), "x₂′": (1, 0)}
+REACHED = {"a": (7, 7), "b": (6, 6), "c": (5, 4), "d": (2, 1), "e": (2, 1), "x₁′": (1, 0), "x₂′": (1, 0)}
 
 
 @pytest.mark.parametrize("state", ["position", "velocity"])

@@ -10,7 +10,6 @@ from gpbnb.report import poster
 from gpbnb.report.gravity_probe_b import summary
 from gpbnb.report.guarantees import certificates
 
-from . import browser as tools
 from .poster import PAGE
 
 PLACES = """() => [...document.querySelectorAll("svg > :is(text, image)")].map((e) => {
@@ -25,9 +24,9 @@ def drawn():
 
 
 @pytest.fixture(scope="module")
-def page(drawn):
-    with tools.launch() as browser:
-        page = browser.new_page()
+def page(drawn, open_page):
+    with open_page("_static/favicon.svg") as page:
+        page.goto("about:blank")
         page.set_content(PAGE.format(poster.WIDTH, poster.HEIGHT, drawn), wait_until="load")
         yield page
 

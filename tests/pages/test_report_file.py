@@ -18,12 +18,11 @@ MODEL = Path(__file__).resolve().parents[2] / "book" / "_static" / "tracker.toml
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory):
+def report(tmp_path_factory, open_page):
     folder = tmp_path_factory.mktemp("report")
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         assert main([str(MODEL), "--tolerance", "0.01", "--report", str(folder / "report.html")]) == 0
-    with tools.serve(folder) as base, tools.launch() as browser:
-        page = browser.new_page(viewport=tools.SIZES["desktop"])
+    with tools.serve(folder) as base, open_page("_static/favicon.svg") as page:
         page.goto(f"{base}report.html", wait_until="load")
         yield page
 
