@@ -11,9 +11,10 @@ for the type of the tag::
 
 Each operation rounds the exact result once and agrees digit for digit with
 :class:`gpbnb.arithmetic.kernels.exact.ExactKernel`; ``DoubleDouble`` has relative errors below 2**-102. A number that
-leaves the range of its backend never passes unnoticed: in base 10 the operation raises OverflowError; a float64 outside
-2**-960 ... 2**1023 becomes NaN, later operations keep it, and ``store``, ``compare`` and :func:`matmul` raise
-OverflowError. Callers must pass numbers of the format; :mod:`gpbnb.arithmetic.kernels.backends` makes the arrays.
+leaves the range of its backend never passes unnoticed: an operation on integers, in base 10 or in ``Wide``, raises
+OverflowError; a float64 outside 2**-960 ... 2**1023 becomes NaN, later operations keep it, and ``store``, ``compare``
+and :func:`matmul` raise OverflowError. Callers must pass numbers of the format;
+:mod:`gpbnb.arithmetic.kernels.backends` makes the arrays.
 """
 
 from __future__ import annotations
@@ -120,7 +121,7 @@ def sqrt(fmt: Any, a: Any) -> Any:
 
 
 def round_(fmt: Any, x: Any) -> Any:
-    """Round a float64 (base 2, 16), a pair ``m * 10**e`` (base 10), or the sum of two float64 (DoubleDouble)."""
+    """Round a float64 (base 2, 16), a pair ``m * 10**e`` (base 10), a number of Wide, or the sum of two float64."""
     raise _only_compiled("round_")
 
 
