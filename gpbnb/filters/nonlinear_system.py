@@ -87,8 +87,8 @@ class NonlinearSystem:
     >>> from gpbnb import BINARY32, NonlinearSystem, required_precision
     >>> def step(fmt, x, u):
     ...     proportional, integral = fmt.array(["0.8", "0.05"])
-    ...     held = np.clip(x[0] + integral * u[0], -1, 1)
-    ...     return held, np.clip(proportional * u[0] + held, -1, 1)
+    ...     total = np.clip(x[0] + integral * u[0], -1, 1)
+    ...     return total, np.clip(proportional * u[0] + total, -1, 1)
     >>> controller = NonlinearSystem(step, [0], name="a PI controller")
     >>> controller(BINARY32, [0.5, 1, 1]).to_float().ravel()
     array([0.42500001, 0.875     , 0.92500001])

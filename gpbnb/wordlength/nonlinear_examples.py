@@ -152,8 +152,8 @@ def _outer(turns: NDArray[np.float64], deviations: NDArray[np.float64]) -> NDArr
 def clipped_step(fmt: Any, x: Any, u: Any) -> Any:
     """Take a step of a PI controller whose integral x[0] and whose command stay between -1 and 1."""
     proportional, integral = fmt.array(["0.8", "0.05"])
-    held = np.clip(x[0] + integral * u[0], -1, 1)
-    return held, np.clip(proportional * u[0] + held, -1, 1)
+    total = np.clip(x[0] + integral * u[0], -1, 1)
+    return total, np.clip(proportional * u[0] + total, -1, 1)
 
 
 def clipped_controller() -> NonlinearSystem:
