@@ -34,7 +34,8 @@ class Ledger(SphinxDirective):
     ``verdict NAME`` the statements with one verdict; ``undone NAME`` what the documents leave undone, with one verdict;
     ``printed TITLE: IDS`` some statements as printed, collapsed;
     ``roots`` the root errors, and ``tree`` the same as squares; ``squares`` every statement as a square; ``argument``
-    how wrong statements pass from one part of the documents to the next; ``claims`` the principal claims;
+    how wrong statements pass from one part of the documents to the next; ``correction`` the main result beside its
+    correction; ``timeline`` the history, with sources; ``claims`` the principal claims;
     ``counts BY`` counts by document, chapter or kind.
     """
 
@@ -52,6 +53,10 @@ class Ledger(SphinxDirective):
             for table in (found for node in parsed for found in node.findall(nodes.table)):
                 table["classes"].append("counts")
             return parsed
+        if what == "timeline":
+            from gpbnb.report.gravity_probe_b import timeline
+
+            return [nodes.raw("", timeline.picture(), format="html"), *self.parse_text_to_nodes(timeline.sources())]
         return [nodes.raw("", self.html(what, *detail), format="html")]
 
     def html(self, what: str, detail: str = "") -> str:
@@ -83,6 +88,10 @@ class Ledger(SphinxDirective):
                 from gpbnb.report.ledger.argument import chain_of_errors  # matplotlib takes a second to import
 
                 return chain_of_errors(rows).html
+            case "correction":
+                from gpbnb.report.ledger.correction import side_by_side
+
+                return side_by_side().html
             case "roots":
                 return ledger().root_table(rows).html
             case "claims":

@@ -228,6 +228,25 @@ def name(
     return ax.annotate(text, at, shift, textcoords="offset points", color=colour, **options)
 
 
+def apart(heights: Sequence[float], lines: Sequence[int], size: float) -> list[float]:
+    """Return heights for texts that collide at the given ones: as close to these as possible, in the same order.
+
+    Parameters
+    ----------
+    heights : wanted heights of the middles of the texts.
+    lines : number of lines of each text. size : height of a line, in the unit of `heights`.
+    """
+    order = sorted(range(len(heights)), key=heights.__getitem__)
+    placed = [heights[i] for i in order]
+    for _ in range(200):
+        for k, (low, high) in enumerate(pairwise(order)):
+            overlap = size * ((lines[low] + lines[high]) / 2) - (placed[k + 1] - placed[k])
+            if overlap > 0:
+                placed[k] -= overlap / 2
+                placed[k + 1] += overlap / 2
+    return [placed[order.index(i)] for i in range(len(order))]
+
+
 def name_ends(ax: Axes, ends: Mapping[str, tuple[float, str]]) -> list[Annotation]:
     """Write names to the right of a panel, each at the height where its curve ends; names that collide move apart.
 
@@ -253,17 +272,9 @@ def name_ends(ax: Axes, ends: Mapping[str, tuple[float, str]]) -> list[Annotatio
     def move_apart() -> None:
         points = 72 / ax.figure.dpi
         heights = [float(ax.transData.transform((1, note.xy[1]))[1]) * points for note in notes]
-        order = sorted(range(len(notes)), key=heights.__getitem__)
-        placed = [heights[i] for i in order]
-        for _ in range(200):
-            for k, (low, high) in enumerate(pairwise(order)):
-                lines = sum(notes[i].get_text().count("\n") + 1 for i in (low, high)) / 2
-                overlap = 1.3 * TEXT * lines - (placed[k + 1] - placed[k])
-                if overlap > 0:
-                    placed[k] -= overlap / 2
-                    placed[k + 1] += overlap / 2
-        for i, place in zip(order, placed, strict=True):
-            notes[i].set_position((6, place - heights[i]))
+        lines = [note.get_text().count("\n") + 1 for note in notes]
+        for note, height, place in zip(notes, heights, apart(heights, lines, 1.3 * TEXT), strict=True):
+            note.set_position((6, place - height))
 
     if isinstance(ax.figure, BookFigure):
         ax.figure.last_moves.append(move_apart)

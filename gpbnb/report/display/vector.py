@@ -7,6 +7,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from html import escape
 from urllib.parse import quote
 from xml.etree import ElementTree
 
@@ -71,6 +72,13 @@ def address(fig: Figure, size: float) -> str:
     """Return a drawn figure as an address that holds it, for the picture of an HTML page; see :func:`svg`."""
     fig.canvas.draw()
     return "data:image/svg+xml," + quote(svg(fig, size).replace('"', "'"), safe=" =:/,;'()+*<>")
+
+
+def element(fig: Figure, size: float, alt: str, caption: str) -> str:
+    """Return a figure as an HTML element with its description and its caption, and close it; see :func:`svg`."""
+    picture = f'<img alt="{escape(alt)}" src="{address(fig, size)}">'
+    plt.close(fig)
+    return f"<figure>{picture}<figcaption>{escape(caption, quote=False)}</figcaption></figure>"
 
 
 def _shorten_names(root: ElementTree.Element) -> None:

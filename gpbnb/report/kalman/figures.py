@@ -175,19 +175,9 @@ def waterfall(ax: Axes, tolerance: Fraction, observed: float) -> list[Artist]:
     tolerance : relative error that is allowed in place of one as large as the drift.
     observed : decimal digits with which an emulated year stayed within that error.
     """
-    printed, formula = report_bounds.PRINTED, report_bounds.coefficients(*report_bounds.EXAMPLE)
-    steps: list[tuple[str, Fraction | float]] = [
-        ("first term, as printed", Fraction(printed["first coefficient"])),
-        ("second term, as printed", Fraction(printed["second coefficient"])),
-        ("(125), evaluated correctly", Fraction(formula.second)),
-        ("1 mas in place of the drift", formula.second / tolerance),
-    ]
-    for name, faults in [*report_bounds.CORRECTIONS.items()][1:]:
-        corrected = report_bounds.coefficients(*report_bounds.EXAMPLE, **faults)
-        steps.append((name.removeprefix("and "), corrected.second / tolerance))
-    digits = [math.log10(coefficient / 2) + 1 for _, coefficient in steps]
+    digits = report_bounds.example_digits(tolerance)
     artists: list[Artist] = []
-    for row, (before, after) in enumerate(pairwise([0.0, *digits])):
+    for row, (before, after) in enumerate(pairwise([0.0, *digits.values()])):
         colour = REFUTED if after >= before else REFERENCE
         artists += ax.barh(-row, after - before, 0.62, left=before, color=colour, alpha=0.85).patches
         change = f"{after:.1f}" if not row else f"{after:.1f} ({after - before:+.1f})".replace("-", "−")
@@ -196,8 +186,8 @@ def waterfall(ax: Axes, tolerance: Fraction, observed: float) -> list[Artist]:
             ax.plot([before, before], [-row + 1.31, -row - 0.31], color=REFERENCE, lw=0.8)
     ax.axvline(observed, color=OBSERVED, lw=1.4)
     write(ax, f"an emulated year: {observed:.1f}", (observed, 0.75), OBSERVED, (6, 0), annotation_clip=False)
-    ax.set_yticks([-row for row in range(len(steps))], [words for words, _ in steps])
-    ax.set_ylim(0.5 - len(steps), 1.2)
+    ax.set_yticks([-row for row in range(len(digits))], [*digits])
+    ax.set_ylim(0.5 - len(digits), 1.2)
     ax.set_xlim(0, 32)
     ax.grid(axis="y", visible=False)
     label(ax, "decimal digits", "")

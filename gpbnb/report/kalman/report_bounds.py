@@ -6,6 +6,7 @@ ints and Fractions and return Fractions.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from graphlib import CycleError, TopologicalSorter
@@ -191,6 +192,30 @@ PRINTED = {
     "second digits": "17",
 }
 """Numbers of the closing example as hung1982 prints them; hung1984 loses a minus sign."""
+
+
+def example_digits(tolerance: Fraction) -> dict[str, float]:
+    """Return the decimal digits that the closing example demands, from its first number to a corrected formula.
+
+    Parameters
+    ----------
+    tolerance : relative error that is allowed in place of one as large as the state.
+
+    Returns
+    -------
+    digits : each change of the formula → digits t with coefficient · 0.5 × 10^(1-t) equal to the allowed error; in the
+        order in which the changes are made, each together with those before it.
+    """
+    formula = coefficients(*EXAMPLE)
+    demanded: dict[str, Fraction] = {
+        "first term, as printed": Fraction(PRINTED["first coefficient"]),
+        "second term, as printed": Fraction(PRINTED["second coefficient"]),
+        "(125), evaluated correctly": Fraction(formula.second),
+        "1 mas in place of the drift": formula.second / tolerance,
+    }
+    for name, faults in [*CORRECTIONS.items()][1:]:
+        demanded[name.removeprefix("and ")] = coefficients(*EXAMPLE, **faults).second / tolerance
+    return {name: math.log10(coefficient / 2) + 1 for name, coefficient in demanded.items()}
 
 
 def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction:

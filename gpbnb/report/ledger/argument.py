@@ -6,12 +6,11 @@ from collections import Counter
 from collections.abc import Iterable
 from typing import NamedTuple
 
-import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from gpbnb.report.display import style
-from gpbnb.report.display.vector import address
+from gpbnb.report.display.vector import element
 from gpbnb.report.ledger.checking import Row, owners
 from gpbnb.report.ledger.html import Html
 from gpbnb.report.ledger.roots import by_root
@@ -130,7 +129,4 @@ def figure(rows: Iterable[Row], height: float = 4.6) -> Figure:
 
 def chain_of_errors(rows: Iterable[Row]) -> Html:
     """Show the parts of the documents, and how wrong statements pass from one to the next, as HTML with a picture."""
-    drawn = figure(rows)
-    picture = f'<img alt="{ALT}" src="{address(drawn, style.TEXT)}">'
-    plt.close(drawn)
-    return Html("chain of errors", f"<figure>{picture}<figcaption>{CAPTION}</figcaption></figure>")
+    return Html("chain of errors", element(figure(rows), style.TEXT, ALT, CAPTION))

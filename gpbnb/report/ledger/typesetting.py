@@ -168,6 +168,8 @@ def _call(function: ast.expr, arguments: list[ast.expr]) -> str:
             return rf"\left({x}\right)"
         case "bracket", [x]:
             return rf"\left[{x}\right]"
+        case "mark", [x, label]:
+            return rf"\underbrace{{{x}}}_{{\text{{({label})}}}}"
         case "op", [x, y]:
             return f"{x}*{y}"
         case "sqrt", [x]:

@@ -1,0 +1,144 @@
+"""The story of Gravity Probe B and of the arithmetic of filters as a timeline: dates, sources, and a picture."""
+
+from __future__ import annotations
+
+from datetime import date
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from gpbnb.report.display import style
+from gpbnb.report.display.vector import element
+
+FIRST, LAST = 1960, 2012
+"""The years between which the timeline runs."""
+MONTHS = "January February March April May June July August September October November December".split()
+
+
+class Event(NamedTuple):
+    """Something that happened.
+
+    Parameters
+    ----------
+    lane : one of :data:`LANES`.
+    begin, end : years, or days in the form 2004-04-20; an event in a single year or on a single day has no end.
+    words : what happened; lines of the picture are separated by line breaks.
+    sources : keys of the bibliography that give the event and its dates.
+    """
+
+    lane: str
+    begin: str
+    end: str
+    words: str
+    sources: tuple[str, ...]
+
+    @property
+    def when(self) -> str:
+        """The dates as a reader writes them."""
+        return "–".join(_written(each) for each in (self.begin, self.end) if each)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Beginning and end in years; the same number twice for an event without an end."""
+        begin = _year(self.begin)
+        return begin, _year(self.end) if self.end else begin
+
+
+LANES = ("Filters and arithmetic", "Gravity Probe B")
+EVENTS = (
+    Event(LANES[0], "1960", "", "Kalman's filter", ("kalman1960",)),
+    Event(LANES[0], "1960", "1969", "Apollo: 15-bit words,\nPotter's square root", ("tracy2022", "dyer1969")),
+    Event(LANES[0], "1961", "", "Wilkinson: errors\nof matrix inversion", ("wilkinson1961",)),
+    Event(LANES[0], "1976", "", "Thornton: triangular\nfactors of covariances", ("thornton1976",)),
+    Event(LANES[0], "1985", "", "IEEE 754", ("ieee1985",)),
+    Event(LANES[0], "1986", "", "Verhaegen, Van Dooren:\nerrors of filter forms", ("verhaegen1986",)),
+    Event(LANES[1], "1960", "", "Schiff predicts\ntwo drifts", ("schiff1960",)),
+    Event(LANES[1], "1982", "", "first report by Hung", ("hung1982",)),
+    Event(LANES[1], "1984", "", "second report,\nwith bound (125)", ("hung1984",)),
+    Event(LANES[1], "2004-04-20", "", "launch", ("everitt2011",)),
+    Event(LANES[1], "2004-08-28", "2005-08-14", "data", ("everitt2011",)),
+    Event(LANES[1], "2009", "", "the team describes\nits estimators", ("heifetz2009",)),
+    Event(LANES[1], "2011", "", "final results", ("everitt2011",)),
+)
+CAPTION = (
+    "The history of filters in short arithmetic, and of Gravity Probe B. A dot is a year or a day, and a bar is a span of "
+    "time. The orange dot is the bound that this book refutes. Our sources do not name the year of Potter's square root: "
+    "it came after Kalman's filter and before the paper of 1969 that extends square-root filtering."
+)
+
+
+def description() -> str:
+    """Say in words what the picture shows, lane by lane."""
+    told = (
+        f"{lane}: " + "; ".join(f"{each.when}, {_line(each)}" for each in EVENTS if each.lane == lane) for lane in LANES
+    )
+    return f"A timeline with two sides, from {FIRST} at the top to {EVENTS[-1].when}. {'. '.join(told)}."
+
+
+def figure(height: float = 6.2) -> Figure:
+    """Draw the timeline, the earliest year above, in a figure of this height in inches."""
+    top, bottom = FIRST - 5.5, LAST + 1
+    line = 1.45 * style.TEXT / 72 * (bottom - top) / height  # of text, in years
+    fig, (ax,) = style.figure(height=height)
+    for side, lane in zip((-1, 1), LANES, strict=True):
+        align = "right" if side < 0 else "left"
+        ax.text(side * 0.22, FIRST - 4.5, lane, ha=align, va="center", fontweight="bold")
+        ax.plot(2 * [side * 0.09], [FIRST, LAST], color=style.REFERENCE, lw=0.8)
+        events = [each for each in EVENTS if each.lane == lane]
+        texts = [f"{_short(each)}: {each.words}" for each in events]
+        years = [sum(each.span) / 2 for each in events]
+        places = style.apart(years, [text.count("\n") + 1 for text in texts], line)
+        for each, text, year, place in zip(events, texts, years, places, strict=True):
+            colour = style.REFUTED if "(125)" in text else style.BLACK
+            if each.end:
+                ax.plot(2 * [side * 0.09], each.span, color=style.REFERENCE, lw=9, alpha=0.5, solid_capstyle="butt")
+            else:
+                ax.plot([side * 0.09], [year], "o", color=colour, ms=6)
+            ax.plot([side * 0.11, side * 0.2], [year, place], color=style.REFERENCE, lw=0.8)
+            ax.text(side * 0.22, place, text, ha=align, va="center", color=colour)
+    for decade in range(FIRST, LAST, 10):
+        ax.text(0, decade, str(decade), ha="center", va="center", color=style.REFERENCE)
+    for text in ax.texts:
+        text.set_fontsize(style.TEXT)
+    ax.set_xlim(-1, 1)
+    ax.set_ylim(bottom, top)
+    ax.axis("off")
+    return fig
+
+
+def picture() -> str:
+    """Return the timeline as an HTML element."""
+    return element(figure(), style.TEXT, description(), CAPTION)
+
+
+def sources() -> str:
+    """Tabulate dates, events and sources in MyST Markdown, folded below a title."""
+    lines = [
+        f"| {each.when} | {_line(each)} | {{cite:p}}`{','.join(each.sources)}` |"
+        for each in sorted(EVENTS, key=lambda each: each.span)
+    ]
+    return "\n".join([":::{dropdown} Dates and sources", "| when | what | source |", "| --- | --- | --- |", *lines, ":::"])
+
+
+def _line(event: Event) -> str:
+    return event.words.replace("\n", " ")
+
+
+def _short(event: Event) -> str:
+    """Return the year or years of an event, in as few characters as possible."""
+    begin, end = event.begin[:4], event.end[:4]
+    return f"{begin}–{end[2:]}" if end else begin
+
+
+def _written(day: str) -> str:
+    if "-" not in day:
+        return day
+    found = date.fromisoformat(day)
+    return f"{found.day} {MONTHS[found.month - 1]} {found.year}"
+
+
+def _year(day: str) -> float:
+    if "-" not in day:
+        return float(day)
+    found = date.fromisoformat(day)
+    return found.year + (found.timetuple().tm_yday - 1) / 365.25

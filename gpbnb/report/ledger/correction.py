@@ -1,0 +1,110 @@
+"""The main result of the report of 1984, bound (125), as printed beside its correction."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from copy import deepcopy
+from fractions import Fraction
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.report.gravity_probe_b import answers, horizon, summary
+from gpbnb.report.kalman import report_bounds
+from gpbnb.report.ledger.corrections import intended
+from gpbnb.report.ledger.formula import Relation
+from gpbnb.report.ledger.html import Html, chapter, typeset
+from gpbnb.report.ledger.page import address
+from gpbnb.report.ledger.statements import Statement, statement
+from gpbnb.report.ledger.typesetting import typeset as typeset_tree
+
+RESULT = "hung1984.II.eq125"
+PRINTED = {"k*(7*n+3*m+6)": "a", "k*(3*n+1) + k*(k-1)/2*(7*n+3*m+6)": "a", "B": "b"}
+CORRECTED = {"e": "a", "F**i": "b"}
+"""Parts of the two formulas that differ; equal letters stand for what takes the place of what."""
+
+
+def marked(relation: Relation, marks: Mapping[str, str]) -> str:
+    """Typeset a relation with braces and letters under some of its parts.
+
+    Parameters
+    ----------
+    relation : a printed or corrected relation.
+    marks : part, in the notation of :mod:`gpbnb.report.ledger.formula` → letter.
+
+    Raises
+    ------
+    ValueError : a part does not occur in the relation.
+    """
+    marking = _Marking({ast.unparse(ast.parse(part, mode="eval").body): letter for part, letter in marks.items()})
+    latex = typeset_tree(marking.visit(deepcopy(relation.tree)), 0)
+    if missing := marking.letters.keys() - marking.found:
+        raise ValueError(f"got the parts {sorted(missing)}; needed parts of {relation.text}")
+    return latex
+
+
+def changes() -> tuple[str, str]:
+    """Say what each letter means and what the change does to the digits, as prose with formulas."""
+    digits = report_bounds.example_digits(Fraction(1, summary.DRIFT))
+    names = [*digits]
+    before = {name: digits[earlier] for earlier, name in zip(names, names[1:], strict=False)}
+
+    def change(name: str) -> str:
+        return f"{digits[name] - before[name]:+.1f}".replace("-", "−")
+
+    year = answers.decimal_digits(FloatFormat(2, answers.find_answers().bits))
+    bits = next(horizon.bits(row) for row in horizon.load() if row.states == "absolute")
+    every = answers.decimal_digits(FloatFormat(2, bits))
+    return (
+        "The report counts roundings, as if the error of a step were in proportion to its result. The correction takes "
+        "$e$, the error that a step really adds, which cancellation can make larger than any count. For 1 mas after a "
+        f"year, (125) demands {digits['1 mas in place of the drift']:.1f} decimal digits. Better counting changes this "
+        f"by {change('roundings counted once')} if each rounding is counted once, by "
+        f"{change('errors of either sign')} with errors of either sign, and by "
+        f"{change('covariance errors carried on')} with the errors of the covariance carried on. The corrected "
+        f"count demands {digits['covariance errors carried on']:.1f} digits, and still is no bound.",
+        "In (125), $B$ bounds every input, however many steps ago it entered, so nothing is forgotten. The correction "
+        "multiplies an earlier error by $F^i$. If $F<1$, the filter forgets this error, and the sum does not grow with "
+        f"$k$. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures errors "
+        f"in another norm. An emulated year stays within 1 mas with {year:.1f} "
+        f"decimal digits, and the extrapolated guarantee for every admissible record demands {every:.1f}.",
+    )
+
+
+def side_by_side() -> Html:
+    """Show bound (125) as printed beside its correction, with the parts that differ marked, and what they change."""
+    printed, corrected = statement(RESULT), intended(RESULT)
+    panels = "".join(
+        f'<div class="correction-{name}"><p><strong>{title}</strong></p><p>{_formula(each, marks)}</p></div>'
+        for name, title, each, marks in (
+            ("printed", f'As printed, <a href="{address(printed)}">(125)</a>', printed, PRINTED),
+            ("corrected", "Corrected", corrected, CORRECTED),
+        )
+    )
+    listed = "".join(f"<li>{typeset(text)}</li>" for text in changes())
+    caption = "Braces and colour mark what differs. A letter under both formulas marks a part and what replaces it."
+    return Html(
+        "(125) beside its correction",
+        f'<figure class="correction"><div class="correction-pair">{panels}</div><figcaption>{caption}</figcaption>'
+        f'</figure>\n<ol class="correction-changes" type="a">{listed}</ol>',
+    )
+
+
+def _formula(each: Statement, marks: Mapping[str, str]) -> str:
+    return typeset(each.text.replace("{{1}}", rf"$\displaystyle {marked(each.relation(), marks)}$"))
+
+
+class _Marking(ast.NodeTransformer):
+    """Put parts of a syntax tree into calls of ``mark``, a sum in its parentheses."""
+
+    def __init__(self, letters: Mapping[str, str]) -> None:
+        self.letters = letters
+        self.found: set[str] = set()
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        text = ast.unparse(node)
+        if not isinstance(node, ast.expr) or text not in self.letters:
+            return self.generic_visit(node)
+        self.found.add(text)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
+            node = ast.Call(ast.Name("group"), [node], [])
+        return ast.Call(ast.Name("mark"), [node, ast.Name(self.letters[text])], [])
