@@ -12,7 +12,10 @@ from gpbnb.report.display.vector import element
 
 FIRST, LAST = 1960, 2012
 """The years between which the timeline runs."""
-MONTHS = "January February March April May June July August September October November December".split()
+MONTHS = (
+    *("January", "February", "March", "April", "May", "June"),
+    *("July", "August", "September", "October", "November", "December"),
+)
 
 
 class Event(NamedTuple):
@@ -61,9 +64,9 @@ EVENTS = (
     Event(LANES[1], "2011", "", "final results", ("everitt2011",)),
 )
 CAPTION = (
-    "The history of filters in short arithmetic, and of Gravity Probe B. A dot is a year or a day, and a bar is a span of "
-    "time. The orange dot is the bound that this book refutes. Our sources do not name the year of Potter's square root: "
-    "it came after Kalman's filter and before the paper of 1969 that extends square-root filtering."
+    "The history of filters in short arithmetic, and of Gravity Probe B. A dot is a year or a day, and a bar is a span "
+    "of time. The orange dot is the bound that this book refutes. Our sources do not name the year of Potter's square "
+    "root: it came after Kalman's filter and before the paper of 1969 that extends square-root filtering."
 )
 
 
@@ -117,7 +120,8 @@ def sources() -> str:
         f"| {each.when} | {_line(each)} | {{cite:p}}`{','.join(each.sources)}` |"
         for each in sorted(EVENTS, key=lambda each: each.span)
     ]
-    return "\n".join([":::{dropdown} Dates and sources", "| when | what | source |", "| --- | --- | --- |", *lines, ":::"])
+    head = [":::{dropdown} Dates and sources", "| when | what | source |", "| --- | --- | --- |"]
+    return "\n".join([*head, *lines, ":::"])
 
 
 def _line(event: Event) -> str:

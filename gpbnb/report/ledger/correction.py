@@ -6,6 +6,7 @@ import ast
 from collections.abc import Mapping
 from copy import deepcopy
 from fractions import Fraction
+from itertools import pairwise
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.gravity_probe_b import answers, horizon, summary
@@ -45,12 +46,9 @@ def marked(relation: Relation, marks: Mapping[str, str]) -> str:
 def changes() -> tuple[str, str]:
     """Say what each letter means and what the change does to the digits, as prose with formulas."""
     digits = report_bounds.example_digits(Fraction(1, summary.DRIFT))
-    names = [*digits]
-    before = {name: digits[earlier] for earlier, name in zip(names, names[1:], strict=False)}
-
-    def change(name: str) -> str:
-        return f"{digits[name] - before[name]:+.1f}".replace("-", "−")
-
+    change = {
+        name: f"{after - before:+.1f}".replace("-", "−") for (_, before), (name, after) in pairwise(digits.items())
+    }
     year = answers.decimal_digits(FloatFormat(2, answers.find_answers().bits))
     bits = next(horizon.bits(row) for row in horizon.load() if row.states == "absolute")
     every = answers.decimal_digits(FloatFormat(2, bits))
@@ -58,14 +56,14 @@ def changes() -> tuple[str, str]:
         "The report counts roundings, as if the error of a step were in proportion to its result. The correction takes "
         "$e$, the error that a step really adds, which cancellation can make larger than any count. For 1 mas after a "
         f"year, (125) demands {digits['1 mas in place of the drift']:.1f} decimal digits. Better counting changes this "
-        f"by {change('roundings counted once')} if each rounding is counted once, by "
-        f"{change('errors of either sign')} with errors of either sign, and by "
-        f"{change('covariance errors carried on')} with the errors of the covariance carried on. The corrected "
+        f"by {change['roundings counted once']} if each rounding is counted once, by "
+        f"{change['errors of either sign']} with errors of either sign, and by "
+        f"{change['covariance errors carried on']} with the errors of the covariance carried on. The corrected "
         f"count demands {digits['covariance errors carried on']:.1f} digits, and still is no bound.",
         "In (125), $B$ bounds every input, however many steps ago it entered, so nothing is forgotten. The correction "
         "multiplies an earlier error by $F^i$. If $F<1$, the filter forgets this error, and the sum does not grow with "
-        f"$k$. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures errors "
-        f"in another norm. An emulated year stays within 1 mas with {year:.1f} "
+        f"$k$. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures "
+        f"errors in another norm. An emulated year stays within 1 mas with {year:.1f} "
         f"decimal digits, and the extrapolated guarantee for every admissible record demands {every:.1f}.",
     )
 
