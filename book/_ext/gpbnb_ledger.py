@@ -34,7 +34,7 @@ class Ledger(SphinxDirective):
     ``verdict NAME`` the statements with one verdict; ``undone NAME`` what the documents leave undone, with one verdict;
     ``printed TITLE: IDS`` some statements as printed, collapsed;
     ``roots`` the root errors, and ``tree`` the same as squares; ``squares`` every statement as a square; ``argument``
-    how wrong statements pass from one part of the documents to the next; ``correction`` the main result beside its
+    how wrong statements pass from one part of the documents to the next; ``correction`` the main result above its
     correction; ``timeline`` the history, with sources; ``claims`` the principal claims;
     ``counts BY`` counts by document, chapter or kind.
     """
@@ -89,9 +89,9 @@ class Ledger(SphinxDirective):
 
                 return chain_of_errors(rows).html
             case "correction":
-                from gpbnb.report.ledger.correction import side_by_side
+                from gpbnb.report.ledger.correction import with_correction
 
-                return side_by_side().html
+                return with_correction().html
             case "roots":
                 return ledger().root_table(rows).html
             case "claims":

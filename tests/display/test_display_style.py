@@ -92,6 +92,15 @@ def test_names_at_the_right_edge_do_not_collide():
     assert names[0].get_position() == (6, 0)
 
 
+def test_texts_move_apart_no_further_than_they_must():
+    assert style.apart([5.0, 1.0], [1, 1], 2.0) == [5.0, 1.0]
+    assert style.apart([1.0, 0.0], [1, 1], 2.0) == [1.5, -0.5]
+    found = style.apart([0.0, 0.5, 9.0, 0.2], [1, 2, 1, 1], 1.0)
+    assert found[2] == 9.0
+    gaps = found[3] - found[0], found[1] - found[3]  # the order stays
+    assert gaps == pytest.approx((1.0, 1.5), abs=1e-6)  # 200 rounds halve what is left each time
+
+
 def test_the_legend_has_no_frame():
     _, (ax,) = style.figure()
     ax.plot([1, 2], label="a line")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gpbnb.report.display import style
-from gpbnb.report.display.vector import DECIMALS, MOST_MARKERS, svg
+from gpbnb.report.display.vector import DECIMALS, MOST_MARKERS, element, svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -85,6 +85,14 @@ def test_the_picture_is_as_wide_as_the_figure():
     assert float(root.get("width")) == pytest.approx(width / 72 * fig.dpi, abs=0.5)
     assert float(root.get("height")) == pytest.approx(height / 72 * fig.dpi, abs=0.5)
     assert abs(float(root.get("width")) - style.WIDTH * fig.dpi) < 0.1 * style.WIDTH * fig.dpi
+
+
+def test_an_element_has_its_description_and_caption_and_leaves_no_figure_open():
+    fig, _ = drawn()
+    html = element(fig, style.TEXT, 'a "curve"', "m < n")
+    assert not plt.fignum_exists(fig.number)
+    assert html.startswith('<figure><img alt="a &quot;curve&quot;" src="data:image/svg+xml,')
+    assert html.endswith('"><figcaption>m &lt; n</figcaption></figure>')
 
 
 def test_thousands_of_markers_become_pixels():

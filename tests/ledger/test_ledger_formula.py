@@ -237,6 +237,7 @@ def test_dots_without_a_pattern_have_no_value(form):
         ("x == pm(digits(d[1], d[2], ...))*b**e", r"x=\left(\pm.d_{1}d_{2}\cdots\right)b^{e}"),
         ("x == y*2*.5", r"x=y\times2\times.5"),
         ("fl(op(x, y))", r"fl\left(x*y\right)"),
+        ("mark(2*x, a)*y", r"\underbrace{2x}_{\text{(a)}}y"),
         ("x == cases((u, v < 1), (w, v >= 1))", r"x=\begin{cases}u & \text{if }v<1\\ w & \text{if }v\ge 1\end{cases}"),
         ("M[1]*...*M[n]", r"M_{1}\cdots\,M_{n}"),
     ],

@@ -1,4 +1,4 @@
-"""The main result of the report of 1984, bound (125), as printed beside its correction."""
+"""The main result of the report of 1984, bound (125), as printed above its correction."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gpbnb.report.ledger.statements import Statement, statement
 from gpbnb.report.ledger.typesetting import typeset as typeset_tree
 
 RESULT = "hung1984.II.eq125"
-PRINTED = {"k*(7*n+3*m+6)": "a", "k*(3*n+1) + k*(k-1)/2*(7*n+3*m+6)": "a", "B": "b"}
+PRINTED = {"k*(7*n+3*m+6)": "a", "k*(3*n+1)": "a", "k*(k-1)/2*(7*n+3*m+6)": "a", "B": "b"}
 CORRECTED = {"e": "a", "F**i": "b"}
 """Parts of the two formulas that differ; equal letters stand for what takes the place of what."""
 
@@ -34,7 +34,7 @@ def marked(relation: Relation, marks: Mapping[str, str]) -> str:
 
     Raises
     ------
-    ValueError : a part does not occur in the relation.
+    ValueError : a part does not occur in the relation, or is a sum.
     """
     marking = _Marking({ast.unparse(ast.parse(part, mode="eval").body): letter for part, letter in marks.items()})
     latex = typeset_tree(marking.visit(deepcopy(relation.tree)), 0)
@@ -50,8 +50,8 @@ def changes() -> tuple[str, str]:
         name: f"{after - before:+.1f}".replace("-", "−") for (_, before), (name, after) in pairwise(digits.items())
     }
     year = answers.decimal_digits(FloatFormat(2, answers.find_answers().bits))
-    bits = next(horizon.bits(row) for row in horizon.load() if row.states == "absolute")
-    every = answers.decimal_digits(FloatFormat(2, bits))
+    bits = {row.states: horizon.bits(row) for row in horizon.load()}  # of the last row, for the whole year
+    every = answers.decimal_digits(FloatFormat(2, bits["absolute"]))
     return (
         "The report counts roundings, as if the error of a step were in proportion to its result. The correction takes "
         "$e$, the error that a step really adds, which cancellation can make larger than any count. For 1 mas after a "
@@ -61,15 +61,15 @@ def changes() -> tuple[str, str]:
         f"{change['covariance errors carried on']} with the errors of the covariance carried on. The corrected "
         f"count demands {digits['covariance errors carried on']:.1f} digits, and still is no bound.",
         "In (125), $B$ bounds every input, however many steps ago it entered, so nothing is forgotten. The correction "
-        "multiplies an earlier error by $F^i$. If $F<1$, the filter forgets this error, and the sum does not grow with "
-        f"$k$. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures "
+        "multiplies an error made $i$ steps ago by $F^i$. If $F<1$, the filter forgets it, and the sum stays below a "
+        f"limit. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures "
         f"errors in another norm. An emulated year stays within 1 mas with {year:.1f} "
         f"decimal digits, and the extrapolated guarantee for every admissible record demands {every:.1f}.",
     )
 
 
-def side_by_side() -> Html:
-    """Show bound (125) as printed beside its correction, with the parts that differ marked, and what they change."""
+def with_correction() -> Html:
+    """Show bound (125) as printed above its correction, with the parts that differ marked, and what they change."""
     printed, corrected = statement(RESULT), intended(RESULT)
     panels = "".join(
         f'<div class="correction-{name}"><p><strong>{title}</strong></p><p>{_formula(each, marks)}</p></div>'
@@ -81,7 +81,7 @@ def side_by_side() -> Html:
     listed = "".join(f"<li>{typeset(text)}</li>" for text in changes())
     caption = "Braces and colour mark what differs. A letter under both formulas marks a part and what replaces it."
     return Html(
-        "(125) beside its correction",
+        "(125) above its correction",
         f'<figure class="correction"><div class="correction-pair">{panels}</div><figcaption>{caption}</figcaption>'
         f'</figure>\n<ol class="correction-changes" type="a">{listed}</ol>',
     )
@@ -92,7 +92,7 @@ def _formula(each: Statement, marks: Mapping[str, str]) -> str:
 
 
 class _Marking(ast.NodeTransformer):
-    """Put parts of a syntax tree into calls of ``mark``, a sum in its parentheses."""
+    """Put parts of a syntax tree into calls of ``mark``."""
 
     def __init__(self, letters: Mapping[str, str]) -> None:
         self.letters = letters
@@ -102,7 +102,7 @@ class _Marking(ast.NodeTransformer):
         text = ast.unparse(node)
         if not isinstance(node, ast.expr) or text not in self.letters:
             return self.generic_visit(node)
-        self.found.add(text)
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
-            node = ast.Call(ast.Name("group"), [node], [])
+            raise ValueError(f"got the sum {text}, which would lose its parentheses; needed one of its terms")
+        self.found.add(text)
         return ast.Call(ast.Name("mark"), [node, ast.Name(self.letters[text])], [])

@@ -1,0 +1,81 @@
+"""The timeline against the bibliography and the text of the page that shows it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import pytest
+
+from gpbnb.report.display import style
+from gpbnb.report.gravity_probe_b import timeline
+
+BOOK = Path(__file__).resolve().parents[2] / "book"
+ENTRIES = {
+    entry.partition(",")[0]: entry
+    for entry in re.split(r"^@\w+\{", (BOOK / "references.bib").read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+}
+
+
+def year(key):
+    return re.search(r"^\s*year\s*=\s*\{(\d+)\}", ENTRIES[key], re.MULTILINE)[1]
+
+
+def test_every_year_is_that_of_its_source():
+    events = {each.words.replace("\n", " "): each for each in timeline.EVENTS}
+    flight = [events.pop(name) for name in ("launch", "data")]
+    apollo = events.pop("Apollo: 15-bit words, Potter's square root")
+    assert (apollo.begin, apollo.end) == (year("kalman1960"), year("dyer1969"))
+    assert set(apollo.sources) == {"tracy2022", "dyer1969"}
+    for each in events.values():
+        assert [year(key) for key in each.sources] == [each.begin]
+        assert each.end == ""
+    told = " ".join((BOOK / "story.md").read_text(encoding="utf-8").split())
+    launch, data = (each.when.replace("–", " to ") for each in flight)
+    assert f"launched on {launch}, and it collected data from {data}." in told
+    assert all(each.sources == ("everitt2011",) for each in flight)
+
+
+def test_days_become_fractions_of_years():
+    (launch,) = [each for each in timeline.EVENTS if each.words == "launch"]
+    (data,) = [each for each in timeline.EVENTS if each.words == "data"]
+    assert launch.span == pytest.approx((2004 + 110 / 366,) * 2, abs=1 / 300)  # 20 April is the 111th day of 2004
+    assert data.span == pytest.approx((2004 + 240 / 366, 2005 + 225 / 365), abs=1 / 300)
+
+
+def test_the_picture_follows_the_rule_of_figures_and_shows_every_event_at_its_time():
+    figure = timeline.figure()
+    figure.canvas.draw()
+    assert style.defects(figure) == []
+    (ax,) = figure.axes
+    dots = sorted(float(line.get_ydata()[0]) for line in ax.lines if line.get_marker() == "o")
+    assert dots == sorted(each.span[0] for each in timeline.EVENTS if not each.end)
+    bars = sorted(tuple(line.get_ydata()) for line in ax.lines if line.get_linewidth() > 5)
+    assert bars == sorted(each.span for each in timeline.EVENTS if each.end)
+    top, bottom = timeline.FIRST, timeline.LAST
+    assert all(top <= time <= bottom for each in timeline.EVENTS for time in each.span)
+    for lane in timeline.LANES:
+        words = [f": {each.words}" for each in sorted(timeline.EVENTS, key=lambda each: sum(each.span))]
+        placed = sorted((text.get_position()[1], text.get_text().partition(": ")) for text in ax.texts)
+        shown = [f": {words}" for _, (_, colon, words) in placed if colon]
+        of_lane = {f": {each.words}" for each in timeline.EVENTS if each.lane == lane}
+        # From the earliest to the latest, also where words were moved apart.
+        assert [each for each in shown if each in of_lane] == [each for each in words if each in of_lane]
+    plt.close(figure)
+
+
+def test_words_and_table_name_every_event():
+    said, table = timeline.description(), timeline.sources().splitlines()
+    assert table[0].startswith(":::{dropdown}")
+    assert table[-1] == ":::"
+    rows = [line for line in table if "{cite:p}" in line]
+    for each in timeline.EVENTS:
+        words = each.words.replace("\n", " ")
+        assert f"{each.when}, {words}" in said
+        (row,) = [row for row in rows if f"| {each.when} | {words} |" in row]
+        assert set(re.search(r"`(.*)`", row)[1].split(",")) == set(each.sources)
+    assert len(rows) == len(timeline.EVENTS)
+    html = timeline.picture()
+    assert html == timeline.picture()
+    assert html.startswith('<figure><img alt="A timeline')

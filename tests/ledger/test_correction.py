@@ -1,0 +1,93 @@
+"""Bound (125) above its correction: the formulas are those of the ledger, the digits follow from counts made here."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from gpbnb.report.gravity_probe_b import summary
+from gpbnb.report.ledger import correction
+from gpbnb.report.ledger.corrections import intended
+from gpbnb.report.ledger.formula import Relation
+from gpbnb.report.ledger.statements import statement
+
+
+def without_braces(latex):
+    """Remove each underbrace and its letter; return what is left and the letters."""
+    letters = []
+    while (start := latex.find(r"\underbrace{")) >= 0:
+        inside = start + len(r"\underbrace{")
+        depth, end = 1, inside
+        while depth:
+            depth += {"{": 1, "}": -1}.get(latex[end], 0)
+            end += 1
+        label = re.match(r"_\{\\text\{\((\w)\)\}\}", latex[end:])
+        letters.append(label[1])
+        latex = latex[:start] + latex[inside : end - 1] + latex[end + label.end() :]
+    return latex, letters
+
+
+@pytest.mark.parametrize(
+    ("shown", "marks", "letters"),
+    [
+        (statement(correction.RESULT), correction.PRINTED, "aaab"),
+        (intended(correction.RESULT), correction.CORRECTED, "ba"),
+    ],
+)
+def test_without_its_braces_the_formula_is_that_of_the_ledger(shown, marks, letters):
+    left, found = without_braces(correction.marked(shown.relation(), marks))
+    assert left == shown.relation().latex()
+    assert found == [*letters]
+
+
+def test_what_cannot_be_marked_is_refused():
+    relation = Relation("x == (a + b)*c")
+    assert correction.marked(relation, {"c": "a"}) == r"x=\left(a+b\right)\underbrace{c}_{\text{(a)}}"
+    with pytest.raises(ValueError, match=r"got the parts \['d'\]; needed parts of x =="):
+        correction.marked(relation, {"d": "a"})
+    with pytest.raises(ValueError, match=r"got the sum a \+ b, .*; needed one of its terms"):
+        correction.marked(relation, {"a+b": "a"})
+
+
+def test_the_digits_follow_from_counting_step_by_step():
+    k, n, m = 3_153_600, 10, 2
+    j = np.arange(1, k + 1, dtype=np.longdouble)
+
+    def digits(loop, entry, sign, more):
+        loops, entries = (
+            loop + more * (j - 1),
+            entry + more * (j - 1),
+        )  # roundings of the loop and of the input of step j
+        after = loops[::-1].cumsum()[::-1] - loops
+        coefficient = (loops.sum() + sign * (after + entries)).sum()
+        return float(1 + np.log10(coefficient * summary.DRIFT / 2))
+
+    loop, entry = 6 * n + 3 * m + 5, 4 * n + 3 * m + 4
+    found = [
+        digits(loop + n + 1, entry + 1, -1, 0),
+        digits(loop, entry, -1, 0),
+        digits(loop, entry, 1, 0),
+        digits(loop, entry, 1, 3 * n + m + 2),
+    ]
+    first, second = correction.changes()
+    by = [f"{change:+.1f}".replace("-", "−") for change in np.diff(found)]
+    assert f"(125) demands {found[0]:.1f} decimal digits" in first
+    assert re.findall(r"by ([+−][\d.]+)", first) == by
+    assert f"The corrected count demands {found[-1]:.1f} digits" in first
+    rows = {each.source: each.bits for each in summary.find()}
+    year, every = (1 + (rows[name] - 1) * np.log10(2) for name in ("One simulated year", "Every admissible record"))
+    assert f"within 1 mas with {year:.1f} decimal digits" in second
+    assert f"every admissible record demands {every:.1f}." in second
+
+
+def test_the_page_shows_both_formulas_and_a_line_for_each_letter():
+    html = correction.with_correction().html
+    assert html.index('class="correction-printed"') < html.index('class="correction-corrected"')
+    assert html.count("<li>") == len({*correction.PRINTED.values()}) == len({*correction.CORRECTED.values()})
+    for each, marks in (
+        (statement(correction.RESULT), correction.PRINTED),
+        (intended(correction.RESULT), correction.CORRECTED),
+    ):
+        assert correction.marked(each.relation(), marks) in html
