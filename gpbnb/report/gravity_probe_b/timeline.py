@@ -72,10 +72,10 @@ CAPTION = (
 
 def description() -> str:
     """Say in words what the picture shows, lane by lane."""
-    told = (
+    lanes = (
         f"{lane}: " + "; ".join(f"{each.when}, {_line(each)}" for each in EVENTS if each.lane == lane) for lane in LANES
     )
-    return f"A timeline with two sides, from {FIRST} at the top to {EVENTS[-1].when}. {'. '.join(told)}."
+    return f"A timeline with two sides, from {FIRST} at the top to {EVENTS[-1].when}. {'. '.join(lanes)}."
 
 
 def figure(height: float = 6.2) -> Figure:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from copy import deepcopy
 from fractions import Fraction
 from itertools import pairwise
+from typing import Any
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.gravity_probe_b import answers, horizon, summary
@@ -98,7 +99,7 @@ class _Marking(ast.NodeTransformer):
         self.letters = letters
         self.found: set[str] = set()
 
-    def visit(self, node: ast.AST) -> ast.AST:
+    def visit(self, node: ast.AST) -> Any:
         text = ast.unparse(node)
         if not isinstance(node, ast.expr) or text not in self.letters:
             return self.generic_visit(node)
