@@ -15,7 +15,10 @@ WIDTHS = """() => [...document.querySelectorAll(".correction-printed, .correctio
   });
 })"""
 BRACES = """(name) => [...document.querySelectorAll(`.correction-${name} mjx-munder`)]
-  .filter((each) => !each.parentElement.closest("mjx-munder")).map((each) => getComputedStyle(each).color)"""
+  .filter((each) => !each.parentElement.closest("mjx-munder, mjx-munderover")).map((each) => getComputedStyle(each).color)"""
+
+LIMITS = """() => [...document.querySelectorAll(".correction mjx-munderover, .correction mjx-munderover *")]
+  .map((each) => getComputedStyle(each).color)"""
 
 
 @pytest.fixture(scope="module", params=tools.SIZES)
@@ -38,6 +41,8 @@ def test_each_brace_has_the_colour_of_its_panel(page):
     (one,), (other,) = set(printed), set(corrected)
     plain = page.evaluate("getComputedStyle(document.querySelector('.correction-printed')).color")
     assert len({one, other, plain}) == 3
+    # The limits of a sum are no brace.
+    assert {*page.evaluate(LIMITS)} == {plain}
 
 
 def test_axe_finds_nothing_in_the_figure(page):
