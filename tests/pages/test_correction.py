@@ -15,7 +15,8 @@ WIDTHS = """() => [...document.querySelectorAll(".correction-printed, .correctio
   });
 })"""
 BRACES = """(name) => [...document.querySelectorAll(`.correction-${name} mjx-munder`)]
-  .filter((each) => !each.parentElement.closest("mjx-munder, mjx-munderover")).map((each) => getComputedStyle(each).color)"""
+  .filter((each) => !each.parentElement.closest("mjx-munder, mjx-munderover"))
+  .map((each) => getComputedStyle(each).color)"""
 
 LIMITS = """() => [...document.querySelectorAll(".correction mjx-munderover, .correction mjx-munderover *")]
   .map((each) => getComputedStyle(each).color)"""
