@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.adversary import attack, random_errors
-from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.forms import Form
 from gpbnb.report.display import style
 from gpbnb.report.display.vector import FONTS, address
@@ -28,7 +27,6 @@ from gpbnb.report.ledger import rows
 from gpbnb.report.ledger.argument import figure as argument
 from gpbnb.report.ledger.argument import inherited, stages
 from gpbnb.report.pictures.operations import STEP
-from gpbnb.wordlength.examples import tracker
 
 WIDTH, HEIGHT = 594, 841
 """Size of A1, mm."""
@@ -137,8 +135,7 @@ def panels() -> Iterator[Panel]:
         "milliarcsecond. A filter that estimates deviations from the predicted drift needs fewer.",
         fig,
     )
-    model = tracker()
-    found = guarantee(model, FloatFormat(2, 24), limits(model.n, model.m, state=[1000, 30], innovation=8))
+    found = certificates.tracker_guarantee()
     outcome = attack(found, steps=2000, candidates=200, center=[750, 0], plans=1)
     fig, (ax,) = style.figure(height=3.9)
     noise = random_errors(found, steps=2000, center=[750, 0])

@@ -43,6 +43,7 @@ SMALLEST, STEPS = "filters of one state in three to six bits", "single steps, co
 
 COMPUTED: dict[tuple[str, str], tuple[str, ...]] = {
     ("code.ipynb", "required_precision(cascade, 1, 0.1, basis='guarantee', within=within)"): (OUTPUTS,),
+    ("code.ipynb", "required_precision(cascade, 1, 0.1, basis='guarantee', within=wider)"): (OUTPUTS,),
     ("guarantee.ipynb", "guarantee(tracker(), FloatFormat(2, 24), within)"): (TRACKER,),
     ("guarantee.ipynb", "('guarantee', 'probable')"): ("tracker within 0.01 m",),
     ("guarantee.ipynb", "guarantee(tracker(), FloatFormat(2, 24), wider)"): WIDER,
@@ -56,10 +57,12 @@ COMPUTED: dict[tuple[str, str], tuple[str, ...]] = {
         "guarantee.ipynb",
         "error_coefficients(given['A'], given['B'], given['C'], given['D'], given['input_bound'])",
     ): (FIXED,),
+    ("processors.ipynb", "fixed_point.required_fraction_bits(given, data, goal, basis)"): (FIXED,),
     (
         "processors.ipynb",
-        "fixed_point.required_fraction_bits(given, data, [0.01, math.inf, math.inf], basis)",
+        "fixed_point.required_fraction_bits(fixed_point.constant_gain(moved, z), z, [0.01, 0.01])",
     ): (FIXED,),
+    ("processors.ipynb", "fixed_point.required_fraction_bits(livelier, minutes[0], goal, basis)"): (FIXED,),
     ("processors.ipynb", "('emulation', 'guarantee')"): (FIXED,),
     (
         "wordlength.ipynb",

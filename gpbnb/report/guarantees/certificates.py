@@ -63,7 +63,7 @@ def _cyclic() -> Guarantee:
     return guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(10, 2, state=100, innovation=10), Form.UD)
 
 
-def _tracker(factor: int = 1, fmt: FloatFormat = FORMAT) -> Guarantee:
+def tracker_guarantee(factor: int = 1, fmt: FloatFormat = FORMAT) -> Guarantee:
     """The tracker of the chapter, with limits that are wider by a factor."""
     return guarantee(tracker(), fmt, limits(2, 1, state=[factor * 1000, factor * 30], innovation=factor * 8))
 
@@ -74,7 +74,7 @@ def _within_a_centimetre() -> Guarantee:
     answer = required_precision(tracker(), 1, [0.01, 0.01], basis="guarantee", within=within)
     if not isinstance(answer.fmt, FloatFormat):
         raise ArithmeticError(f"got {answer}; needed a precision that meets the tolerance")
-    return _tracker(fmt=answer.fmt)
+    return tracker_guarantee(fmt=answer.fmt)
 
 
 def guarantees() -> dict[str, Callable[[], Guarantee]]:
@@ -83,8 +83,8 @@ def guarantees() -> dict[str, Callable[[], Guarantee]]:
     return {
         **found,
         "ten states": _cyclic,
-        "tracker, limits twice as wide": lambda: _tracker(2),
-        "tracker, limits four times as wide": lambda: _tracker(4),
+        "tracker, limits twice as wide": lambda: tracker_guarantee(2),
+        "tracker, limits four times as wide": lambda: tracker_guarantee(4),
         "tracker within 0.01 m": _within_a_centimetre,
     }
 

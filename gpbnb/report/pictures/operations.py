@@ -11,21 +11,18 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
-from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.contributions import Contributions, contributions
-from gpbnb.bounds.guarantee import Guarantee, guarantee, limits
-from gpbnb.filters.model import LinearModel
+from gpbnb.bounds.guarantee import Guarantee
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, innovation_program
 from gpbnb.report.calculators.page import Input
 from gpbnb.report.display import style
+from gpbnb.report.guarantees.certificates import tracker_guarantee
+from gpbnb.report.guarantees.table import FORMAT
 from gpbnb.report.pictures.picture import Picture, short_number
 from gpbnb.wordlength.examples import tracker
 
 STATES = {"position": "m", "velocity": "m/s"}
 """The states of the tracker and their units."""
-BINARY32 = FloatFormat(2, 24)
-WITHIN = {"state": [1000, 30], "innovation": 8}
-"""The limits of the chapter on the guarantee."""
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _SIGNS = {ADD: "+", SUBTRACT: "−"}
 
@@ -103,8 +100,7 @@ def _lines() -> tuple[ListedValue, ...]:
 
 @cache
 def _found() -> tuple[Guarantee, Contributions]:
-    model: LinearModel = tracker()
-    found = guarantee(model, BINARY32, limits(model.n, model.m, **WITHIN))
+    found = tracker_guarantee()
     return found, contributions(found)
 
 
@@ -142,7 +138,7 @@ def step_data() -> dict[str, Any]:
         "states": [*STATES],
         "units": [*STATES.values()],
         "bounds": [short_number(bound) for bound in found.bound],
-        "bits": BINARY32.precision,
+        "bits": FORMAT.precision,
     }
 
 
