@@ -23,7 +23,7 @@ class Event(NamedTuple):
 
     Parameters
     ----------
-    lane : one of :data:`LANES`.
+    lane : name of the row of the picture where it stands.
     begin, end : years, or days in the form 2004-04-20; an event in a single year or on a single day has no end.
     words : what happened; lines of the picture are separated by line breaks.
     sources : keys of the bibliography that give the event and its dates.
