@@ -160,6 +160,8 @@ class Search(Generic[Kind]):
         least: int = 2,
     ) -> None:
         self._ratios, self._why = dict[int, float](), dict[int, str]()
+        #: What the search asks of a format.
+        self.error: Callable[[Kind], Outcome] = error
         self._like: Kind = like
         self._given = largest is not None
         #: Precisions above the answer for which there is no bound.

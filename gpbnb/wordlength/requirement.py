@@ -47,6 +47,9 @@ class Requirement:
     limit : the reason why the search ended at the last precision of `tried`. It is shown if there is no answer.
     ends : whether a guarantee holds for the steps asked for, because no precision has one for ever.
     untraced : why a function ran operation by operation, and not in compiled code; empty if it did not.
+    processors : the largest error / tolerance of a run in binary32, and in binary64 if binary32 has too few bits or
+        misses the tolerance. Empty if no run was made: in another base, with directed rounding or a given range, and
+        for bounds, which hold for ties to even, too.
     """
 
     fmt: FloatFormat | MaybeNone
@@ -62,6 +65,7 @@ class Requirement:
     cause: str = ""
     ends: bool = False
     untraced: str = ""
+    processors: tuple[tuple[str, float], ...] = ()
 
     @property
     def precision(self) -> int | MaybeNone:
@@ -89,24 +93,32 @@ class Requirement:
             return f"no precision up to {most} {met} {by_evidence}{why}{end}"
         tried = dict(self.tried)
         why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
-        named = f" ({self.processor_format} is enough)" if self.processor_format else ""
+        named = [f"{name} misses the tolerance: {ratio:.2g}" for name, ratio in self.processors if not ratio <= 1]
+        named += [f"{self.processor_format} is enough"] if self.processor_format else []
+        on_processors = f" ({'; '.join(named)})" if named else ""
         share = f"{tried[self.fmt.precision]:.2g} of the tolerance"
-        return f"{arithmetic(self.fmt)}{named}: {share}, {evidence}{why}{end}"
+        return f"{arithmetic(self.fmt)}{on_processors}: {share}, {evidence}{why}{end}"
 
     @property
     def processor_format(self) -> str:
-        """Name of the smaller of binary32 and binary64 that was tried and meets the tolerance; empty if neither.
+        """Name of the smaller of binary32 and binary64 that meets the tolerance; empty if neither, or if unknown.
 
-        It applies to rounding to nearest in base 2, and says nothing about the range of the exponents.
+        An observed error is that of a run in this format, with its ties to even and its range. A bound holds for
+        either rounding of ties, and says nothing about the range. There is no name in other bases, with directed
+        rounding, or with a given range.
         """
-        fmt, ratios = self.fmt, dict(self.tried)
-        if fmt is None or fmt.base != 2 or fmt.limits is not None:
-            return ""
-        if fmt.rounding not in (Rounding.NEAREST, Rounding.EVEN):
-            return ""
-        named = {"binary32": BINARY32.precision, "binary64": BINARY64.precision}
-        enough = (name for name, t in named.items() if t >= fmt.precision and ratios.get(t, math.inf) <= 1)
+        if self.basis == "emulation":
+            return next((name for name, ratio in self.processors if ratio <= 1), "")
+        ratios = dict(self.tried)
+        enough = (name for name, each in _on_processors(self.fmt) if ratios.get(each.precision, math.inf) <= 1)
         return next(enough, "")
+
+
+def _on_processors(fmt: FloatFormat | None) -> tuple[tuple[str, FloatFormat], ...]:
+    """Return the names and formats of processors that have the digits of a format and round to nearest as it does."""
+    if fmt is None or fmt.base != 2 or fmt.limits is not None or fmt.rounding not in (Rounding.NEAREST, Rounding.EVEN):
+        return ()
+    return tuple((n, f) for n, f in (("binary32", BINARY32), ("binary64", BINARY64)) if f.precision >= fmt.precision)
 
 
 _EVIDENCE = {
@@ -185,6 +197,7 @@ class Asked(NamedTuple):
         if found.undecided and not advice:
             advice = f"no bound exists in {listed(found.undecided)} digits"
         tried, irregular, limit = found.tried, found.irregular, found.limit
+        processors = self._run_on_processors(found) if self.basis == "emulation" else ()
         return Requirement(
             found.fmt,
             self.basis,
@@ -199,7 +212,17 @@ class Asked(NamedTuple):
             cause,
             ends,
             untraced,
+            processors,
         )
+
+    def _run_on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:
+        """Run in binary32, and in binary64 if that is not enough, where the search tried as many digits."""
+        runs = list[tuple[str, float]]()
+        for name, fmt in _on_processors(found.fmt):
+            if fmt.precision in dict(found.tried) and not any(ratio <= 1 for _, ratio in runs):
+                ratio, _ = found.error(fmt)
+                runs.append((name, ratio))
+        return tuple(runs)
 
 
 def listed(numbers: Sequence[int]) -> str:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 
+import numpy as np
 import pytest
 
+from gpbnb import LinearSystem, required_precision
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.wordlength.requirement import Requirement, listed
 
@@ -55,8 +58,44 @@ def test_notes_follow_in_the_order_of_their_weight():
         (FloatFormat(10, 6), ((6, 0.7), (24, 0.3)), "6 decimal digits: 0.7 of"),
     ],
 )
-def test_a_processor_format_is_named_if_it_was_tried_and_meets_the_tolerance(fmt, tried, named):
-    assert str(Requirement(fmt, "emulation", 1, tried)) == f"{named} the tolerance, observed in 1 step"
+def test_a_bound_names_the_processor_format_that_was_tried_and_meets_the_tolerance(fmt, tried, named):
+    assert str(Requirement(fmt, "bound", 1, tried)) == f"{named} the tolerance, proved for this run of 1 step"
+
+
+@pytest.mark.parametrize(
+    ("runs", "named"),
+    [
+        ((("binary32", 0.2),), "17 bits (binary32 is enough): 0.7 of"),
+        (
+            (("binary32", 1.12), ("binary64", 0.0)),
+            "17 bits (binary32 misses the tolerance: 1.1; binary64 is enough): 0.7 of",
+        ),
+        ((("binary32", float("inf")),), "17 bits (binary32 misses the tolerance: inf): 0.7 of"),
+        ((), "17 bits: 0.7 of"),
+    ],
+)
+def test_an_observed_answer_names_what_a_run_in_the_processor_format_gives(runs, named):
+    found = Requirement(FloatFormat(2, 17), "emulation", 1, ((17, 0.7), (24, 0.01)), processors=runs)
+    assert str(found) == f"{named} the tolerance, observed in 1 step"
+
+
+@pytest.mark.parametrize("seed", [7, 15, 30])
+def test_binary32_is_enough_only_if_the_processor_itself_stays_within_the_tolerance(seed):
+    """Inputs with many ties, which binary32 rounds to even and the search away from zero."""
+    inputs = np.random.default_rng(seed).integers(-(2**24), 2**24, (60, 1)) / 2**20
+    single, exact, largest = np.float32(0), Fraction(0), Fraction(0)
+    for u in inputs[:, 0]:
+        single = np.float32(0.75) * single + np.float32(u)
+        exact = Fraction(3, 4) * exact + Fraction(float(u))
+        largest = max(largest, abs(Fraction(float(single)) - exact))
+    tolerance = 0.95 * float(largest)
+    system = LinearSystem.from_coefficients([1], ["1", "-3/4"], structure="direct form I")
+    found = required_precision(system, 60, tolerance, z=inputs)
+    assert found.precision <= 24
+    assert dict(found.tried)[24] <= 1
+    assert found.processors[0] == ("binary32", pytest.approx(float(largest) / tolerance))
+    assert found.processor_format == "binary64"
+    assert "(binary32 misses the tolerance: 1.1; binary64 is enough)" in str(found)
 
 
 @pytest.mark.parametrize(
