@@ -69,7 +69,8 @@ def required_precision(
     precisions of binary32 and binary64 if they are higher (:data:`gpbnb.arithmetic.search.CHECKED`); all of these meet
     the tolerance. It also runs the next lower precision, which does not qualify. If a higher precision misses the
     tolerance, the search runs every precision up to the largest and the other forms; the answer is then above the
-    highest precision that misses.
+    highest precision that misses. The text of an answer in bits also says what a run in binary32 itself, or in
+    binary64, gives.
 
     Parameters
     ----------
