@@ -192,7 +192,7 @@ DEROLL = Calculator(
         Input("drift", "Drift (mas a year)", 1e-9, 1e9, (1, 10000), log=True),
     ),
     definitions=derivation.off_tuned,
-    columns=("quantity (worst case)", "value"),
+    columns=("quantity, for the largest error of the rate", "value"),
     lines=(
         Line("roll rate (rad/s)", ("rate",)),
         Line("its error Δω (rad/s)", ("error",)),
@@ -201,9 +201,10 @@ DEROLL = Calculator(
         Line("loss of the signal at the end, one dimension (above 1: sign reversed)", ("lost",)),
         Line("cross drift, two dimensions (mas a year)", ("across",)),
     ),
-    sentence="The roll rate may be off by {error} rad/s. After {duration} days the phase is off by {phase} rad; in one "
-    "dimension the signal loses {lost} of its size (above 1, its sign is reversed); in two, a cross drift of "
-    "{across} mas a year appears.",
+    sentence="The roll rate may be off by {error} rad/s. If it is, the phase is off by {phase} rad after {duration} "
+    "days; in one dimension the signal loses {lost} of its size (above 1, its sign is reversed); in two, a cross drift "
+    "of {across} mas a year appears. Once the phase is off by more than half a turn, a smaller error of the rate can "
+    "do more harm.",
     figure=Figure(
         "t",
         "Share of the signal lost by the end of the record, against the places of the register",

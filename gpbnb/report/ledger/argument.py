@@ -43,9 +43,9 @@ ALT = (
     "integration stand alone."
 )
 CAPTION = (
-    "The parts of the documents and the argument that connects three of them. Each box counts the statements of a part "
-    "and the wrong ones among them, drawn as a bar; an arrow counts wrong statements that inherit a root error from "
-    "the part where it begins."
+    "The parts of the documents, and how errors pass between four of them. Each box counts the statements of a part "
+    "and the wrong ones among them, drawn as a bar. An arrow counts the wrong statements at its head that follow "
+    "from a root error at its tail."
 )
 
 

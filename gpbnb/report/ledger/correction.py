@@ -59,8 +59,8 @@ def changes() -> tuple[str, str]:
         f"year, (125) demands {digits['1 mas in place of the drift']:.1f} decimal digits. Better counting changes this "
         f"by {change['roundings counted once']} if each rounding is counted once, by "
         f"{change['errors of either sign']} with errors of either sign, and by "
-        f"{change['covariance errors carried on']} with the errors of the covariance carried on. The corrected "
-        f"count demands {digits['covariance errors carried on']:.1f} digits, and still is no bound.",
+        f"{change['covariance errors carried on']} with the errors of the covariance carried on. With all "
+        f"three, (125) demands {digits['covariance errors carried on']:.1f} digits. It still is no bound.",
         "In (125), $B$ bounds every input, however many steps ago it entered, so nothing is forgotten. The correction "
         "multiplies an error made $i$ steps ago by $F^i$. If $F<1$, the filter forgets it, and the sum stays below a "
         f"limit. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures "

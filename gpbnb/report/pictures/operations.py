@@ -186,9 +186,9 @@ STEP = Picture(
     sentence="{formula} rounds by at most {error} {unit} in {bits} bits. The new position changes by {first} times "
     "this error, and the new velocity by {second} times. In all steps together, this operation can move the {name} by "
     "{sum} {total_unit}, which is {share} % of the bound.",
-    caption="Each line is an operation that rounds, and its arcs lead to its operands. Choose one with the list or tap "
-    "it; the way of its error to the new states is drawn thick. Products with 0 and 1 and sums with 0, all exact, "
-    "are left out.",
+    caption="Below the states and the measurement, each row is an operation that rounds, and its arcs lead to its "
+    "operands. Choose one with the list or tap it. Thick arcs show how its error reaches the new states. Products with "
+    "0 and 1 and sums with 0, all exact, are left out.",
     data=step_data,
     still=_still,
     alt="The seven operations of a step that round, one below the other after the two states and the measurement. Arcs "

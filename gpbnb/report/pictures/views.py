@@ -60,8 +60,8 @@ NUMBER_LINE = Picture(
     ),
     start={"base": "10", "t": "1", "chop": "to nearest", "x": "2.4"},
     sentence="In {digits}, {x} becomes {written} = {rounded}: a relative error of {error}, which is {share} β.",
-    caption="Move x with its slider, or drag in the lower half. The error is largest just above a power of the base, "
-    "where numbers are small and the gaps between them have just widened.",
+    caption="Move x with its slider, or drag in the lower half. From two digits on, the error is largest just above a "
+    "power of the base, where numbers are small and the gaps between them have just widened.",
     data=dict,
     still=_spacings,
     alt="Three number lines from 1 to 16. The numbers of one decimal digit are 1 apart up to 10 and then 10 apart. "
