@@ -75,7 +75,7 @@ def test_the_digits_follow_from_counting_step_by_step():
     by = [f"{change:+.1f}".replace("-", "−") for change in np.diff(found)]
     assert f"(125) demands {found[0]:.1f} decimal digits" in first
     assert re.findall(r"by ([+−][\d.]+)", first) == by
-    assert f"The corrected count demands {found[-1]:.1f} digits" in first
+    assert f"With all three, (125) demands {found[-1]:.1f} digits" in first
     rows = {each.source: each.bits for each in summary.find()}
     year, every = (1 + (rows[name] - 1) * np.log10(2) for name in ("One simulated year", "Every admissible record"))
     assert f"within 1 mas with {year:.1f} decimal digits" in second
