@@ -58,7 +58,7 @@ def test_a_figure_is_enlarged_and_the_focus_returns(phone, way, end):
     phone.wait_for_function("document.activeElement.scrollLeft > 0")
     phone.keyboard.press("Escape") if end == "Escape" else phone.locator("dialog.enlarged button").click()
     assert not phone.evaluate(SHOWN)
-    assert phone.locator("dialog.enlarged").count() == 0
+    phone.wait_for_selector("dialog.enlarged", state="detached")
     assert button.evaluate("e => e === document.activeElement")
 
 
