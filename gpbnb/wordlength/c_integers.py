@@ -1,6 +1,6 @@
 """Integer arithmetic in C99 for generated filters: rounding, overflow, and 128 bits where products need them.
 
-Each helper is a function in C. A file contains those that it uses, so compilers have no reason for a warning, and no
+Each helper is a function in C. A file contains only the helpers that it uses, so that it compiles without a warning. No
 operation has an undefined or implementation-defined result.
 """
 
@@ -79,7 +79,7 @@ def word_bits(fmt: FixedFormat) -> int | None:
 
 
 def radicand_bits(fmt: FixedFormat) -> int:
-    """Return the bits of the integer whose root, a whole number, is the root of a word.
+    """Return the bits of a word shifted left by its fraction bits; the integer square root of this is the word's root.
 
     Raises
     ------

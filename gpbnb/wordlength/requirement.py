@@ -103,9 +103,9 @@ class Requirement:
     def processor_format(self) -> str:
         """Name of the smaller of binary32 and binary64 that meets the tolerance; empty if neither, or if unknown.
 
-        An observed error is that of a run in this format, with its ties to even and its range. A bound holds for
-        either rounding of ties, and says nothing about the range. There is no name in other bases, with directed
-        rounding, or with a given range.
+        An observed answer rests on a run in this format itself, which rounds ties to even and has a limited range. A
+        bound holds for either rounding of ties, and says nothing about the range. There is no name in other bases,
+        with directed rounding, or with a given range.
         """
         if self.basis == "emulation":
             return next((name for name, ratio in self.processors if ratio <= 1), "")
