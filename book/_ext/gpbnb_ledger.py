@@ -33,9 +33,9 @@ class Ledger(SphinxDirective):
     ``page NAME`` is a page of the complete ledger; ``errors TOPIC`` the errors in the statements of a chapter;
     ``verdict NAME`` the statements with one verdict; ``undone NAME`` what the documents leave undone, with one verdict;
     ``printed TITLE: IDS`` some statements as printed, collapsed;
-    ``roots`` the root errors, and ``tree`` the same as squares; ``squares`` every statement as a square; ``argument``
-    how wrong statements pass from one part of the documents to the next; ``correction`` the main result above its
-    correction; ``timeline`` the history, with sources; ``claims`` the principal claims;
+    ``roots`` the root errors, and ``root-squares`` the squares of what each affects; ``squares`` every statement as a
+    square; ``argument`` how wrong statements pass from one part of the documents to the next; ``correction`` the main
+    result above its correction; ``timeline`` the history, with sources; ``claims`` the principal claims;
     ``counts BY`` counts by document, chapter or kind.
     """
 
@@ -82,8 +82,8 @@ class Ledger(SphinxDirective):
                 return ledger().note_table((r for r in items if r.finding and r.finding.verdict is chosen), True).html
             case "squares":
                 return ledger().squares(rows).html
-            case "tree":
-                return ledger().root_tree(rows).html
+            case "root-squares":
+                return ledger().root_squares(rows).html
             case "argument":
                 from gpbnb.report.ledger.argument import chain_of_errors  # matplotlib takes a second to import
 

@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb, to_rgba
+from matplotlib.text import Text
 
 from gpbnb.report.display import style
 
@@ -85,11 +86,23 @@ def test_names_at_the_right_edge_do_not_collide():
     ends = {"low": (1.0, style.VALID), "same": (30.0, style.REFUTED), "also\nsame": (30.0, style.OBSERVED)}
     names = style.name_ends(ax, ends)
     fig.canvas.draw()
-    boxes = [each.get_window_extent() for each in names]
+    boxes = [Text.get_window_extent(each) for each in names]
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
     assert all(box.x0 > ax.get_window_extent().x1 and box.x1 <= fig.bbox.x1 for box in boxes)
     assert {each.get_text(): each.get_color() for each in names} == {k: colour for k, (_, colour) in ends.items()}
-    assert names[0].get_position() == (6, 0)
+    # Two names have moved: lines lead from all names to the ends of the curves.
+    assert all(each.arrow_patch.get_visible() for each in names)
+    assert names[0].get_position() == (18, 0)
+
+
+def test_names_in_their_places_need_no_lines():
+    fig, (ax,) = style.figure()
+    ax.plot([1, 10], [1, 1000])
+    style.label(ax, "x", "y (no unit)")
+    names = style.name_ends(ax, {"low": (1.0, style.VALID), "high": (1000.0, style.REFUTED)})
+    fig.canvas.draw()
+    assert [each.get_position() for each in names] == [(6, 0), (6, 0)]
+    assert not any(each.arrow_patch.get_visible() for each in names)
 
 
 def test_texts_move_apart_no_further_than_they_must():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -149,6 +150,11 @@ def test_the_waterfall_leads_from_the_printed_digits_to_the_corrected_ones():
     fig.canvas.draw()
     assert style.defects(fig) == []
     ends = [bar.get_x() + bar.get_width() for bar in bars]
+    # What is written adds up, and is right to its last place.
+    written = [text.get_text().replace("−", "-") for text in ax.texts if "year" not in text.get_text()]
+    numbers = [[float(each) for each in re.findall(r"[-+]?\d+\.\d\d", words)] for words in written]
+    assert [each[0] for each in numbers] == [round(end, 2) for end in ends]
+    assert np.cumsum([each[-1] for each in numbers]) == pytest.approx([each[0] for each in numbers], abs=1e-9)
     # Each bar begins where the last one ended.
     assert [bar.get_x() for bar in bars] == pytest.approx([0, *ends[:-1]])
     # β = 1/coefficient = 0.5 × 10^(1-t), as printed and by the counts of the chapter.

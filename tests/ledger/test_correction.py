@@ -72,10 +72,12 @@ def test_the_digits_follow_from_counting_step_by_step():
         digits(loop, entry, 1, 3 * n + m + 2),
     ]
     first, second = correction.changes()
-    by = [f"{change:+.1f}".replace("-", "−") for change in np.diff(found)]
-    assert f"(125) demands {found[0]:.1f} decimal digits" in first
-    assert re.findall(r"by ([+−][\d.]+)", first) == by
-    assert f"With all three, (125) demands {found[-1]:.1f} digits" in first
+    assert f"(125) demands {found[0]:.2f} decimal digits" in first
+    by = [float(each.replace("−", "-")) for each in re.findall(r"by ([+−][\d.]+)", first)]
+    assert by == pytest.approx(np.diff(found), abs=0.01)
+    # A reader who adds them up finds the sum that is written.
+    assert f"With all three, (125) demands {found[-1]:.2f} digits" in first
+    assert round(found[0], 2) + sum(by) == pytest.approx(round(found[-1], 2), abs=1e-9)
     rows = {each.source: each.bits for each in summary.find()}
     year, every = (1 + (rows[name] - 1) * np.log10(2) for name in ("One simulated year", "Every admissible record"))
     assert f"within 1 mas with {year:.1f} decimal digits" in second

@@ -211,7 +211,14 @@ def test_a_year_shows_the_stored_run(pages, t, rule, quantity):
     for (x, y), (day, error) in zip(circles, shown, strict=True):
         assert y == pytest.approx(limit - slope * math.log10(error), abs=0.25)
         share = math.log(day / days[0]) / math.log(days[-1] / days[0])
-        assert x == pytest.approx(58 + share * (found["width"] - 72), abs=1e-3)
+        assert x == pytest.approx(58 + share * (found["width"] - 98), abs=1e-3)
+    # Each curve of this rounding has its bits at its end, the largest error above, and no two collide.
+    ends = [(y, int(text)) for x, y, text in found["texts"] if x == found["width"] - 26]
+    last = {each: np.abs(getattr(stored[each], quantity)).max(axis=1)[-1] for each in stored}
+    assert sorted(each for _, each in ends) == sorted(stored)
+    heights = [float(f"{last[each]:.3g}") for _, each in sorted(ends)]
+    assert heights == sorted(heights, reverse=True)
+    assert np.diff(sorted(y for y, _ in ends)).min() >= 13.9
     step, ulp = (float(found[name][1:].split()[0]) for name in ("step", "ulp"))
     decade = (found["width"] - 72) / -math.floor(math.log10(8192 * 2.0**-53))
     assert (step - ulp) / decade == pytest.approx(math.log10(6606 / 3153600 / 2.0 ** (13 - bits)), abs=0.01)

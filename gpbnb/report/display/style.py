@@ -248,7 +248,9 @@ def apart(heights: Sequence[float], lines: Sequence[int], size: float) -> list[f
 
 
 def name_ends(ax: Axes, ends: Mapping[str, tuple[float, str]]) -> list[Annotation]:
-    """Write names to the right of a panel, each at the height where its curve ends; names that collide move apart.
+    """Write names to the right of a panel, each at the height where its curve ends.
+
+    Names that collide move apart. If one moves far, lines join all names to their curves.
 
     Parameters
     ----------
@@ -265,6 +267,7 @@ def name_ends(ax: Axes, ends: Mapping[str, tuple[float, str]]) -> list[Annotatio
             va="center",
             fontsize=TEXT,
             annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.8, "shrinkA": 1, "shrinkB": 1, "relpos": (0, 0.5)},
         )
         for text, (height, colour) in ends.items()
     ]
@@ -273,8 +276,11 @@ def name_ends(ax: Axes, ends: Mapping[str, tuple[float, str]]) -> list[Annotatio
         points = 72 / ax.figure.dpi
         heights = [float(ax.transData.transform((1, note.xy[1]))[1]) * points for note in notes]
         lines = [note.get_text().count("\n") + 1 for note in notes]
-        for note, height, place in zip(notes, heights, apart(heights, lines, 1.3 * TEXT), strict=True):
-            note.set_position((6, place - height))
+        moves = np.subtract(apart(heights, lines, 1.3 * TEXT), heights)
+        far = bool((np.abs(moves) > TEXT / 2).any())
+        for note, move in zip(notes, moves, strict=True):
+            note.set_position((18 if far else 6, move))
+            note.arrow_patch.set_visible(far)
 
     if isinstance(ax.figure, BookFigure):
         ax.figure.last_moves.append(move_apart)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from gpbnb.report.display import style
 from gpbnb.report.display.vector import element
 
-FIRST, LAST = 1960, 2012
+FIRST, LAST = 1960, 2017
 """The years between which the timeline runs."""
 MONTHS = (
     *("January", "February", "March", "April", "May", "June"),
@@ -55,6 +55,7 @@ EVENTS = (
     Event(LANES[0], "1976", "", "Thornton: triangular\nfactors of covariances", ("thornton1976",)),
     Event(LANES[0], "1985", "", "IEEE 754", ("ieee1985",)),
     Event(LANES[0], "1986", "", "Verhaegen, Van Dooren:\nerrors of filter forms", ("verhaegen1986",)),
+    Event(LANES[0], "2016", "", "Savage: errors of\ndigital integration", ("savage2016",)),
     Event(LANES[1], "1960", "", "Schiff predicts\ntwo drifts", ("schiff1960",)),
     Event(LANES[1], "1982", "", "first report by Hung", ("hung1982",)),
     Event(LANES[1], "1984", "", "second report,\nwith bound (125)", ("hung1984",)),
@@ -64,9 +65,9 @@ EVENTS = (
     Event(LANES[1], "2011", "", "final results", ("everitt2011",)),
 )
 CAPTION = (
-    "The history of filters in short arithmetic, and of Gravity Probe B. A dot is a year or a day, and a bar is a span "
-    "of time. The orange dot is the bound that this book refutes. Our sources do not name the year of Potter's square "
-    "root: it came after Kalman's filter and before the paper of 1969 that extends square-root filtering."
+    "The history of filters in short arithmetic, and of Gravity Probe B. Dots mark events, and bars mark periods. The "
+    "orange dot is the bound that this book refutes. Our sources do not name the year of Potter's square root: it came "
+    "after Kalman's filter and before the paper of 1969 that extends square-root filtering."
 )
 
 
@@ -75,7 +76,8 @@ def description() -> str:
     lanes = (
         f"{lane}: " + "; ".join(f"{each.when}, {_line(each)}" for each in EVENTS if each.lane == lane) for lane in LANES
     )
-    return f"A timeline with two sides, from {FIRST} at the top to {EVENTS[-1].when}. {'. '.join(lanes)}."
+    last = max(each.begin[:4] for each in EVENTS)
+    return f"A timeline with two sides, from {FIRST} at the top to {last}. {'. '.join(lanes)}."
 
 
 def figure(height: float = 6.2) -> Figure:

@@ -119,12 +119,12 @@ def step_parts(n: int, m: int) -> tuple[StepPart, ...]:
     difference = counted(z - algebra.times(model.H, ahead))
     counted(kalman_step.corrected_by(algebra, K, ahead, difference))
     names = {
-        "predict covariance": r"$\Phi P\Phi^T + Q$",
-        "gain": r"$P_pH^T(HP_pH^T + R)^{-1}$",
-        "update covariance": r"$(I - KH)P_p$",
-        "predict state": r"$\Phi x$",
-        "innovation": r"$z - Hx_p$",
-        "correct state": r"$x_p + Ky$",
+        "predict covariance": r"$P_p = \Phi P\Phi^T + Q$",
+        "gain": r"$K = P_pH^T(HP_pH^T + R)^{-1}$",
+        "update covariance": r"$P = (I - KH)P_p$",
+        "predict state": r"$x_p = \Phi x$",
+        "innovation": r"$y = z - Hx_p$",
+        "correct state": r"$x = x_p + Ky$",
     }
     return tuple(
         StepPart(name, formula, after - before)
@@ -136,12 +136,13 @@ def block_diagram(parts: Sequence[StepPart], ax: Axes) -> list[Artist]:
     """Draw a step as blocks: covariance and gain above, the state below; each block has its share of the roundings."""
     total = sum(part.operations for part in parts)
     artists: list[Artist] = []
-    places = [(column, row) for row in (1.0, 0.0) for column in (0.0, 1.0, 2.0)]
-    for part, (column, row) in zip(parts, places, strict=True):
+    columns = ((0.0, 0.46), (1.2, 0.56), (2.4, 0.46))  # centre and half a width; the formula of the gain is long
+    places = [(*column, row) for row in (1.0, 0.0) for column in columns]
+    for part, (column, half, row) in zip(parts, places, strict=True):
         share = part.operations / total
         box = FancyBboxPatch(
-            (column - 0.42, row - 0.27),
-            0.84,
+            (column - half, row - 0.27),
+            2 * half,
             0.54,
             boxstyle="round,pad=0.03",
             facecolor=(*to_rgb(OBSERVED), 0.06 + 0.5 * share),
@@ -153,14 +154,14 @@ def block_diagram(parts: Sequence[StepPart], ax: Axes) -> list[Artist]:
     arrows = [
         (x, row, x + length, row)
         for row in (1, 0)
-        for x, length in ((-0.65, 0.2), (0.45, 0.1), (1.45, 0.1), (2.45, 0.2))
+        for x, length in ((-0.69, 0.2), (0.49, 0.12), (1.79, 0.12), (2.89, 0.2))
     ]
-    for *start, x, y in [*arrows, (1.2, 0.7, 1.8, 0.3), (1, -0.55, 1, -0.3)]:
+    for *start, x, y in [*arrows, (1.5, 0.7, 2.08, 0.3), (1.2, -0.55, 1.2, -0.3)]:
         ax.annotate("", (x, y), (start[0], start[1]), arrowprops={"arrowstyle": "->", "color": BLACK, "lw": 1.4})
-    letters = (("P", -0.72, 1), ("x", -0.72, 0), ("P", 2.72, 1), ("x", 2.72, 0), ("z", 1, -0.66), ("K", 1.6, 0.55))
+    letters = (("P", -0.76, 1), ("x", -0.76, 0), ("P", 3.16, 1), ("x", 3.16, 0), ("z", 1.2, -0.66), ("K", 1.9, 0.56))
     for letter, x, y in letters:
         artists.append(ax.text(x, y, f"${letter}$", ha="center", va="center", fontsize=TEXT))
-    ax.set_xlim(-0.8, 2.8)
+    ax.set_xlim(-0.85, 3.25)
     ax.set_ylim(-0.75, 1.35)
     ax.axis("off")
     return artists
@@ -175,19 +176,21 @@ def waterfall(ax: Axes, tolerance: Fraction, observed: float) -> list[Artist]:
     observed : decimal digits with which an emulated year stayed within that error.
     """
     digits = report_bounds.example_digits(tolerance)
+    written = [*report_bounds.written_changes(digits).values()]
     artists: list[Artist] = []
     for row, (before, after) in enumerate(pairwise([0.0, *digits.values()])):
         colour = REFUTED if after >= before else REFERENCE
         artists += ax.barh(-row, after - before, 0.62, left=before, color=colour, alpha=0.85).patches
-        change = f"{after:.1f}" if not row else f"{after:.1f} ({after - before:+.1f})".replace("-", "−")
-        write(ax, change, (max(before, after), -row), BLACK, (6 if row else -6, 0))
+        count, change = written[row]
+        words = f"{count} ({change})" if change else count
+        write(ax, words, (max(before, after), -row), BLACK, (6 if row else -6, 0))
         if row:
             ax.plot([before, before], [-row + 1.31, -row - 0.31], color=REFERENCE, lw=0.8)
     ax.axvline(observed, color=OBSERVED, lw=1.4)
     write(ax, f"an emulated year: {observed:.1f}", (observed, 0.75), OBSERVED, (6, 0), annotation_clip=False)
     ax.set_yticks([-row for row in range(len(digits))], [*digits])
     ax.set_ylim(0.5 - len(digits), 1.2)
-    ax.set_xlim(0, 32)
+    ax.set_xlim(0, 36)
     ax.grid(axis="y", visible=False)
     label(ax, "decimal digits", "")
     return artists

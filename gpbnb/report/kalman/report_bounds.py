@@ -7,9 +7,10 @@ ints and Fractions and return Fractions.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -208,14 +209,32 @@ def example_digits(tolerance: Fraction) -> dict[str, float]:
     """
     formula = coefficients(*EXAMPLE)
     demanded: dict[str, Fraction] = {
-        "first term, as printed": Fraction(PRINTED["first coefficient"]),
-        "second term, as printed": Fraction(PRINTED["second coefficient"]),
-        "(125), evaluated correctly": Fraction(formula.second),
+        "printed number, first term": Fraction(PRINTED["first coefficient"]),
+        "printed number, second term": Fraction(PRINTED["second coefficient"]),
+        "formula as printed": Fraction(formula.second),
         "1 mas in place of the drift": formula.second / tolerance,
     }
     for name, faults in [*CORRECTIONS.items()][1:]:
         demanded[name.removeprefix("and ")] = coefficients(*EXAMPLE, **faults).second / tolerance
     return {name: math.log10(coefficient / 2) + 1 for name, coefficient in demanded.items()}
+
+
+def written_changes(digits: Mapping[str, float]) -> dict[str, tuple[str, str]]:
+    """Write digits and their changes to two decimals, so that a reader can add the changes up.
+
+    Parameters
+    ----------
+    digits : as :func:`example_digits` returns them.
+
+    Returns
+    -------
+    written : for each name, the digits and their change since the name before, which is empty for the first.
+    """
+    rounded = {name: round(count, 2) for name, count in digits.items()}
+    changes = [f"{after - before:+.2f}".replace("-", "−") for before, after in pairwise(rounded.values())]
+    return {
+        name: (f"{count:.2f}", change) for (name, count), change in zip(rounded.items(), ["", *changes], strict=True)
+    }
 
 
 def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction:

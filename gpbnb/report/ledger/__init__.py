@@ -27,7 +27,7 @@ from gpbnb.report.ledger.page import (
 )
 from gpbnb.report.ledger.render import table
 from gpbnb.report.ledger.roots import by_root, load_roots
-from gpbnb.report.ledger.squares import root_tree, squares
+from gpbnb.report.ledger.squares import root_squares, squares
 from gpbnb.report.ledger.statements import Statement, load_statements, quote, select
 
 __all__ = [
@@ -51,8 +51,8 @@ __all__ = [
     "note_table",
     "printed_table",
     "quote",
+    "root_squares",
     "root_table",
-    "root_tree",
     "rows",
     "select",
     "select_topic",

@@ -6,7 +6,6 @@ import ast
 from collections.abc import Mapping
 from copy import deepcopy
 from fractions import Fraction
-from itertools import pairwise
 from typing import Any
 
 from gpbnb.arithmetic.formats import FloatFormat
@@ -46,21 +45,19 @@ def marked(relation: Relation, marks: Mapping[str, str]) -> str:
 
 def changes() -> tuple[str, str]:
     """Say what each letter means and what the change does to the digits, as prose with formulas."""
-    digits = report_bounds.example_digits(Fraction(1, summary.DRIFT))
-    change = {
-        name: f"{after - before:+.1f}".replace("-", "−") for (_, before), (name, after) in pairwise(digits.items())
-    }
+    digits = report_bounds.written_changes(report_bounds.example_digits(Fraction(1, summary.DRIFT)))
+    change = {name: step for name, (_, step) in digits.items()}
     year = answers.decimal_digits(FloatFormat(2, answers.find_answers().bits))
     bits = {row.states: horizon.bits(row) for row in horizon.load()}  # of the last row, for the whole year
     every = answers.decimal_digits(FloatFormat(2, bits["absolute"]))
     return (
         "The report counts roundings, as if the error of a step were in proportion to its result. The correction takes "
         "$e$, the error that a step really adds, which cancellation can make larger than any count. For 1 mas after a "
-        f"year, (125) demands {digits['1 mas in place of the drift']:.1f} decimal digits. Better counting changes this "
+        f"year, (125) demands {digits['1 mas in place of the drift'][0]} decimal digits. Better counting changes this "
         f"by {change['roundings counted once']} if each rounding is counted once, by "
         f"{change['errors of either sign']} with errors of either sign, and by "
         f"{change['covariance errors carried on']} with the errors of the covariance carried on. With all "
-        f"three, (125) demands {digits['covariance errors carried on']:.1f} digits. It still is no bound.",
+        f"three, (125) demands {digits['covariance errors carried on'][0]} digits. It still is no bound.",
         "In (125), $B$ bounds every input, however many steps ago it entered, so nothing is forgotten. The correction "
         "multiplies an error made $i$ steps ago by $F^i$. If $F<1$, the filter forgets it, and the sum stays below a "
         f"limit. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures "

@@ -265,7 +265,7 @@ def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
     rows = in_reading_order(rows)
     owner = topics()
     lines = [
-        f'<tr><th scope="row">{_link(row)}{_chapter(row, owner)}</th><td>{badge(row.outcome)}</td>'
+        f'<tr><th scope="row">{_link(row)}{_chapter(row, owner)}</th><td>{badge(outcome_name(row.outcome))}</td>'
         f"{_evidence(row, note_first=not left_undone)}</tr>"
         for row in rows
     ]
@@ -343,7 +343,8 @@ def _error(group: Sequence[Row]) -> str:
         places.setdefault(row.statement.document, []).append(link)
     affected = "".join(f"<p>{document[-4:]}: {', '.join(links)}</p>" for document, links in places.items())
     badges = " ".join(
-        badge(outcome) for outcome in dict.fromkeys(row.outcome for row in sorted(group, key=_seriousness))
+        badge(outcome_name(outcome))
+        for outcome in dict.fromkeys(row.outcome for row in sorted(group, key=_seriousness))
     )
     return f'<tr><th scope="row">{text}</th><td>{badges}</td><td>{affected}</td></tr>'
 

@@ -9,11 +9,13 @@ from collections.abc import Iterable
 
 from gpbnb.report.display.tables import Table, one_line
 from gpbnb.report.ledger.checking import FAILED, MISSING, Row, counts, in_reading_order
+from gpbnb.report.ledger.finding import Verdict
 from gpbnb.report.ledger.statements import Statement
 
 COLUMNS = ("id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note")
 _AGREES = {True: "true", False: "false", None: ""}
-OUTCOMES = {MISSING: "no check", FAILED: "check failed"}
+OUTCOMES = {MISSING: "no check", FAILED: "check failed", Verdict.OCR.value: "scan error"}
+"""Outcomes that readers see under another name."""
 
 
 def to_csv(rows: Iterable[Row]) -> str:

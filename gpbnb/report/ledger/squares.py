@@ -1,4 +1,4 @@
-"""The ledger at a glance: one square a statement, in the order of the documents, and the tree of root errors."""
+"""The ledger at a glance: one square a statement, in the order of the documents, and those of each root error."""
 
 from __future__ import annotations
 
@@ -30,15 +30,23 @@ def squares(rows: Iterable[Row]) -> Html:
     return Html(f"{len(rows)} squares", _whole(f'<ul class="squares-key">{key}</ul>', lines))
 
 
-def root_tree(rows: Iterable[Row]) -> Html:
-    """Draw each root error with the squares of the statements that it affects, the largest first."""
+ROOT_CAPTION = (
+    "Each row is a root error, and its squares are the statements that it makes wrong or inconsistent. The longest row "
+    "comes first. Squares have the shapes and colours of the picture at the top of this page, and lead to the ledger."
+)
+
+
+def root_squares(rows: Iterable[Row]) -> Html:
+    """Draw the squares of the statements that each root error affects, the longest row first, with a caption."""
     found = sorted(by_root(rows).items(), key=lambda item: -len(item[1]))
     lines = [_group(typeset(load_roots()[key].title), in_reading_order(spoiled), True) for key, spoiled in found]
-    return Html(f"tree of {len(found)} root errors", _whole("", lines, " squares-tree"))
+    picture = _whole("", lines, " squares-roots")
+    caption = f"<figcaption>{escape(ROOT_CAPTION)}</figcaption>"
+    return Html(f"squares of {len(found)} root errors", f"<figure>{picture}{caption}</figure>")
 
 
 def _class(outcome: str) -> str:
-    return f"square-{outcome.replace(' ', '-')}"
+    return f"square-{outcome_name(outcome).replace(' ', '-')}"
 
 
 def _whole(key: str, lines: Iterable[str], classes: str = "") -> str:

@@ -73,6 +73,10 @@ function draw({ add, svg, width, values, set, scale, show, superscript }) {
   const [top, bottom] = [132, 292];
   const along = scale(0, Math.log10(b), left, right, true, 70);
   const up = (value) => bottom - (value / (1.25 * beta)) * (bottom - top);
+  const below = e - 1;
+  const place = (number) => along.place(Math.min(b, Math.max(1, number / b ** below)));
+  const [first, last] = [place(values.near[0]), place(values.near.at(-1))];
+  add("rect", { class: "range", x: first, y: top, width: Math.max(2, last - first), height: bottom - top });
   add("text", { x: 4, y: top - 16 }, "Relative error, in units of β");
   for (const share of [0, 0.5, 1]) {
     add("line", { class: share === 1 ? "curve curve-2 bound" : "grid", x1: left, x2: right, y1: up(share * beta), y2: up(share * beta) });
@@ -97,13 +101,12 @@ function draw({ add, svg, width, values, set, scale, show, superscript }) {
     to(b, 0);
   }
   add("path", { class: teeth > TEETH ? "mark-1 teeth" : "curve curve-5 teeth", d: path });
-  const below = e - 1;
-  const m = Math.min(b, Math.max(1, x / b ** below));
-  add("circle", { class: "curve-0 here", cx: along.place(m), cy: up(error), r: 5 });
+  add("circle", { class: "curve-0 here", cx: place(x), cy: up(error), r: 5 });
   const named = (power) => (power === 0 ? "1" : power === 1 ? String(b) : `${b}${superscript(power)}`);
   add("text", { x: left, y: bottom + 20, "text-anchor": "middle" }, named(below));
   add("text", { x: right, y: bottom + 20, "text-anchor": "end" }, named(e));
-  add("text", { x: (left + right) / 2, y: bottom + 20, "text-anchor": "middle" }, "number x");
+  add("text", { x: (left + right) / 2, y: bottom + 20, "text-anchor": "middle" }, "number x, logarithmic");
+  add("text", { x: right, y: up(beta) - 6, "text-anchor": "end", class: "text-2" }, "β");
 
   const drag = (event) => {
     if (!event.buttons && event.pointerType === "mouse") return;

@@ -60,8 +60,10 @@ NUMBER_LINE = Picture(
     ),
     start={"base": "10", "t": "1", "chop": "to nearest", "x": "2.4"},
     sentence="In {digits}, {x} becomes {written} = {rounded}: a relative error of {error}, which is {share} β.",
-    caption="Move x with its slider, or drag in the lower half. From two digits on, the error is largest just above a "
-    "power of the base, where numbers are small and the gaps between them have just widened.",
+    caption="Move x with its slider, or drag in the lower graph. The upper graph enlarges the shaded part of the lower "
+    "one. The lower graph covers one power of the base on a logarithmic axis; its horizontal line is β, which no "
+    "relative error exceeds. From two digits on, the error is largest just above a power of the base, where numbers "
+    "are small and the gaps between them have just widened.",
     data=dict,
     still=_spacings,
     alt="Three number lines from 1 to 16. The numbers of one decimal digit are 1 apart up to 10 and then 10 apart. "
@@ -121,8 +123,9 @@ A_YEAR = Picture(
     start={"t": "24", "chop": "to nearest", "quantity": "drift rate"},
     sentence="{stored}With {bits} bits, the error of the {name} {when}. At the end of the year it is {end} {unit}. "
     "{place}.",
-    caption="Above, one run of the filter with circles at its checkpoints, and the other stored runs in grey. Below, "
-    "what one step adds to a drift angle, beside the last place of that angle.",
+    caption="Above, one run of the filter with circles at its checkpoints, and the other stored runs in grey. Each "
+    "curve ends at its number of bits. Below, what one step adds to a drift angle, beside the last place of that "
+    "angle. Short grey lines mark the last place for the other runs.",
     data=year_data,
     still=_year_still,
     alt="Error of the drift rate over a year, on logarithmic axes, for 18, 24, 32 and 40 bits. More bits give smaller "
@@ -177,7 +180,8 @@ DEROLL = Picture(
     "{unrolled} to {rolled} mas a year, by a factor of {gain}. A phase that is wrong by {phase} arcseconds adds a "
     "false drift of {across} mas a year.",
     caption="Above, rolling moves the drift to the right, where 1/f noise is weak. Below, the deroll brings it back, "
-    "and an error of the roll angle turns a small part of the large drift into the direction of the small one.",
+    "and an error of the roll angle turns a small part of the large drift into the direction of the small one. The "
+    "roll period changes only the upper graph, and the phase error only the lower one.",
     data=roll_data,
     still=_roll_still,
     alt="Density of the samples of 1/f noise against frequency on logarithmic axes. A drift that is not rolled lies at "

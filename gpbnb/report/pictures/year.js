@@ -24,9 +24,16 @@ function compute({ t, chop, quantity }, data) {
   return { t, chop, quantity, bits: run.t, ulp, errors: run.errors, end: errors.at(-1), unit, name, stored, when, place };
 }
 
+// Places at least a line apart, within limits, for the ends of curves from the highest to the lowest.
+function apart(ends, top, bottom) {
+  const line = 14;
+  ends.forEach((each, i) => (each.place = Math.max(each.end, i ? ends[i - 1].place + line : top)));
+  for (let i = ends.length - 1, limit = bottom; i >= 0; i--, limit = ends[i + 1].place - line) ends[i].place = Math.min(ends[i].place, limit);
+}
+
 function draw({ add, width, values, data, scale, axes, show, superscript }) {
   const { quantity, bits, chop, ulp } = values;
-  const [left, right, top, bottom] = [58, width - 14, 30, 270];
+  const [left, right, top, bottom] = [58, width - 40, 30, 270];
   const every = data.runs.flatMap((run) => run.errors[quantity]).filter((error) => error > 0);
   const y = scale(Math.floor(Math.log10(Math.min(...every))), Math.ceil(Math.log10(Math.max(...every))), bottom, top, true, 30);
   const days = data.steps.map((step) => (step * data.interval) / 86400);
@@ -41,8 +48,16 @@ function draw({ add, width, values, data, scale, axes, show, superscript }) {
     });
     return path;
   };
-  for (const run of data.runs) {
-    if (run.chop === chop && run.t !== bits) add("path", { class: "faint", d: curve(run.errors[quantity]) });
+  const shown = data.runs.filter((run) => run.chop === chop);
+  for (const run of shown) if (run.t !== bits) add("path", { class: "faint", d: curve(run.errors[quantity]) });
+  // Each curve has its bits at its end, moved apart where curves end close together.
+  const ends = shown.map((run) => ({ bits: run.t, end: y.place(run.errors[quantity].at(-1)) })).sort((a, b) => a.end - b.end);
+  apart(ends, top, bottom);
+  add("text", { x: width - 4, y: 14, "text-anchor": "end" }, "bits");
+  for (const each of ends) {
+    add("path", { class: "faint", d: `M${right} ${each.end.toFixed(1)}L${right + 12} ${each.place.toFixed(1)}` });
+    const own = each.bits === bits ? { class: "ending text-0", "font-weight": 600 } : { class: "ending" };
+    add("text", { x: right + 14, y: each.place + 4, ...own }, String(each.bits));
   }
   const limit = y.place(data.tolerance);
   add("line", { class: "limit", x1: left, x2: right, y1: limit, y2: limit });
@@ -54,15 +69,16 @@ function draw({ add, width, values, data, scale, axes, show, superscript }) {
 
   // The last place of an angle of a year's drift, beside what one step adds to it.
   const low = Math.log10(data.angle_bound) - 53 * Math.log10(2);
-  const ladder = scale(Math.floor(low), 0, left, right, true, 60);
+  const edge = width - 14;
+  const ladder = scale(Math.floor(low), 0, left, edge, true, 60);
   const line = bottom + 110;
   add("text", { x: 4, y: line - 46 }, `Last place of ${data.drift} mas, and one step (mas)`);
-  add("line", { class: "line", x1: left, x2: right, y1: line, y2: line });
+  add("line", { class: "line", x1: left, x2: edge, y1: line, y2: line });
   for (const [at, label] of ladder.ticks) {
     add("line", { class: "line", x1: at, x2: at, y1: line, y2: line + 5 });
     add("text", { x: at, y: line + 22, "text-anchor": "middle" }, label);
   }
-  for (const run of data.runs.filter((each) => each.chop === chop)) {
+  for (const run of shown) {
     const at = ladder.place(data.angle_bound / 2 ** run.t);
     add("line", { class: "faint", x1: at, x2: at, y1: line - 6, y2: line });
   }
