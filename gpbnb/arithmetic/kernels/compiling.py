@@ -28,6 +28,7 @@ import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from gpbnb.arithmetic.kernels.machine_code import generate_on_demand
@@ -119,7 +120,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         return str(self._folder)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        target_context.refresh()
+        rtsys.initialize(target_context)  # the rest of numba, which takes 0.3 s, is imported only for compiling
         key = self._index_key(sig, target_context.codegen())
         path = self._path(key)
         found = _load(path, key, target_context)
