@@ -23,7 +23,6 @@ from gpbnb.arithmetic.array import NumberFormat
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.names import format_parts
 
 
 def _ieee(base: int, precision: int, emax: int) -> FloatFormat:
@@ -127,20 +126,3 @@ def format_text(fmt: FloatFormat | FixedFormat) -> str:
     ('BINARY32', '7 decimal digits, chopped')
     """
     return next((name for name, each in NAMED.items() if fmt == each), arithmetic(fmt))
-
-
-def format_named(name: str) -> FloatFormat | FixedFormat:
-    """Return the format with a name: that of a processor, "Q15", "Q4.12" or "fixed 4.12"; case is ignored.
-
-    Raises
-    ------
-    ValueError : no such format; see :func:`gpbnb.names.format_parts`.
-
-    Examples
-    --------
-    >>> from gpbnb import FixedFormat
-    >>> format_named("bfloat16") == BFLOAT16, format_named("fixed 4.12") == FixedFormat(4, 12)
-    (True, True)
-    """
-    found = format_parts(name)
-    return NAMED[found] if isinstance(found, str) else FixedFormat(*found)

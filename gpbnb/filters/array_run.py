@@ -25,7 +25,6 @@ from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.filters import array_steps
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_steps import ONE_FORMAT, BlockStorage
-from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.bounded_steps import CarriedBound, Taken
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
 from gpbnb.filters.forms import Form
@@ -41,7 +40,7 @@ from gpbnb.filters.kalman_step import (
 )
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import opening
-from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums
+from gpbnb.filters.run import Checkpoints
 
 ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
 FACTORED = (Form.UD, *ROOTS)
@@ -351,38 +350,6 @@ class _BoundTaker:
         if self.run.form in FACTORED:
             return double_doubles(self.run.covariance(self.run.P))
         return _double_doubles(self.run.P)
-
-
-def opened_run(
-    model: LinearModel,
-    fmt: FloatFormat | BlockFormats,
-    form: AnyForm,
-    checkpoint_steps: Sequence[int] = (),
-    bounded: bool = False,
-    sums: Sums = LEFT_TO_RIGHT,
-    compensated: bool = False,
-) -> Run | ArrayRun:
-    """Return a run in compiled loops if the form has them and the model has no inputs, else in array operations.
-
-    Raises
-    ------
-    ValueError : the run has no compiled loops, but other sums or compensated summation are required; or for a reason
-        given in
-        :class:`~gpbnb.filters.run.Run` and :class:`ArrayRun`.
-    """
-    if not model.has_inputs and not isinstance(form, ArrayForm):
-        return Run(model, fmt, form, checkpoint_steps, sums, compensated, bounded)
-    if sums != LEFT_TO_RIGHT or compensated:
-        raise ValueError(
-            "got sums or compensated with known inputs or a form without compiled loops; needed neither; for "
-            'compensated summation write form="compensated"'
-        )
-    if isinstance(fmt, BlockFormats):
-        raise ValueError(
-            "got formats of blocks with known inputs or a form without compiled loops; needed neither; its forms are "
-            f"{', '.join(map(str, Form))}"
-        )
-    return ArrayRun(model, fmt, form, checkpoint_steps, bounded)
 
 
 def block_algebra(formats: Sequence[FloatFormat], stored: BlockStorage) -> BlockAlgebra:

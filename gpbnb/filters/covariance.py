@@ -118,20 +118,19 @@ def repaired(
     return symmetric, Repair(letter, member, asymmetry, shift) if asymmetry or shift else None
 
 
-def stored_in(
+def raised_as_stored(
     fmt: FloatFormat | FixedFormat, letter: str, member: int, matrix: NDArray[Any], strictly: bool
 ) -> tuple[NDArray[Any], Repair] | None:
-    """Return a covariance as a format stores it, with raised variances, and the change.
+    """Return a covariance as a format stores it, with variances raised until it is definite, and the change.
 
     Parameters
     ----------
-    matrix : (n, n), exact.
+    matrix : (n, n), exact; indefinite as the format stores it.
     strictly : whether it must be positive definite.
 
     Returns
     -------
-    stored : None if no change is necessary, or if none helps: a variance overflows, or becomes zero while a covariance
-        does not.
+    stored : None if no change helps: a variance overflows, or becomes zero while a covariance does not.
     """
 
     def sound(candidate: NDArray[Any]) -> bool:
@@ -141,10 +140,8 @@ def stored_in(
         return np.asarray(fmt.array(candidate).to_fractions(), dtype=object)
 
     try:
-        if sound(store(matrix)):
-            return None
         found = raised_until(matrix, sound, least_shift(fmt), LARGEST_STORED_SHIFT, store)
-    except OverflowError:  # nothing can store it
+    except OverflowError:
         return None
     return None if found is None else (found[0], Repair(letter, member, 0.0, found[1], fmt))
 

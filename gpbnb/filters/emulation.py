@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.array_forms import AnyForm
-from gpbnb.filters.array_run import ArrayRun, opened_run
+from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
 from gpbnb.filters.missing import stored_measurements
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
-from gpbnb.filters.nonlinear_run import NonlinearRun, complete, nonlinear_checkpoints
+from gpbnb.filters.nonlinear_run import NonlinearRun, complete, nonlinear_checkpoints, opened
 from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums, log_spaced, reference
 
 
@@ -151,15 +151,11 @@ def emulate(
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     if chosen and max(chosen) > len(measured):
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
-    if isinstance(model, NonlinearModel):
-        if compensated or sums != LEFT_TO_RIGHT:
-            raise ValueError("got sums or compensated estimates for a nonlinear model; needed neither: it has no loops")
-        nonlinear = NonlinearRun(model, fmt, form, chosen)
-        nonlinear.take(measured)
-        return compare_runs(nonlinear, nonlinear_checkpoints(model, measured, chosen) if true is None else true)
-    run = opened_run(model, fmt, form, chosen, False, sums, compensated)
+    run = opened(model, fmt, form, chosen, sums=sums, compensated=compensated)
     run.take(measured)
-    if true is None:
-        stored = model.rounded(fmt.model if isinstance(fmt, BlockFormats) else fmt)
-        true = reference(stored, measured, chosen)
-    return compare_runs(run, true)
+    if true is not None:
+        return compare_runs(run, true)
+    if isinstance(model, NonlinearModel):
+        return compare_runs(run, nonlinear_checkpoints(model, measured, chosen))
+    stored = model.rounded(fmt.model if isinstance(fmt, BlockFormats) else fmt)
+    return compare_runs(run, reference(stored, measured, chosen))

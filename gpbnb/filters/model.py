@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import Numbers
+from gpbnb.arithmetic.definiteness import is_definite
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
@@ -23,9 +24,9 @@ from gpbnb.filters.covariance import (
     Repair,
     check_covariance,
     in_floats,
+    raised_as_stored,
     repair_tolerance,
     repaired,
-    stored_in,
 )
 from gpbnb.filters.named import checked_name, checked_names, range_text, sized
 
@@ -380,7 +381,7 @@ class LinearModel:
         ValueError : a stored covariance is indefinite, and :meth:`definite_in` could not repair it.
         """
         sound = self.definite_in(fmt)
-        stored = {letter: array.to_fractions() for letter, array in sound.arrays(fmt).items()}
+        stored = {letter: array.to_fractions() for letter, array in stored_arrays(sound, fmt).items()}
         made = replace(self, **stored, name=f"{self.name}, in {fmt}", repair=None)
         object.__setattr__(made, "repairs", sound.repairs)
         return made
@@ -419,6 +420,20 @@ class LinearModel:
         return {letter: entries.copy() for letter, entries in _floats(self).items()}
 
 
+def stored_arrays(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
+    """Return :meth:`LinearModel.arrays`, rounded once for each format; their formats are equal to `fmt`.
+
+    With stochastic rounding, they are rounded each time: arrays that were kept would draw no random numbers, and the
+    measurements would be rounded with others.
+    """
+    return model.arrays(fmt) if fmt.rounding is Rounding.STOCHASTIC else _arrays_once(model, fmt)
+
+
+@lru_cache(maxsize=8)
+def _arrays_once(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
+    return model.arrays(replace(fmt))  # a format of its own, for which no search refuses conversions
+
+
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
 _INPUTS = ("B", "u", "b", "d")
 _CYCLES = ("Phi", "H", "Q", "R", "B")
@@ -451,20 +466,25 @@ def _floats(model: LinearModel) -> dict[str, NDArray[np.float64]]:
 
 @lru_cache(maxsize=16)
 def _definite_in(model: LinearModel, fmt: FloatFormat | FixedFormat) -> LinearModel:
+    try:
+        rounded = {letter: stored_arrays(model, fmt)[letter].to_fractions() for letter in _COVARIANCES}
+    except OverflowError:  # nothing can store it
+        return model
     changed: dict[str, NDArray[Any]] = {}
     repairs: list[Repair] = []
     for letter, strictly in _COVARIANCES.items():
         matrices = getattr(model, letter)
-        stored = matrices.reshape(-1, *matrices.shape[-2:]).copy()
+        members = matrices.reshape(-1, *matrices.shape[-2:]).copy()
         found: dict[tuple[Fraction, ...], tuple[NDArray[Any], Repair] | None] = {}
-        for member, matrix in enumerate(stored):
-            key = tuple(matrix.flat)
+        for member, stored in enumerate(rounded[letter].reshape(members.shape)):
+            key = tuple(members[member].flat)
             if key not in found:
-                found[key] = stored_in(fmt, letter, member, matrix, strictly)
+                sound = is_definite(stored, strictly)
+                found[key] = None if sound else raised_as_stored(fmt, letter, member, members[member], strictly)
             if (better := found[key]) is not None:
-                stored[member], repair = better
+                members[member], repair = better
                 repairs.append(repair._replace(member=member))
-                changed[letter] = stored.reshape(matrices.shape)
+                changed[letter] = members.reshape(matrices.shape)
     if not changed:
         return model
     made = replace(model, **changed)  # type: ignore[arg-type]

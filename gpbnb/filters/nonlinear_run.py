@@ -23,7 +23,6 @@ from gpbnb.filters.array_run import (
     ArrayRun,
     SteppedRun,
     block_algebra,
-    opened_run,
 )
 from gpbnb.filters.array_steps import BlockStorage, observe_ud, observed, root_of_factors
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
@@ -33,7 +32,7 @@ from gpbnb.filters.kalman_step import corrected_by, measured_in, predicted_in
 from gpbnb.filters.missing import without_missing
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.reference import Step, agreed
-from gpbnb.filters.run import Checkpoints, Run, reference_states
+from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
 from gpbnb.filters.unscented import UnscentedModel, unscented_step
 
@@ -215,16 +214,35 @@ def opened(
     form: AnyForm,
     checkpoint_steps: Sequence[int] = (),
     bounded: bool = False,
+    sums: Sums = LEFT_TO_RIGHT,
+    compensated: bool = False,
 ) -> Run | ArrayRun | NonlinearRun:
-    """Return a run of a linear or nonlinear filter.
+    """Return a run of a filter: in compiled loops if the form has them and a linear model has no inputs.
 
     Raises
     ------
-    ValueError, OverflowError : as for :func:`~gpbnb.filters.array_run.opened_run` and :class:`NonlinearRun`.
+    ValueError : the run has no compiled loops, but other sums, compensated summation or formats of blocks are required;
+        or for a reason given in :class:`~gpbnb.filters.run.Run`, :class:`~gpbnb.filters.array_run.ArrayRun` or
+        :class:`NonlinearRun`.
+    OverflowError : the model has entries beyond the range of the format.
     """
     if isinstance(model, NonlinearModel):
+        if compensated or sums != LEFT_TO_RIGHT:
+            raise ValueError("got sums or compensated estimates for a nonlinear model; needed neither: it has no loops")
         return NonlinearRun(model, fmt, form, checkpoint_steps)
-    return opened_run(model, fmt, form, checkpoint_steps, bounded)
+    if not model.has_inputs and not isinstance(form, ArrayForm):
+        return Run(model, fmt, form, checkpoint_steps, sums, compensated, bounded)
+    if sums != LEFT_TO_RIGHT or compensated:
+        raise ValueError(
+            "got sums or compensated with known inputs or a form without compiled loops; needed neither; for "
+            'compensated summation write form="compensated"'
+        )
+    if isinstance(fmt, BlockFormats):
+        raise ValueError(
+            "got formats of blocks with known inputs or a form without compiled loops; needed neither; its forms are "
+            f"{', '.join(map(str, Form))}"
+        )
+    return ArrayRun(model, fmt, form, checkpoint_steps, bounded)
 
 
 def complete(model: AnyModel, z: Any) -> tuple[Any, Any]:

@@ -29,12 +29,11 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, Floats, Pairs, double_doubles
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.records import pairs_as_double_doubles
 from gpbnb.filters.kernels.step import StepArrays, factor_each, invert_each
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, stored_arrays
 
 
 class Opening(NamedTuple):
@@ -79,9 +78,7 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
     OverflowError : the model has entries beyond the range of the format's backend.
     """
     stored = model if fmt is None else model.definite_in(fmt)
-    # A result that was stored would draw no random numbers, and the measurements would be rounded with others.
-    random = fmt is not None and fmt.rounding is Rounding.STOCHASTIC
-    Phi, H, Q, R, x0, P0 = (each.copy() for each in (_packed if random else _packed_once)(stored, fmt))
+    Phi, H, Q, R, x0, P0 = (each.copy() for each in (_double_doubles(stored) if fmt is None else _packed(stored, fmt)))
     UQ, UR, U0, RI = (np.zeros_like(each) for each in (Q, R, P0, R))
     raised: list[Repair] = []
 
@@ -208,18 +205,20 @@ def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
     return out
 
 
-def _packed(model: LinearModel, fmt: FloatFormat | None) -> list[NDArray[Any]]:
+_LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
+
+
+@lru_cache(maxsize=8)
+def _double_doubles(model: LinearModel) -> list[NDArray[np.float64]]:
+    return [double_doubles(getattr(model, letter)) for letter in _LETTERS]
+
+
+def _packed(model: LinearModel, fmt: FloatFormat) -> list[NDArray[Any]]:
     """Phi, H, Q, R, x0 and P0 as the compiled loops expect them."""
-    letters = "Phi", "H", "Q", "R", "x0", "P0"
-    if fmt is None:
-        return [double_doubles(getattr(model, letter)) for letter in letters]
-    arrays, packed = model.arrays(fmt), []
-    for letter in letters:
+    arrays, packed = stored_arrays(model, fmt), []
+    for letter in _LETTERS:
         try:
             packed.append(packed_array(arrays[letter]))
         except OverflowError as error:
             raise OverflowError(f"{letter}: {error}") from None
     return packed
-
-
-_packed_once = lru_cache(maxsize=8)(_packed)

@@ -131,13 +131,11 @@ class Run:
             raise ValueError(
                 f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more"
             )
-        if fmt is not None:
-            fmt.check_compiled()
-            if bounded and fmt.overflow != "raise":
-                raise ValueError(
-                    f"got a bound along with a run in {fmt}; needed overflow 'raise': a result that leaves the range "
-                    "would be wrong by more than any rounding"
-                )
+        if fmt is not None and bounded and fmt.overflow != "raise":
+            raise ValueError(
+                f"got a bound along with a run in {fmt}; needed overflow 'raise': a result that leaves the range "
+                "would be wrong by more than any rounding"
+            )
         if not isinstance(sums, Sums):
             raise TypeError(f"sums: got {sums!r}; needed Sums(...), such as Sums(fmt=BINARY32)")
         if sums.fmt is not None and not isinstance(sums.fmt, (FloatFormat, FixedFormat)):
@@ -170,8 +168,8 @@ class Run:
         )
         self.notes = np.zeros(4, dtype=np.int64)
         identity = np.eye(n, dtype=int)
-        increment = self.as_packed(model.Phi - identity) if compensated else None
-        self.matrices = step_arrays(start, self.as_packed(identity), increment)
+        increment = as_packed(self.fmt, model.Phi - identity) if compensated else None
+        self.matrices = step_arrays(start, as_packed(self.fmt, identity), increment)
         self._step_tag: Tag = Free(self.tag) if isinstance(self.tag, Hardware32 | Hardware64) else self.tag
         self._stepped = self._as_stepped(self.matrices)
         #: Why the run stopped, if it did.
@@ -283,7 +281,7 @@ class Run:
         for begin in range(0, len(z), RECORDS_BLOCK):
             if self.stopped:
                 break
-            x = self.take_block(self.as_packed(z[begin : begin + RECORDS_BLOCK]))[0][1:, :states]
+            x = self.take_block(as_packed(self.fmt, z[begin : begin + RECORDS_BLOCK]))[0][1:, :states]
             some = out[begin : begin + len(x)]
             if x.dtype == np.float64:
                 some[:] = x if x.ndim == 3 else x[..., 0]
@@ -301,10 +299,10 @@ class Run:
         if np.shape(H)[1:] != (self.model.m, self.model.n):
             raise ValueError(f"got H of shape {np.shape(H)}; needed (p, {self.model.m}, {self.model.n})")
         if decimals is not None and self.fmt is not None and self.fmt.base == 10:
-            packed = self.as_packed(np.rint(H * 10.0**decimals))
+            packed = as_packed(self.fmt, np.rint(H * 10.0**decimals))
             packed[..., 1] -= np.where(packed[..., 0] == 0, 0, decimals)
         else:
-            packed = self.as_packed(H)
+            packed = as_packed(self.fmt, H)
         self.matrices = self.matrices._replace(H=packed, HT=np.ascontiguousarray(np.swapaxes(packed, 1, 2)))
         new = self._as_stepped(self.matrices)
         self._stepped = self._stepped._replace(H=new.H, HT=new.HT)
@@ -402,10 +400,6 @@ class Run:
         """Name the cause that ended the last step, as in "overflow in the gain at step 812"."""
         kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
         return f"{kind} in {QUANTITIES[int(self.matrices.place[0])]} at step {self.stopped}"
-
-    def as_packed(self, values: Any) -> NDArray[Any]:
-        """Round numbers into the format, and return them as the compiled loops expect them."""
-        return as_packed(self.fmt, values)
 
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Convert results of the compiled loops to exact Fractions."""
@@ -566,6 +560,6 @@ def _take_with_inputs(run: Run, model: LinearModel, z: Any) -> None:
         run.take((measured - measurement - model.H[k % len(model.H)] @ state)[np.newaxis])
         if run.stopped:
             return
-        run.x = run.as_packed(run.exactly(run.x) + state.reshape(-1, 1))
+        run.x = as_packed(run.fmt, run.exactly(run.x) + state.reshape(-1, 1))
         if run.notes[NEXT_CHECKPOINT] > at:
             run.X[at] = run.x

@@ -6,10 +6,11 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gpbnb.sweeps.table import DamagedFileError
+from gpbnb.sweeps.table import damaged_file, text_of
 
 CHECK = "sha256"
 """Key of the checksum; it covers everything else."""
@@ -34,21 +35,10 @@ def read_record(file: Path, cure: str) -> dict[str, Any]:
     ------
     DamagedFileError : the file is not as it was written; the message names the line if there is one.
     """
-
-    def damaged(line: int, problem: str) -> DamagedFileError:
-        return DamagedFileError(
-            f"{file.parent.name}/{file.name}, line {line}: {problem}. Restore the file from the repository, or compute "
-            f"it again: {cure}"
-        )
-
+    damaged = partial(damaged_file, file, cure)
+    text = text_of(file, cure)
     try:
-        found = json.loads(file.read_bytes().decode("utf-8"))
-    except FileNotFoundError:
-        raise damaged(1, "the file is missing") from None
-    except OSError as error:
-        raise damaged(1, f"the file cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise damaged(1, f"the file is not UTF-8: {error}") from None
+        found = json.loads(text)
     except json.JSONDecodeError as error:
         raise damaged(error.lineno, f"the file is not JSON: {error.msg}") from None
     except (ValueError, RecursionError) as error:  # an integer of thousands of digits, or lists nested too deeply

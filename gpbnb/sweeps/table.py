@@ -12,6 +12,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal, TypeVar
 
@@ -106,6 +107,31 @@ def write(file: Path, columns: Sequence[Column], rows: Iterable[Record], provena
     draft.replace(file)
 
 
+def damaged_file(file: Path, cure: str, line: int, problem: str) -> DamagedFileError:
+    """Return the error that names the file, the line and the command that computes the file again."""
+    return DamagedFileError(
+        f"{file.parent.name}/{file.name}, line {line}: {problem}. Restore the file from the repository, or compute "
+        f"it again: {cure}"
+    )
+
+
+def text_of(file: Path, cure: str) -> str:
+    """Return the text of a stored file.
+
+    Raises
+    ------
+    DamagedFileError : the file is missing, cannot be read, or is not UTF-8.
+    """
+    try:
+        return file.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise damaged_file(file, cure, 1, "the file is missing") from None
+    except OSError as error:
+        raise damaged_file(file, cure, 1, f"the file cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise damaged_file(file, cure, 1, f"the file is not UTF-8: {error}") from None
+
+
 def read(file: Path, columns: Sequence[Column], cure: str) -> StoredTable:
     """Read a table and check all of it.
 
@@ -118,21 +144,8 @@ def read(file: Path, columns: Sequence[Column], cure: str) -> StoredTable:
     ------
     DamagedFileError : the file is not as it was written; the message names the line and the cure.
     """
-
-    def damaged(line: int, problem: str) -> DamagedFileError:
-        return DamagedFileError(
-            f"{file.parent.name}/{file.name}, line {line}: {problem}. Restore the file from the repository, or compute "
-            f"it again: {cure}"
-        )
-
-    try:
-        text = file.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        raise damaged(1, "the file is missing") from None
-    except OSError as error:
-        raise damaged(1, f"the file cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise damaged(1, f"the file is not UTF-8: {error}") from None
+    damaged = partial(damaged_file, file, cure)
+    text = text_of(file, cure)
     lines = text.split("\n")
     provenance: dict[str, str] = {}
     for number, line in enumerate(lines, 1):

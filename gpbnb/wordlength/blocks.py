@@ -20,7 +20,7 @@ from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
 from gpbnb.wordlength.fixed_point import FixedAnswer, exact_sums, required_fraction_bits, words_error
-from gpbnb.wordlength.precision import recorded_strategy
+from gpbnb.wordlength.precision import checked_question, recorded_strategy
 from gpbnb.wordlength.requirement import Asked, Requirement, format_like
 
 
@@ -112,9 +112,10 @@ def required_block_precisions(
             raise ValueError("got sums=True for a nonlinear filter; needed False: its blocks round each sum")
     else:
         model.refuse_inputs("a search over blocks")
+    tolerances = checked_question(model, [like], tolerance, asked.basis)
     if z is None:
         z = simulated(model, asked.steps, whole_number("seed", seed, 0))
-    strategy = recorded_strategy(model, asked, tolerance, form, z)
+    strategy = recorded_strategy(model, asked, tolerances, form, z)
     most = replace(like, precision=largest_compiled(like))
     tried = list[tuple[BlockFormats, float]]()
 

@@ -82,7 +82,7 @@ def judge(
         if within is None:
             raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
         check_limits(within, model.n, model.m, model.x0)
-        tolerances = checked_tolerance(tolerance, model.n, "states", fmt.base, basis)
+        tolerances = checked_tolerance(tolerance, model.n, "states", basis)
         strategy = Guaranteed if basis == "guarantee" else Probable
         of_model = strategy(model, compiled_form(form), within, tolerances)
         found = of_model.error(kind)

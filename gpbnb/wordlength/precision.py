@@ -136,9 +136,7 @@ def required_precision(
     asked = asked._replace(largest=_checked_largest(model, largest, like))
     if isinstance(model, LinearSystem):
         return required_system_precision(model, asked, tolerance, z, within)
-    tolerances = _checked(model, tolerance, base, basis)
-    if like.limits is None:
-        model.check_sizes()
+    tolerances = checked_question(model, [like], tolerance, basis)
     if isinstance(model, NonlinearModel):
         if within is not None:
             raise ValueError(f"got limits for {model.name}; needed none: {NO_GUARANTEE}")
@@ -266,9 +264,7 @@ def survey_formats(
     basis: Basis = "emulation",
 ) -> list[Outcome]:
     """Run a filter in each format; return largest error or bound / tolerance, and why it is infinite."""
-    tolerances = _checked(model, tolerance, formats[0].base, basis)
-    if any(fmt.limits is None for fmt in formats):
-        model.check_sizes()
+    tolerances = checked_question(model, formats, tolerance, basis)
     model, z = complete(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
@@ -300,13 +296,22 @@ def _checked_largest(model: AnyModel | LinearSystem, largest: int | None, like: 
     return largest
 
 
-def _checked(model: AnyModel, tolerance: Any, base: int, basis: str) -> NDArray[np.float64]:
-    """Check the question, and return the tolerance of each state."""
+def checked_question(
+    model: AnyModel, formats: Sequence[FloatFormat], tolerance: Any, basis: str
+) -> NDArray[np.float64]:
+    """Check a question about a filter in some formats, and return the tolerance of each state, (n,).
+
+    Raises
+    ------
+    ValueError, TypeError, OverflowError : for a reason given in :func:`required_precision`.
+    """
     if not isinstance(model, LinearModel | NonlinearModel):
         raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel, NonlinearModel or LinearSystem")
-    tolerances = checked_tolerance(tolerance, model.n, "states", base, basis)
+    tolerances = checked_tolerance(tolerance, model.n, "states", basis)
     if basis != "emulation" and isinstance(model, NonlinearModel):
         raise ValueError(f'got basis "{basis}" for {model.name}; needed "emulation": {NO_GUARANTEE}')
+    if any(fmt.limits is None for fmt in formats):
+        model.check_sizes()
     return tolerances
 
 
@@ -386,16 +391,15 @@ class Bounded(Recorded):
         return run.bounds[0]
 
 
-def recorded_strategy(model: AnyModel, asked: Asked, tolerance: Any, form: AnyForm, z: Any) -> Recorded:
-    """Check a question about one measurement record, (steps, m), and return the strategy that answers it.
+def recorded_strategy(
+    model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], form: AnyForm, z: Any
+) -> Recorded:
+    """Check one measurement record, (steps, m), and return the strategy that answers a question about it.
 
     Raises
     ------
     ValueError, TypeError : for a reason given in :func:`required_precision`.
     """
-    tolerances = _checked(model, tolerance, asked.like.base, asked.basis)
-    if asked.like.limits is None:
-        model.check_sizes()
     sound, filled = complete(model, z)
     measured = _measured(sound, filled, asked.steps)
     sound.check_steps(asked.steps)

@@ -151,7 +151,7 @@ def survey_records(
             raise ValueError(f"got {fmt!r}; needed a FloatFormat")
         if isinstance(model, LinearModel):
             fmt.check_compiled()
-    tolerances = checked_tolerance(tolerance, model.n, "states", given[0].base, basis)
+    tolerances = checked_tolerance(tolerance, model.n, "states", basis)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"')
     data = _data(model, records, steps)

@@ -137,7 +137,7 @@ def recursion_strategy(
     ------
     ValueError, TypeError : as for that function.
     """
-    checked_tolerance(tolerance, max(np.size(tolerance), 1), "outputs", base, basis)
+    checked_tolerance(tolerance, max(np.size(tolerance), 1), "outputs", basis)
     if basis != "emulation":
         raise ValueError(f'got basis "{basis}" of a function; needed "emulation": bounds exist for models')
     inputs = None if z is None else real_numbers(z)
@@ -146,7 +146,7 @@ def recursion_strategy(
     digits = max(largest, largest_by_default(base)) + math.ceil(SPARE_BITS / math.log2(base))
     traced = run if isinstance(run, FixedIntervalSmoother) else TracedFunction(run)
     short, true = (_reference(traced, FloatFormat(base, each), inputs, steps) for each in (digits, digits * 3 // 2))
-    found = EmulatedFunction(traced, inputs, true, checked_tolerance(tolerance, true.shape[1], "outputs", base, basis))
+    found = EmulatedFunction(traced, inputs, true, checked_tolerance(tolerance, true.shape[1], "outputs", basis))
     off = found.share(short - true)
     if not off <= SETTLED:
         raise ValueError(

@@ -237,8 +237,8 @@ def listed(numbers: Sequence[int]) -> str:
     return ", ".join(texts)
 
 
-def checked_tolerance(tolerance: Any, count: int, what: str, base: int, basis: str) -> NDArray[np.float64]:
-    """Check tolerance, base and basis, and return the tolerance of each of `count` states or outputs.
+def checked_tolerance(tolerance: Any, count: int, what: str, basis: str) -> NDArray[np.float64]:
+    """Check tolerance and basis, and return the tolerance of each of `count` states or outputs.
 
     Raises
     ------
@@ -262,19 +262,7 @@ def checked_tolerance(tolerance: Any, count: int, what: str, base: int, basis: s
         raise ValueError(f"got tolerance {tolerance}; {needed}")
     if not isinstance(basis, str) or basis not in get_args(Basis):
         raise ValueError(f"got basis {basis!r}; needed one of {', '.join(map(repr, get_args(Basis)))}")
-    check_base(base)
     return np.broadcast_to(tolerances, (count,))
-
-
-def check_base(base: Any) -> None:
-    """Reject a base without compiled loops.
-
-    Raises
-    ------
-    ValueError : another base.
-    """
-    if isinstance(base, bool) or not isinstance(base, int) or base not in LARGEST_PRECISION:
-        raise ValueError(f"got base {base!r}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
 
 
 def format_like(
@@ -286,7 +274,8 @@ def format_like(
     ------
     ValueError : a base without compiled loops; a range that ``FloatFormat`` refuses.
     """
-    check_base(base)
+    if isinstance(base, bool) or not isinstance(base, int) or base not in LARGEST_PRECISION:
+        raise ValueError(f"got base {base!r}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
     return FloatFormat(base, 2, rounding, emin, emax, subnormal)
 
 

@@ -88,7 +88,7 @@ def system_strategy(
 ) -> Strategy:
     """Check the question, and return the strategy that answers it."""
     basis = asked.basis
-    tolerances = checked_tolerance(tolerance, system.p, "outputs", asked.like.base, basis)
+    tolerances = checked_tolerance(tolerance, system.p, "outputs", basis)
     if u is None and (within is None or basis in ("emulation", "bound")):
         raise ValueError(f'got no inputs for basis "{basis}"; needed z=, of shape ({asked.steps}, {system.m})')
     largest = np.array([np.inf])

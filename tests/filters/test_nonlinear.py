@@ -24,10 +24,9 @@ from gpbnb import (
     required_precision,
 )
 from gpbnb.filters.array_forms import ArrayForm
-from gpbnb.filters.array_run import opened_run
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.nonlinear import SigmaPoints
-from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, simulated, true_states
+from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, opened, simulated, true_states
 from gpbnb.filters.run import Run
 from gpbnb.wordlength.blocks import required_block_precisions
 from gpbnb.wordlength.precision import survey
@@ -521,7 +520,7 @@ def by_functions(**options):
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 11), FloatFormat(2, 24, "chop"), FloatFormat(10, 6)])
 @pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, ArrayForm.SYMMETRIZED])
 def test_linear_functions_have_the_digits_of_the_linear_filter(form, fmt):
-    run, expected = NonlinearRun(by_functions(), fmt, form, [60]), opened_run(linear(), fmt, form, [60])
+    run, expected = NonlinearRun(by_functions(), fmt, form, [60]), opened(linear(), fmt, form, [60])
     assert np.array_equal(run.states(RECORD), expected.states(RECORD))
     assert np.array_equal(run.checkpoints().P, expected.checkpoints().P)
     assert np.array_equal(run.checkpoints().K, expected.checkpoints().K)
@@ -538,7 +537,7 @@ def test_factored_forms_subtract_the_predicted_measurement_as_a_sum():
     """The linear filter subtracts one product after the other, so that only exact arithmetic would agree."""
     fmt = FloatFormat(2, 24)
     for form in (Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON):
-        run, expected = NonlinearRun(by_functions(), fmt, form, [60]), opened_run(linear(), fmt, form, [60])
+        run, expected = NonlinearRun(by_functions(), fmt, form, [60]), opened(linear(), fmt, form, [60])
         difference = np.abs(run.states(RECORD) - expected.states(RECORD)).max()
         assert 0 < difference < 1e-5  # a few units in the last place of estimates near one
         whole = run.checkpoints().K.astype(float)

@@ -11,6 +11,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.products import add_transposed, product_by_columns, product_with_units
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.opening import as_packed
 from gpbnb.filters.run import Run
 
 
@@ -37,8 +38,8 @@ def run_of(fmt):
 
 def products(fmt, a, b):
     run = run_of(fmt)
-    first, second = run.as_packed(a), run.as_packed(b)
-    c, d = run.as_packed(np.ones((len(a), b.shape[1]))), run.as_packed(np.ones((len(a), b.shape[1])))
+    first, second = as_packed(run.fmt, a), as_packed(run.fmt, b)
+    c, d = as_packed(run.fmt, np.ones((len(a), b.shape[1]))), as_packed(run.fmt, np.ones((len(a), b.shape[1])))
     both(run.tag, first, second, c, d)
     return run.exactly(c), run.exactly(d)
 
@@ -76,13 +77,13 @@ def test_what_leaves_the_range_is_reported():
             products(fmt, np.full((2, 2), sizes[0]), np.full((2, 2), sizes[1]))
         run = run_of(fmt)
         with pytest.raises(OverflowError):
-            by_columns(run.tag, *(run.as_packed(np.full((2, 2), size)) for size in (*sizes, 1.0)))
+            by_columns(run.tag, *(as_packed(run.fmt, np.full((2, 2), size)) for size in (*sizes, 1.0)))
 
 
 def test_a_sparse_matrix_is_added_transposed():
     fmt = FloatFormat(2, 5)
     run = run_of(fmt)
     a, c = np.array([[0.0, 3.0], [0.0, 1.0]]), np.array([[1.0, 2.0], [40.0, 0.25]])
-    packed = run.as_packed(c)
-    add_into(run.tag, run.as_packed(a), packed)
+    packed = as_packed(run.fmt, c)
+    add_into(run.tag, as_packed(run.fmt, a), packed)
     assert run.exactly(packed).tolist() == (fmt.array(c) + fmt.array(a.T)).to_fractions().tolist()

@@ -213,7 +213,8 @@ class TestSweeps:
             experiment.InverseCell(family, FMT, True, (2, 4), 3, (1, k)) for k, family in enumerate(("random", "Kahan"))
         ]
         names = ("ball",)
-        rows = experiment.sweep_rows(cells, names)
+        samples = [(cell, experiment.cell_sample(cell, names)) for cell in cells]
+        rows = [row for each in samples for row in experiment.cell_rows(*each)] + experiment.sum_rows(samples, names)
         assert [(row["family"], row["format"]) for row in rows] == [
             ("random", "2:24:nearest"),
             ("Kahan", "2:24:nearest"),

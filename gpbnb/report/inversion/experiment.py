@@ -416,12 +416,6 @@ def sum_rows(samples: Iterable[tuple[InverseCell, InverseSample]], names: Sequen
     return rows + whole.rows("all", "all", "all", "all")
 
 
-def sweep_rows(cells: Iterable[InverseCell], names: Sequence[str]) -> list[dict[str, str]]:
-    """Compute cells and return the rows of each cell, each family, and all families together."""
-    samples = [(cell, cell_sample(cell, names)) for cell in cells]
-    return [row for each in samples for row in cell_rows(*each)] + sum_rows(samples, names)
-
-
 def worst(bound: str, sweep: str = "variants") -> InverseTrial:
     """Recompute the regular matrix of a stored sweep whose error is largest relative to a bound.
 

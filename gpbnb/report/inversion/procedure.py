@@ -229,11 +229,6 @@ def inverse_error(inverse: Any, e: Any, signed: bool = True) -> NDArray[Any]:
     return np.asarray(front @ e if signed else abs(front) @ abs(e))
 
 
-def error_norm(error: Any, norm: str = "column sum") -> Any:
-    """Last box, "Compute ‖δ(A⁻¹)‖"."""
-    return NORMS[norm](_plain(error))
-
-
 @dataclass(frozen=True)
 class ProcedureResult:
     """Intermediate results and bound of the procedure.

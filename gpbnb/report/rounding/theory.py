@@ -212,13 +212,6 @@ def relative_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
     return strict_dot_bound(a, b, beta) / value
 
 
-def matmul_entry_bounds(a: Any, b: Any, beta: Fraction) -> NDArray[Any]:
-    r"""Bound of each entry, :math:`[\tilde C] \le \beta [A] D [B]`; hung1982, ch. III, (27)."""
-    weights = np.array(dot_weights(interfaces([a, b])[0]), dtype=object)
-    bounds: NDArray[Any] = beta * ((abs(exact(a)) * weights) @ abs(exact(b)))
-    return bounds
-
-
 def chain_bound(matrices: Sequence[Any], beta: Fraction) -> Fraction:
     r"""Bound as :math:`\beta\,(\sum d_i)\prod\|M_j\|`; hung1984, ch. II, (32), or (28) for two factors.
 

@@ -25,7 +25,7 @@ from gpbnb.filters.emulation import compare_runs
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel, kalman_step
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.run import Run, log_spaced, reference, reference_states
+from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.report.gravity_probe_b.year import Year
 from gpbnb.report.kalman import report_bounds
 from gpbnb.wordlength.precision import required_precision
@@ -246,14 +246,6 @@ def native(
     with np.errstate(all="ignore"):
         given = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
         return innovation_form(given, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)
-
-
-def native_error(model: LinearModel, z: NDArray[Any], dtype: type[np.floating[Any]]) -> NDArray[np.float64]:
-    """Return the largest errors (n,) of :func:`native`, as :func:`gpbnb.wordlength.precision.survey` defines them.
-
-    It includes the errors of storing model and measurements, and is infinite or NaN if the range is too small.
-    """
-    return np.asarray(np.abs(native(model, z, dtype) - reference_states(model, z)[:, :, 0]).max(axis=0))
 
 
 def innovation_form(given: Mapping[str, NDArray[Any]], z: NDArray[Any], progress: bool = False) -> NDArray[Any]:
