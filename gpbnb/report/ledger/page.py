@@ -259,8 +259,9 @@ def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
 
     Parameters
     ----------
-    rows : which.
-    left_undone : show all texts, labelled as what the documents leave undone and what is answered here.
+    rows : the rows to show.
+    left_undone : show every text, labelled as work that the documents leave undone, and every note, labelled as the
+        answer of this book.
     """
     rows = in_reading_order(rows)
     owner = topics()
