@@ -66,9 +66,9 @@ class NonlinearModel:
     :class:`~gpbnb.filters.model.LinearModel` with the matrices :math:`F = \partial f/\partial x` at the last estimate
     and :math:`H = \partial h/\partial x` at the predicted one, in the same order of operations. It predicts the
     estimate :math:`\bar x = f(\hat x)`, and the innovation is :math:`z - h(\bar x)`. If f and h multiply the state by
-    matrices, the innovation form and Joseph's form give the same digits as for that linear filter. In the UD form and
-    with square roots, the digits differ: the linear filter subtracts the products of H and x from z one after the
-    other, while the extended filter subtracts their sum.
+    matrices, the innovation form and Joseph's form give the same digits as that linear filter. In the UD form and with
+    square roots, the digits differ: the linear filter subtracts the products of H and x from z one after the other,
+    while the extended filter subtracts their sum.
 
     Parameters
     ----------
@@ -338,7 +338,7 @@ class NonlinearModel:
             return jacobian(lambda state: self._checked(name, function(state, *_given(u)), x, (rows,)), x)
 
     def difference(self, z: FloatArray, predicted: FloatArray) -> FloatArray:
-        """Return the innovation (m,): the difference, with angles wrapped, or the residual."""
+        """Return the innovation (m,): z - h(x) with its angles wrapped, or what `residual` returns."""
         if self.residual is not None:
             with kept_in(z.format):
                 return self._checked("residual", self.residual(z, predicted), z, (self.m,))

@@ -57,8 +57,8 @@ class BlockRequirement:
         limits = " and ".join(f"the {name}" for name in self.limiting)
         verb = "limit" if len(self.limiting) > 1 else "limits"
         return (
-            f"{self.formats}: {self.ratio:.2g} of the tolerance; {limits} {verb} the filter: alone, with all others in "
-            f"the most digits, the blocks need {each}; one format for all needs {self.uniform.precision}"
+            f"{self.formats}: {self.ratio:.2g} of the tolerance; {limits} {verb} the filter: lowered one "
+            f"at a time, the blocks need {each}; one format for all needs {self.uniform.precision}"
         )
 
 

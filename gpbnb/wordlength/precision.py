@@ -356,7 +356,7 @@ class Recorded(ABC):
             return Outcome(math.inf, f"the run is refused: {run.reason}")
         if run.indefinite is not None and not self.bounded:
             lost = f"a computed variance was not positive at step {run.indefinite}"
-            return Outcome(math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0")
+            return Outcome(math.inf, f"{lost}; if the model gives a state no variance, give it a little in P0")
         ratio = largest_ratio(np.abs(errors[:, asked]), self.tolerances[asked])
         return Outcome(ratio, "the bound says nothing" if math.isinf(ratio) else "")
 
