@@ -16,7 +16,7 @@ The public interface::
     required_precision         the smallest precision that keeps a filter, or your own function, within a tolerance
     required_block_precisions  the same for each block of a Kalman filter; BlockFormats: a format for each block
     required_fraction_bits     the same in fixed point; WordFormats: separate formats for coefficients, data, sums
-    limit_cycles               how a filter in fixed point ends with a constant input
+    limit_cycles               every limit cycle of a filter in fixed point with a constant input
     limits, guarantee          limits on a filter, and a bound for every measurement within them, for ever
     emulate, Form              one run of a filter with every operation rounded, in one of the forms of its update
     FixedIntervalSmoother      a Rauch-Tung-Striebel smoother of a record, as a function of a format
@@ -26,8 +26,8 @@ The public interface::
     peek                       show intermediate values of a function whose precision is being searched
     read_model                 a model from a TOML file, SciPy, python-control or FilterPy
 
-Each chapter of the book has a sub-package: rounding, inversion, kalman, rolling, integration, budget, geometry and
-wordlength. ``gpbnb.ledger`` judges every statement printed in the three documents.
+Each chapter of the book has a sub-package of ``gpbnb.report``, such as ``gpbnb.report.kalman``.
+``gpbnb.report.ledger`` judges every statement printed in the three documents.
 """
 
 from importlib import import_module

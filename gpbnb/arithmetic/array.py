@@ -110,20 +110,21 @@ class FloatArray(ComponentArray, NumPyProtocols):
 
     ``+ - * / @``, ``-x``, ``abs(x)``, ``np.sqrt(x)``, sums and products are rounded after every single operation. The
     documentation of each function states the order of its operations. Shapes broadcast as in NumPy. The other operand
-    may be a plain number or array if the format holds each of its entries exactly. Nothing is rounded silently.
-    Indexing follows NumPy's rules and gives a FloatArray. Comparisons are exact and give booleans.
+    may be a plain number or array if the format holds each of its entries exactly. An operand is never rounded
+    silently. Indexing follows NumPy's rules and gives a FloatArray. Comparisons are exact and give booleans.
 
     Conversion to other number types is explicit. ``x.to_float()`` gives the nearest float64, ``x.to_fractions()`` the
     exact value. A function that converts on its own, such as ``np.asarray``, ``float``, ``math.sqrt``, ``np.save`` or
-    ``scipy.linalg.solve``, receives float64 numbers if the conversion is exact. Otherwise it raises an error. While the
-    precision of a function is searched, all of these conversions raise an error; see :mod:`gpbnb.arithmetic.exits`.
+    ``scipy.linalg.solve``, receives float64 numbers if the conversion is exact. Otherwise the conversion raises an
+    error. While the precision of a function is searched, all of these conversions raise an error; see
+    :mod:`gpbnb.arithmetic.exits`.
 
     Raises
     ------
     ValueError : the operands have different formats, or shapes that do not broadcast; a plain
         operand is not a number of the format; the square root of a negative number.
     ZeroDivisionError : a divisor is zero; the message names the entry.
-    TypeError : an operand is not a number; an entry is assigned to.
+    TypeError : an operand is not a number, or code assigns to an entry.
 
     Examples
     --------
@@ -298,7 +299,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
 
     @property
     def at(self) -> At:
-        """Copies of the array with other entries, as in JAX; see :class:`gpbnb.arithmetic.assignment.At`.
+        """Makes copies of the array with some entries changed, as in JAX; see :class:`gpbnb.arithmetic.assignment.At`.
 
         Examples
         --------

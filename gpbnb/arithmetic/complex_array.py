@@ -21,7 +21,8 @@ from gpbnb.arithmetic.text import in_columns
 class ComplexArray:
     r"""An immutable array of complex numbers :math:`a + \mathrm{i} b`, whose two parts are arrays of one format.
 
-    Each operation below is rounded once; where several stand in a formula, products come first, and a quotient last.
+    Each operation below is rounded once. If a formula has several operations, the products are computed first and the
+    quotient last.
 
     ===================  ==========================================================================
     result               real part, imaginary part
@@ -32,8 +33,8 @@ class ComplexArray:
     :math:`|x|`          :math:`\sqrt{aa + bb}`, a :class:`~gpbnb.arithmetic.array.FloatArray`
     ===================  ==========================================================================
 
-    An operand that is no complex number, such as a FloatArray or a plain number, is multiplied with, or divides, both
-    parts, and is added to the real part.
+    A real operand, such as a FloatArray or a plain number, multiplies or divides both parts, but is added only to the
+    real part.
 
     Parameters
     ----------
@@ -263,13 +264,13 @@ def fft(x: ComplexArray | FloatArray, inverse: bool = False) -> ComplexArray:
 
     .. math:: X_k = \sum_{j=0}^{n-1} x_j\, w^{jk}, \qquad w = \mathrm{e}^{-2\pi\mathrm{i}/n}
 
-    A transform of length 2h consists of those of the entries with even numbers, E, and with odd numbers, O. For k from
-    0 to h - 1, with correctly rounded real and imaginary parts of the factor,
+    A transform of length 2h combines two of length h: E, that of the entries with even indices, and O, that of the
+    entries with odd indices. For k from 0 to h - 1, with correctly rounded real and imaginary parts of the factor,
 
     .. math:: t = O_k\, \mathrm{e}^{-\pi\mathrm{i}k/h}, \qquad X_k = E_k + t, \qquad X_{k+h} = E_k - t
 
-    The factor of k = 0 is 1 and multiplies nothing, all others multiply as complex numbers. A transform of n numbers
-    takes :math:`\log_2 n` such stages. With stochastic rounding, factors are rounded to nearest.
+    The factor for k = 0 is 1, so that product is omitted; all other factors multiply as complex numbers. A transform
+    of n numbers takes :math:`\log_2 n` such stages. With stochastic rounding, factors are rounded to nearest.
 
     Parameters
     ----------
@@ -283,11 +284,11 @@ def fft(x: ComplexArray | FloatArray, inverse: bool = False) -> ComplexArray:
     Raises
     ------
     TypeError : `x` is not an array of a format.
-    ValueError : n is not a power of two. Such an array needs zeros at its end, which give another transform, or the
-        sum above, written out.
+    ValueError : n is not a power of two. Either append zeros, which gives another transform, or write out the sum
+        above.
     OverflowError : a number leaves the range of the format. In fixed point, numbers grow by up to
-        :math:`1 + \sqrt 2` in a stage; scale them before the call, or use more integer bits. A format that holds no 1,
-        such as Q15, does not hold the factor i of the inverse transform either.
+        :math:`1 + \sqrt 2` in a stage; scale them before the call, or use more integer bits. A format that cannot store
+        1, such as Q15, cannot store the factor i of the inverse transform either.
 
     References
     ----------

@@ -37,15 +37,15 @@ _counted: ContextVar[tuple[tuple[Rules, Flags], ...]] = ContextVar("formats whos
 
 @contextmanager
 def flags(fmt: Any) -> Iterator[Flags]:
-    """Count the exceptions of every operation in one format, such as those of one run; runs may be nested.
+    """Count the IEEE 754 exceptions of all operations in one format inside a ``with`` block; blocks may be nested.
 
-    Conversions into the format are operations, too. Comparisons, and the maximum and minimum that use them, count
-    nothing.
+    Conversions into the format are operations, too. Comparisons, and the maximum and minimum that use them, are not
+    counted.
 
     Parameters
     ----------
-    fmt : a format with ``overflow="infinity"``; others raise Python's exceptions, and their compiled loops count
-        nothing.
+    fmt : a format with ``overflow="infinity"``; other formats raise Python's exceptions, and their compiled loops
+        count nothing.
 
     Raises
     ------

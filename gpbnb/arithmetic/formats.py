@@ -60,9 +60,9 @@ class FloatFormat(Makes[FloatArray]):
     ------
     TypeError : a parameter has the wrong type.
     ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory; an unknown rounding; `emin` or
-        `emax` without the other, ``emin > emax``, or exponents too large to compute with; a largest number that is not
-        in the format; an unknown `overflow`, one without a range, or "infinity" in a format whose words all store
-        numbers, such as FP6.
+        `emax` without the other, ``emin > emax``, or exponents too large to compute with; a largest number that is
+        not in the format; an unknown `overflow`, an `overflow` without a range, or "infinity" in a format that has no
+        words left for infinity and NaN, such as FP6.
 
     Notes
     -----
@@ -71,8 +71,8 @@ class FloatFormat(Makes[FloatArray]):
 
     With ``overflow="infinity"``, the operations ``+ - * /``, square root and fused multiply-add give what IEEE 754
     requires for every operand: a result that overflows becomes infinite, or the largest number if the rounding is
-    directed toward it; there is one NaN. E4M3, which has NaN and no infinity, gives NaN in its place. Elementary
-    functions, remainders and sorting need finite entries, and take a negative zero for zero.
+    directed toward it; there is only one NaN. E4M3, which has NaN and no infinity, gives NaN in its place. Elementary
+    functions, remainders and sorting need finite entries, and treat negative zero as zero.
     :func:`~gpbnb.arithmetic.flags.flags` counts the exceptions of IEEE 754. Such a format computes on Python integers,
     about a thousand times slower than compiled loops. Filters have compiled loops for "saturate" in base 2 up to 52
     bits, and in base 16.

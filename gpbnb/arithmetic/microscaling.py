@@ -54,7 +54,7 @@ class MicroscalingFormat:
     Parameters
     ----------
     element : format of the elements, such as FP8_E4M3 or FP4_E2M1, or ``FixedFormat(1, 6, "even")`` for MXINT8, whose
-        elements are two's complement from -2 to 1 63/64; they saturate.
+        elements are two's complement numbers from -2 to 127/64. Elements saturate.
     block : number of elements in a block, 32 in the specification.
 
     Raises
@@ -85,7 +85,8 @@ class MicroscalingFormat:
         """Convert numbers (..., n) to blocks along the last axis.
 
         The scale of a block is the largest power of two not above its largest number, divided by the largest power of
-        two among the elements; elements beyond their range saturate. It is at least 2**-127, also that of zeros.
+        two that an element can store. The scale is at least 2**-127, also for a block of zeros. Elements beyond their
+        range saturate.
 
         Raises
         ------
@@ -108,11 +109,11 @@ class MicroscalingFormat:
         return ScaledBlocks(exponents, self.element.array(given / _scales(exponents)))
 
     def from_bits(self, scales: Any, elements: Any) -> ScaledBlocks:
-        """Return the blocks that E8M0 words (..., n / k) and words of elements (..., n / k, k) store.
+        """Return the blocks stored in E8M0 words (..., n / k), the scales, and in words of elements (..., n / k, k).
 
         Raises
         ------
-        ValueError : a scale that is NaN, or an element that is no finite number.
+        ValueError : a scale that is NaN, or an element that is not a finite number.
         """
         words = np.asarray(scales)
         if words.size and not (words.min() >= 0 and words.max() < 255):
@@ -137,8 +138,9 @@ def microscaling_dot(
     r"""Inner product of two vectors in blocks, :math:`\sum_j X_j Y_j \sum_i p_{ji} q_{ji}`, in a stated order.
 
     In the format `sums`, the products of the elements of a block are formed and added as in
-    :func:`gpbnb.arithmetic.linalg.matmul`; the result is multiplied with the product of both scales, one rounding; and
-    the blocks are added from left to right. The specification leaves precision and order open.
+    :func:`gpbnb.arithmetic.linalg.matmul`; the result is multiplied by the exact product of both scales, which
+    takes one rounding; and the blocks are added from left to right. The specification of microscaling leaves precision
+    and order open.
 
     Parameters
     ----------

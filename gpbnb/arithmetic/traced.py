@@ -33,14 +33,14 @@ _ORDERS, _BITS = np.array([-1, 0, 1]), np.array([1, 2, 4])
 class TracedFunction:
     """A function of a format and arrays that is traced for each set of shapes, and then runs as a list of operations.
 
-    The digits are those of the function itself. Where a run finds an overflow, a division by zero or the root of a
-    negative number, the function itself runs instead, so that errors are also its own.
+    The results have the same digits as those of the function itself. If a run meets an overflow, a division by zero
+    or the root of a negative number, the function itself runs instead and raises its own error.
 
     Parameters
     ----------
-    function : ``function(fmt, *arrays)``, which returns an array of the format, or a list or tuple of such arrays, also
-        nested. It is called once for each set of shapes of its arrays, with arrays that stand for all numbers. It must
-        not depend on anything that changes between its calls.
+    function : ``function(fmt, *arrays)``, which returns an array of the format, or a list or tuple of such arrays,
+        possibly nested. It is called once for each set of shapes of its arrays, with placeholders in place of
+        numbers. It must not depend on anything that changes between its calls.
 
     Raises
     ------
@@ -73,11 +73,11 @@ class TracedFunction:
 
     @property
     def refusal(self) -> str:
-        """Why the function cannot be traced; empty if it can, or has not run."""
+        """Why the function cannot be traced; empty if it can be, or if it has not run yet."""
         return next((each for each in self._traces.values() if isinstance(each, str)), "")
 
     def recorded(self, *shapes: tuple[int, ...]) -> tuple[Tape, Any]:
-        """Return the operations for arrays of some shapes, and what the function returns, with places for numbers.
+        """Return the operations for arrays of the given shapes, and the function's result with placeholders.
 
         Raises
         ------

@@ -136,8 +136,8 @@ def limits(
 
     Raises
     ------
-    ValueError : a limit is negative or NaN; there is neither one number nor one per entry; or too few limits are
-        finite.
+    ValueError : a limit is negative or NaN; a limit is neither one number nor one number per entry; or too few limits
+        are finite.
     """
     found = []
     n, m = whole_number("states", n), whole_number("measurements", m)

@@ -89,7 +89,7 @@ class LimitCycles:
 def limit_cycles(
     system: LinearSystem, words: WordFormats, u: Any = 0, most: int = MOST_STATES, everywhere: bool = False
 ) -> LimitCycles:
-    """Find every cycle in which a filter can end with a constant input.
+    """Find every limit cycle in which a fixed-point filter can end when its input is constant.
 
     Parameters
     ----------

@@ -124,8 +124,8 @@ def emulate(
     checkpoint_steps : steps at which to compare; by default four per decade.
     true : the reference run to compare with. By default, it uses model and measurements as the format stores them, so
         the errors come only from the arithmetic. With a reference for the model as given, they include the errors of
-        storing the model. The reference of a nonlinear model always takes it as given, since a format stores the
-        constants within its functions.
+        storing the model. The reference for a nonlinear model always uses the model as given, because its functions
+        round their own constants.
     sums, compensated : as for :class:`~gpbnb.filters.run.Run`.
 
     Raises

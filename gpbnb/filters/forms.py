@@ -16,7 +16,7 @@ def plain_name(name: str) -> str:
 class Form(IntEnum):
     r"""The order in which a filter computes one step. In exact arithmetic, all forms agree.
 
-    In the table, P_p is the predicted covariance (100).
+    In the table, P_p is the predicted covariance, equation (100); all equation numbers are those of hung1984, ch. II.
 
     ================  ===================================================================================
     form              gain, covariance, estimate

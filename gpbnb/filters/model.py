@@ -69,7 +69,7 @@ class LinearModel:
     b : (n,), or (c, n) for a cycle: known offset of the states.
     d : (m,), or (c, m) for a cycle: known offset of the measurements.
     steps : number of steps that the model describes; required if an argument is a function. By default, this is the
-        number of rows of `u`; without rows, there is no limit. A longer run is rejected.
+        number of rows of `u`; if `u` is missing or a single row, there is no limit. A longer run is rejected.
     state_names, measurement_names, input_names : names of the n states, m measurements and inputs u, for messages,
         tables and reports, each optionally with its unit, as in ``["tilt (°)", "rate (°/s)"]``; by default they are
         numbered.
@@ -363,8 +363,8 @@ class LinearModel:
         """Return this model, or a copy with covariances repaired so that they stay definite when a format stores them.
 
         The variances of a covariance that would become indefinite are raised as described in
-        :mod:`gpbnb.filters.covariance`; `repairs` lists the changes. A covariance stays as it is if that does not help,
-        if `repair` is False, or for stochastic rounding.
+        :mod:`gpbnb.filters.covariance`; `repairs` lists the changes. A covariance is not changed if larger variances do
+        not help, if `repair` is False, or for stochastic rounding.
         """
         if self.repair is False or fmt.rounding is Rounding.STOCHASTIC:
             return self
@@ -373,8 +373,8 @@ class LinearModel:
     def rounded(self, fmt: FloatFormat | FixedFormat) -> LinearModel:
         """Return the model as a computer with this format stores it, with each entry rounded.
 
-        Runs in this format are compared with the exact filter of this model. A run itself starts from the model as
-        given; see :mod:`gpbnb.filters.opening`.
+        A run in this format is compared with the exact filter for the rounded model. The run itself starts from the
+        model as given; see :mod:`gpbnb.filters.opening`.
 
         Raises
         ------

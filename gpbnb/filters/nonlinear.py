@@ -65,10 +65,10 @@ class NonlinearModel:
     ``x.format.array("0.1")``. The extended filter takes the step of a
     :class:`~gpbnb.filters.model.LinearModel` with the matrices :math:`F = \partial f/\partial x` at the last estimate
     and :math:`H = \partial h/\partial x` at the predicted one, in the same order of operations. It predicts the
-    estimate :math:`\bar x = f(\hat x)`, and the innovation is :math:`z - h(\bar x)`. If f and h are the products of a
-    state with matrices, it has the digits of that linear filter in the innovation form and Joseph's. In the UD form and
-    with square roots, the digits differ: the linear filter subtracts the products of H and x one after the other from
-    z, and this one subtracts their sum.
+    estimate :math:`\bar x = f(\hat x)`, and the innovation is :math:`z - h(\bar x)`. If f and h multiply the state by
+    matrices, the innovation form and Joseph's form give the same digits as that linear filter. In the UD form and with
+    square roots, the digits differ: the linear filter subtracts the products of H and x from z one after the other,
+    while the extended filter subtracts their sum.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class NonlinearModel:
     method : "extended" or "unscented". The unscented filter has one form and needs no Jacobians. It subtracts
         :math:`(KS)K^T` from the predicted covariance.
     points : the sigma points of the unscented filter.
-    steps : number of steps that the model describes; by default the number of rows of `u`, or any number.
+    steps : number of steps that the model describes; by default the number of rows of `u`, or without `u` no limit.
 
     Attributes
     ----------
@@ -99,9 +99,9 @@ class NonlinearModel:
 
     Raises
     ------
-    TypeError : something that is not a function.
+    TypeError : an argument that must be a function is not one.
     ValueError : shapes that do not fit together; an unknown measurement among the angles; angles and a residual
-        together; several iterations or a Jacobian of the unscented filter; or for a reason given in ``LinearModel``.
+        together; several iterations or a Jacobian for the unscented filter; or for a reason given in ``LinearModel``.
 
     References
     ----------
@@ -274,7 +274,7 @@ class NonlinearModel:
         self.noise.check_sizes()
 
     def without_missing(self, z: Any) -> tuple[NonlinearModel, Any]:
-        """Return a model for the measurements of each step, and these with zeros in place of missing ones.
+        """Return a model that ignores missing measurements, and the measurements with zeros in their place.
 
         A missing measurement gets an innovation of zero and a row of zeros in H.
         """
@@ -287,7 +287,7 @@ class NonlinearModel:
         return made, filled
 
     def seen(self, k: int) -> NDArray[np.bool_] | None:
-        """Return which measurements of step k + 1 are there, (m,); None if no step misses any."""
+        """Return which measurements are present in step k + 1, (m,); None if none is missing in any step."""
         H = self.noise.H
         return None if len(H) == 1 else np.array([bool(each) for each in H[k % len(H)][:, 0]])
 
@@ -338,7 +338,7 @@ class NonlinearModel:
             return jacobian(lambda state: self._checked(name, function(state, *_given(u)), x, (rows,)), x)
 
     def difference(self, z: FloatArray, predicted: FloatArray) -> FloatArray:
-        """Return the innovation (m,): the difference, with angles wrapped, or the residual."""
+        """Return the innovation (m,): z - h(x) with its angles wrapped, or what `residual` returns."""
         if self.residual is not None:
             with kept_in(z.format):
                 return self._checked("residual", self.residual(z, predicted), z, (self.m,))
@@ -347,7 +347,7 @@ class NonlinearModel:
     def wrapped(self, y: FloatArray) -> FloatArray:
         r"""Wrap the angles of a difference (m,): :math:`y - 2\pi\,\mathrm{rint}(y/2\pi)`, each operation rounded.
 
-        The angle of a turn, :math:`2\pi`, is twice the rounded :math:`\pi`.
+        The value used for :math:`2\pi` is twice the rounded :math:`\pi`.
         """
         if not self.angles:
             return y
@@ -357,7 +357,7 @@ class NonlinearModel:
         return found
 
     def normalized(self, x: FloatArray) -> FloatArray:
-        """Return a new estimate (n,) as the model normalizes it."""
+        """Return a new estimate (n,) after the model's normalization."""
         if self.normalize is None:
             return x
         with kept_in(x.format):

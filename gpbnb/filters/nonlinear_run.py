@@ -246,7 +246,7 @@ def opened(
 
 
 def complete(model: AnyModel, z: Any) -> tuple[Any, Any]:
-    """Return a model for the measurements of each step, and these with zeros in place of missing ones."""
+    """Return a model that ignores missing measurements, and the measurements with zeros in their place."""
     return model.without_missing(z) if isinstance(model, NonlinearModel) else without_missing(model, z)
 
 

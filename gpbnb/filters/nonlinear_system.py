@@ -61,15 +61,15 @@ class NonlinearSystem:
     r"""A system with known inputs whose step is a function: :math:`(x_{k+1}, y_k) = s(x_k, u_k)`.
 
     A system is a function of a format and of inputs, ``system(fmt, u)``, which returns the outputs (steps, p).
-    :func:`~gpbnb.wordlength.precision.required_precision` and other searches of functions take it as it is, and
+    :func:`~gpbnb.wordlength.precision.required_precision` and other searches of functions accept it as it is, and
     :func:`~gpbnb.wordlength.code.write_code` writes its step in C.
 
     Parameters
     ----------
-    step : function of a format, the state (n,) and the inputs (m,) of a step. It returns the next state and the output,
-        each an array of the format, or a list of arrays, which are joined. All operations must be in the format; write
-        constants as ``fmt.array("0.1")``. What it chooses by a number, it must choose by ``np.where``, ``np.clip`` and
-        the like to run in compiled code and in C.
+    step : function of a format, the state (n,) and the inputs (m,) of a step. It returns the next state and the
+        output, each as an array of the format or as a list of arrays, which are then joined. All operations must be
+        in the format; write constants as ``fmt.array("0.1")``. To run in compiled code and in C, the function must
+        express a choice that depends on a number with ``np.where``, ``np.clip`` or a similar function.
     x0 : (n,), the first state.
     m : number of inputs.
     name : name in tables and in code.
@@ -165,7 +165,7 @@ class NonlinearSystem:
 
         Raises
         ------
-        ValueError : the step cannot be traced, or takes a function that has no exact counterpart in C.
+        ValueError : the step cannot be traced, or uses a function that has no exact counterpart in C.
         OverflowError : a constant is beyond the range of the format.
         """
         tape, returned = self._one_step.recorded((self.n,), (self.m,))

@@ -172,13 +172,13 @@ def _joint_root(model: RootModel, S: Matrix, identity: Matrix) -> tuple[Matrix, 
 
 @dataclass(frozen=True, eq=False)
 class FixedIntervalSmoother:
-    r"""A Rauch–Tung–Striebel smoother for a measurement record, to run or search in any format.
+    r"""A Rauch–Tung–Striebel smoother for one measurement record, which can run in any format.
 
     A smoother is a function of a format, so :func:`gpbnb.wordlength.precision.required_precision` and
     :func:`gpbnb.wordlength.fixed_point.required_fraction_bits` can find the digits that it needs. They compare each run
-    with a reference run that has 37 bits more than the highest precision to try. A second reference run, with half as
-    many extra bits again, must agree with the first. Only errors of the estimates count; they include the errors of
-    storing the model.
+    with a reference run that has 37 bits more than the highest precision to try. A second reference run with half as
+    many extra bits again checks the first. Only errors of the estimates count; they include the errors of storing the
+    model.
 
     Parameters
     ----------

@@ -156,7 +156,8 @@ class LinearSystem:
     D : (p, m), feedthrough matrix; by default zero.
     x0 : (n,), the first state; by default zeros.
     name : name in tables and reports.
-    made : the program that computes a step, if it does not multiply by the matrices directly; see :meth:`from_filter`.
+    made : the program that computes a step, if a step does not multiply by the matrices directly; see
+        :meth:`from_filter`.
     state_names, input_names, output_names : names of the n states, m inputs and p outputs, for messages, tables and
         reports, each optionally with its unit, as in ``["speed (m/s)"]``; by default they are numbered.
 
@@ -463,9 +464,9 @@ class LinearSystem:
             no bound that holds for ever.
         limits : lowest and highest output; by default none.
         integral_limits : lowest and highest integral, one way to prevent windup; by default none.
-        back_calculation : :math:`K_b`, another way to prevent windup. The limiter changes the output by :math:`y_{-1} -
-            v_{-1}` in the last step, and :math:`K_b` times this change is added to the integral. This requires
-            `limits`.
+        back_calculation : :math:`K_b`, another way to prevent windup. In the last step, the limiter changed the
+            output by :math:`y_{-1} - v_{-1}`; the controller adds :math:`K_b` times this change to the integral. This
+            requires `limits`.
 
         Raises
         ------
@@ -570,7 +571,7 @@ class LinearSystem:
         return out
 
     def stored(self, fmt: FloatFormat | FixedFormat) -> tuple[NDArray[Any], ...]:
-        """Return the exact A, B, C and D that follow from the coefficients of the structure as a format stores them."""
+        """Return the exact A, B, C and D of the structure after a format has rounded its coefficients."""
         made = self.as_filter()
         A, B = matrices(made.program, made.stored(fmt))
         return A[: self.n, : self.n], B[: self.n], A[self.n :, : self.n], B[self.n :]

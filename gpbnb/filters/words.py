@@ -69,8 +69,8 @@ class WordFormats:
     data : format of inputs, states, outputs, and of each result that is stored.
     coefficients : format of all coefficients; or a number of significant bits, where each coefficient has its own
         binary point. By default the format of the data.
-    sums : format of the accumulator, with at least the fraction bits of the data; by default there is no accumulator,
-        and each product and each sum is stored in the format of the data.
+    sums : format of the accumulator, with at least as many fraction bits as the data; by default there is no
+        accumulator, and each product and each sum is stored in the format of the data.
 
     Raises
     ------

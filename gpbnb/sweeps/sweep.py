@@ -60,11 +60,11 @@ class Sweep(Generic[C]):
     seed : seed of all random numbers.
     version : a number that changes when results change, so that cells saved by an older version are not used.
     summary : function that makes further rows from the results of all cells.
-    sample : function that recomputes rows of a cell as a check, by default all of them; it may choose some with the
-        generator.
-    same : function that tells whether a stored and a recomputed row agree; by default they must be equal.
+    sample : function that recomputes rows of a cell as a check, by default all of them; it receives a random
+        generator and may choose rows with it.
+    same : function that decides whether a stored and a recomputed row agree; by default they must be equal.
     packages : packages whose versions the provenance lists.
-    faults : function that lists results in a table that must not occur.
+    faults : function that lists the impossible results in a table.
     """
 
     name: str
@@ -141,13 +141,14 @@ class Sweep(Generic[C]):
         Parameters
         ----------
         folder : folder for the table and for saved progress.
-        count : number of cells to compute, the first ones; all by default.
+        count : compute only this number of cells, the first ones; by default all cells.
         only : words, one of which must be in the text of a cell; the table keeps the stored rows of other cells.
-        store : whether to write the finished cells without computing more.
+        store : whether to write the table from the finished cells without computing more.
 
         Raises
         ------
-        ValueError : no cell has one of the words; words for a sweep with sums over all cells.
+        ValueError : no cell contains one of the words; or words are given for a sweep with rows that combine all
+            cells.
         """
         if only and self.summary is not None:
             raise ValueError(
@@ -171,7 +172,7 @@ class Sweep(Generic[C]):
         file: Path | None = None,
         kept: Sequence[Record] = (),
     ) -> None:
-        """Write the table of results, with its provenance; a new row replaces a kept row with the same key."""
+        """Write the table of results, with its provenance; a new row replaces a stored row with the same key."""
         lines = [row for cell, result in results for row in self.rows(cell, result)]
         if kept:
             lines = list(({row[: self.key]: row for row in kept} | {row[: self.key]: row for row in lines}).values())
@@ -210,7 +211,7 @@ class Sweep(Generic[C]):
 
         Parameters
         ----------
-        count : number of cells; all are recomputed if there are not more.
+        count : number of cells; if there are no more than these, all are recomputed.
         """
         stored = {row[: self.key]: row for row in self.load().rows}
         if len(stored) < len(self.load().rows):

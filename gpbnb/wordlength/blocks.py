@@ -57,8 +57,8 @@ class BlockRequirement:
         limits = " and ".join(f"the {name}" for name in self.limiting)
         verb = "limit" if len(self.limiting) > 1 else "limits"
         return (
-            f"{self.formats}: {self.ratio:.2g} of the tolerance; {limits} {verb} the filter: alone, with all others in "
-            f"the most digits, the blocks need {each}; one format for all needs {self.uniform.precision}"
+            f"{self.formats}: {self.ratio:.2g} of the tolerance; {limits} {verb} the filter: lowered one "
+            f"at a time, the blocks need {each}; one format for all needs {self.uniform.precision}"
         )
 
 
@@ -76,7 +76,7 @@ def required_block_precisions(
     emax: int | None = None,
     subnormal: bool = True,
 ) -> BlockRequirement:
-    """Lower each block of a Kalman filter to its smallest precision within a tolerance, and name the block that limits.
+    """Lower each block of a Kalman filter to its smallest precision within a tolerance, and name the limiting block.
 
     The search first finds one format for all blocks, as :func:`gpbnb.wordlength.precision.required_precision` does with
     the basis "emulation". Then it lowers one block at a time, while all other blocks keep the highest precision.
@@ -87,8 +87,8 @@ def required_block_precisions(
     ----------
     model, steps, tolerance, base, rounding, z, seed, emin, emax, subnormal : as for ``required_precision``.
     form : a form with compiled loops; the innovation form, Joseph's or UD for a nonlinear filter.
-    sums : whether sums of products have a format of their own. It keeps the highest precision while the blocks are
-        lowered, and is lowered last, to no fewer digits than any block has.
+    sums : whether sums of products have a format of their own. This format keeps the highest precision while the
+        blocks are lowered. It is lowered last, but never below the precision of any block.
 
     Raises
     ------

@@ -95,10 +95,10 @@ def write_code(
         a function of your own.
     fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; or a :class:`~gpbnb.filters.words.WordFormats`.
     form_or_structure : for a design, its structure; for a Kalman filter, a form with compiled loops, or "constant
-        gain"; None for a linear system, which already has a structure, for a nonlinear system, or for the default. The
-        UD form takes no words of more than 52 bits, and none that wrap around.
+        gain"; None for a linear system, which already has a structure, for a nonlinear system, or for the default.
+        The UD form accepts no words of more than 52 bits and no words that wrap around.
     folder : folder for the files, which is created if necessary.
-    name : name of the files, and prefix of all that the header declares.
+    name : name of the files, and prefix of every name that the header declares.
     inputs : (steps, m), inputs or measurements of the test vectors; by default 100 steps of noise, or of simulated
         measurements.
     within : limits from :func:`gpbnb.bounds.guarantee.limits`; the header states the error bound that holds

@@ -66,11 +66,11 @@ def required_precision(
     """Find the smallest precision with which a filter stays within a tolerance.
 
     The search is a bisection that checks its own assumption. It runs the answer, the next two precisions, and the
-    precisions of binary32 and binary64 if they are higher (:data:`gpbnb.arithmetic.search.CHECKED`); all of these meet
-    the tolerance. It also runs the next lower precision, which does not qualify. If a higher precision misses the
-    tolerance, the search runs every precision up to the largest and the other forms; the answer is then above the
-    highest precision that misses. The text of an answer in bits also says what a run in binary32 itself, or in
-    binary64, gives.
+    precisions of binary32 and binary64 if they are higher (:data:`gpbnb.arithmetic.search.CHECKED`); all of these
+    meet the tolerance. It also runs the next lower precision, which does not qualify. If a higher precision misses
+    the tolerance, the search runs every precision up to the largest, and tries the other forms; the answer is then
+    above the highest precision that misses. The text of an answer in bits also says what a run in binary32 itself, or
+    in binary64, gives.
 
     Parameters
     ----------
@@ -90,13 +90,13 @@ def required_precision(
     rounding, form : values or their names, such as "nearest" and "UD"; see :class:`gpbnb.filters.forms.Form` and
         :class:`gpbnb.filters.array_forms.ArrayForm`.
     basis : "emulation" compares a run in each precision with a run in double-double of the model as given, so the
-        errors include those of storing the model. The answer holds for these measurements. "bound" uses the contraction
-        bound of :mod:`gpbnb.filters.contraction`, which is proved for the arithmetic of this run and requires more
-        digits. "guarantee" bounds the error for every measurement sequence within limits, and for ever, or for `steps`
-        if the filter keeps its errors; "probable" takes three standard deviations of the error that independent
-        roundings would cause. The last two do not depend on `z`, and for them only the neighbours of the answer are
-        checked. Both assume sums from left to right without fused multiply-add, and refuse stochastic rounding of a
-        Kalman filter.
+        errors include those of storing the model. The answer holds for these measurements. "bound" uses the
+        contraction bound of :mod:`gpbnb.filters.contraction`, which is proved for the arithmetic of this run and
+        requires more digits. "guarantee" bounds the error for every measurement sequence within limits; the bound
+        holds for ever, or for `steps` steps if the filter never forgets its errors. "probable" takes three standard
+        deviations of the error that independent roundings would cause. The last two do not depend on `z`; for them,
+        the search checks only the precisions next to the answer. Both assume sums from left to right without fused
+        multiply-add, and refuse stochastic rounding of a Kalman filter.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.bounds.guarantee.limits`.
     emin, emax, subnormal : range of the formats, as in a :class:`gpbnb.arithmetic.formats.FloatFormat`; by default
@@ -361,7 +361,7 @@ class Recorded(ABC):
             return Outcome(math.inf, f"the run is refused: {run.reason}")
         if run.indefinite is not None and not self.bounded:
             lost = f"a computed variance was not positive at step {run.indefinite}"
-            return Outcome(math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0")
+            return Outcome(math.inf, f"{lost}; if the model gives a state no variance, give it a little in P0")
         ratio = largest_ratio(np.abs(errors[:, asked]), self.tolerances[asked])
         return Outcome(ratio, "the bound says nothing" if math.isinf(ratio) else "")
 

@@ -99,7 +99,7 @@ def survey_records(
     chunk: int = 1,
     progress: bool = False,
 ) -> RecordSurvey:
-    """Run a filter on many measurement records in many formats, as :func:`gpbnb.wordlength.precision.survey`.
+    """Run a filter on many measurement records in many formats, as :func:`gpbnb.wordlength.precision.survey` does.
 
     Parameters
     ----------

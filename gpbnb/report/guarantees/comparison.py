@@ -111,7 +111,7 @@ NOT_COMPARABLE = (
         "worst-case peak gain",
         None,
         None,
-        "the examples draw random filters or read binary files, and print nothing in the repository",
+        "the examples use random filters or binary files, and the repository contains no printed results",
         "fixif/examples, TC2018",
     ),
     PublishedNumber(

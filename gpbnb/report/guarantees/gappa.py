@@ -140,7 +140,7 @@ def load(file: Path = FILE) -> tuple[GappaRow, ...]:
 
 def table(rows: Sequence[GappaRow]) -> Table:
     """Tabulate both bounds."""
-    header = ("filter", "state", "our bound of one step", "Gappa's", "Gappa's / ours")
+    header = ("filter", "state", "our bound for one step", "Gappa's", "Gappa's / ours")
     body = []
     for row in rows:
         mine, other = float(row.ours), float(row.gappa)

@@ -2,7 +2,7 @@
 
 ``python -m gpbnb.ledger`` writes the ledger. In a notebook::
 
-    from gpbnb import ledger
+    from gpbnb.report import ledger
 
     rows = ledger.rows(document="hung1984", chapter="II", sections=range(1, 10))
     ledger.error_table(rows)

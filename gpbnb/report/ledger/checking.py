@@ -83,7 +83,7 @@ def examine(
 
     Returns
     -------
-    rows : in the order of `statements`. A check that takes no statement and judges several runs once.
+    rows : in the order of `statements`. A check that judges several statements at once runs only once.
     """
     results: dict[Check, Finding | Exception] = {}
     rows: list[Row] = []

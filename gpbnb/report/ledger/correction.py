@@ -57,7 +57,7 @@ def changes() -> tuple[str, str]:
         f"by {change['roundings counted once']} if each rounding is counted once, by "
         f"{change['errors of either sign']} with errors of either sign, and by "
         f"{change['covariance errors carried on']} with the errors of the covariance carried on. With all "
-        f"three, (125) demands {digits['covariance errors carried on'][0]} digits. It still is no bound.",
+        f"three, (125) demands {digits['covariance errors carried on'][0]} digits. Even then it is not a bound.",
         "In (125), $B$ bounds every input, however many steps ago it entered, so nothing is forgotten. The correction "
         "multiplies an error made $i$ steps ago by $F^i$. If $F<1$, the filter forgets it, and the sum stays below a "
         f"limit. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures "
@@ -77,7 +77,7 @@ def with_correction() -> Html:
         )
     )
     listed = "".join(f"<li>{typeset(text)}</li>" for text in changes())
-    caption = "Braces and colour mark what differs. A letter under both formulas marks a part and what replaces it."
+    caption = "Braces and colour mark the parts that differ. A part of (125) and its replacement have the same letter."
     return Html(
         "(125) above its correction",
         f'<figure class="correction"><div class="correction-pair">{panels}</div><figcaption>{caption}</figcaption>'

@@ -82,23 +82,23 @@ CLAIMS = {
     ),
     "hung1984.II.eq18": Claim(
         "The rounding error of a sum is bounded by its terms, each times the number of additions it passes through",
-        "You can rely on it to first order. With few digits and many terms, use a strict bound.",
+        "You can rely on this bound to first order. With few digits and many terms, use a strict bound.",
     ),
     "hung1984.II.eq26": Claim(
         "The rounding error of an inner product is bounded by its products, counted in the same way",
-        "You can rely on it to first order. With few digits, use a strict bound.",
+        "You can rely on this bound to first order. With few digits, use a strict bound.",
     ),
     "hung1984.II.eq31": Claim(
         "The rounding error of a product of matrices is a few unit roundoffs of the product",
-        "Where the terms of an entry cancel, all its digits may be wrong although the formula promises most of them.",
+        "Where the terms of an entry cancel, the formula promises most of its digits, but all of them may be wrong.",
     ),
     "hung1984.II.s10.practicality-of-44": Claim(
-        "The bound on an inverse by its residual is impractical",
-        "The report abandons the sharpest of the bounds that we tried. It costs one product with twice the digits.",
+        "Bounding the error of an inverse by its residual is impractical",
+        "The report abandons the sharpest bound that we tried. This bound costs one product with twice the digits.",
     ),
     "hung1984.II.eq91": Claim(
         "The errors of elimination and back substitution may be added",
-        "The bound that follows can be exceeded, so a matrix that passes may have a worse inverse than allowed.",
+        "The error can exceed the resulting bound, so a matrix that passes may have a worse inverse than allowed.",
     ),
     "hung1984.II.s11-4.table-1-proposed-3-places": Claim(
         "Table 1 bounds the inverses of some matrices",
@@ -110,7 +110,7 @@ CLAIMS = {
     ),
     "hung1984.II.eq125": Claim(
         "After k steps, the estimate of a Kalman filter is off by at most the bound (125)",
-        "You cannot choose a wordlength with it: one step may violate it, and after a year it is far too large.",
+        "Do not choose a wordlength with this bound: one step may violate it, and after a year it is far too large.",
     ),
     "hung1984.II.s12.example-9-digits": Claim(
         "A year of Gravity Probe B needs 9 digits, by the first term of (125)",
@@ -118,23 +118,23 @@ CLAIMS = {
     ),
     "hung1984.II.s12.example-17-digits": Claim(
         "A year of Gravity Probe B needs 17 digits, by the second term of (125)",
-        "The number rules out IEEE double precision, which is ample.",
+        "This number rules out IEEE double precision, which in fact is ample.",
     ),
     "hung1982.IV.eq8": Claim(
         "This equation derolls the first drift",
-        "Programmed as printed, it measures a drift of zero. Changing two signs corrects it.",
+        "Programmed as printed, this equation measures a drift of zero. Changing two signs corrects it.",
     ),
     "hung1982.IV.eq9": Claim(
         "This equation derolls the second drift",
-        "Programmed as printed, it measures a drift of zero. Changing two signs corrects it.",
+        "Programmed as printed, this equation measures a drift of zero. Changing two signs corrects it.",
     ),
     "savage2016.main.eq35": Claim(
         "A trapezoidal integrator of a noisy signal has this random walk",
-        "You can choose a sampling rate with it.",
+        "You can choose a sampling rate with this formula.",
     ),
     "savage2016.main.eq39": Claim(
         "For fast sampling, the random walk has this simpler form",
-        "You can rely on it if the sampling rate is far above the bandwidth. The abstract omits this condition.",
+        "You can rely on this formula if sampling is far faster than the bandwidth. The abstract omits this condition.",
     ),
 }
 """The principal claims of the documents, by statement id."""
@@ -259,8 +259,9 @@ def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
 
     Parameters
     ----------
-    rows : which.
-    left_undone : show all texts, labelled as what the documents leave undone and what is answered here.
+    rows : the rows to show.
+    left_undone : show every text, labelled as work that the documents leave undone, and every note, labelled as the
+        answer of this book.
     """
     rows = in_reading_order(rows)
     owner = topics()

@@ -15,7 +15,8 @@ from gpbnb.report.ledger.roots import by_root, load_roots
 def squares(rows: Iterable[Row]) -> Html:
     """Draw a square for each statement, coloured by its verdict, which links to its row in the ledger.
 
-    A row of squares is a page of the ledger. Verdicts also differ in shape, for readers who do not see the colours.
+    Each row of squares stands for one page of the ledger. Verdicts also differ in shape, for readers who do not see
+    the colours.
     """
     rows = in_reading_order(rows)
     key = "".join(

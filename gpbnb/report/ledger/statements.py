@@ -238,7 +238,7 @@ def select(
     chapter: str | None = None,
     sections: str | Iterable[str | int] | None = None,
 ) -> tuple[Statement, ...]:
-    """Pick the entries of a document, a chapter, some sections.
+    """Pick the entries of a document, of a chapter or of some sections.
 
     Parameters
     ----------

@@ -314,7 +314,7 @@ def factored_1982(printed: Statement) -> Finding:
         "the weights are those of (87), but β stands for $\\epsilon$, so the equation fails where "
         "$\\epsilon$ is negative; $|\\Delta A|\\le|A_D|M_A\\beta$ holds",
         Verdict.WRONG if counted else Verdict.INCONSISTENT,
-        otherwise_note="this is the step for which (49), (52)–(54), (59) and (60) are wrong; hung1984 has "
+        otherwise_note="this step is the reason why (49), (52)–(54), (59) and (60) are wrong; hung1984 has "
         "neither β nor $\\epsilon$ there",
         root=ONE_EPSILON,
     )

@@ -21,7 +21,7 @@ from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement, statement
 
 _NO_BOUND = (
-    "the case is one state with $P=H=\\Phi=x_0=1$, $z=0$ and $R$ below the last digit; the estimate "
+    "the counterexample has one state with $P=H=\\Phi=x_0=1$, $z=0$ and $R$ below the last digit; the estimate "
     "is then lost completely, in every format"
 )
 _BETA = "; the prefactor is $\\beta$, as in the example, although the scans show B"

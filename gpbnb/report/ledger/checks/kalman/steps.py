@@ -58,8 +58,8 @@ def rounded_prediction(printed: Statement) -> Finding:
     return _prediction(
         printed,
         "$P_{k-1}$ stands here without a hat, so the error that earlier steps left in it is dropped. With one state it "
-        f"makes the error of $P_{{kp}}$ {times:.3g} times $(2n+1)\\beta P_{{kp}}$ in the second step. Carried on, "
-        f"it lets the bound grow as $k^3$: twice as many steps multiply it by {growth:.2g}. Also, {_CANCELS}",
+        f"makes the error of $P_{{kp}}$ {times:.3g} times $(2n+1)\\beta P_{{kp}}$ in the second step. If it "
+        f"is carried on, the bound grows as $k^3$: twice as many steps multiply it by {growth:.2g}. Also, {_CANCELS}",
         DROPPED,
     )
 

@@ -55,7 +55,11 @@ def deviation(found: float, expected: float, error: float) -> float:
 
 
 def expected_squares(study: experiment.FilterStudy, duration: float = YEAR / 16) -> np.ndarray:
-    """Return lag and exact noise of a study's filters; the noise is taken where its logarithm has its mean."""
+    """Return the mean square error of each filter of a study: the square of its lag, plus the exact noise.
+
+    The noise grows with the logarithm of time. It is taken at T/e, where the logarithm has its mean over a record of
+    length T.
+    """
     middle = round(duration / theory.INTERVAL / math.e)
     expected = []
     for kind, lag, width in zip(study.kinds, study.lag, study.bandwidth, strict=True):

@@ -319,7 +319,7 @@ def _error_of_the_shortcut() -> tuple[bool, str]:
 
 
 _SHORTCUT = (
-    "(28) bounds a norm; the error is no multiple of the product, because the product may cancel while the error "
+    "(28) bounds a norm; the error is not a multiple of the product, because the product may cancel while the error "
     "remains"
 )
 
