@@ -22,7 +22,11 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding, rounding_named
 from gpbnb.arithmetic.search import Outcome, Search
 from gpbnb.bounds.words import WordGuarantee, bounded_rounding, largest_rounding
+from gpbnb.filters.array_forms import AnyForm
+from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import form_named
+from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.program import innovation_program, matrices
 from gpbnb.filters.run import log_spaced, reference
 from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable, system_inputs
@@ -34,8 +38,9 @@ from gpbnb.filters.words import (
     run_integers,
     run_words,
 )
+from gpbnb.wordlength.precision import recorded_strategy
 from gpbnb.wordlength.recursion import Recursion, recursion_strategy
-from gpbnb.wordlength.requirement import largest_ratio
+from gpbnb.wordlength.requirement import Asked, Strategy, largest_ratio
 
 Basis = Literal["emulation", "guarantee"]
 LARGEST_FRACTION = 60  # bits
@@ -185,7 +190,7 @@ def bound_per_unit(given: ScaledFilter, coefficient_bits: int = 15, wide: bool =
 
 
 def required_fraction_bits(
-    given: ScaledFilter | LinearSystem | Recursion,
+    given: ScaledFilter | LinearSystem | AnyModel | Recursion,
     z: Any,
     tolerance: Sequence[float] | float,
     basis: Basis = "emulation",
@@ -193,6 +198,7 @@ def required_fraction_bits(
     coefficient_bits: int = 15,
     wide: bool = False,
     like: FixedFormat | WordFormats | None = None,
+    form: AnyForm | str = Form.INNOVATION,
 ) -> FixedAnswer:
     """Find the smallest number of fraction bits with which errors stay within a tolerance.
 
@@ -202,26 +208,28 @@ def required_fraction_bits(
     Parameters
     ----------
     given : a linear system in any structure; a function of a format and `z`, as in
-        :func:`gpbnb.wordlength.recursion.required_recursion_precision`; or a scaled filter. The error of a system is
-        the difference between its outputs and those of the system as given, and includes the error of storing
-        coefficients and inputs. The error of a scaled filter is due only to rounding its states.
+        :func:`gpbnb.wordlength.recursion.required_recursion_precision`; a Kalman filter, linear or nonlinear, all of
+        whose operations are rounded into one format; or a scaled filter. The error of a system is the difference
+        between its outputs and those of the system as given, and includes the error of storing coefficients and
+        inputs; so does that of a Kalman filter. The error of a scaled filter is due only to rounding its states.
     z : (steps, m), inputs or measurements.
-    tolerance : largest acceptable error of each output, or of each state of a scaled filter, in its unit; infinite if
-        its accuracy does not matter.
+    tolerance : largest acceptable error of each output, or of each state of a filter, in its unit; infinite if its
+        accuracy does not matter.
     basis : "emulation" of these measurements; or "guarantee", for a system for all inputs that are never larger than
         the largest of `z`, with a proof that nothing overflows, and for a scaled filter for all measurements that do
-        not overflow.
+        not overflow. A Kalman filter has :func:`gpbnb.bounds.guarantee.guarantee` in its place.
     rounding, coefficient_bits, wide : as for :func:`emulated`.
     like : formats for a system or a function, in place of `rounding`, `coefficient_bits` and `wide`. They set the
         integer bits, the rounding and the overflow. The search changes the fraction bits of the data, and those of the
         sums by the same number. Coefficients change with the data if they have the format of the data; otherwise they
-        keep their own format. A function requires `like`.
+        keep their own format. A function or a Kalman filter requires a `FixedFormat`.
+    form : the form of a Kalman filter, or its name, as in :func:`gpbnb.wordlength.precision.required_precision`.
 
     Raises
     ------
     TypeError : another kind of filter.
     ValueError : a tolerance is not above 0, no tolerance is finite, or the basis is neither of the two; inputs that do
-        not fit; a guarantee for a function; a function without `like`.
+        not fit; a guarantee for a function or a Kalman filter, or either without `like`; a form of anything else.
     OverflowError : an output of a system as given is beyond the range of float64.
 
     Examples
@@ -234,23 +242,23 @@ def required_fraction_bits(
     """
     if basis not in ("emulation", "guarantee"):
         raise ValueError(f'got basis {basis!r}; needed "emulation" or "guarantee"')
-    rounding = rounding_named(rounding)
+    rounding, form = rounding_named(rounding), form_named(form)
+    if form is not Form.INNOVATION and not isinstance(given, LinearModel | NonlinearModel):
+        raise ValueError(f"got the {form} form; needed none: only a LinearModel or a NonlinearModel has forms")
     strategy: _Strategy
+    if not isinstance(given, ScaledFilter | LinearSystem | LinearModel | NonlinearModel) and not callable(given):
+        raise TypeError(f"got a {type(given).__name__}; needed a LinearSystem, a model or a function")
     if isinstance(given, ScaledFilter):
         goal = _goal(tolerance, given.filter.program.n)
         strategy = _States(given, z, goal, rounding, (coefficient_bits, wide), basis)
     elif isinstance(given, LinearSystem):
         words = WordFormats(like) if isinstance(like, FixedFormat) else like
         strategy = _of_system(given, z, _goal(tolerance, given.p), basis, rounding, (coefficient_bits, wide), words)
-    elif not callable(given):
-        raise TypeError(
-            f"got a {type(given).__name__}; needed a LinearSystem or a function; for a LinearModel in one fixed-point "
-            "format, use emulate or guarantee; for a NonlinearModel, emulate(model, z, FixedFormat(...))"
-        )
-    elif isinstance(like, FixedFormat):
-        strategy = _Function(given, z, tolerance, basis, like)
+    elif not isinstance(like, FixedFormat):
+        kind = "function" if callable(given) else type(given).__name__
+        raise ValueError(f"got like={like!r} for a {kind}; needed a FixedFormat, with integer bits for its numbers")
     else:
-        raise ValueError(f"got like={like!r} for a function; needed a FixedFormat, with integer bits for its numbers")
+        strategy = _Runs(_of_runs(given, z, tolerance, basis, form, like), like)
     largest = LARGEST_FRACTION - 1
     found = Search(strategy.error, strategy.like, (), largest=largest, least=strategy.least)
     ratios = dict(found.tried)
@@ -409,17 +417,27 @@ class _Outputs(_Strategy):
         return self._words_of(replace(fmt, integer_bits=fmt.integer_bits + self._more.get(fmt.fraction_bits, 0)))
 
 
-class _Function(_Strategy):
-    """Errors of a function, against its reference in floating point."""
+class _Runs(_Strategy):
+    """Errors of the runs of a function or a Kalman filter, against a reference in floating point."""
 
-    def __init__(self, run: Recursion, z: Any, tolerance: Any, basis: Basis, like: FixedFormat) -> None:
+    def __init__(self, runs: Strategy, like: FixedFormat) -> None:
         super().__init__(like, np.ones(1))
-        most = LARGEST_FRACTION + max(like.integer_bits, 0)
-        self._strategy = recursion_strategy(run, None, tolerance, z, 2, basis, most)
+        self._runs = runs
 
     def error(self, fmt: FixedFormat) -> Outcome:
-        ratio, why = self._strategy.error(fmt)
-        return Outcome(ratio, why and f"are refused: {why}")
+        ratio, why = self._runs.error(fmt)
+        return Outcome(ratio, why and f"fail: {why}")
+
+
+def _of_runs(
+    given: AnyModel | Recursion, z: Any, tolerance: Any, basis: Basis, form: AnyForm, like: FixedFormat
+) -> Strategy:
+    if callable(given):
+        most = LARGEST_FRACTION + max(like.integer_bits, 0)
+        return recursion_strategy(given, None, tolerance, z, 2, basis, most)
+    if basis != "emulation":
+        raise ValueError(f'got basis "{basis}" for {given.name}; needed "emulation"; for a LinearModel, use guarantee')
+    return recorded_strategy(given, Asked(len(z) if hasattr(z, "__len__") else 1, basis), tolerance, form, z)
 
 
 def _of_system(

@@ -1,4 +1,4 @@
-"""Nonlinear examples: a beacon seen in range and bearing, an attitude, an aircraft's height, a clipped controller."""
+"""Nonlinear examples: a vehicle seen in range and bearing, an aircraft's height, a clipped controller."""
 
 from __future__ import annotations
 
@@ -46,61 +46,6 @@ def beacon() -> NonlinearModel:
         state_names=["east (m)", "north (m)", "east rate (m/s)", "north rate (m/s)"],
         measurement_names=["range (m)", "bearing (rad)"],
         name="range and bearing",
-    )
-
-
-def turned(q: FloatArray, u: FloatArray) -> Any:
-    """Return a quaternion turned by three small angles u (rad), to first order."""
-    half = u / 2
-    rows = [
-        [q[0], -q[1], -q[2], -q[3]],
-        [q[1], q[0], -q[3], q[2]],
-        [q[2], q[3], q[0], -q[1]],
-        [q[3], -q[2], q[1], q[0]],
-    ]
-    return np.stack([row[0] + row[1] * half[0] + row[2] * half[1] + row[3] * half[2] for row in rows])
-
-
-def seen_directions(q: FloatArray, u: FloatArray) -> Any:
-    """Return the third and the first row of the rotation matrix: down and north as the body sees them."""
-    w, x, y, z = q
-    return np.stack(
-        [
-            2 * (x * z - w * y),
-            2 * (w * x + y * z),
-            w * w - x * x - y * y + z * z,
-            w * w + x * x - y * y - z * z,
-            2 * (x * y - w * z),
-            2 * (x * z + w * y),
-        ]
-    )
-
-
-def unit(q: FloatArray) -> Any:
-    """Return a quaternion scaled to length one."""
-    return q / np.linalg.norm(q)
-
-
-def attitude(steps: int = 40) -> NonlinearModel:
-    """An attitude quaternion from gyroscopes, accelerometers and a magnetometer, n = 4 and m = 6.
-
-    The gyroscopes, which turn at 0.3 rad/s and swing, are the inputs, 100 times a second. The vehicle does not
-    accelerate, so that the accelerometers see the direction of gravity.
-    """
-    t = np.arange(steps) * 0.01
-    rates = np.stack([0.2 * np.sin(t), 0.1 * np.cos(0.7 * t), np.full(steps, 0.3)], axis=1)
-    return NonlinearModel(
-        turned,
-        None,
-        seen_directions,
-        None,
-        Q=np.eye(4) * 2.0**-22,
-        R=np.diag([2.0**-8] * 3 + [2.0**-6] * 3),
-        x0=[1, 0, 0, 0],
-        P0=np.eye(4) / 16,
-        u=np.rint(rates * 0.01 * 2**20) / 2**20,
-        normalize=unit,
-        name="attitude quaternion",
     )
 
 

@@ -363,6 +363,49 @@ def test_every_digit_in_fixed_point_is_that_of_plain_loops(form):
     assert run.P.to_fractions().tolist() == plain.P
 
 
+def largest_error(form, r, count=20):
+    """The largest error of any state in the first steps of plain loops, against loops in 120 bits."""
+    _, z, sight, given, u = case(MOTIONS[3], seed=3)
+    run = PlainFilter(MOTIONS[3], sight, given, form, r)
+    true = PlainFilter(MOTIONS[3], sight, given, Form.INNOVATION, rounding(2, 120))
+    both = zip(*(plain_estimates(each, z[:count], u[:count]) for each in (run, true)), strict=True)
+    return max(float(abs(a - b)) for x, exact in both for a, b in zip(x, exact, strict=True))
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD])
+def test_fraction_bits_are_those_of_plain_loops(form):
+    model, z, *_ = case(MOTIONS[3], seed=3)
+    found = required_fraction_bits(model, z[:20], 0.01, like=FixedFormat(8, 1), form=str(form))
+    bits = found.fmt.fraction_bits
+    assert found.fmt == FixedFormat(8, bits)
+    ratios = dict(found.tried)
+    for each in (bits - 1, bits, bits + 1):  # the reference has twice 53 bits or more
+        assert ratios[each] == pytest.approx(largest_error(form, words(each)) / 0.01, rel=1e-9)
+    assert ratios[bits] <= 1 < ratios[bits - 1]
+    assert ratios[bits + 1] <= 1
+    assert str(found).startswith(f"{bits} fraction bits in a word of {9 + bits} bits, by emulation; {bits - 1} ")
+
+
+@pytest.mark.parametrize("form", ["innovation", "Joseph"])
+def test_fraction_bits_of_a_linear_filter_are_those_of_its_functions(form):
+    Phi, H, noises = [[1, 0.5], [0, 1]], [[1, 0]], ([[0, 0], [0, 0.01]], [[1]], [0, 0], np.eye(2))
+    linear = LinearModel(Phi, H, *noises)
+    alike = NonlinearModel(lambda x: x.format.array(Phi) @ x, None, lambda x: x.format.array(H) @ x, None, *noises)
+    z = np.ma.masked_equal(np.round(simulated(linear, 40, seed=1), 3), 100)
+    z[7] = np.ma.masked
+    one, other = (required_fraction_bits(each, z, 0.01, like=FixedFormat(8, 1), form=form) for each in (linear, alike))
+    assert one.tried == other.tried
+    assert one.fmt is not None
+    assert one.fmt == other.fmt
+
+
+def test_fraction_bits_name_the_overflow_of_a_nonlinear_filter():
+    model, z, *_ = case(MOTIONS[3], seed=3)
+    found = required_fraction_bits(model, z, 0.01, like=FixedFormat(3, 1))
+    assert found.fmt is None
+    assert "59 fraction bits fail: overflow: measurements: entry" in str(found)
+
+
 @pytest.mark.parametrize(
     ("fmt", "r"), [(FloatFormat(2, 20), rounding(2, 20)), (FixedFormat(8, 22), words(22))], ids=["20 bits", "fixed"]
 )
@@ -392,8 +435,6 @@ def test_emulate_refuses_what_a_nonlinear_filter_does_not_have():
         emulate(model, z, FloatFormat(2, 24), sums="pairwise")
     with pytest.raises(TypeError, match="needed a LinearModel or a NonlinearModel"):
         emulate(model.noise.H, z, FloatFormat(2, 24))
-    with pytest.raises(TypeError, match=r"for a NonlinearModel, emulate\(model, z, FixedFormat"):
-        required_fraction_bits(model, z, 0.01, like=FixedFormat(8, 1))
     stopped = emulate(model, z, FixedFormat(3, 20))
     assert stopped.stopped == 1
     assert stopped.reason == "overflow at step 1"

@@ -201,32 +201,6 @@ def test_the_beacon_is_tracked_behind_the_instrument():
     assert found.state_norm.max() < 1e-4
 
 
-def test_a_quaternion_turns_as_its_rotation_matrix_says():
-    q, u = np.array([0.5, 0.5, -0.5, 0.5]), np.array([0.125, -0.25, 0.5])
-    w, v = q[0], q[1:]
-    expected = q + np.append(-v @ u / 2, (w * u + np.cross(v, u)) / 2)
-    fmt = FloatFormat(2, 53)
-    assert examples.turned(fmt.array(q), fmt.array(u)).to_float().tolist() == expected.tolist()
-    x, y, z = v
-    matrix = np.array(
-        [
-            [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-        ]
-    )
-    assert examples.seen_directions(fmt.array(q), None).to_float().tolist() == [*matrix[2], *matrix[0]]
-    assert examples.unit(fmt.array([3, 0, 4, 0])).to_float().tolist() == [0.6, 0, 0.8, 0]
-
-
-def test_the_attitude_stays_of_length_one():
-    model = examples.attitude(20)
-    found = emulate(model, simulated(model, 20), FloatFormat(2, 30))
-    lengths = np.linalg.norm(found.reference.x.astype(float), axis=1)
-    assert np.abs(lengths - 1).max() < 1e-15
-    assert 0 < found.state_norm.max() < 1e-6
-
-
 def test_the_clipped_controller_is_clipped():
     controller = examples.clipped_controller()
     u = np.concatenate([np.ones(30), np.random.default_rng(2).uniform(-1, 1, 400)])

@@ -169,7 +169,16 @@ def test_a_digital_filter_has_named_inputs_and_outputs():
         (lambda: limit_cycles(WALK, FixedFormat(2, 5)), "got a LinearModel; needed a LinearSystem"),
         (
             lambda: required_fraction_bits(WALK, [[1]], 1),
-            "got a LinearModel; needed a LinearSystem or a function",
+            "got like=None for a LinearModel; needed a FixedFormat",
+        ),
+        (lambda: required_fraction_bits(3, [[1]], 1), "got a int; needed a LinearSystem, a model or a function"),
+        (
+            lambda: required_fraction_bits(WALK, [[1]], 1, "guarantee", like=FixedFormat(2, 5)),
+            'got basis "guarantee" for .*; needed "emulation"; for a LinearModel, use guarantee',
+        ),
+        (
+            lambda: required_fraction_bits(SYSTEM, [[1]], 1, form="UD"),
+            "got the UD form; needed none: only a LinearModel or a NonlinearModel has forms",
         ),
         (lambda: required_precision(lambda: 1, 5, 1), "got a function that does not take .*fmt.*: .*; needed f.fmt."),
         (lambda: required_precision(lambda f, z: 1, 5, 1), "got a function that does not take .*; needed f.fmt.* z="),
