@@ -34,7 +34,7 @@ from gpbnb.arithmetic.rounding import Rounding, Rules
 from gpbnb.report.display.tables import Table
 
 PRECISIONS = {2: range(1, 54), 10: range(1, 19), 16: range(1, 14)}
-WIDE = {2: (54, 55, 63, 64, 65, 106, 112, 113), 10: (19, 20, 21, 27, 33, 34), 16: (14, 15, 27, 28)}
+WIDE = {2: (54, 55, 61, 62, 63, 64, 65, 106, 112, 113), 10: (19, 20, 21, 27, 33, 34), 16: (14, 15, 27, 28)}
 """Precisions whose significands take two words."""
 OPERATIONS = ("add", "subtract", "multiply", "divide", "sqrt", "round")
 PER_BASE_AND_ROUNDING = {2: 10_000_000, 10: 10_000_000, 16: 1_000_000}

@@ -1,4 +1,6 @@
-"""Compare significands of two words with the exact kernel in every rounding and range: ``python -m benchmarks.wide``.
+"""Compare the longest significands with the exact kernel in every rounding and range: ``python -m benchmarks.wide``.
+
+These are significands of two words, and those of 53 bits that the machine's float64 serves.
 
 Operands are those of :mod:`benchmarks.exactness`: random, ties, near-ties, cancellations, carries. In a format with a
 range, a third of the pairs lies at its lower end, where numbers are subnormal or become zero, and a third at its upper
@@ -20,12 +22,14 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.exactness import OPERATIONS, RESULTS, WIDE, Job, pairs, radicands
-from gpbnb.arithmetic.kernels.backends import Backend, Components, TwoWords, exact
+from gpbnb.arithmetic.kernels import backends
+from gpbnb.arithmetic.kernels.backends import Backend, Components, Looped, TwoWords, exact
 from gpbnb.arithmetic.kernels.exact import kernel
 from gpbnb.arithmetic.kernels.selection import wide_tag
 from gpbnb.arithmetic.rounding import Limits, Rounding, Rules
 from gpbnb.report.display.tables import Table
 
+BINARY = 53  # bits of float64
 ROUNDINGS = [rounding for rounding in Rounding if rounding is not Rounding.STOCHASTIC]
 RANGES = ("none", "subnormal", "flushed", "saturating", "short", "fixed")
 BATCH = 500
@@ -51,21 +55,35 @@ def formats() -> Iterator[Rules]:
                         yield Rules(base, precision, rounding, _limits(base, precision, kind))
 
 
-def _limits(base: int, precision: int, kind: str) -> Limits | None:
+def formats_of_float64() -> Iterator[Rules]:
+    """Every rounding and range of 53 bits, but ties away from zero; in fixed point, 53 bits with the sign."""
+    for rounding in ROUNDINGS:
+        for kind in RANGES if rounding is not Rounding.NEAREST else ():
+            precision = BINARY - (kind == "fixed")
+            yield Rules(2, precision, rounding, _limits(2, precision, kind, 200))
+
+
+def _limits(base: int, precision: int, kind: str, far: int = 3000) -> Limits | None:
     if kind == "none":
         return None
     if kind == "fixed":
         unit = Fraction(1, 2 ** (precision - 3))
         return Limits(2, True, (2**precision - 1) * unit, -(2**precision) * unit, "saturate", True)
-    emin, emax = (-6, 9) if kind == "short" else (-3000, 3000)
+    emin, emax = (-6, 9) if kind == "short" else (-far, far)
     # A largest number that does not end in nines, as FP8 E4M3 has.
     digits = base**precision - (base if kind == "saturating" else 1)
     largest = digits * Fraction(base) ** (emax - precision + 1)
     return Limits(emin, kind != "flushed", largest, -largest, "saturate" if kind == "saturating" else "raise")
 
 
-def backend(rules: Rules) -> TwoWords:
-    """The backend with significands of two words, also of a format that has a faster one."""
+def _in_float64(rules: Rules) -> bool:
+    return rules.base == 2 and rules.precision <= BINARY
+
+
+def backend(rules: Rules) -> Looped:
+    """The backend that is compared: significands of two words beyond the bits of float64."""
+    if _in_float64(rules):
+        return cast(Looped, backends.backend(rules))
     tag = wide_tag(rules)
     if tag is None:
         raise ValueError(f"got {rules}; needed significands that two words hold")
@@ -166,14 +184,20 @@ def compare(rules: Rules, count: int, seed: int) -> Count:
     return Count(rules, compared, overflowed, different)
 
 
+def _family(rules: Rules) -> str:
+    return "base 2, float64" if _in_float64(rules) else f"base {rules.base}, two words"
+
+
 def write(counts: list[Count]) -> None:
-    """Write what was compared in each base and rounding to ``benchmarks/results``."""
+    """Write what was compared in each family and rounding to ``benchmarks/results``."""
     body = []
-    for base, rounding in product(WIDE, ROUNDINGS):
-        mine = [count for count in counts if (count.rules.base, count.rules.rounding) == (base, rounding)]
+    families = dict.fromkeys(_family(count.rules) for count in counts)
+    for family, rounding in product(families, ROUNDINGS):
+        mine = [count for count in counts if (_family(count.rules), count.rules.rounding) == (family, rounding)]
         numbers = [(count.compared, count.overflowed, len(count.different)) for count in mine]
-        body.append((str(base), rounding.value, *(f"{sum(column):,}" for column in zip(*numbers, strict=True))))
-    table = Table("results compared", ("base", "rounding", "compared", "overflows", "different"), tuple(body))
+        if mine:
+            body.append((family, rounding.value, *(f"{sum(column):,}" for column in zip(*numbers, strict=True))))
+    table = Table("results compared", ("significands", "rounding", "compared", "overflows", "different"), tuple(body))
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / "wide.md").write_text(f"{table.markdown()}\n", encoding="utf-8")
 
@@ -183,7 +207,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=COUNT, help="results of each operation in each format")
     parser.add_argument("--seed", type=int, default=754)
     options = parser.parse_args()
-    counts = [compare(rules, options.count, options.seed) for rules in tqdm(list(formats()))]
+    counts = [compare(rules, options.count, options.seed) for rules in tqdm([*formats(), *formats_of_float64()])]
     if options.count >= COUNT:
         write(counts)
     for text in [text for count in counts for text in count.different][:20]:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.assignment import At
 from gpbnb.arithmetic.conversion import entries, exact_ratio, special_number
+from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import check_exit, entering
-from gpbnb.arithmetic.functions import DomainError, floor_divide, kept, lines, power, remainder
+from gpbnb.arithmetic.functions import floor_divide, kept, lines, power, remainder
 from gpbnb.arithmetic.kernels.backends import Backend, Components
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
 from gpbnb.arithmetic.rounding import Rounding

@@ -13,7 +13,7 @@ from flint import arb, fmpq
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import entries
-from gpbnb.arithmetic.functions import rounded_enclosure
+from gpbnb.arithmetic.elementary import rounded_enclosure
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.text import in_columns
 

@@ -28,8 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.elementary import elementary
 from gpbnb.arithmetic.fixed import FixedArray
-from gpbnb.arithmetic.functions import elementary, lines
+from gpbnb.arithmetic.functions import lines
 
 SLOPES: dict[str, Callable[[Any, Any], Any]] = {
     "exp": lambda a, c: c,

@@ -75,7 +75,7 @@ class FloatFormat(Makes[FloatArray]):
     functions, remainders and sorting need finite entries, and treat negative zero as zero.
     :func:`~gpbnb.arithmetic.flags.flags` counts the exceptions of IEEE 754. Such a format computes on Python integers,
     about a thousand times slower than compiled loops. Filters have compiled loops for "saturate" in base 2 up to 52
-    bits, and in base 16.
+    bits, or 53 unless ties go away from zero, and in base 16.
 
     References
     ----------

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import functions
 from gpbnb.arithmetic.conversion import single
+from gpbnb.arithmetic.elementary import ELEMENTARY, ELEMENTARY_PAIRS, elementary
 from gpbnb.arithmetic.exits import check_exit
 
 _EXACT = {2: 53, 16: 13}  # digits of float64
@@ -359,10 +360,10 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "fmod": functions.fmod,
     "floor_divide": functions.floor_divide,
     "power": functions.power,
-    "radians": partial(functions.elementary, "deg2rad"),
-    "degrees": partial(functions.elementary, "rad2deg"),
-    **{name: partial(functions.elementary, name) for name in functions.ELEMENTARY + functions.ELEMENTARY_PAIRS},
-    **{name: partial(functions.elementary, name) for name in ("floor", "ceil", "trunc", "rint")},
+    "radians": partial(elementary, "deg2rad"),
+    "degrees": partial(elementary, "rad2deg"),
+    **{name: partial(elementary, name) for name in ELEMENTARY + ELEMENTARY_PAIRS},
+    **{name: partial(elementary, name) for name in ("floor", "ceil", "trunc", "rint")},
 }
 
 _REDUCTIONS: dict[str, Callable[..., Any]] = {
@@ -421,7 +422,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "cross": functions.cross,
     "diff": lambda x, a, n=1, axis=-1: functions.diff(a, n, axis),
     "dot": _dot,
-    "fix": lambda x, a: functions.elementary("trunc", a),
+    "fix": lambda x, a: elementary("trunc", a),
     "full_like": lambda x, a, fill_value: functions.full_like(a, fill_value),
     "isclose": lambda x, a, b, rtol=1e-5, atol=1e-8: functions.isclose(a, b, rtol, atol),
     "ndim": lambda x, a: a.ndim,

@@ -20,6 +20,7 @@ import numpy as np
 from gpbnb.arithmetic import functions, linalg
 from gpbnb.arithmetic.array import ComponentArray, FloatArray
 from gpbnb.arithmetic.conversion import entries
+from gpbnb.arithmetic.elementary import elementary
 from gpbnb.arithmetic.exits import unseen
 from gpbnb.arithmetic.kernels.backends import Backend
 from gpbnb.arithmetic.protocols import broadcast
@@ -283,7 +284,7 @@ class TracedArray(FloatArray):
     def called(self, name: str, *arrays: TracedArray) -> TracedArray:
         """Record an elementary function."""
         function = {"fmod": functions.fmod, "floor_divide": functions.floor_divide}.get(name)
-        return self._called(function or partial(functions.elementary, name), arrays)
+        return self._called(function or partial(elementary, name), arrays)
 
     def _called(self, function: Callable[..., FloatArray], arrays: Sequence[TracedArray]) -> TracedArray:
         made: TracedArray = self.format.made(self.tape.call(function, *(each.components[0] for each in arrays)))

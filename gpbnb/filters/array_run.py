@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.algebra import Algebra
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
+from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.functions import DomainError
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.filters import array_steps
 from gpbnb.filters.array_forms import AnyForm, ArrayForm

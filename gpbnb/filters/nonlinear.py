@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.derivatives import jacobian
+from gpbnb.arithmetic.elementary import elementary
 from gpbnb.arithmetic.exits import kept_in
-from gpbnb.arithmetic.functions import elementary
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.covariance import Repair
 from gpbnb.filters.missing import without_missing

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import kept_in, lifted
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.functions import DomainError
 from gpbnb.arithmetic.search import CHECKED, Outcome, largest_by_default
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.missing import real_numbers

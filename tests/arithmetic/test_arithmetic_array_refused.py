@@ -13,9 +13,9 @@ import pytest
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
+from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.functions import DomainError
 from gpbnb.arithmetic.rounding import Rounding
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

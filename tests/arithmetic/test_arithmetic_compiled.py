@@ -12,7 +12,7 @@ from gpbnb.filters.run import Run, Sums
 from gpbnb.filters.system import state_space
 
 REFUSED = [
-    (FloatFormat(2, 53, "even"), "got 53 digits of base 2, rounded even; needed at most 52 "),
+    (FloatFormat(2, 54, "even"), "got 54 digits of base 2, rounded even; needed at most 53 "),
     (FloatFormat(2, 60), "got 60 digits of base 2; needed at most 53 "),
     (FloatFormat(2, 53, emin=-1022, emax=1023), "got 53 digits of base 2 with a limited range; needed at most 52 "),
     (FloatFormat(10, 19, "even"), "got 19 digits of base 10, rounded even; needed at most 18 "),

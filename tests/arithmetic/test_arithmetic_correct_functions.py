@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from gpbnb import FloatFormat, Rounding
+from gpbnb.arithmetic.elementary import ELEMENTARY, ELEMENTARY_PAIRS
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.functions import ELEMENTARY, ELEMENTARY_PAIRS
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32, BINARY64
 
 AMPLE = 1200  # bits; no argument below leads within 2**-1000 of a tie that is not hit exactly

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from gpbnb import FloatFormat, Rounding
-from gpbnb.arithmetic import functions
+from gpbnb.arithmetic import elementary
+from gpbnb.arithmetic.elementary import ELEMENTARY
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.functions import ELEMENTARY
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
 
 FORMATS = [FloatFormat(2, 11), FloatFormat(10, 4), FloatFormat(2, 113), FloatFormat(2, 24, Rounding.CHOP)]
@@ -297,10 +297,10 @@ def test_results_by_float64_are_those_of_arb(name: str) -> None:
     decided = 0
     for fmt in (BINARY32, BFLOAT16, FloatFormat(2, 24, "chop"), FloatFormat(16, 6), FloatFormat(2, 44)):
         x = fmt.array(arguments(name, 40))
-        found = functions._by_float64(name, x)
+        found = elementary._by_float64(name, x)
         assert found is not None
         decided += np.count_nonzero(~found[1])
-        exact = functions._by_arb(name, [x], np.ndindex(x.shape), np.empty(x.shape, object))
+        exact = elementary._by_arb(name, [x], np.ndindex(x.shape), np.empty(x.shape, object))
         assert np.array_equal(getattr(np, name)(x), exact)
     assert decided > 100
 
@@ -309,16 +309,16 @@ def test_results_by_float64_are_those_of_arb(name: str) -> None:
 def test_numpys_functions_are_closer_than_the_doubt_about_them(name: str) -> None:
     wide = FloatFormat(2, 120)
     x = arguments(name, 200)
-    exact = wide.array(functions._by_arb(name, [wide.array(x)], np.ndindex(x.shape), np.empty(x.shape, object)))
+    exact = wide.array(elementary._by_arb(name, [wide.array(x)], np.ndindex(x.shape), np.empty(x.shape, object)))
     for found, expected in zip(getattr(np, name)(x).tolist(), exact.to_fractions().tolist(), strict=True):
-        assert abs(Fraction(found) - expected) <= abs(expected) * Fraction(functions._DOUBT) / 4
+        assert abs(Fraction(found) - expected) <= abs(expected) * Fraction(elementary._DOUBT) / 4
 
 
 def test_a_result_in_doubt_is_left_to_arb(monkeypatch: pytest.MonkeyPatch) -> None:
     x = BINARY32.array(arguments("exp", 40))
     expected = np.exp(x)
-    monkeypatch.setattr(functions, "_DOUBT", 0.25)
-    found = functions._by_float64("exp", x)
+    monkeypatch.setattr(elementary, "_DOUBT", 0.25)
+    found = elementary._by_float64("exp", x)
     assert found is not None
     assert found[1].all()
     assert np.array_equal(np.exp(x), expected)

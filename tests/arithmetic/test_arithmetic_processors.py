@@ -186,7 +186,9 @@ def test_fused_multiply_add_of_every_triple(tiny: FloatFormat, mode: Rounding) -
 
 
 @pytest.mark.parametrize("mode", DETERMINISTIC)
-@pytest.mark.parametrize("fmt", [named.BINARY32, named.TF32, FloatFormat(2, 40), FloatFormat(16, 6)], ids=str)
+@pytest.mark.parametrize(
+    "fmt", [named.BINARY32, named.TF32, FloatFormat(2, 40), FloatFormat(2, 53), FloatFormat(16, 6)], ids=str
+)
 def test_fused_multiply_add_with_cancellation(fmt: FloatFormat, mode: Rounding) -> None:
     fmt = replace(fmt, rounding=mode)
     rng = np.random.default_rng(7)
@@ -194,6 +196,16 @@ def test_fused_multiply_add_with_cancellation(fmt: FloatFormat, mode: Rounding) 
     near = fmt.array(-(a * b).to_float() * rng.choice([1, 1, 1 + 2.0**-20, 2.0**-30, 2.0**30], 300))
     exact = [expected(p * q + r, fmt) for p, q, r in zip(*(u.to_fractions() for u in (a, b, near)), strict=True)]
     assert a.multiply_add(b, near).to_fractions().tolist() == exact
+
+
+@pytest.mark.parametrize("precision", [11, 26, 53])
+@pytest.mark.parametrize("subnormal", [True, False])
+def test_an_overflow_within_a_sum_is_never_lost(precision: int, subnormal: bool) -> None:
+    fmt = FloatFormat(2, precision, "even", emin=-14, emax=15, subnormal=subnormal)
+    x = fmt.array([300, 1, 1])
+    for product in (lambda: x @ x, lambda: x[None] @ x[:, None], lambda: linalg.dot(x, x, order="pairwise")):
+        with pytest.raises(OverflowError):
+            product()
 
 
 @pytest.mark.parametrize("shapes", [((3,), (3,), (2, 3)), ((3,), (2, 1), (3,)), ((2, 3), (), (3,)), ((), (), (2,))])

@@ -47,6 +47,8 @@ from gpbnb.wordlength.models import read_model
 from gpbnb.wordlength.precision import required_precision
 
 CASES = list(cases())
+STEPS = 3_000
+"""Steps of each combination; `make exactness` compares 10,000 of all combinations."""
 needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang")
 
 
@@ -66,7 +68,7 @@ SLICE = [*slice_of(1, 2)]
 @pytest.fixture(scope="module")
 def compared():
     """What became of each combination of the slice; they are compiled together, which takes a third of the time."""
-    return compare(SLICE, 10_000, settings_of(installed(), sanitize=False))
+    return compare(SLICE, STEPS, settings_of(installed(), sanitize=False))
 
 
 @needs_compiler
@@ -75,7 +77,7 @@ def test_code_has_the_digits_of_its_emulation(i, compared):
     builds = len(settings_of(installed(), sanitize=False))
     assert compared[i].case is SLICE[i]
     assert compared[i].faults == ()
-    assert (compared[i].builds, compared[i].steps) == (builds, builds * 10_000)
+    assert (compared[i].builds, compared[i].steps) == (builds, builds * STEPS)
 
 
 def built(folder, flags=FLAGS):

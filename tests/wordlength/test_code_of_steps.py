@@ -15,6 +15,7 @@ from gpbnb import BINARY16, BINARY32, BINARY64, FixedFormat, FloatFormat, Nonlin
 from gpbnb.wordlength.c_files import FLAGS
 from tests.step_functions import SYSTEMS
 
+STEPS = 2_000
 FORMATS = [
     ("binary32", BINARY32),
     ("binary64", BINARY64),
@@ -29,9 +30,9 @@ def test_code_has_the_digits_of_its_emulation(system):
     cases = [Case(kind, system.name, system, fmt, None) for kind, fmt in FORMATS]
     settings = settings_of(installed(), sanitize=False)
     assert len(settings) == len(LEVELS) * len(installed())
-    found = compare(cases, 10_000, settings)
+    found = compare(cases, STEPS, settings)
     assert [each.faults for each in found] == [()] * len(cases)
-    assert [each.steps for each in found] == [10_000 * len(settings)] * len(cases)
+    assert [each.steps for each in found] == [STEPS * len(settings)] * len(cases)
 
 
 def short_words():

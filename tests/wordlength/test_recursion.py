@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpbnb import FloatFormat, LinearSystem, required_precision
-from gpbnb.arithmetic.functions import DomainError
+from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.forms import Form

@@ -28,6 +28,7 @@ from gpbnb.arithmetic.kernels.tags import (
     Hardware64,
     Hexadecimal,
     Limited,
+    LongEven,
     Random,
     ShortEven,
     Tag,
@@ -401,13 +402,15 @@ class Floats(Compiled):
         if isinstance(tag, Hardware32 | Hardware64):
             return Free(tag)
         limited = isinstance(tag, Limited)
-        if a.shape[0] * n * b.shape[1] < _MANY or (limited and not isinstance(tag.mode, ShortEven)):
+        if a.shape[0] * n * b.shape[1] < _MANY or (limited and not isinstance(tag.mode, ShortEven | LongEven)):
             return tag
         gradual, least, largest = (tag.gradual, tag.least, tag.largest) if limited else (0.0, LEAST, LIMIT)
         low, high, smallest, biggest = self._extents(a, b)
         low, high = extents_of_sums(n, self.base, self.precision, gradual, low, high)
         if not high <= largest or not (gradual or low >= least):
             return tag
+        if limited and isinstance(tag.mode, LongEven):
+            return Free(Hardware64()) if low >= gradual else tag
         single = low >= max(_LEAST_32, gradual) and smallest >= _LEAST_32 and max(high, biggest) <= _LARGEST_32
         return Free(Hardware32() if limited and self.precision == 24 and single else tag)
 

@@ -24,7 +24,6 @@ _BITS = ir.IntType(128)
 _WORD = ir.IntType(64)
 _U1 = np.uint64(1)
 _HALF_WORD = np.uint64(2**32 - 1)
-_TWO_64 = 2.0**64
 
 
 class _UInt128(types.Type):  # type: ignore[misc]
@@ -122,13 +121,8 @@ def length(n: Any) -> Any:
 
 
 @inner(forceinline=True)
-def to_float64(n: Any) -> Any:
-    """A float64 near a uint128."""
-    return np.float64(high_word(n)) * _TWO_64 + np.float64(low_word(n))
-
-
-@inner(forceinline=True)
-def _words_product(a: Any, b: Any) -> Any:
+def words_product(a: Any, b: Any) -> Any:
+    """The product of two uint64, as a uint128."""
     return wide(a) * wide(b)
 
 
@@ -136,8 +130,8 @@ def _words_product(a: Any, b: Any) -> Any:
 def product(a: Any, b: Any) -> Any:
     """The product of two uint128, as its upper and lower 128 bits."""
     a1, a0, b1, b0 = high_word(a), low_word(a), high_word(b), low_word(b)
-    low, high = _words_product(a0, b0), _words_product(a1, b1)
-    cross, other = _words_product(a0, b1), _words_product(a1, b0)
+    low, high = words_product(a0, b0), words_product(a1, b1)
+    cross, other = words_product(a0, b1), words_product(a1, b0)
     middle = wide(high_word(low)) + wide(low_word(cross)) + wide(low_word(other))
     high = high + wide(high_word(cross)) + wide(high_word(other)) + wide(high_word(middle))
     return high, joined(low_word(middle), low_word(low))
@@ -205,10 +199,10 @@ def _next_word(rest: Any, word: Any, d: Any, v: Any) -> Any:
     Moeller and Granlund, algorithm 5.
     """
     u1 = low_word(rest)
-    q = _words_product(v, high_word(rest)) + rest
+    q = words_product(v, high_word(rest)) + rest
     digit, fraction = high_word(q), low_word(q)
     r1 = u1 - digit * high_word(d)
-    r = joined(r1, word) - _words_product(low_word(d), digit) - d
+    r = joined(r1, word) - words_product(low_word(d), digit) - d
     digit += _U1
     if high_word(r) >= fraction:
         digit -= _U1

@@ -26,6 +26,7 @@ from gpbnb.arithmetic.kernels.tags import (
     Even,
     Hardware32,
     Hardware64,
+    LongEven,
     Mode,
     Random,
     ShortEven,
@@ -94,9 +95,10 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
     """Make the scalar operations for a class of digits and a class of rounding mode."""
     if mode is ShortEven:
         return {**_short(_within), "fused": operations(digits, Even)["fused"]}
+    if mode is LongEven:
+        return _with_residuals(_fit_53, 0)
     dropped = inner(forceinline=True)(_DROPPED[digits])
     round_magnitude = inner(forceinline=True)(_MODES[mode])
-    exact_product = EXACT_PRODUCT // (4 if digits is Sixteen else 1)  # digits
 
     @inner(forceinline=True)
     def fit(fmt: Any, p: Any, r: Any, exact_zero: Any) -> Any:
@@ -115,6 +117,16 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
         y = fmt.over if y > fmt.largest else y
         y = fmt.under if y < fmt.lowest else y
         return y if a == a else np.nan
+
+    made = _with_residuals(fit, EXACT_PRODUCT // (4 if digits is Sixteen else 1))
+    return {**made, "round_": _round_even_of_52} if (digits, mode) == (Two, Even) else made
+
+
+def _with_residuals(fit: Any, exact_product: int) -> dict[str, Any]:
+    """Make the scalar operations that round the nearest float64 p and the sign of a residual by ``fit``.
+
+    Products of numbers of at most `exact_product` digits have none.
+    """
 
     @inner(forceinline=True)
     def add(fmt: Any, a: Any, b: Any) -> Any:
@@ -159,7 +171,7 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
         "multiply": multiply,
         "quotient": quotient,
         "root": root,
-        "round_": _round_even_of_52 if (digits, mode) == (Two, Even) else round_,
+        "round_": round_,
         "fused": fused,
     }
 
@@ -194,9 +206,26 @@ def _nearest_even_of_52(fmt: Any, x: Any) -> Any:
 def _within(fmt: Any, y: Any, exact_zero: Any) -> Any:
     """Apply the limits to a rounded number."""
     if fmt.least > 0.0:
-        y = y if (abs(y) >= fmt.least) | (exact_zero & (y == 0.0)) else fmt.below
+        y = fmt.below if (abs(y) < fmt.least) & ((y != 0.0) | (not exact_zero)) else y  # NaN stays
     y = fmt.over if y > fmt.largest else y
     return fmt.under if y < fmt.lowest else y
+
+
+@inner(forceinline=True)
+def _fit_53(fmt: Any, p: Any, r: Any, exact_zero: Any) -> Any:
+    """Round the exact p + r to 53 bits, where p is its nearest float64 and thus the result, except below B.
+
+    There, adding B rounds p a second time. That is wrong if p, but not p + r, is a tie, and goes away from p + r.
+    """
+    a, rest = abs(p), (-r if p < 0.0 else r)
+    base = fmt.gradual if a < fmt.gradual else 0.0
+    s = a + base
+    unit = base * 2.0**-52  # the spacing of all numbers from B to 2B
+    twice = 2.0 * (a - (s - base))
+    s = s + unit if (twice == unit) & (rest > 0.0) else s
+    s = s - unit if (twice == -unit) & (rest < 0.0) else s
+    y = s - base
+    return _within(fmt, 0.0 - y if p < 0.0 else y, exact_zero)
 
 
 @inner(forceinline=True)

@@ -151,7 +151,8 @@ def _mode(base: int, precision: int, rounding: Rounding, seed: int) -> Any:
     if rounding is Rounding.STOCHASTIC:
         return tags.Random(np.array([seed & (2**64 - 1), 0], np.uint64))
     if rounding is Rounding.EVEN:
-        return tags.ShortEven() if base == 2 and precision <= tags.SAFE_TWICE else tags.Even()
+        short = base == 2 and precision <= tags.SAFE_TWICE
+        return tags.ShortEven() if short else tags.LongEven() if (base, precision) == (2, 53) else tags.Even()
     return tags.Mode(_CODES[rounding])
 
 
@@ -175,7 +176,8 @@ def _longest(base: int, rounding: Rounding, limited: bool) -> int:
         return LARGEST_PRECISION[base]
     if rounding is Rounding.STOCHASTIC:
         return 53 - DRAW_BITS
-    return 52 if limited or rounding not in Rounding.documented() else LARGEST_PRECISION[2]
+    # With 53 bits, the sign of a residual does not tell a tie.
+    return 52 if limited and rounding is Rounding.NEAREST else LARGEST_PRECISION[2]
 
 
 def check_order(order: Order, fused: bool, block: int) -> None:

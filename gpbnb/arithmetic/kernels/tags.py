@@ -72,6 +72,10 @@ class ShortEven(NamedTuple):
     """The same in base 2 with at most 25 digits, the mode of most processors, with the fastest loops."""
 
 
+class LongEven(NamedTuple):
+    """The same in base 2 with 53 bits, as the machine rounds float64."""
+
+
 class Mode(NamedTuple):
     """Any other mode but the random one; the same compiled loop serves them all."""
 
@@ -107,7 +111,7 @@ class Limited(NamedTuple):
     """Bases 2 and 16 with any rounding mode and a limited range; a number is a float64, an array is float64 (...)."""
 
     digits: Any  # Two or Sixteen
-    mode: Any  # Even, ShortEven, Mode or Random
+    mode: Any  # Even, ShortEven, LongEven, Mode or Random
     sums: Any  # Separate, Fused, Pairwise or Blocked
     precision: int
     gradual: float  # smaller numbers keep the spacing just above it; 0 without subnormal numbers

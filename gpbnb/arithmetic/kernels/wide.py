@@ -29,8 +29,8 @@ from gpbnb.arithmetic.kernels.integers import (
     product,
     reciprocal,
     shifted_left,
-    to_float64,
     wide,
+    words_product,
 )
 from gpbnb.arithmetic.kernels.tags import ABRUPT, FARTHEST, FIXED, GRADUAL
 
@@ -50,7 +50,9 @@ _RECIPROCAL = np.array([(2**192 - 1) // d - 2**64 for d in _NORMAL], np.uint64)
 _FIVE = _table([5**k for k in range(56)])
 _MOST_PLACES = 55  # 5**55 has 128 bits
 
-_U0, _U1 = np.uint64(0), np.uint64(1)
+_U0, _U1, _U2 = np.uint64(0), np.uint64(1), np.uint64(2)
+_ROOT = math.sqrt(2.0**63)
+_OFFSET = 2.0**16 - 2.0**-20  # makes numbers positive, which a conversion to integers chops
 _LOW_60 = np.uint64(2**60 - 1)
 
 
@@ -71,8 +73,8 @@ def _digits(fmt: Any, n: Any) -> Any:
     count = length(n)
     if fmt.bits == 1:
         return count
-    if fmt.bits > 1:
-        return (count + fmt.bits - 1) // fmt.bits
+    if fmt.bits == 4:
+        return (count + 3) >> 2
     # floor(count log10 2): the number of digits, or one less.
     count = (count * 1233) >> 12
     return count + np.int64(n >= _entry(_POWER, count))
@@ -125,14 +127,15 @@ def _enlarged(fmt: Any, n: Any, k: Any) -> Any:
 @inner(forceinline=True)
 def number(fmt: Any, high: Any, low: Any, e: Any) -> Any:
     """The number of three int64."""
-    return high < 0, (wide(np.uint64(abs(high))) << fmt.split) | wide(np.uint64(low)), e
+    # The lower part has less than 64 bits, and a shift by a number below 64 takes half as many instructions.
+    return high < 0, (wide(np.uint64(abs(high))) << (fmt.split & 63)) | wide(np.uint64(low)), e
 
 
 @inner(forceinline=True)
 def parts(fmt: Any, x: Any) -> Any:
     """The three int64 of a number."""
     negative, m, e = x
-    high = np.int64(low_word(m >> fmt.split))
+    high = np.int64(low_word(m >> (fmt.split & 63)))
     return -high if negative else high, np.int64(low_word(m) & ((_U1 << np.uint64(fmt.split)) - _U1)), e
 
 
@@ -150,6 +153,18 @@ def _exceeds(fmt: Any, m: Any, e: Any, limit: Any) -> Any:
     if e != limit[2]:
         return e > limit[2]
     return m > number(fmt, limit[0], limit[1], limit[2])[1]
+
+
+@inner(forceinline=True)
+def _in_range(fmt: Any, negative: Any, n: Any, e: Any) -> Any:
+    """The number of these t digits if the format has it, or what replaces it."""
+    if fmt.small == ABRUPT and e < fmt.quantum:
+        return zero()
+    if _exceeds(fmt, n, e, fmt.lowest if negative else fmt.largest):
+        return _beyond(fmt, negative)
+    if e < -FARTHEST:
+        raise OverflowError("got a result with an exponent below -2**60; needed one above; scale the numbers")
+    return negative, n, e
 
 
 @inner
@@ -185,13 +200,60 @@ def rounded(fmt: Any, negative: Any, n: Any, more: Any, e: Any) -> Any:
     elif count < t:
         n = _raised(fmt, n, t - count)
         e -= t - count
-    if fmt.small == ABRUPT and e < fmt.quantum:
+    return _in_range(fmt, negative, n, e)
+
+
+@inner(forceinline=True)
+def _rounded_word(fmt: Any, negative: Any, n: Any, more: Any, e: Any) -> Any:
+    """:func:`rounded` for one word n in base 2, if the format's numbers have one, too."""
+    if n == _U0:
         return zero()
-    if _exceeds(fmt, n, e, fmt.lowest if negative else fmt.largest):
-        return _beyond(fmt, negative)
-    if e < -FARTHEST:
-        raise OverflowError("got a result with an exponent below -2**60; needed one above; scale the numbers")
-    return negative, n, e
+    t = np.int64(fmt.precision)
+    drop = 64 - leading_zeros(n) - t
+    if fmt.small == FIXED:
+        drop = fmt.quantum - e
+    elif fmt.small == GRADUAL:
+        drop = max(drop, fmt.quantum - e)
+    if drop > 0:
+        e += drop
+        if drop > 64:
+            n, more, drop = _U0, True, np.int64(64)
+        last = np.uint64(drop - 1)
+        q = n >> last
+        more |= (q << last) != n
+        n, half = q >> _U1, (q & _U1) == _U1
+        n += increment(fmt, n, half, half & (not more), half | more, negative)
+        if n == _U0:
+            return zero()
+    if (n >> np.uint64(t)) != _U0:  # a power of two after a carry, or too large for fixed point
+        return rounded(fmt, negative, wide(n), False, e)
+    up = leading_zeros(n) - (64 - t)
+    return _in_range(fmt, negative, wide(n << np.uint64(up)), e - up)
+
+
+@inner(forceinline=True)
+def _one_word(fmt: Any) -> Any:
+    """Whether sums, with two bits more, and products cut to 63 bits serve as words: base 2 up to 61 bits."""
+    return (fmt.bits == 1) & (fmt.precision <= 61)
+
+
+@inner(forceinline=True)
+def _add_words(fmt: Any, a: Any, b: Any) -> Any:
+    negative, x, e = a[0], low_word(a[1]) << _U2, a[2] - 2
+    other, y, f = b[0], low_word(b[1]) << _U2, b[2] - 2
+    if e < f:
+        negative, x, e, other, y, f = other, y, f, negative, x, e
+    # The smaller number is cut off two bits below the last digit of the larger one.
+    s = np.uint64(min(e - f, 63))
+    lower = y >> s
+    more = (lower << s) != y
+    if negative == other:
+        n = x + lower
+    elif x >= lower:
+        n = x - lower - np.uint64(more)
+    else:
+        n, negative = lower - x, other
+    return _rounded_word(fmt, negative, n, more, e)
 
 
 @inner
@@ -202,6 +264,8 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
         return round_(fmt, b)  # the opposite of a lowest number, if it was subtracted
     if y == wide(_U0):
         return a
+    if _one_word(fmt):
+        return _add_words(fmt, a, b)
     if e < f:
         negative, x, e, other, y, f = other, y, f, negative, x, e
     # The larger number gets more digits at its end, and the smaller one is cut off at the last of them.
@@ -240,6 +304,10 @@ def opposite(a: Any) -> Any:
 def multiply(fmt: Any, a: Any, b: Any) -> Any:
     if a[1] == wide(_U0) or b[1] == wide(_U0):
         return zero()
+    if _one_word(fmt):
+        p, k = words_product(low_word(a[1]), low_word(b[1])), 2 * fmt.precision - 63
+        n = p >> k if k > 0 else p
+        return _rounded_word(fmt, a[0] != b[0], low_word(n), k > 0 and (n << k) != p, a[2] + b[2] + max(k, 0))
     k = max(2 * fmt.precision - fmt.room, 0)
     high, low = product(a[1], b[1])
     n, more = _cut(fmt, high, low, k)
@@ -252,11 +320,11 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
         raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
     if a[1] == wide(_U0):
         return zero()
-    if fmt.bits == 1 and fmt.split == 0:  # significands of at most 61 bits: a quotient of 63 or 64 is long enough
+    if _one_word(fmt):  # a quotient of 63 or 64 bits is long enough
         x, y = low_word(a[1]), low_word(b[1])
         up, s = leading_zeros(x), leading_zeros(y)
         digit, left = divided_by_word(x << (up - 1), _U0, y << s)
-        return rounded(fmt, a[0] != b[0], wide(digit), left != _U0, a[2] - b[2] - 63 - up + s)
+        return _rounded_word(fmt, a[0] != b[0], digit, left != _U0, a[2] - b[2] - 63 - up + s)
     k = fmt.room - 1
     high, low = _enlarged(fmt, a[1], k)
     s = 128 - length(b[1])
@@ -266,21 +334,16 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
     return rounded(fmt, a[0] != b[0], n, rest != wide(_U0), a[2] - b[2] - k)
 
 
-@inner
+@inner(error_model="numpy", forceinline=True)
 def _root_of_126_bits(n: Any) -> Any:
     """floor(sqrt(n)) for 2**124 <= n < 2**126, a word."""
-    s = np.uint64(math.sqrt(to_float64(n)))
-    square = wide(s) * wide(s)
-    # One step of Newton's method leaves an error of at most two.
-    if square <= n:
-        s += np.uint64(to_float64(n - square) / (2.0 * np.float64(s)))
-    else:
-        s -= np.uint64(to_float64(square - n) / (2.0 * np.float64(s)))
-    while wide(s) * wide(s) > n:
-        s -= _U1
-    while wide(s + _U1) * wide(s + _U1) <= n:
-        s += _U1
-    return s
+    # float64 gives 50 bits. Newton's step gives the others, with a margin for its errors, so that at most 1 is missing.
+    near = math.sqrt(np.float64(np.int64(low_word(n >> 63)))) * _ROOT
+    s = np.uint64(np.int64(near))
+    # Of the rest, a number of either sign below 2**78 in two's complement, 63 bits suffice.
+    rest = np.float64(np.int64(low_word((n - words_product(s, s)) >> 16))) * 2.0**15
+    s += np.uint64(np.int64(rest / near + _OFFSET) - np.int64(_OFFSET + 1.0))
+    return s + np.uint64(n - words_product(s, s) > wide(s) << 1)
 
 
 @inner
@@ -289,6 +352,12 @@ def sqrt(fmt: Any, a: Any) -> Any:
         raise ValueError("got the square root of a negative number; needed x >= 0")
     if a[1] == wide(_U0):
         return zero()
+    if _one_word(fmt):
+        k = np.int64(125 - fmt.precision)
+        k += (a[2] - k) & 1
+        n = a[1] << k
+        root = _root_of_126_bits(n)
+        return _rounded_word(fmt, False, root, words_product(root, root) != n, (a[2] - k) >> 1)
     # The root of a number with 2t + 1 or 2t + 2 digits and an even exponent has t + 1.
     k = fmt.precision + 2 - ((a[2] - fmt.precision) & 1)
     high, low = _enlarged(fmt, a[1], k)

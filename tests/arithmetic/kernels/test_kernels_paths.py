@@ -9,13 +9,13 @@ import pytest
 
 from benchmarks import paths
 from gpbnb.arithmetic.kernels.backends import Compiled, Floats
-from gpbnb.arithmetic.kernels.tags import Free, Hardware32, Limited
+from gpbnb.arithmetic.kernels.tags import Free, Hardware32, Hardware64, Limited
 
 # One format for each tag and each way of choosing it; the command compares all.
 CHOSEN = (
     "bfloat16", "FP8 E4M3", "binary32", "binary64", "24 bits, even", "24 bits, even, flushed", "24 bits, even, small",
-    "26 bits, even", "24 bits, nearest", "53 bits, chop", "6 hexadecimal, chop", "8 decimal, nearest",
-    "17 decimal, chop", "Q3.12, even",
+    "26 bits, even", "53 bits, even, small", "11 bits, even, flushed", "24 bits, nearest", "53 bits, chop",
+    "6 hexadecimal, chop", "8 decimal, nearest", "17 decimal, chop", "Q3.12, even",
 )  # fmt: skip
 WHOLLY = ("bfloat16", "binary32", "24 bits, nearest", "8 decimal, nearest")
 
@@ -47,6 +47,8 @@ def test_products_without_range_checks_are_those_that_cannot_leave_the_range(mon
     assert isinstance(chosen("24 bits, even", 2.0**-475, monkeypatch), Limited)
     assert isinstance(chosen("24 bits, even, flushed", 2.0**-48, monkeypatch), Limited)
     assert isinstance(chosen("24 bits, even, small", 2.0**-10, monkeypatch).tag, Limited)
+    assert chosen("53 bits, even", 1.0, monkeypatch) == Free(Hardware64())
+    assert isinstance(chosen("53 bits, even, small", 2.0**-30, monkeypatch), Limited)
 
 
 def test_a_product_that_leaves_the_range_unseen_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

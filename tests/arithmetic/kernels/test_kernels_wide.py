@@ -20,7 +20,7 @@ FORMATS = {
     "binary128": named.BINARY128,
     "54 bits": FloatFormat(2, 54),
     "64 bits, up": FloatFormat(2, 64, "up"),
-    "53 bits, even": FloatFormat(2, 53, "even"),
+    "53 bits, saturating": FloatFormat(2, 53, emin=-200, emax=200, overflow="saturate"),
     "24 bits, far": FloatFormat(2, 24, "even", emin=-16382, emax=16383),
     "IBM, 14 digits": named.IBM_HEX64,
     "decimal128": named.DECIMAL128,
@@ -36,6 +36,25 @@ def test_every_rounding_and_range_agrees_with_the_exact_kernel() -> None:
     assert [text for count in counts for text in count.different] == []
     assert min(count.compared for count in counts) > 150
     assert sum(count.overflowed for count in counts) > 20
+
+
+def test_53_bits_in_float64_agree_with_the_exact_kernel() -> None:
+    counts = [wide.compare(rules, 60, 8) for rules in wide.formats_of_float64()]
+    assert len(counts) == 30
+    assert [text for count in counts for text in count.different] == []
+    assert min(count.compared for count in counts) > 300
+    assert sum(count.overflowed for count in counts) > 200
+
+
+@pytest.mark.parametrize(
+    ("factor", "other", "units"), [(3 + 3 * 2.0**-30, 1 - 2.0**-30, 1), (5 + 5 * 2.0**-27, 1 - 2.0**-27 + 2.0**-53, 3)]
+)
+def test_a_product_next_to_a_tie_below_the_range_is_rounded_once(factor: float, other: float, units: int) -> None:
+    fmt = FloatFormat(2, 53, "even", emin=-100, emax=100)
+    assert factor * other == round(factor)  # the nearest float64 is a tie of the spacing 2**-152, and goes to even
+    for sign in (1, -1):
+        product = fmt.array(sign * factor * 2.0**-80) * fmt.array(other * 2.0**-73)
+        assert product.to_fractions() == Fraction(sign * units, 2**152)
 
 
 def test_a_wrong_rounding_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
