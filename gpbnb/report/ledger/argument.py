@@ -44,8 +44,8 @@ ALT = (
 )
 CAPTION = (
     "The parts of the documents, and how errors pass between four of them. Each box counts the statements of a part "
-    "and the wrong ones among them, drawn as a bar. An arrow counts the wrong statements at its head that follow "
-    "from a root error at its tail."
+    "and the wrong ones among them, drawn as a bar. An arrow leads to a part that uses results of another; its number "
+    "counts the wrong statements that this part inherits from there."
 )
 
 
