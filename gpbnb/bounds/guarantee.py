@@ -52,6 +52,7 @@ from gpbnb.bounds.envelope import (
     certify,
     columns,
     disturbances,
+    eigenvalue_sizes,
     peaks,
     units,
 )
@@ -330,7 +331,7 @@ def _radius(given: Schedule) -> float:
     whole = np.eye(given.program.n)
     for each in F:
         whole = each @ whole
-    return float(np.abs(np.linalg.eigvals(whole)).max() ** (1 / len(F)))
+    return float(eigenvalue_sizes(whole).max() ** (1 / len(F)))
 
 
 def _enough_lags(radius: float, period: int) -> int:

@@ -488,7 +488,7 @@ def _without_bound(given: ScaledFilter, coefficient_bits: int) -> str:
     if not is_stable(matrices(program, stored_coefficients(given.filter, coefficient_bits))[0]):
         stored = f"stored in {coefficient_bits} bits"
         return f"the filter is stable, but not with its coefficients {stored}; raise coefficient_bits"
-    return "the filter is stable, but decays too slowly for its peak gain to be enclosed in balls of 8192 bits"
+    return "the filter is stable, but decays too slowly for a bound: its response lasts for millions of steps"
 
 
 def stored_coefficients(made: LinearFilter, bits: int) -> NDArray[Any]:
