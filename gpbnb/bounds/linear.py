@@ -279,14 +279,13 @@ def largest_gains(
 def _above(matrices: tuple[Any, ...], terms: int | None) -> NDArray[np.float64]:
     """Return upper bounds of the gains to states and outputs, (n + p, m), in balls where float64 is not sharp."""
     _check_terms(terms)
-    found = _certified(*matrices, terms)
+    found = _certified(matrices, terms)
     return _gains(matrices, terms, _SHARP).high if found is None else found
 
 
-def _certified(
-    A: NDArray[Any], B: NDArray[Any], C: NDArray[Any], D: Any, terms: int | None
-) -> NDArray[np.float64] | None:
+def _certified(matrices: tuple[Any, ...], terms: int | None) -> NDArray[np.float64] | None:
     """Bound the gains by the certificate of :mod:`gpbnb.bounds.envelope`; None if that is not sharp."""
+    A, B, C, D = matrices
     numbers = [abs(each) for X in (A, B, C) for each in X.flat if each]
     if not all(_LEAST < each < 1 / _LEAST for each in numbers):
         return None

@@ -29,7 +29,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.linear import largest_gains, transfer_gains
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, exact_functionals, matrices
-from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.system import LinearSystem, is_stable
 from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program
 
 _UP = 1 + 2.0**-40
@@ -199,6 +199,10 @@ class WordGuarantee:
             program, n = made.program, self.system.n
             A, B = matrices(program, made.coefficients)
             stored = A[:n, :n], B[:n], A[n:, :n], B[n:]
+            if self._steps is None and not is_stable(stored[0]):
+                raise ValueError(
+                    "the system is stable, but not with its coefficients as stored; needed more of their bits"
+                )
             difference, inputs, states = transfer_gains(self.system, stored, self._steps)
             rows, first = exact_functionals(program, made.coefficients), program.n + program.m
             inner = [

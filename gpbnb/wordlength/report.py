@@ -29,8 +29,8 @@ from gpbnb.wordlength.blocks import (
     required_block_precisions,
     required_word_formats,
 )
+from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, FixedAnswer, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.fixed_point import FixedAnswer, required_fraction_bits
 from gpbnb.wordlength.judging import Judgement, judge
 from gpbnb.wordlength.precision import largest_errors, required_precision
 from gpbnb.wordlength.ranges import binary_ranges
@@ -137,6 +137,7 @@ class Question:
         :func:`gpbnb.wordlength.blocks.required_block_precisions`. In fixed point, the formats of data, coefficients
         and sums of a linear system.
     fixed : whether to count fraction bits of fixed point, of a linear system.
+    coefficient_bits : significant bits of each coefficient in fixed point.
     """
 
     model: LinearModel | LinearSystem
@@ -154,6 +155,7 @@ class Question:
     structures: Mapping[str, LinearSystem] = field(default_factory=dict)
     mixed: bool = False
     fixed: bool = False
+    coefficient_bits: int = COEFFICIENT_BITS
 
     @property
     def count(self) -> int:
@@ -201,7 +203,7 @@ class Question:
         """Answer one of the single questions, by a search or by judging the one format."""
         if self.fixed and isinstance(part.model, LinearSystem):
             basis = cast(FixedBasis, part.basis)
-            return required_fraction_bits(part.model, z, self.tolerance, basis, self.rounding)
+            return required_fraction_bits(part.model, z, self.tolerance, basis, self.rounding, self.coefficient_bits)
         if self.fmt is not None:
             return judge(part.model, self.fmt, self.count, self.tolerance, part.form, part.basis, z, self.within)
         return required_precision(

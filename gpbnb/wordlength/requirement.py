@@ -50,6 +50,8 @@ class Requirement:
     processors : the largest error / tolerance of a run in binary32, and in binary64 if binary32 has too few bits or
         misses the tolerance. Empty if no run was made: in another base, with directed rounding or a given range, and
         for bounds, which hold for ties to even, too.
+    warnings : reasons why an observed answer may not hold for other inputs; see
+        :func:`gpbnb.wordlength.system.weak_evidence`.
     """
 
     fmt: FloatFormat | MaybeNone
@@ -66,6 +68,7 @@ class Requirement:
     ends: bool = False
     untraced: str = ""
     processors: tuple[tuple[str, float], ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def precision(self) -> int | MaybeNone:
@@ -79,6 +82,7 @@ class Requirement:
             notes.insert(0, f"{listed(self.irregular)} digits meet it, but {listed(missed)} do not")
         if self.advice:
             notes.append(self.advice)
+        notes += self.warnings
         if self.untraced:
             notes.append(f"the function ran operation by operation: {self.untraced}")
         end = "".join(f"; {note}" for note in notes)

@@ -28,8 +28,8 @@ from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.blocks import required_word_formats
 from gpbnb.wordlength.code import VECTORS, AnyFormat, write_code
+from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.fixed_point import required_fraction_bits
 from gpbnb.wordlength.judging import judge
 from gpbnb.wordlength.models import read_measurements, read_model, read_structures
 from gpbnb.wordlength.options import QUANTITIES
@@ -70,6 +70,7 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
         structures,
         given.mixed,
         given.fixed,
+        given.coefficients or COEFFICIENT_BITS,
     )
     return study(asked, source, command, tell)
 
@@ -237,8 +238,9 @@ def _words_within_tolerance(
 ) -> tuple[WordFormats, FilterLimits]:
     """Return the formats that a search in fixed point finds on the first basis, and the largest inputs as limits."""
     z, _ = _inputs(given, system, bases)
-    search = required_word_formats if given.mixed else required_fraction_bits
-    words = search(system, z, given.tolerance, cast(FixedBasis, bases[0]), given.rounding or "nearest").words
+    asked = (system, z, given.tolerance, cast(FixedBasis, bases[0]), given.rounding or "nearest")
+    bits = given.coefficients or COEFFICIENT_BITS
+    words = (required_word_formats(*asked) if given.mixed else required_fraction_bits(*asked, bits)).words
     if words is None:
         raise ValueError(f"got --code {given.code}, and no format meets the tolerance; needed a larger tolerance")
     return words, limits(system.n, system.m, measurement=np.abs(z).max(axis=0))

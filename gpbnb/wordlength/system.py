@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.search import CHECKED, Outcome
-from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.bounds.envelope import FilterLimits, eigenvalue_sizes
 from gpbnb.bounds.probable import probable_error
 from gpbnb.bounds.system import output_errors
+from gpbnb.filters.named import named
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.wordlength.requirement import (
     Asked,
@@ -63,7 +64,8 @@ def required_system_precision(
     limited = not system.as_filter().program.is_linear
     cause = "" if found.fmt is not None or limited else system.unstable()
     if not cause:
-        return asked.answer(found, ends=ends)
+        warnings = strategy.warnings() if isinstance(strategy, EmulatedSystem) else ()
+        return replace(asked.answer(found, ends=ends), warnings=warnings)
     if asked.basis == "probable":
         return asked.answer(found, cause=f"{cause}, {_FOR_SOME_STEPS}")
     grow = "grow with every step, whatever the precision" if asked.basis == "emulation" else "add up with every step"
@@ -114,6 +116,39 @@ def system_strategy(
     return BoundedSystem(system, largest, tolerances, asked.steps if keeps else None)
 
 
+_FORGOTTEN = 0.01
+"""Share to which the slowest response must decay within a run."""
+
+
+def weak_evidence(system: LinearSystem, true: NDArray[np.float64], tolerances: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return why the errors of a run may say little about other runs, in a sentence each; empty if nothing does.
+
+    A run that ends before the slowest response has decayed does not show how errors add up. An output that stays within
+    its tolerance would also meet it if it were zero.
+
+    Parameters
+    ----------
+    true : (steps, p, 2), outputs of the system as given. tolerances : (p,).
+    """
+    found = list[str]()
+    entries = system.A.astype(np.float64)
+    radius = float(eigenvalue_sizes(entries).max()) if np.isfinite(entries).all() else math.inf
+    if 0 < radius < 1 and radius ** len(true) > _FORGOTTEN:
+        steps = math.log(_FORGOTTEN) / math.log(radius)
+        digits = max(len(str(int(steps))) - 2, 0)
+        found.append(
+            f"the run of {len(true)} steps is shorter than the memory of the system, whose slowest response takes "
+            f"{math.ceil(steps / 10**digits) * 10**digits} steps to decay to 1 %: take as many, or ask for a guarantee"
+        )
+    largest = np.abs(true[..., 0]).max(axis=0)
+    for i in np.flatnonzero((largest <= tolerances) & np.isfinite(tolerances)):
+        found.append(
+            f"{named('output', int(i), system.output_names)} never exceeds {largest[i]:.3g} in this run, so that zero "
+            f"would be within the tolerance of {tolerances[i]:.3g}: take larger inputs, or a smaller tolerance"
+        )
+    return tuple(found)
+
+
 @dataclass(frozen=True, eq=False)
 class EmulatedSystem:
     """Errors of the outputs for given inputs, (steps, m), against `true`, the outputs of the system as given."""
@@ -122,6 +157,10 @@ class EmulatedSystem:
     u: Any
     true: NDArray[np.float64]
     tolerances: NDArray[np.float64]
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return why the errors of this run may say little about other runs."""
+        return weak_evidence(self.system, self.true, self.tolerances)
 
     def error(self, fmt: FloatFormat) -> Outcome:
         """Return the largest error over its tolerance, or infinity and the reason."""

@@ -149,7 +149,7 @@ def test_peak_gains_of_slow_filters_are_those_of_a_plain_loop(
     slowest = max(abs(root) for row in sections for root in np.roots(row[3:]))
     steps = int(12 / (1 - slowest))  # what is left decays from there, and is below a thousandth
     reached = float(F(sum(map(abs, impulse_response(sections, steps))), ONE))
-    found = linear._certified(system.A, system.B, system.C, system.D, None)
+    found = linear._certified((system.A, system.B, system.C, system.D), None)
     assert found is not None
     enclosed = peak_gain(system.A, system.B, system.C, system.D)
     assert reached <= enclosed.low[0, 0] <= enclosed.high[0, 0] <= reached * 1.001
