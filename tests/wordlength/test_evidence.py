@@ -67,7 +67,7 @@ def test_coefficients_in_a_format_and_a_stored_filter_that_is_not_stable_are_nam
     words = WordFormats(FixedFormat(2, 15), FixedFormat(1, 14))
     found = required_fraction_bits(LOW_PASS, np.ones((3000, 1)), 1e-3, like=words)
     assert "stored in fixed point of 16 bits, 14 of them fraction, they give" in found.why
-    near = LinearSystem.from_coefficients(["0.3"], [1, "-1.99988", "0.99998"])
+    near = LinearSystem.from_coefficients(["1e-7"], [1, "-1.9995", "0.99950006"])
     found = required_fraction_bits(near, np.ones((100, 1)), 1e-3, "guarantee")
     assert "stored in 15 significant bits, words are refused: the system is stable, but not with" in found.why
 
