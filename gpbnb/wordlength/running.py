@@ -31,9 +31,9 @@ from gpbnb.wordlength.code import VECTORS, AnyFormat, write_code
 from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
 from gpbnb.wordlength.judging import judge
-from gpbnb.wordlength.models import read_measurements, read_model, read_structures
+from gpbnb.wordlength.models import compares_all, lacking_structures, read_measurements, read_model, read_structures
 from gpbnb.wordlength.options import QUANTITIES
-from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, study
+from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, part_label, study
 from gpbnb.wordlength.requirement import Basis
 
 
@@ -71,6 +71,8 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
         given.mixed,
         given.fixed,
         given.coefficients or COEFFICIENT_BITS,
+        given.form != CONSTANT_GAIN and compares_all(given.model),
+        lacking_structures(given.model) if len(structures) > 1 else {},
     )
     return study(asked, source, command, tell)
 
@@ -171,7 +173,9 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
     ------
     ValueError : no precision has a guarantee, or the format is fixed point.
     """
-    digits = next(each.digits for each in report.answers if each.basis == "guarantee")
+    guaranteed = [each for each in report.answers if each.basis == "guarantee"]
+    own = part_label(report.structure, "guarantee")
+    digits = next(each.digits for each in guaranteed if not report.structure or each.label == own)
     fmt = _format(given)
     if digits is None:
         raise ValueError("got no precision with a guarantee; needed one for a certificate; allow a larger tolerance")
@@ -180,7 +184,7 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
     if fmt is None:
         fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
     model, structures = _filter(given)
-    chosen = next(iter(structures.values()), model)
+    chosen = structures.get(report.structure, model)
     sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
     if isinstance(chosen, LinearModel):
         within = limits(chosen.n, chosen.m, **sizes)
@@ -190,11 +194,11 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
     return from_schedule(made, limits(made.program.n, made.program.m, **sizes), report.steps).certificate()
 
 
-def write_code_of(given: argparse.Namespace) -> tuple[Path, ...]:
+def write_code_of(given: argparse.Namespace, structure: str = "") -> tuple[Path, ...]:
     """Write the filter of a command line as C, into the folder of its option ``--code``.
 
     The format is the one that is judged, or the answer in fixed point, or else the first of binary32 and binary64 that
-    meets the tolerance, on the first basis. A digital filter has the structure that its file names, or the usual one.
+    meets the tolerance, on the first basis. A digital filter has the structure that gives the answer of the report.
 
     Raises
     ------
@@ -203,15 +207,15 @@ def write_code_of(given: argparse.Namespace) -> tuple[Path, ...]:
     OSError : a file cannot be written.
     """
     model, structures = _filter(given)
-    structure, model = next(iter(structures.items()), (None, model))
+    model = structures.get(structure, model)
     bases = _bases(given)
     if given.fixed and isinstance(model, LinearSystem):
         words, largest = _words_within_tolerance(given, model, bases)
-        return _written(given, model, words, largest, structure)
+        return _written(given, model, words, largest, structure or None)
     sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
     within = _limits(model, bases, sizes)
     fmt = _format(given) or _type_within_tolerance(given, model, bases, within)
-    return _written(given, model, fmt, within, structure)
+    return _written(given, model, fmt, within, structure or None)
 
 
 def _written(
