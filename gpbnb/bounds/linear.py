@@ -311,12 +311,13 @@ def _certified(matrices: tuple[Any, ...], terms: int | None) -> NDArray[np.float
             return None
         states = known[:n]
         for _ in range(5):  # each state stays within its number if what follows from all of them does not exceed it
-            rest = sums.sums[:, ROUNDING] + later @ states
-            rest[n:] += rows_off @ states
-            rest *= 1 + 2.0**-40
-            if (known[:n] + rest[:n] <= states).all():
-                break
-            states = (known[:n] + rest[:n]) * (1 + 2.0**-40)
+            with np.errstate(over="ignore", invalid="ignore"):
+                rest = sums.sums[:, ROUNDING] + later @ states
+                rest[n:] += rows_off @ states
+                rest *= 1 + 2.0**-40
+                if (known[:n] + rest[:n] <= states).all():
+                    break
+                states = (known[:n] + rest[:n]) * (1 + 2.0**-40)
         else:
             return None
         if not (rest[n:] <= known[n:] * (_SHARP / 2)).all():

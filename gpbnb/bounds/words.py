@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.linear import largest_gains, transfer_gains
@@ -185,7 +186,9 @@ class WordGuarantee:
         share = largest_rounding(words.data.rounding) * float(words.data.unit)
         inputs = self._largest + share
         if (inputs > float(words.data.largest)).any():
-            raise OverflowError(f"inputs of up to {self._largest.max():.6g} are beyond the range of {words.data}")
+            raise OverflowError(
+                f"inputs of up to {self._largest.max():.6g} are beyond the range of {arithmetic(words.data)}"
+            )
         limits = rounding_limits(made)
         grouped = _grouped(made.program, limits)
         rounding = self._rounding(gains, made, grouped) @ grouped * _UP

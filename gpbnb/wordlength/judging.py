@@ -17,7 +17,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form, form_named
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.precision import Guaranteed, Probable, survey_formats
-from gpbnb.wordlength.requirement import Asked, Basis, checked_tolerance, evidence
+from gpbnb.wordlength.requirement import Asked, Basis, checked_tolerance, evidence, without_evidence
 from gpbnb.wordlength.system import BoundedSystem, EmulatedSystem, over_steps, system_strategy
 
 
@@ -48,7 +48,7 @@ class Judgement(NamedTuple):
         how = evidence(self.basis, self.steps, self.ends)
         verdict = f"{format_text(self.fmt)} {'meets' if self.met else 'misses'} the tolerance"
         if math.isinf(self.ratio):
-            return f"{verdict}, {how}: {self.why}"
+            return f"{verdict}, {without_evidence(self.basis, self.steps, self.ends)}: {self.why}"
         return "; ".join([f"{verdict}: {self.ratio:.2g} of it, {how}", *self.warnings])
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED
+from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED, arithmetic
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
@@ -180,7 +180,9 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
     if digits is None:
         raise ValueError("got no precision with a guarantee; needed one for a certificate; allow a larger tolerance")
     if isinstance(fmt, FixedFormat):
-        raise ValueError(f"got --certificate with {fmt}; needed floating point: the checker covers no fixed point")
+        raise ValueError(
+            f"got --certificate with {arithmetic(fmt)}; needed floating point: the checker covers no fixed point"
+        )
     if fmt is None:
         fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
     model, structures = _filter(given)

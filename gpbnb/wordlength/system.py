@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.search import CHECKED, Outcome
+from gpbnb.arithmetic.search import CHECKED, Outcome, Search
 from gpbnb.bounds.envelope import FilterLimits, eigenvalue_sizes
 from gpbnb.bounds.probable import probable_error
 from gpbnb.bounds.system import output_errors
@@ -64,12 +64,39 @@ def required_system_precision(
     limited = not system.as_filter().program.is_linear
     cause = "" if found.fmt is not None or limited else system.unstable()
     if not cause:
+        advice = "" if found.fmt is not None else _too_many_digits(system, found)
         warnings = strategy.warnings() if isinstance(strategy, EmulatedSystem) else ()
-        return replace(asked.answer(found, ends=ends), warnings=warnings)
+        return replace(asked.answer(found, advice=advice, ends=ends), warnings=warnings)
     if asked.basis == "probable":
         return asked.answer(found, cause=f"{cause}, {_FOR_SOME_STEPS}")
     grow = "grow with every step, whatever the precision" if asked.basis == "emulation" else "add up with every step"
-    return asked.answer(found, advice=f"{cause}, so that errors {grow}: take fewer steps", ends=ends)
+    return asked.answer(
+        found, advice=f"{cause}, so that errors {grow}: take fewer steps{_lost_design(system)}", ends=ends
+    )
+
+
+def _is_long(system: LinearSystem) -> bool:
+    """Whether one recursion of the structure has an order of 3 or more, so that its coefficients move its poles far."""
+    return system.made is not None and "a3" in system.made.program.coefficient_names
+
+
+def _lost_design(system: LinearSystem) -> str:
+    """Return what to do if b and a of a stable design are not stable."""
+    if not _is_long(system):
+        return ""
+    return (
+        "; if its design is stable, b and a have lost it in their rounding to float64: take second-order sections from "
+        'the design tool, as output="sos" of SciPy gives them'
+    )
+
+
+def _too_many_digits(system: LinearSystem, found: Search[FloatFormat]) -> str:
+    """Return how far the largest precision misses the tolerance, and which structure needs fewer digits."""
+    digits, ratio = found.tried[-1]
+    parts = [] if math.isinf(ratio) else [f"{digits} digits give {ratio:.3g} times the tolerance"]
+    if _is_long(system):
+        parts.append("second-order sections usually need fewer digits: their coefficients move the poles less")
+    return "; ".join(parts)
 
 
 _FOR_SOME_STEPS = (

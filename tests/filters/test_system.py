@@ -283,7 +283,7 @@ def test_a_system_that_is_unstable_only_as_stored_is_said_to_be(basis):
     found = required_precision(NEAR, 20, 1e-3, z=np.ones((20, 1)), basis=basis, within=within)
     assert found.precision is None
     assert "no precision up to 53 digits, the most with compiled loops" in str(found)
-    assert "in 53 digits the system is stable, but as stored in FloatFormat(base=2, precision=53" in found.why
+    assert "in 53 digits the system is stable, but as stored in 53 bits it is not, since A has" in found.why
     assert "eigenvalue of size 1 or more" in found.why
 
 
@@ -297,7 +297,7 @@ def test_below_the_answer_a_system_that_is_unstable_as_stored_is_named_with_the_
     asked = {"steps": 20, "tolerance": 1e3, "z": np.ones((20, 1)), "basis": "bound"}
     at_12 = required_precision(system, **asked, largest=12)
     assert at_12.why == f"in 12 digits {system.unstable(FloatFormat(2, 12))}"
-    assert "the system is stable, but as stored in FloatFormat" in at_12.why
+    assert "the system is stable, but as stored in 12 bits it is not" in at_12.why
     assert at_12.cause == ""
     found = required_precision(system, **asked)
     assert found.why.startswith(

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import signal
 
-from gpbnb import FixedFormat, FloatFormat, LinearSystem, WordFormats, required_fraction_bits, required_precision
+from gpbnb import (
+    FixedFormat,
+    FloatFormat,
+    LinearSystem,
+    WordFormats,
+    limits,
+    required_fraction_bits,
+    required_precision,
+)
+from gpbnb.arithmetic.search import Outcome
+from gpbnb.filters.words import run_words
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.requirement import Asked
 
 SLOW = LinearSystem([["0.99997"]], [["0.00003"]], name="slow")
 MEMORY = "shorter than the memory of the system, whose slowest response takes 160000 steps to decay to 1 %"
@@ -94,3 +106,63 @@ def test_the_command_takes_the_bits_of_coefficients(tmp_path, capsys):
         assert message in capsys.readouterr().err
     assert main([*given[:-1], "--coefficients", "24"]) == 2
     assert "got --coefficients; needed --fixed with it" in capsys.readouterr().err
+
+
+# -- what a refusal says ----------------------------------------------------------------------------------------------
+
+
+def test_precisions_above_an_answer_without_a_bound_are_not_said_to_refute_it():
+    def error(fmt):
+        return Outcome(0.5) if fmt.precision < 40 else Outcome(math.inf, "numbers are too large")
+
+    asked = Asked(100, "guarantee", FloatFormat(2, 2))
+    with asked.search((24, 53), bounds=True) as search:
+        found = asked.answer(search(SimpleNamespace(error=error)))
+    assert str(found).endswith(
+        "guaranteed for ever; the proof does not cover 53 digits, in which no bound was found: numbers are too large"
+    )
+
+
+def test_a_design_that_float64_has_made_unstable_is_told_where_to_find_sections():
+    u = np.ones((500, 1))
+    long = LinearSystem.from_coefficients(*signal.butter(12, 0.02))
+    assert long.unstable()
+    advice = 'take second-order sections from the design tool, as output="sos" of SciPy gives them'
+    assert str(required_precision(long, 500, 1e-3, z=u)).endswith(advice)
+    short = LinearSystem.from_coefficients([1], [1, -2.5, 1])
+    assert "sections" not in str(required_precision(short, 500, 1e-3, z=u))
+
+
+def test_a_direct_form_that_no_precision_suits_says_by_how_much_it_misses():
+    long = LinearSystem.from_coefficients(*signal.butter(8, 0.02))
+    found = required_precision(long, 500, 1e-7, z=np.ones((500, 1)))
+    assert f"; 53 digits give {found.tried[-1][1]:.3g} times the tolerance; second-order sections usually" in str(found)
+    lasting = required_precision(long, 500, 1e-3, basis="bound", z=np.ones((500, 1)))
+    assert "an error causes rounding errors as large as itself; second-order sections usually" in str(lasting)
+
+
+@pytest.mark.parametrize("basis", ["emulation", "bound", "guarantee"])
+def test_a_coefficient_beyond_a_format_is_named_alike_on_every_basis(basis):
+    sections = LinearSystem.from_sections(signal.butter(4, 0.02, output="sos"))
+    z, within = np.full((20, 1), 0.5), limits(4, 1, measurement=0.5)
+    found = str(judge(sections, FixedFormat(0, 15), 20, 1e-3, basis=basis, z=z, within=within))
+    assert "coefficient a1_1: got a result of about -1." in found
+    assert "WordFormats(data, coefficients), or --fixed --mixed in the command" in found
+    without = {
+        "emulation": "in a run of 20 steps",
+        "bound": "without a bound on this run of 20 steps",
+        "guarantee": "without a guarantee for ever",
+    }[basis]
+    assert found.startswith(f"fixed point of 16 bits, 15 of them fraction misses the tolerance, {without}: coefficient")
+
+
+def test_refusals_describe_formats_in_words():
+    system = LinearSystem([["0.5"]], [[1]])
+    for basis in ("emulation", "bound", "guarantee"):
+        z, within = np.full((3, 1), 100), limits(1, 1, measurement=100)
+        found = str(judge(system, FixedFormat(3, 12), 3, 1, basis=basis, z=z, within=within))
+        assert "fixed point of 16 bits, 12 of them fraction" in found
+        assert "FixedFormat(" not in found
+    words = WordFormats(FixedFormat(2, 12), FixedFormat(0, 15))
+    with pytest.raises(OverflowError, match="beyond the range of fixed point of 16 bits, 15 of them fraction; needed"):
+        run_words(LOW_PASS, np.ones((3, 1)), words)
