@@ -209,7 +209,7 @@ class Tape:
 
         Raises
         ------
-        ArithmeticError, ValueError, TypeError : an operation has no result in the format, or a constant is not a number.
+        ArithmeticError, ValueError, TypeError : an operation has no result in the format; a non-numeric constant.
         """
         fmt: Any = inputs.format
         constants = [each.rounded(fmt) for each in self._constants]
