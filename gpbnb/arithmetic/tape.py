@@ -205,7 +205,8 @@ class Tape:
 
         Parameters
         ----------
-        inputs : (inputs,). results : (m,), places.
+        inputs : (inputs,).
+        results : (m,), places.
 
         Raises
         ------

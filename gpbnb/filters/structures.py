@@ -514,8 +514,10 @@ class Controller(NamedTuple):
 
     Parameters
     ----------
-    Kp, Ki, Kd : gains per step. leak : λ, the factor by which the integral decays in a step.
-    limits : lowest and highest output. integral_limits : lowest and highest integral.
+    Kp, Ki, Kd : gains per step.
+    leak : λ, the factor by which the integral decays in a step.
+    limits : lowest and highest output.
+    integral_limits : lowest and highest integral.
     back : :math:`K_b`; this gain times the last output minus its value before limiting is added to the integral.
     """
 

@@ -75,7 +75,8 @@ class FixedAnswer:
     tried : fraction bits, and largest error or bound / tolerance, infinite if a number overflows.
     why : why the next smaller format was rejected.
     words : the formats of data, coefficients and sums; None for a function, or if there is no answer.
-    steps : number of steps for which a guarantee holds, of a system that keeps its errors; None if it holds for ever.
+    steps : number of steps for which a guarantee holds, if the system never forgets its errors; None if it holds for
+        ever.
     """
 
     fmt: FixedFormat | MaybeNone
@@ -101,7 +102,8 @@ def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilt
 
     Parameters
     ----------
-    model : a model with constant matrices. z : (steps, m), typical measurements.
+    model : a model with constant matrices.
+    z : (steps, m), typical measurements.
     margin : factor by which later numbers may exceed those of this run.
 
     Raises
@@ -305,7 +307,8 @@ class _Strategy:
 
     Parameters
     ----------
-    like : a format with the integer bits, the rounding and the overflow of those to try. goal : tolerances.
+    like : a format with the integer bits, the rounding and the overflow of those to try.
+    goal : tolerances.
     least : lowest number of fraction bits.
     steps : number of steps for which a guarantee holds; None if it holds for ever.
     """
