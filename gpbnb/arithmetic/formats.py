@@ -59,10 +59,10 @@ class FloatFormat(Makes[FloatArray]):
     Raises
     ------
     TypeError : a parameter has the wrong type.
-    ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory; an unknown rounding; `emin` or
-        `emax` without the other, ``emin > emax``, or exponents too large to compute with; a largest number that is
-        not in the format; an unknown `overflow`, an `overflow` without a range, or "infinity" in a format that has no
-        words left for infinity and NaN, such as FP6.
+    ValueError : ``base < 2`` or ``precision < 1``, or so many digits that numbers do not fit in memory; an unknown
+        rounding; `emin` or `emax` without the other, ``emin > emax``, or exponents too large to compute with; a
+        largest number that is not in the format; an unknown `overflow`, an `overflow` without a range, or "infinity"
+        in a format that has no words left for infinity and NaN, such as FP6.
 
     Notes
     -----

@@ -205,11 +205,12 @@ class Tape:
 
         Parameters
         ----------
-        inputs : (inputs,). results : (m,), places.
+        inputs : (inputs,).
+        results : (m,), places.
 
         Raises
         ------
-        ArithmeticError, ValueError, TypeError : an operation has no result in the format, or a constant is no number.
+        ArithmeticError, ValueError, TypeError : an operation has no result in the format; a non-numeric constant.
         """
         fmt: Any = inputs.format
         constants = [each.rounded(fmt) for each in self._constants]

@@ -205,7 +205,8 @@ def greedy(fmt: Any, given: Any, plan: Any, x: Any, x_exact: Any, chosen: Any, e
 
     Parameters
     ----------
-    given : _Attacked. plan : Plan.
+    given : _Attacked.
+    plan : Plan.
     x, x_exact : the first estimate, packed and double-double.
     chosen : (steps, m[, 2]), the chosen measurements, packed.
 

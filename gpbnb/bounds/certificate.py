@@ -65,8 +65,11 @@ def written(
 
     Parameters
     ----------
-    given : the filter's coefficients. asked : limits as given. known : those that follow from them.
-    bound : (n,), bound of the errors. steps : number of steps for which it holds, None for ever.
+    given : the filter's coefficients.
+    asked : limits as given.
+    known : those that follow from them.
+    bound : (n,), bound of the errors.
+    steps : number of steps for which it holds, None for ever.
     F : (steps, n, n), closed loops.
 
     Raises

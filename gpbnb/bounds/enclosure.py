@@ -61,7 +61,9 @@ class Enclosed:
 
     Parameters
     ----------
-    exactly : arb ball. error : float, not negative. unit : unit roundoff of an operation, or twice that for chopping.
+    exactly : arb ball.
+    error : float, not negative.
+    unit : unit roundoff of an operation, or twice that for chopping.
     """
 
     __slots__ = ("error", "exactly", "unit")

@@ -208,7 +208,8 @@ def disturbances(program: Any, given: Any, units: Any, limits: Any, b: Any, caps
     Parameters
     ----------
     program : :class:`gpbnb.filters.program.Operations`.
-    given : Steps. units : units of the format.
+    given : Steps.
+    units : units of the format.
     limits : limits on the filter without rounding.
     b : (n,), bound of the error before and after each step.
     caps : (o,), bound of each operation's linear function of the exact filter; infinite if not known.
@@ -544,9 +545,11 @@ def peaks(given: Any, HPhi: Any, known: Any, first: int, early: int, steady: boo
 
     Parameters
     ----------
-    given : Columns. HPhi : (steps, m, n), float64.
+    given : Columns.
+    HPhi : (steps, m, n), float64.
     known : Sizes; those of the states are for the small terms and the tail.
-    early : number of first steps to examine. steady : whether to examine each step of the period as well.
+    early : number of first steps to examine.
+    steady : whether to examine each step of the period as well.
     end : End, as for :func:`certify`.
     """
     n, m, rows = given.F.shape[1], HPhi.shape[1], given.F.shape[0]

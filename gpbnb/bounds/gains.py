@@ -49,7 +49,8 @@ class Schedule:
     Phi, HPhi : (steps, n, n, 2) and (steps, m, n, 2), the model as stored, double-double.
     exact, dK : (steps, n, m, 2) and (steps, n, m), the exact filter's gain and a bound of its error.
     x0 : (n,), the first estimate as stored.
-    first : row at which the period begins. settled : whether the rows from there on repeat for ever.
+    first : row at which the period begins.
+    settled : whether the rows from there on repeat for ever.
     repeat, period : first step whose computed covariance occurs again, `period` steps later.
     why : why the gain has not settled, if it has not.
     enclosed : the first step from which a gain that never repeats stays within known limits.

@@ -35,7 +35,8 @@ class LimitCycle:
 
     Parameters
     ----------
-    states : (period, n), integers in units of the data. outputs : (period, p), likewise.
+    states : (period, n), integers in units of the data.
+    outputs : (period, p), likewise.
     """
 
     states: NDArray[np.int64]

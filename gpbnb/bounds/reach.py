@@ -222,7 +222,9 @@ def onward(given: Any, first: int, lags: int, reach: Any, size: Any, b: Any) -> 
     Parameters
     ----------
     given : :class:`gpbnb.bounds.envelope.Columns`; the rows from `first` on repeat.
-    lags : number of steps. reach : the set after step `first`. b : (n,), bound of earlier errors, by which the
+    lags : number of steps.
+    reach : the set after step `first`.
+    b : (n,), bound of earlier errors, by which the
         rounding errors of the rows are multiplied.
 
     Returns

@@ -175,7 +175,7 @@ def raised_until(
     Parameters
     ----------
     matrix : (n, n) or (p, n, n), exact; all members are raised alike.
-    sound : function that tells whether a raised matrix will do.
+    sound : function that decides whether a raised matrix is acceptable.
     least, largest : first and last δ.
     store : applied to the raised matrix before it is judged and returned.
 

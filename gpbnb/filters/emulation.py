@@ -35,7 +35,7 @@ class History:
     reference : the reference at the same steps.
     indefinite : the first step at which a variance or a pivot of the innovation covariance was not positive, if any.
     stopped : the step at which a division by zero or a number beyond the format's range ended the run, if any.
-    reason : what ended it, such as "overflow in the gain at step 812".
+    reason : what ended the run, such as "overflow in the gain at step 812".
     repairs : changes of covariances that would otherwise be indefinite, each as text.
     """
 

@@ -441,7 +441,7 @@ _COVARIANCES = {"Q": False, "R": True, "P0": False}  # and whether they must be 
 
 
 def _of_one(matrices: NDArray[Any]) -> tuple[int, ...]:
-    """Return the shape of each matrix of a cycle, or of an array that is no cycle."""
+    """Return the shape of each matrix of a cycle, or of an array that is not a cycle."""
     return matrices.shape[1:] if matrices.ndim == 3 else matrices.shape
 
 

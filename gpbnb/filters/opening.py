@@ -121,7 +121,8 @@ def step_arrays(start: Opening, identity: NDArray[Any], increment: NDArray[Any] 
 
     Parameters
     ----------
-    identity : (n, n), packed. increment : (p, n, n), packed, for compensated summation; by default none.
+    identity : (n, n), packed.
+    increment : (p, n, n), packed, for compensated summation; by default none.
     """
     PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (start.Phi, start.H))
     none, carried = np.zeros((0, *identity.shape), identity.dtype), np.zeros_like(start.x0[:, np.newaxis])

@@ -446,7 +446,8 @@ def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes
 
     Parameters
     ----------
-    coefficients : (c, 2), double-double. first : n + m.
+    coefficients : (c, 2), double-double.
+    first : n + m.
     rows : (n + m + o, n + m, 2), to be filled, double-double; relative to `sizes`, errors are below 2**-90.
     sizes : (n + m + o, n + m), to be filled: the result with all signs made positive.
     """

@@ -62,7 +62,8 @@ def agreed(name: str, count: int, steps: Callable[[int], list[Step] | None]) -> 
 
     Parameters
     ----------
-    name : name of the model. count : number of steps.
+    name : name of the model.
+    count : number of steps.
     steps : function that returns all steps in a number of bits, or None if they cannot be computed in them.
 
     Raises

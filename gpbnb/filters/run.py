@@ -89,8 +89,7 @@ class Run:
         its errors or, in double-double, of its distance from the exact filter.
     records : number of measurement records. Covariance and gain do not depend on the measurements and are computed
         once; the estimates of all records are the columns of one matrix, and have the same digits as in separate runs.
-        Many records
-        need :meth:`carry` and a form other than UD, which computes gain and estimate together.
+        Many records need :meth:`carry` and a form other than UD, which computes gain and estimate together.
 
     Raises
     ------

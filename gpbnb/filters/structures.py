@@ -433,7 +433,7 @@ def _fractions(matrix: fmpq_mat) -> NDArray[Any]:
 
 
 def state_space_structure(A: Any, B: Any, C: Any = None, D: Any = None) -> Structure:
-    """Return a filter from its exact matrices; with C (p, n) and D (p, m), p outputs follow the states."""
+    """Return a filter from its exact matrices; with C (p, n) and D (p, m), its last p states are the outputs."""
     n, m = B.shape
     p = 0 if C is None else len(C)
     (a, b, c, d), count = coefficient_matrices((n, n), (n, m), (p, n), (p, m))
@@ -514,8 +514,10 @@ class Controller(NamedTuple):
 
     Parameters
     ----------
-    Kp, Ki, Kd : gains per step. leak : λ, the factor by which the integral decays in a step.
-    limits : lowest and highest output. integral_limits : lowest and highest integral.
+    Kp, Ki, Kd : gains per step.
+    leak : λ, the factor by which the integral decays in a step.
+    limits : lowest and highest output.
+    integral_limits : lowest and highest integral.
     back : :math:`K_b`; this gain times the last output minus its value before limiting is added to the integral.
     """
 

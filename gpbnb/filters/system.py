@@ -125,7 +125,7 @@ class LinearFilter:
 
 
 def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a state-space filter") -> LinearFilter:
-    """Return a filter from its matrices; with C and D, outputs follow the states.
+    """Return a filter from its matrices; with C and D, its last states are the outputs.
 
     Raises
     ------
@@ -529,7 +529,7 @@ class LinearSystem:
         return int(self.C.shape[0])
 
     def as_filter(self) -> LinearFilter:
-        """Return this system as the linear filter that a guarantee needs, in which the outputs follow the states."""
+        """Return this system as the linear filter that a guarantee needs, whose last p states are the outputs."""
         return self.made if self.made is not None else state_space(self.A, self.B, self.C, self.D, self.name)
 
     def outputs(self, u: Any, fmt: FloatFormat | None = None) -> NDArray[np.float64]:

@@ -32,8 +32,10 @@ class UnscentedModel(NamedTuple):
 
     Parameters
     ----------
-    f, h : functions of a state (n,). difference : function of two measurements (m,).
-    scale : :math:`n + \lambda`. means, covariances : weights (2n + 1,). Q (n, n), R (m, m).
+    f, h : functions of a state (n,).
+    difference : function of two measurements (m,).
+    scale : :math:`n + \lambda`.
+    means, covariances : weights (2n + 1,). Q (n, n), R (m, m).
     """
 
     f: Callable[[Matrix], Matrix]

@@ -284,7 +284,8 @@ def largest_values(made: LinearFilter, u: NDArray[np.float64], start: Any = None
 
     Parameters
     ----------
-    u : (steps, m). start : (n,), the first state; by default zeros.
+    u : (steps, m).
+    start : (n,), the first state; by default zeros.
     """
     program = made.program
     x = np.zeros(program.n) if start is None else np.array(start, dtype=np.float64)

@@ -34,7 +34,7 @@ class BlockRequirement:
         allow; None if one format for all blocks does not meet it.
     ratio : largest error / tolerance with these formats.
     uniform : the answer with one format for all blocks.
-    alone : for each block, the smallest precision where all others have the most digits; None if none is enough.
+    alone : for each block, the smallest precision while all others have the highest precision; None if none is enough.
     tried : formats of the blocks, and largest error / tolerance, in the order in which they were run.
     """
 
@@ -46,7 +46,7 @@ class BlockRequirement:
 
     @property
     def limiting(self) -> tuple[str, ...]:
-        """The blocks that need the most digits alone."""
+        """The blocks that need the most digits when lowered alone."""
         most = max((digits for digits in self.alone.values() if digits is not None), default=None)
         return tuple(name for name, digits in self.alone.items() if digits == most)
 

@@ -397,7 +397,9 @@ class CodeSource:
 
     Parameters
     ----------
-    step : the operations. arithmetic : how they are written. name : name of the files, and prefix of the public names.
+    step : the operations.
+    arithmetic : how they are written.
+    name : name of the files, and prefix of the public names.
     """
 
     def __init__(self, step: CodeStep, arithmetic: CodeNumbers, name: str) -> None:

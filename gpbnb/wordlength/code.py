@@ -62,7 +62,8 @@ class Prepared(NamedTuple):
     Parameters
     ----------
     step, arithmetic : its operations, and how they are written.
-    title : what it is. structure : its structure or form.
+    title : what it is.
+    structure : its structure or form.
     emulate : function that returns the vectors for inputs, (steps, m).
     inputs : function that returns inputs for a number of steps.
     bound : function that returns what is proven about the errors, in words, for limits.

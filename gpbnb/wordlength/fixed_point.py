@@ -81,7 +81,8 @@ class FixedAnswer:
     tried : fraction bits, and largest error or bound / tolerance, infinite if a number overflows.
     why : why the next smaller format was rejected.
     words : the formats of data, coefficients and sums; None for a function, or if there is no answer.
-    steps : number of steps for which a guarantee holds, of a system that keeps its errors; None if it holds for ever.
+    steps : number of steps for which a guarantee holds, if the system never forgets its errors; None if it holds for
+        ever.
     warnings : as of a :class:`gpbnb.wordlength.requirement.Requirement`.
     """
 
@@ -110,7 +111,8 @@ def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilt
 
     Parameters
     ----------
-    model : a model with constant matrices. z : (steps, m), typical measurements.
+    model : a model with constant matrices.
+    z : (steps, m), typical measurements.
     margin : factor by which later numbers may exceed those of this run.
 
     Raises
@@ -221,14 +223,15 @@ def required_fraction_bits(
     given : a linear system in any structure; a function of a format and `z`, as in
         :func:`gpbnb.wordlength.recursion.required_recursion_precision`; a Kalman filter, linear or nonlinear, all of
         whose operations are rounded into one format; or a scaled filter. The error of a system is the difference
-        between its outputs and those of the system as given, and includes the error of storing coefficients and
-        inputs; so does that of a Kalman filter. The error of a scaled filter is due only to rounding its states.
+        between its outputs and those of the system as given. It includes the error of storing coefficients and
+        inputs, and the error of a Kalman filter does so, too. The error of a scaled filter is due only to rounding its
+        states.
     z : (steps, m), inputs or measurements.
     tolerance : largest acceptable error of each output, or of each state of a filter, in its unit; infinite if its
         accuracy does not matter.
     basis : "emulation" of these measurements; or "guarantee", for a system for all inputs that are never larger than
         the largest of `z`, with a proof that nothing overflows, and for a scaled filter for all measurements that do
-        not overflow. A Kalman filter has :func:`gpbnb.bounds.guarantee.guarantee` in its place.
+        not overflow. For a Kalman filter, call :func:`gpbnb.bounds.guarantee.guarantee` instead.
     rounding, coefficient_bits, wide : as for :func:`emulated`.
     like : formats for a system or a function, in place of `rounding`, `coefficient_bits` and `wide`. They set the
         integer bits, the rounding and the overflow. The search changes the fraction bits of the data, and those of the
@@ -240,7 +243,8 @@ def required_fraction_bits(
     ------
     TypeError : another kind of filter.
     ValueError : a tolerance is not above 0, no tolerance is finite, or the basis is neither of the two; inputs that do
-        not fit; a guarantee for a function or a Kalman filter, or either without `like`; a form of anything else.
+        not fit; a guarantee for a function or a Kalman filter; a function or a Kalman filter without `like`; a `form`
+        for anything but a Kalman filter.
     OverflowError : an output of a system as given is beyond the range of float64.
 
     Examples
@@ -315,7 +319,8 @@ class _Strategy:
 
     Parameters
     ----------
-    like : a format with the integer bits, the rounding and the overflow of those to try. goal : tolerances.
+    like : a format with the integer bits, the rounding and the overflow of those to try.
+    goal : tolerances.
     least : lowest number of fraction bits.
     steps : number of steps for which a guarantee holds; None if it holds for ever.
     """

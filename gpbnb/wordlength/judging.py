@@ -26,7 +26,8 @@ class Judgement(NamedTuple):
 
     Parameters
     ----------
-    ratio : largest error or bound / tolerance; infinite if there is none. why : why it is infinite.
+    ratio : largest error or bound / tolerance; infinite if there is none.
+    why : why it is infinite.
     ends : whether a guarantee holds for the steps only, because there is none for ever.
     warnings : as of a :class:`gpbnb.wordlength.requirement.Requirement`.
     """

@@ -263,7 +263,7 @@ def survey_formats(
     form: AnyForm = Form.INNOVATION,
     basis: Basis = "emulation",
 ) -> list[Outcome]:
-    """Run a filter in each format; return largest error or bound / tolerance, and why it is infinite."""
+    """Run a filter in each format; return the largest error or bound / tolerance, and the reason if it is infinite."""
     tolerances = checked_question(model, formats, tolerance, basis)
     model, z = complete(model, z)
     measured = _measured(model, z)
@@ -346,7 +346,7 @@ class Recorded(ABC):
     bounded: ClassVar[bool] = False
 
     def error(self, fmt: FloatFormat | BlockFormats) -> Outcome:
-        """Return the largest error, or its bound, over the tolerance; or infinity and the reason."""
+        """Return the largest error or bound as a multiple of the tolerance; or infinity, with the reason."""
         asked = np.isfinite(self.tolerances)
         try:
             measured = stored_measurements(self.z, fmt)
@@ -372,7 +372,7 @@ class Recorded(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Emulated(Recorded):
-    """Errors against `true`, (steps, n, 2), the estimates of the filter without rounding."""
+    """Errors relative to `true`, (steps, n, 2), the estimates of the filter without rounding."""
 
     true: NDArray[np.float64]
 

@@ -108,7 +108,7 @@ class EmulatedFunction:
 
     @property
     def untraced(self) -> str:
-        """Why the user's function cannot be traced; empty if it can. A smoother stores its model by the rounding."""
+        """Why the user's function cannot be traced; empty if it can be."""
         return self.run.refusal if isinstance(self.run, TracedFunction) else ""
 
     def error(self, fmt: FloatFormat | FixedFormat) -> Outcome:

@@ -61,16 +61,19 @@ class Report:
     Parameters
     ----------
     name, kind : name of the model, and "Kalman filter" or "linear system".
-    digits : the answer, None if there is none. text : the answer in words, with its basis.
+    digits : the answer, None if there is none.
+    text : the answer in words, with its basis.
     base, rounding, steps, tolerance : the question.
     source : origin of the measurements.
     answers : one answer for each basis and form or structure, the requested one first.
     errors : error / tolerance of each state at the answer; None if the tolerance is infinite.
     ranges : name, smallest and largest power of two.
-    command : the command that reproduces the report. versions : versions of the machine and packages.
+    command : the command that reproduces the report.
+    versions : versions of the machine and packages.
     limits : for the bases "guarantee" and "probable", the limits on each state, innovation and measurement of the
         filter without rounding; None if there is no limit.
-    format : the one format that was judged; empty for a search. met : whether an answer meets the tolerance.
+    format : the one format that was judged; empty for a search.
+    met : whether an answer meets the tolerance.
     names : names of the states, or of the outputs of a linear system.
     measurement_names : names of the measurements, or of the inputs of a linear system.
     exponents : the range of the exponents; empty if it is unlimited.

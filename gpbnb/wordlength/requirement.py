@@ -37,16 +37,16 @@ class Requirement:
     steps : steps of the filter.
     tried : precision, and largest error / tolerance over states and steps; infinite if the run stopped, a
         variance was no longer positive, or no bound exists.
-    why : the reason why an error is infinite, for the largest precision at which it is; empty if all errors are finite.
-        The answer shows this reason if it prevented a smaller answer.
+    why : the reason why an error is infinite, for the largest precision at which it is infinite; empty if all errors
+        are finite. The answer shows this reason if it prevented a smaller answer.
     form : form of the filter.
     irregular : precisions that meet the tolerance although a higher one that was run misses it; usually empty.
-    advice : a form that meets the tolerance, if more digits fail where fewer do not; the higher precisions in which no
-        bound was found, and why; or what else helps.
+    advice : a form that meets the tolerance, if a precision fails although a lower one does not; the higher precisions
+        in which no bound was found, and why; or what else helps.
     repairs : changes of the model's covariances, each as text.
     cause : the reason why no precision can be an answer; the limit of the search then does not matter.
     limit : the reason why the search ended at the last precision of `tried`. It is shown if there is no answer.
-    ends : whether a guarantee holds for the steps asked for, because no precision has one for ever.
+    ends : whether the guarantee holds only for the steps asked for, because no precision has a guarantee for ever.
     untraced : why a function ran operation by operation, and not in compiled code; empty if it did not.
     processors : the largest error / tolerance of a run in binary32, and in binary64 if binary32 has too few bits or
         misses the tolerance. Empty if no run was made: in another base, with directed rounding or a given range, and
@@ -106,7 +106,7 @@ class Requirement:
 
     @property
     def processor_format(self) -> str:
-        """Name of the smaller of binary32 and binary64 that meets the tolerance; empty if neither, or if unknown.
+        """Name of the smaller format of binary32 and binary64 that meets the tolerance; empty if none is known.
 
         An observed answer rests on a run in this format itself, which rounds ties to even and has a limited range. A
         bound holds for either rounding of ties, and says nothing about the range. There is no name in other bases,
@@ -166,7 +166,7 @@ class Strategy(Protocol):
     """One way to find out how well a format does: by emulation, or by one of the bounds."""
 
     def error(self, fmt: FloatFormat) -> Outcome:
-        """Return the largest error, or its bound, over the tolerance; or infinity and the reason."""
+        """Return the largest error or bound as a multiple of the tolerance; or infinity, with the reason."""
 
 
 class Asked(NamedTuple):
@@ -174,7 +174,8 @@ class Asked(NamedTuple):
 
     Parameters
     ----------
-    steps : number of steps of the filter. basis : what counts as an error.
+    steps : number of steps of the filter.
+    basis : what counts as an error.
     like : a format of any precision, with base, rounding and range of those to try.
     largest : highest precision to try; by default the largest with compiled loops.
     progress : whether to show a progress bar that counts precisions.

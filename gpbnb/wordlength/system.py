@@ -1,6 +1,6 @@
 """Find the precision for a linear system: its errors for given inputs, or their bounds for all inputs.
 
-A bound holds for ever, or for the steps asked for if the system keeps its errors.
+A bound holds for ever, or for the steps asked for if the system never forgets its errors.
 
 The error of an output is the difference from the system with the given coefficients, so it includes the errors of
 storing them.
@@ -40,10 +40,10 @@ def required_system_precision(
     Parameters
     ----------
     asked : the question. Its basis "emulation" compares with the system as given, for these inputs. "bound" holds for
-        ever and for every input that is never larger than the largest of `u`, from rest; "guarantee" for inputs
-        within the limits on the measurement. Both bound rounding, and the errors of storing coefficients and inputs.
-        For a system that keeps its errors, such as a clock or an integrator, they hold for the steps asked for.
-        "probable" takes three standard deviations for rounding in place of its bound.
+        ever and for every input that is never larger than the largest of `u`, from rest; "guarantee" for inputs within
+        the limits on the measurement. Both bound rounding, and the errors of storing coefficients and inputs. For a
+        system that keeps its errors, such as a clock or an integrator, they hold for the steps asked for. "probable"
+        takes three standard deviations of the rounding error in place of its bound.
     tolerance : largest error of each output, in its unit; one number, or (p,).
     u : (steps, m), inputs.
     within : result of :func:`gpbnb.bounds.guarantee.limits`; only the limit on the measurement is used.

@@ -75,8 +75,8 @@ NAMES = {
         r"(125), second form: $\hat x = 1$": "1/(16*beta*R)",
     },
     "contraction": {
-        "the two forms of (99) are one: $AH'-KS$ is zero where $(A-KHA)H'-KR$ is": "(A - K*H*A)*HT - K*R",
-        "and $HB-TL'$ where $H(B-BH'L')-RL'$ is": "H*(B - B*HT*LT) - R*LT",
+        "the two forms of (99) are one: $AH'-KS$ is zero where $(A-KHA)H'-KR$ is zero": "(A - K*H*A)*HT - K*R",
+        "likewise, $HB-TL'$ is zero where $H(B-BH'L')-RL'$ is zero": "H*(B - B*HT*LT) - R*LT",
         "two updates, subtracted; the last two terms are zero": (
             "(1 - K*H)*(A - B)*(1 - HT*LT) + ((A - K*H*A)*HT - K*R)*LT - K*(H*(B - B*HT*LT) - R*LT)"
         ),
@@ -89,8 +89,8 @@ NAMES = {
         ),
     },
     "recursion": {
-        r"$f \le \alpha + f\,g\zeta$, from $F_k = A_k + F_kE_{k-1}G_k$, has the largest $f$": "alpha/(1 - t)",
-        r"residuals of one size and $\alpha < 1$: errors stay at": "q/(1 - alpha)",
+        r"$f \le \alpha + f\,g\zeta$, from $F_k = A_k + F_kE_{k-1}G_k$: the largest such $f$": "alpha/(1 - t)",
+        r"residuals of one size and $\alpha < 1$: the errors stay at": "q/(1 - alpha)",
     },
 }
 """What each step derives, beside its name; see `steps.check_names`."""

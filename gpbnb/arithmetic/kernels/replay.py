@@ -37,7 +37,8 @@ def replay(fmt: Any, instructions: Any, begin: int, end: int, values: Any, truth
     Parameters
     ----------
     instructions : (n, 5), code, three operands and the number of the result.
-    values : numbers, in the layout of the arithmetic. truths : truth values, as 0 and 1.
+    values : numbers, in the layout of the arithmetic.
+    truths : truth values, as 0 and 1.
     """
     for o in range(begin, end):
         code = instructions[o, 0]

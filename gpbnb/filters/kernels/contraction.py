@@ -209,7 +209,9 @@ def gain_error_bound(bound: Any, K: Any, used: Any, dK: Any) -> Any:
 
     Parameters
     ----------
-    bound : Contraction after the step. K, dK : as in :func:`contraction_step`. used : (n, m), the program's gain.
+    bound : Contraction after the step.
+    K, dK : as in :func:`contraction_step`.
+    used : (n, m), the program's gain.
     """
     up = 1 + _many(K.shape[0], K.shape[1])
     rows = np.sqrt((bound.L * bound.L).sum(axis=1))

@@ -234,7 +234,8 @@ def apart(heights: Sequence[float], lines: Sequence[int], size: float) -> list[f
     Parameters
     ----------
     heights : wanted heights of the middles of the texts.
-    lines : number of lines of each text. size : height of a line, in the unit of `heights`.
+    lines : number of lines of each text.
+    size : height of a line, in the unit of `heights`.
     """
     order = sorted(range(len(heights)), key=heights.__getitem__)
     placed = [heights[i] for i in order]

@@ -91,7 +91,8 @@ def bounds_in_blocks(
     within : limits on state and innovation, one for each bound.
     assumed : for each bound, (n,), an error that is assumed not to be exceeded. It enters the size of the computed
         estimate; a bound above it ends the iteration with an ``ArithmeticError``.
-    steps : number of steps. block : number of steps at a time; by default a cycle of the model.
+    steps : number of steps.
+    block : number of steps at a time; by default a cycle of the model.
     saved : file for the state of the run, written now and then. If it exists, the run continues from there; the
         arguments must be the same.
 

@@ -25,7 +25,8 @@ class YearAnswer(NamedTuple):
     Parameters
     ----------
     source : who or what gives the answer.
-    decimal : decimal digits, if the answer is in these. bits : bits, if it is in these.
+    decimal : decimal digits, if the answer is in these.
+    bits : bits, if it is in these.
     deviation : bits if the filter estimates deviations from the predicted drift; None if that was not asked.
     meaning : what the answer rests on, or allows.
     """

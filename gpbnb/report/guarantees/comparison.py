@@ -137,7 +137,7 @@ def rows() -> tuple[PublishedNumber, ...]:
             "rounding error, binary64",
             1.2505552149377763e-12,
             _reduction,
-            "SATIRE charges a whole unit roundoff for storing a number; a number within 1 loses at most half of it",
+            "SATIRE charges a unit roundoff for storing a number; storing a number within 1 costs at most half of that",
             "Satire, README.md, Reduction_1024",
         ),
         PublishedNumber(

@@ -35,7 +35,8 @@ def draw_errors(
     Parameters
     ----------
     chosen, random : (steps, n), errors.
-    state : index of the state. quantity : its name and unit, for the axis.
+    state : index of the state.
+    quantity : its name and unit, for the axis.
     """
     steps = np.arange(1, len(chosen) + 1)
     ax.plot(steps, bound_of(found, state, len(steps)), color=VALID, label="bound for every measurement sequence")
@@ -75,7 +76,8 @@ def draw_set(
 
     Parameters
     ----------
-    chosen : (steps, 2), errors. names : name and unit of each state, for the axes.
+    chosen : (steps, 2), errors.
+    names : name and unit of each state, for the axes.
     scale : units on the axes in a unit of the states, such as 1000 for millimetres.
     """
     corners = scale * reachable_corners(found)

@@ -56,13 +56,16 @@ class GuaranteeCase:
     Parameters
     ----------
     make : function that returns the filter.
-    state, innovation : limits for a Kalman filter. measurement : limit for a linear filter.
+    state, innovation : limits for a Kalman filter.
+    measurement : limit for a linear filter.
     center : the state near which the adversary stays.
-    steps : length of the adversary's runs. candidates : number of measurements to choose from at each step.
+    steps : length of the adversary's runs.
+    candidates : number of measurements to choose from at each step.
     aims : the states whose errors the adversary tries to make large; all states if empty.
     horizon : number of steps that the bound covers, for filters without process noise.
     states : name and unit of each state.
-    form : form of a Kalman filter. budget : budget of the guarantee in binary32, for filters that settle slowly.
+    form : form of a Kalman filter.
+    budget : budget of the guarantee in binary32, for filters that settle slowly.
     """
 
     make: Callable[[], LinearModel | LinearFilter]

@@ -290,8 +290,14 @@ def contraction() -> Derivation:
     zero_l = unevaluated(h * after_b - r * lt)
     return Derivation(
         (
-            Step("the two forms of (99) are one: $AH'-KS$ is zero where $(A-KHA)H'-KR$ is", a * ht - k * s, zero_k),
-            Step("and $HB-TL'$ where $H(B-BH'L')-RL'$ is", h * b - unevaluated(h * b * ht + r) * lt, zero_l),
+            Step(
+                "the two forms of (99) are one: $AH'-KS$ is zero where $(A-KHA)H'-KR$ is zero", a * ht - k * s, zero_k
+            ),
+            Step(
+                "likewise, $HB-TL'$ is zero where $H(B-BH'L')-RL'$ is zero",
+                h * b - unevaluated(h * b * ht + r) * lt,
+                zero_l,
+            ),
             Step(
                 "two updates, subtracted; the last two terms are zero",
                 after_a - after_b,  # SymPy typesets an unevaluated difference without its parentheses
@@ -328,12 +334,12 @@ def recursion() -> Derivation:
     return Derivation(
         (
             Step(
-                "$f \\le \\alpha + f\\,g\\zeta$, from $F_k = A_k + F_kE_{k-1}G_k$, has the largest $f$",
+                "$f \\le \\alpha + f\\,g\\zeta$, from $F_k = A_k + F_kE_{k-1}G_k$: the largest such $f$",
                 together(alpha, t * over(alpha, 1 - t)),
                 over(alpha, 1 - t),
             ),
             Step(
-                "residuals of one size and $\\alpha < 1$: errors stay at",
+                "residuals of one size and $\\alpha < 1$: the errors stay at",
                 together(alpha * over(size, 1 - alpha), size),
                 over(size, 1 - alpha),
             ),

@@ -37,7 +37,8 @@ class Terms:
 
         Parameters
         ----------
-        fmt : format that defines β. k : 1 or more; beyond the last step, x and u of the last step are used.
+        fmt : format that defines β.
+        k : 1 or more; beyond the last step, x and u of the last step are used.
         faults : faults to correct, as for :func:`gpbnb.report.kalman.report_bounds.coefficients`.
         """
         first, second = report_bounds.coefficients(k, self.n, self.m, **faults)

@@ -87,7 +87,8 @@ def coefficients(
 
     Parameters
     ----------
-    k : steps. n, m : dimensions of the state and of the measurement.
+    k : steps.
+    n, m : dimensions of the state and of the measurement.
     once : whether to count only once the product with the state and the last addition, which (114)-(116) count already.
     free_signs : whether each term has an error of its own sign, so that :math:`a_0 + a_i` replaces :math:`a_0 - a_i`.
     carried : whether the errors of P from earlier steps propagate into P, K and F, as all other errors do in the
@@ -129,7 +130,8 @@ def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fr
 
     Parameters
     ----------
-    transitions : F_1 … F_k of (109). inputs : u_1 … u_k of (110).
+    transitions : F_1 … F_k of (109).
+    inputs : u_1 … u_k of (110).
 
     Raises
     ------
@@ -160,7 +162,8 @@ def precision_for_coefficient(
 
     Parameters
     ----------
-    coefficient : the factor of β. tolerance : the allowed error, in the same units.
+    coefficient : the factor of β.
+    tolerance : the allowed error, in the same units.
     base, rounding : base and rounding of the format.
 
     Raises
@@ -242,7 +245,8 @@ def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction
 
     Parameters
     ----------
-    k, n, m : as in :func:`coefficients`. loop : another value of 7n + 3m + 6.
+    k, n, m : as in :func:`coefficients`.
+    loop : another value of 7n + 3m + 6.
     """
     return Fraction(k * (3 * n + 1) * (k - 1), 2) * (7 * n + 3 * m + 6 if loop is None else loop)
 
@@ -281,7 +285,8 @@ def bound_for_size(beta: Fraction, k: int, n: int, m: int, size: Fraction, **fau
 
     Parameters
     ----------
-    beta : unit roundoff. k, n, m : steps, states and measurements.
+    beta : unit roundoff.
+    k, n, m : steps, states and measurements.
     size : size in the unit of the result.
     faults : faults to correct, as for :func:`coefficients`.
     """
@@ -293,7 +298,8 @@ def gravity_probe_b_bound(beta: Fraction, k: int, **faults: bool) -> float:
 
     Parameters
     ----------
-    beta : unit roundoff. k : steps.
+    beta : unit roundoff.
+    k : steps.
     faults : faults to correct, as for :func:`coefficients`.
     """
     return float(bound_for_size(beta, k, *EXAMPLE[1:], YEAR_SIZE, **faults))

@@ -90,7 +90,8 @@ def tolerances(k: int, n: int, m: int, tolerance: Fraction | int, size: Fraction
 
     Parameters
     ----------
-    k, n, m : values of the example. tolerance, size : allowed error, and size of the quantity, in the same units.
+    k, n, m : values of the example.
+    tolerance, size : allowed error, and size of the quantity, in the same units.
     """
     body = []
     for name, coefficient in zip(("first", "second"), report_bounds.coefficients(k, n, m), strict=True):

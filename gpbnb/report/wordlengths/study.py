@@ -42,7 +42,8 @@ def printed_precision(
 
     Parameters
     ----------
-    tolerance, size : in the same unit. faults : options of :func:`gpbnb.report.kalman.report_bounds.coefficients` that
+    tolerance, size : in the same unit.
+    faults : options of :func:`gpbnb.report.kalman.report_bounds.coefficients` that
         correct (125).
 
     References
@@ -156,7 +157,8 @@ def update_stagnation(
 
     Parameters
     ----------
-    state : index of the state. last : number of steps at the end that are examined one by one.
+    state : index of the state.
+    last : number of steps at the end that are examined one by one.
 
     Raises
     ------
