@@ -26,7 +26,7 @@ function compute({ t, chop, quantity }, data) {
 
 // Places a line apart for names of curves, as close as possible to their ends, which are sorted from the highest on.
 function apart(ends, top) {
-  const line = 14;
+  const line = 12.6;
   for (const each of ends) each.place = each.end;
   for (let round = 0; round < 200; round++) {
     for (let i = 1; i < ends.length; i++) {
@@ -59,7 +59,7 @@ function draw({ add, width, values, data, scale, axes, show, superscript }) {
   for (const run of shown) if (run.t !== bits) add("path", { class: "faint", d: curve(run.errors[quantity]) });
   // Each curve has its bits at its end, moved apart where curves end close together.
   const ends = shown.map((run) => ({ bits: run.t, end: y.place(run.errors[quantity].at(-1)) })).sort((a, b) => a.end - b.end);
-  apart(ends, top);
+  apart(ends, top - 4);
   add("text", { x: width - 4, y: 14, "text-anchor": "end" }, "bits");
   for (const each of ends) {
     add("path", { class: "faint", d: `M${right} ${each.end.toFixed(1)}L${right + 12} ${each.place.toFixed(1)}` });
