@@ -16,20 +16,26 @@ os.environ.setdefault("GPBNB_QUIET", "1")
 
 # What takes longest, longest first: with several processes none of it is left over at the end.
 LONGEST = (
-    "alterations of hung1984.II",
-    "tests/test_types.py",
-    "tests/wordlength/test_precision.py",
-    "tests/arithmetic/kernels/test_kernels_compiling.py",
     "tests/bounds/test_certificates.py",
-    "tests/filters/test_structures.py",
-    "tests/sweeps/test_sweeps_sweep.py",
+    "tests/guarantees/test_guarantees_filters.py",
+    "tests/test_types.py",
+    "alterations of hung1984.II",
+    "tests/wordlength/test_code.py",
+    "tests/arithmetic/kernels/test_kernels_compiling.py",
+    "tests/arithmetic/test_arithmetic_special.py",
     "tests/bounds/test_guarantee.py",
-    "tests/filters/test_inputs.py",
-    "tests/test_execute_notebooks.py",
+    "tests/filters/test_nonlinear.py",
+    "tests/wordlength/test_precision.py",
+    "tests/arithmetic/test_arithmetic_traced.py",
+    "tests/sweeps/test_sweeps_sweep.py",
+    "tests/wordlength/test_code_of_steps.py",
+    "tests/arithmetic/kernels/test_kernels_paths.py",
     "tests/arithmetic/kernels/test_kernels_scalar.py",
-    "tests/wordlength/test_wordlength_command.py",
-    "tests/ledger/checks/test_rounding_checks.py",
+    "tests/arithmetic/test_arithmetic_processors.py",
+    "tests/filters/test_structures.py",
     "tests/ledger/test_ledger_command.py",
+    "tests/test_execute_notebooks.py",
+    "tests/gravity_probe_b/test_year.py",
 )
 
 

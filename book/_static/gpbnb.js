@@ -81,6 +81,19 @@ function keepPunctuation(formula) {
   kept.append(formula, after);
 }
 
+// A formula that is too wide even so, such as a matrix on a phone, is set smaller, as far as it can be read.
+const SMALLEST = 0.6;
+function shrinkToLine(boxes) {
+  const wide = boxes.filter((box) => box.matches('[display="true"]') && !box.closest("td"));
+  for (const box of wide) if (box.dataset.size) box.style.fontSize = box.dataset.size;
+  const shares = wide.map((box) => box.clientWidth / box.scrollWidth);
+  wide.forEach((box, i) => {
+    if (!(shares[i] < 1)) return;
+    box.dataset.size ??= box.style.fontSize;
+    box.style.fontSize = `${parseFloat(box.dataset.size) * Math.max(SMALLEST, 0.98 * shares[i])}%`;
+  });
+}
+
 // What scrolls sideways must be reachable by keyboard. Formulas get their width late, boxes with the window's.
 function markScrolling(boxes = [...document.querySelectorAll("article :is(div, pre, mjx-container)")]) {
   const scrolls = boxes.map((box) => box.scrollWidth > box.clientWidth && /auto|scroll/.test(getComputedStyle(box).overflowX));
@@ -116,6 +129,7 @@ function take(formulas) {
 function settle(formulas) {
   const boxes = formulas.map((formula) => formula.querySelector("mjx-container")).filter(Boolean);
   breakFormulas(boxes);
+  shrinkToLine(boxes);
   // A formula that gets its width changes that of the others in its table.
   const tables = new Set(formulas.map((formula) => formula.closest("table")).filter(Boolean));
   markScrolling([...boxes, ...[...tables].flatMap((table) => [...table.querySelectorAll("mjx-container")])]);
@@ -161,7 +175,10 @@ window.formulasTypeset = new Promise((resolve) => {
     // Not when the window is resized: the sidebars slide, and the text has its width only after that.
     let width = null;
     const marked = new ResizeObserver(([{ contentRect }]) => {
-      if (contentRect.width !== width) markScrolling();
+      if (contentRect.width !== width) {
+        shrinkToLine([...document.querySelectorAll("article mjx-container")]);
+        markScrolling();
+      }
       width = contentRect.width;
     });
     for (const article of document.querySelectorAll("article")) marked.observe(article);
@@ -175,7 +192,10 @@ document.fonts.addEventListener("loadingdone", () => markScrolling());
 // the whole page would be laid out again. Its formulas are typeset, and broken into lines, once they are seen.
 document.addEventListener(
   "toggle",
-  ({ target }) => markScrolling([...target.querySelectorAll("div, pre, mjx-container")]),
+  ({ target }) => {
+    shrinkToLine([...target.querySelectorAll("mjx-container")]);
+    markScrolling([...target.querySelectorAll("div, pre, mjx-container")]);
+  },
   true,
 );
 window.addEventListener("beforeprint", () => {

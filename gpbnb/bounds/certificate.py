@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.bounds.envelope import FilterLimits, eigenvalue_sizes
 from gpbnb.bounds.gains import Schedule
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
@@ -176,7 +176,7 @@ def _back(F: NDArray[np.float64], *sizes: NDArray[np.float64]) -> int:
 
 def _extra(F: NDArray[np.float64]) -> int:
     """Return a number of steps, whole periods, after which the exact covariance is far nearer to its limit."""
-    rate = -2 * math.log(max(float(np.abs(np.linalg.eigvals(_product(F))).max()), 1e-9))
+    rate = -2 * math.log(max(float(eigenvalue_sizes(_product(F)).max()), 1e-9))
     return math.ceil(math.log(_NEARER) / rate) * len(F)
 
 
@@ -187,7 +187,7 @@ def _keep(F: NDArray[np.float64], back: int, care: _Care) -> int:
     """
     if back <= _WHOLE:
         return back
-    modes = np.sort(np.abs(np.linalg.eigvals(_product(F)))) ** (1 / len(F))
+    modes = np.sort(eigenvalue_sizes(_product(F))) ** (1 / len(F))
     fast = modes[modes < modes[-1] ** 2]
     return 4 + math.ceil(math.log(care.left) / math.log(max(float(fast.max(initial=0.0)), 1e-9)))
 

@@ -52,6 +52,7 @@ from gpbnb.bounds.envelope import (
     certify,
     columns,
     disturbances,
+    eigenvalue_sizes,
     peaks,
     units,
 )
@@ -282,7 +283,7 @@ def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000, b
     if ended is None and not np.isfinite(new).all():
         ended, why = 0, "no bound was found: in this precision, an error causes rounding errors as large as itself"
         if given.fmt.limits is not None:
-            why = f"no bound was found within the range of {given.fmt}: a number may exceed the largest"
+            why = f"no bound was found within the range of {arithmetic(given.fmt)}: a number may exceed the largest"
     at = history.argmax(axis=0)
     worst = np.array([parts[at[i], i] for i in range(n)])
     return Guarantee(
@@ -330,7 +331,7 @@ def _radius(given: Schedule) -> float:
     whole = np.eye(given.program.n)
     for each in F:
         whole = each @ whole
-    return float(np.abs(np.linalg.eigvals(whole)).max() ** (1 / len(F)))
+    return float(eigenvalue_sizes(whole).max() ** (1 / len(F)))
 
 
 def _enough_lags(radius: float, period: int) -> int:
@@ -395,15 +396,19 @@ def _sums(
     rows, row_parts = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
     for _ in range(200):  # the error of the last steps persists, so raise the bound until it bounds itself
         rows, row_parts = [], []
+        if not np.isfinite(largest).all():
+            break
         for certificate in sums:
-            carried = (certificate.residual + certificate.tail) @ largest
+            with np.errstate(over="ignore", invalid="ignore"):
+                carried = (certificate.residual + certificate.tail) @ largest
             each = np.array(certificate.sums)
             each[:, START] += carried
             row_parts.append(each)
             rows.append(each.sum(axis=1) * (1 + (n + 31) * 2.0**-53))  # n + 7 roundings
         new = np.max(rows, axis=0)
         if not (new <= largest).all():
-            largest = np.maximum(largest, new * (1 + 2.0**-40))
+            with np.errstate(over="ignore", invalid="ignore"):
+                largest = np.maximum(largest, new * (1 + 2.0**-40))
             continue
         if not given.first:  # without a separate start, sums have fewer terms
             return np.array(rows), np.array(row_parts), lags

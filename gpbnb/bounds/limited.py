@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.bounds import above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.bounds.envelope import largest_error, units
 from gpbnb.bounds.storing import storing_errors
 from gpbnb.filters.program import AT_LEAST, AT_MOST, MULTIPLY, SUBTRACT
@@ -59,8 +60,8 @@ def limited_errors(
     errors = _invariant(steps.errors, n)
     if errors is None:
         raise ValueError(
-            f"got {system.name}, which keeps its errors of rounding, or whose numbers may exceed the range of {fmt}; "
-            "needed a leak below 1, limits on the integral, or a larger range"
+            f"got {system.name}, which keeps its errors of rounding, or whose numbers may exceed the range of "
+            f"{arithmetic(fmt)}; needed a leak below 1, limits on the integral, or a larger range"
         )
     return errors[system.n :]
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.bounds.guarantee import Guarantee, from_schedule, limits
 from gpbnb.bounds.limited import limited_errors
 from gpbnb.bounds.linear import filter_schedule, transfer_gains
@@ -74,7 +75,7 @@ def output_errors(
     gains = transfer_gains(system, system.stored(fmt), steps)
     storing, sizes = storing_errors(fmt, largest), stored_sizes(fmt, largest)
     if not np.isfinite(storing).all():
-        raise ValueError(f"got inputs of up to {largest}; needed inputs within the range of {fmt}")
+        raise ValueError(f"got inputs of up to {largest}; needed inputs within the range of {arithmetic(fmt)}")
     state = np.concatenate([gains.states, gains.inputs]) @ sizes * (1 + 2.0**-40)
     if not np.isfinite(state).all():
         raise OverflowError("a state or an output may be beyond the range of float64; scale the numbers")

@@ -7,8 +7,8 @@ so the error of a state i has the bound
 .. math:: |e_i| \le \sum_g \Big(\sum_{l\ge0} |(A^l G)_{ig}|\Big) h_g
 
 where column g of G holds the effect of roundings on the states after a step, and :math:`h_g` the sum of their largest
-errors. A and G are exact, and the infinite sums are enclosed in ball arithmetic. Over a number of steps, the sum over l
-has as many terms.
+errors. A and G are exact, and :func:`gpbnb.bounds.linear.largest_gains` bounds the infinite sums. Over a number of
+steps, the sum over l has as many terms.
 
 References
 ----------
@@ -25,11 +25,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.linear import peak_gain, transfer_gains
+from gpbnb.bounds.linear import largest_gains, transfer_gains
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, exact_functionals, matrices
-from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.system import LinearSystem, is_stable
 from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program
 
 _UP = 1 + 2.0**-40
@@ -106,7 +107,7 @@ def rounding_gains(
     reached = ((np.linalg.matrix_power((A != 0) + np.eye(n), n) @ (G != 0)) > 0) & used
     for pattern in {tuple(row) for row in reached.tolist() if any(row)}:  # enclosures do not show which sums are zero
         rows, columns = (reached == pattern).all(axis=1), np.array(pattern)
-        gains[np.ix_(rows, columns)] = peak_gain(A, G[:, columns], identity[rows], terms=steps).high
+        gains[np.ix_(rows, columns)] = largest_gains(A, G[:, columns], identity[rows], terms=steps)
     return gains
 
 
@@ -185,7 +186,9 @@ class WordGuarantee:
         share = largest_rounding(words.data.rounding) * float(words.data.unit)
         inputs = self._largest + share
         if (inputs > float(words.data.largest)).any():
-            raise OverflowError(f"inputs of up to {self._largest.max():.6g} are beyond the range of {words.data}")
+            raise OverflowError(
+                f"inputs of up to {self._largest.max():.6g} are beyond the range of {arithmetic(words.data)}"
+            )
         limits = rounding_limits(made)
         grouped = _grouped(made.program, limits)
         rounding = self._rounding(gains, made, grouped) @ grouped * _UP
@@ -199,6 +202,10 @@ class WordGuarantee:
             program, n = made.program, self.system.n
             A, B = matrices(program, made.coefficients)
             stored = A[:n, :n], B[:n], A[n:, :n], B[n:]
+            if self._steps is None and not is_stable(stored[0]):
+                raise ValueError(
+                    "the system is stable, but not with its coefficients as stored; needed more of their bits"
+                )
             difference, inputs, states = transfer_gains(self.system, stored, self._steps)
             rows, first = exact_functionals(program, made.coefficients), program.n + program.m
             inner = [
@@ -210,7 +217,7 @@ class WordGuarantee:
                     [[rows[first + o].get(j, Fraction(0)) for j in range(first)] for o in inner], dtype=object
                 )
                 terms = None if self._steps is None else self._steps - 1
-                found = peak_gain(stored[0], stored[1], row[:, :n], row[:, program.n :], terms).high
+                found = largest_gains(stored[0], stored[1], row[:, :n], row[:, program.n :], terms)
                 values = dict(zip(inner, found, strict=True))
             self._known[key] = _Gains(difference, inputs, np.concatenate([states, inputs]), rows, values, {})
         return self._known[key]

@@ -102,7 +102,7 @@ class FilterDesign:
         return LinearSystem.from_coefficients(b, a, found, name=self.name)
 
     def systems(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> dict[str, LinearSystem]:
-        """Return the filter in several structures, by their names; those that it does not have are left out.
+        """Return the filter in several structures, by their names; :meth:`lacking` names those that it does not have.
 
         Parameters
         ----------
@@ -112,13 +112,27 @@ class FilterDesign:
         ------
         ValueError : a structure is unknown, or the filter has none of them.
         """
+        found, why = self._tried(structures)
+        if not found:
+            raise ValueError("; ".join(f"{name}: {reason}" for name, reason in why.items()))
+        return found
+
+    def lacking(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> dict[str, str]:
+        """Return the structures that the filter does not have, by their names, each with the reason.
+
+        Examples
+        --------
+        >>> list(FilterDesign(b=[1], a=[1, 0, 1]).lacking("all"))
+        ['lattice', 'balanced state space']
+        """
+        return self._tried(structures)[1]
+
+    def _tried(self, structures: Sequence[str] | str) -> tuple[dict[str, LinearSystem], dict[str, str]]:
         names = STRUCTURES if structures == "all" else [structures] if isinstance(structures, str) else structures
-        found, why = dict[str, LinearSystem](), list[str]()
+        found, why = dict[str, LinearSystem](), dict[str, str]()
         for name in map(structure_named, names):
             try:
                 found[name] = self.system(name)
             except ValueError as error:
-                why.append(f"{name}: {error}")
-        if not found:
-            raise ValueError("; ".join(why))
-        return found
+                why[name] = str(error)
+        return found, why

@@ -22,6 +22,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.filters.missing import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
@@ -46,6 +47,10 @@ from gpbnb.filters.structures import (
     structure_named,
     sum_structure,
     transfer_function,
+)
+
+_WORDS = (
+    "; coefficients may have a format of their own: WordFormats(data, coefficients), or --fixed --mixed in the command"
 )
 
 _TINY = 2.0**-700
@@ -84,9 +89,16 @@ class LinearFilter:
         """Return the coefficients as a run in a format stores them, exact, (c,).
 
         Stochastic rounding begins with its first random number, as in a run.
+
+        Raises
+        ------
+        OverflowError : a coefficient beyond the range of the format; the message names it.
         """
         fmt.restart()
-        return np.asarray(fmt.array(self.coefficients).to_fractions(), dtype=object)
+        try:
+            return np.asarray(fmt.array(self.coefficients).to_fractions(), dtype=object)
+        except OverflowError:
+            raise self._beyond(fmt) from None
 
     def packed(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
         """Return the coefficients, rounded into a format, as the compiled loops expect them.
@@ -98,12 +110,18 @@ class LinearFilter:
         try:
             return as_packed(fmt, self.coefficients)
         except OverflowError:
-            for name, value in zip(self.program.coefficient_names, self.coefficients, strict=False):
-                try:
-                    fmt.round(value)
-                except OverflowError as error:
-                    raise OverflowError(f"coefficient {name}: {error}") from None
-            raise
+            raise self._beyond(fmt) from None
+
+    def _beyond(self, fmt: FloatFormat | FixedFormat) -> OverflowError:
+        """Return the error that names the first coefficient beyond the range of a format."""
+        names = self.program.coefficient_names or [str(i) for i in range(len(self.coefficients))]
+        for name, value in zip(names, self.coefficients, strict=True):
+            try:
+                fmt.round(value)
+            except OverflowError as error:
+                cure = _WORDS if isinstance(fmt, FixedFormat) else ""
+                return OverflowError(f"coefficient {name}: {error}{cure}")
+        return OverflowError(f"got coefficients beyond the range of {arithmetic(fmt)}")
 
 
 def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a state-space filter") -> LinearFilter:
@@ -585,14 +603,14 @@ class LinearSystem:
             return f"the system as given is not stable, since A has {_eigenvalue(self.A, self.state_names)}"
         if fmt is not None and not is_stable(stored := self.stored(fmt)[0]):
             growing = _eigenvalue(stored, self.state_names)
-            return f"the system is stable, but as stored in {fmt} it is not, since A has {growing}"
+            return f"the system is stable, but as stored in {arithmetic(fmt)} it is not, since A has {growing}"
         return ""
 
     def _beyond(self, fmt: FloatFormat | None) -> str:
         """Return why a number cannot be stored, and what to do about it."""
         what = "a number beyond the range of float64"
         if fmt is not None and (fmt.limits is not None or fmt.base == 10):
-            what = f"a number beyond the range of {fmt}"
+            what = f"a number beyond the range of {arithmetic(fmt)}"
         if cause := self.unstable(fmt):
             return f"got {what}; {cause}, so numbers grow without end; scaling delays that, no precision prevents it"
         cure = "scale the numbers"

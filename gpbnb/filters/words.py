@@ -24,6 +24,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.tags import Double
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.program import (
@@ -176,8 +177,9 @@ def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
             stored[i] = FloatFormat(2, fmt).round(value) if isinstance(fmt, int) else fmt.round(value)
         except OverflowError:
             name = program.coefficient_names[i] if program.coefficient_names else f"coefficient {i}"
+            text = arithmetic(fmt) if isinstance(fmt, FixedFormat) else f"{fmt} significant bits"
             raise OverflowError(
-                f"got {name} = {float(value):.6g}, beyond the range of {fmt}; needed coefficients with more integer "
+                f"got {name} = {float(value):.6g}, beyond the range of {text}; needed coefficients with more integer "
                 "bits, or a number of significant bits"
             ) from None
     point, target = words.data.fraction_bits, words.accumulator.fraction_bits

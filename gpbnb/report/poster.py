@@ -100,8 +100,8 @@ def panels() -> Iterator[Panel]:
     kalman.waterfall(ax, Fraction(1, summary.DRIFT), digits)
     yield Panel(
         f"1. The report: {observed.printed[0]} digits, or {observed.printed[1]}",
-        "Formula (125) of 1984 has two terms. Both printed numbers are wrong. Evaluated correctly, for an error of one "
-        "milliarcsecond and with every error of the formula corrected, it asks for ever more.",
+        "Formula (125) of 1984 has two terms. Both printed numbers are wrong. For an error of one milliarcsecond, and "
+        "with every error of the formula corrected, it asks for ever more.",
         fig,
     )
     count, passed = stages(everything)["kalman"], inherited(everything)

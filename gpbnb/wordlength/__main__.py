@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             replace_file(given.certificate, proof.encode())
         option = f"--code {given.code}"
         if given.code and report.met:
-            print("code:", *write_code_of(given))
+            print("code:", *write_code_of(given, report.structure))
         elif given.code:
             print(f"{program}: no code, since no format meets the tolerance", file=sys.stderr)
     except (ValueError, ArithmeticError) as error:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rounding import Rounding, rounding_named
 from gpbnb.arithmetic.search import Outcome, Search
 from gpbnb.bounds.words import WordGuarantee, bounded_rounding, largest_rounding
@@ -41,9 +42,14 @@ from gpbnb.filters.words import (
 from gpbnb.wordlength.precision import recorded_strategy
 from gpbnb.wordlength.recursion import Recursion, recursion_strategy
 from gpbnb.wordlength.requirement import Asked, Strategy, largest_ratio
+from gpbnb.wordlength.system import weak_evidence
 
 Basis = Literal["emulation", "guarantee"]
 LARGEST_FRACTION = 60  # bits
+COEFFICIENT_BITS = 15
+"""Significant bits of a coefficient, if none are given: those of a word of 16 bits."""
+LONGEST_COEFFICIENT = 53
+"""Significant bits of a coefficient up to which more of them are tried where the coefficients limit a filter."""
 _MORE_INTEGER_BITS = 16
 """Integer bits beyond those of a run that a guarantee may need."""
 
@@ -77,6 +83,7 @@ class FixedAnswer:
     words : the formats of data, coefficients and sums; None for a function, or if there is no answer.
     steps : number of steps for which a guarantee holds, if the system never forgets its errors; None if it holds for
         ever.
+    warnings : as of a :class:`gpbnb.wordlength.requirement.Requirement`.
     """
 
     fmt: FixedFormat | MaybeNone
@@ -85,13 +92,15 @@ class FixedAnswer:
     why: str
     words: WordFormats | None = None
     steps: int | None = None
+    warnings: tuple[str, ...] = ()
 
     def __str__(self) -> str:
+        end = "".join(f"; {warning}" for warning in self.warnings)
         basis = self.basis if self.steps is None else f"{self.basis} for {self.steps} steps"
         if self.fmt is None:
-            return f"no format, by {basis}: {self.why}"
+            return f"no format, by {basis}: {self.why}{end}"
         word = 1 + self.fmt.precision
-        return f"{self.fmt.fraction_bits} fraction bits in a word of {word} bits, by {basis}; {self.why}"
+        return f"{self.fmt.fraction_bits} fraction bits in a word of {word} bits, by {basis}; {self.why}{end}"
 
 
 def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilter:
@@ -143,7 +152,7 @@ def integer_bits(given: ScaledFilter, z: Any) -> int:
 
 
 def emulated(
-    given: ScaledFilter, z: Any, fmt: FixedFormat, coefficient_bits: int = 15, wide: bool = False
+    given: ScaledFilter, z: Any, fmt: FixedFormat, coefficient_bits: int = COEFFICIENT_BITS, wide: bool = False
 ) -> NDArray[np.float64]:
     """Return the error of each state after each step, (steps, n), in the units of the model, due to rounding.
 
@@ -171,7 +180,7 @@ def emulated(
 
 
 def guaranteed(
-    given: ScaledFilter, fmt: FixedFormat, coefficient_bits: int = 15, wide: bool = False
+    given: ScaledFilter, fmt: FixedFormat, coefficient_bits: int = COEFFICIENT_BITS, wide: bool = False
 ) -> NDArray[np.float64]:
     """Bound the error of each state, (n,), in the units of the model, for ever and for all measurements.
 
@@ -184,7 +193,9 @@ def guaranteed(
     return bound_per_unit(given, coefficient_bits, wide) * (largest_rounding(fmt.rounding) * float(fmt.unit))
 
 
-def bound_per_unit(given: ScaledFilter, coefficient_bits: int = 15, wide: bool = False) -> NDArray[np.float64]:
+def bound_per_unit(
+    given: ScaledFilter, coefficient_bits: int = COEFFICIENT_BITS, wide: bool = False
+) -> NDArray[np.float64]:
     """Return the bound of :func:`guaranteed` for rounding errors of at most one; the bound is proportional to them."""
     ones = FixedFormat(1, 0, Rounding.DOWN)
     made = integer_program(given.filter, _words(given.filter, ones, coefficient_bits, wide))
@@ -197,7 +208,7 @@ def required_fraction_bits(
     tolerance: Sequence[float] | float,
     basis: Basis = "emulation",
     rounding: Rounding | str = Rounding.NEAREST,
-    coefficient_bits: int = 15,
+    coefficient_bits: int = COEFFICIENT_BITS,
     wide: bool = False,
     like: FixedFormat | WordFormats | None = None,
     form: AnyForm | str = Form.INNOVATION,
@@ -274,12 +285,13 @@ def required_fraction_bits(
         return f"{bits} fraction bits " + (refused or f"give {ratios[bits]:.3g} times the tolerance")
 
     if found.fmt is None:
-        why = f"{rejection(largest)}; {largest} fraction bits are the most tried"
-        return FixedAnswer(None, basis, found.tried, why, None, strategy.steps)
+        why = strategy.blame(largest) or f"{rejection(largest)}; {largest} fraction bits are the most tried"
+        return FixedAnswer(None, basis, found.tried, why, None, strategy.steps, strategy.warnings())
     bits = found.fmt.fraction_bits
     why = rejection(bits - 1 if bits > strategy.least else min(bits + 1, largest))
     words = strategy.words(found.fmt)
-    return FixedAnswer(found.fmt if words is None else words.data, basis, found.tried, why, words, strategy.steps)
+    fmt = found.fmt if words is None else words.data
+    return FixedAnswer(fmt, basis, found.tried, why, words, strategy.steps, strategy.warnings())
 
 
 def words_error(
@@ -337,6 +349,14 @@ class _Strategy:
     def cause(self) -> str:
         """Return in words why there is no answer in any format; empty if there may be one."""
         return ""
+
+    def blame(self, fraction: int) -> str:
+        """Return in words what limits the filter where so many fraction bits are not enough; empty if these do."""
+        return ""
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return why the errors of the run may say little about other runs."""
+        return ()
 
 
 class _States(_Strategy):
@@ -420,6 +440,33 @@ class _Outputs(_Strategy):
 
     def words(self, fmt: FixedFormat) -> WordFormats | None:
         return self._words_of(replace(fmt, integer_bits=fmt.integer_bits + self._more.get(fmt.fraction_bits, 0)))
+
+    def warnings(self) -> tuple[str, ...]:
+        return () if self._proof is not None else weak_evidence(self._system, self._true, self.goal)
+
+    def blame(self, fraction: int) -> str:
+        """Return in words that the coefficients limit the filter, and how many of their bits are enough."""
+        fmt = replace(self.like, fraction_bits=fraction)
+        given, words_of = self._words_of(fmt).coefficients, self._words_of
+        if given is None:
+            return ""
+
+        def error(bits: FloatFormat) -> Outcome:
+            self._words_of = lambda each: replace(words_of(each), coefficients=bits.precision)
+            return self.error(fmt)
+
+        found = Search(error, FloatFormat(2, 2), (), largest=LONGEST_COEFFICIENT)
+        self._words_of = words_of
+        if found.fmt is None:
+            return ""
+        stored = f"{given} significant bits" if isinstance(given, int) else arithmetic(given)
+        ratio, refused = self.error(fmt)
+        misses = refused and f"words are refused: {refused.removeprefix('are refused: ')}"
+        return (
+            f"the coefficients limit the filter, whatever the fraction bits of the data: stored in {stored}, "
+            f"{misses or f'they give {ratio:.3g} times the tolerance'}; {found.fmt.precision} significant bits of each "
+            "coefficient are enough (coefficient_bits, or --coefficients in the command)"
+        )
 
 
 class _Runs(_Strategy):
@@ -511,7 +558,7 @@ def _without_bound(given: ScaledFilter, coefficient_bits: int) -> str:
     if not is_stable(matrices(program, stored_coefficients(given.filter, coefficient_bits))[0]):
         stored = f"stored in {coefficient_bits} bits"
         return f"the filter is stable, but not with its coefficients {stored}; raise coefficient_bits"
-    return "the filter is stable, but decays too slowly for its peak gain to be enclosed in balls of 8192 bits"
+    return "the filter is stable, but decays too slowly for a bound: its response lasts for millions of steps"
 
 
 def stored_coefficients(made: LinearFilter, bits: int) -> NDArray[Any]:

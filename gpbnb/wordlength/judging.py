@@ -17,8 +17,8 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form, form_named
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.precision import Guaranteed, Probable, survey_formats
-from gpbnb.wordlength.requirement import Asked, Basis, checked_tolerance, evidence
-from gpbnb.wordlength.system import BoundedSystem, over_steps, system_strategy
+from gpbnb.wordlength.requirement import Asked, Basis, checked_tolerance, evidence, without_evidence
+from gpbnb.wordlength.system import BoundedSystem, EmulatedSystem, over_steps, system_strategy
 
 
 class Judgement(NamedTuple):
@@ -29,6 +29,7 @@ class Judgement(NamedTuple):
     ratio : largest error or bound / tolerance; infinite if there is none.
     why : why it is infinite.
     ends : whether a guarantee holds for the steps only, because there is none for ever.
+    warnings : as of a :class:`gpbnb.wordlength.requirement.Requirement`.
     """
 
     fmt: FloatFormat | FixedFormat
@@ -37,6 +38,7 @@ class Judgement(NamedTuple):
     ratio: float
     why: str
     ends: bool = False
+    warnings: tuple[str, ...] = ()
 
     @property
     def met(self) -> bool:
@@ -47,8 +49,8 @@ class Judgement(NamedTuple):
         how = evidence(self.basis, self.steps, self.ends)
         verdict = f"{format_text(self.fmt)} {'meets' if self.met else 'misses'} the tolerance"
         if math.isinf(self.ratio):
-            return f"{verdict}, {how}: {self.why}"
-        return f"{verdict}: {self.ratio:.2g} of it, {how}"
+            return f"{verdict}, {without_evidence(self.basis, self.steps, self.ends)}: {self.why}"
+        return "; ".join([f"{verdict}: {self.ratio:.2g} of it, {how}", *self.warnings])
 
 
 def judge(
@@ -70,13 +72,14 @@ def judge(
     fmt.check_compiled()
     kind = cast(FloatFormat, fmt)  # strategies take fixed point, too, where there are loops for it
     asked = Asked(steps, basis, kind, None, False)
-    ends = False
+    ends, warnings = False, tuple[str, ...]()
     if isinstance(model, LinearSystem):
         of_system = system_strategy(model, asked, tolerance, z, within)
         found = of_system.error(kind)
         ends = isinstance(of_system, BoundedSystem) and of_system.steps is not None
         if math.isinf(found.ratio) and (later := over_steps(of_system, asked)):
             found, ends = _or(found, later.error(kind))
+        warnings = of_system.warnings() if isinstance(of_system, EmulatedSystem) else ()
     elif basis in ("emulation", "bound"):
         (found,) = survey_formats(model, z, tolerance, [kind], form_named(form), basis)
     else:
@@ -89,7 +92,7 @@ def judge(
         found = of_model.error(kind)
         if math.isinf(found.ratio) and basis == "guarantee":
             found, ends = _or(found, replace(of_model, steps=steps).error(kind))
-    return Judgement(fmt, basis, steps, *found, ends)
+    return Judgement(fmt, basis, steps, *found, ends, warnings)
 
 
 def _or(for_ever: Outcome, for_steps: Outcome) -> tuple[Outcome, bool]:

@@ -176,7 +176,7 @@ def read_structures(source: str | Path | Mapping[str, Any]) -> dict[str, LinearS
     ------
     ValueError, OSError : as for :func:`read_model`.
     """
-    given, where = (source, "the mapping") if isinstance(source, Mapping) else (_toml(Path(source)), Path(source).name)
+    given, where = _read(source)
     if not _is_design(given):
         return {}
     design, structure = _design(given, where)
@@ -187,6 +187,36 @@ def read_structures(source: str | Path | Mapping[str, Any]) -> dict[str, LinearS
         return {first: design.system(first), **{name: each for name, each in design.systems().items() if name != first}}
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None
+
+
+def lacking_structures(source: str | Path | Mapping[str, Any]) -> dict[str, str]:
+    """Return the structures that :func:`read_structures` leaves out, by name, each with the reason.
+
+    Raises
+    ------
+    ValueError, OSError : as for :func:`read_model`.
+    """
+    given, where = _read(source)
+    if not _is_design(given):
+        return {}
+    design, structure = _design(given, where)
+    return design.lacking("all") if structure == "all" else design.lacking()
+
+
+def compares_all(source: str | Path | Mapping[str, Any]) -> bool:
+    """Whether a source is a digital filter with ``structure = "all"``, so that none of its structures is the given one.
+
+    Raises
+    ------
+    OSError, ValueError : a file cannot be read, or is not TOML.
+    """
+    given, _ = _read(source)
+    return _is_design(given) and given.get("structure") == "all"
+
+
+def _read(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+    """Return the entries of a source, and where they stand."""
+    return (source, "the mapping") if isinstance(source, Mapping) else (_toml(Path(source)), Path(source).name)
 
 
 def _is_design(given: Mapping[str, Any]) -> bool:

@@ -33,7 +33,8 @@ EPILOG = """
 The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps C, D, x0. A filter may have known inputs
 B and u (or --inputs) and known offsets b of the states and d of the measurements. A digital filter has b and a, or sos,
 and perhaps structure, such as "direct form I", "cascade of direct form II transposed", "lattice" or "all"; its
-structures are compared side by side. Numbers are read as decimals.
+structures are compared side by side, and with "all", the one that needs the fewest digits gives the answer and the
+code. Numbers are read as decimals.
 With --form "constant gain", a Kalman filter is the linear system with the gain that it approaches; its inputs are the
 measurements.
 The file may name states, measurements, inputs and outputs, each with its unit: states = ["tilt (°)", "rate (°/s)"].
@@ -139,6 +140,11 @@ def _add_kinds(made: argparse.ArgumentParser) -> None:
         "no larger than these; with --mixed, find formats of data, coefficients and sums",
     )
     made.add_argument(
+        "--coefficients",
+        metavar="N",
+        help="with --fixed: significant bits of each coefficient, which has its own binary point; default: 15",
+    )
+    made.add_argument(
         "--mixed",
         action="store_true",
         help="also lower each block of a Kalman filter (state, gain, covariance, innovation covariance) to its "
@@ -159,7 +165,7 @@ def read(arguments: Sequence[str] | None) -> argparse.Namespace:
     given = parser().parse_args(arguments)
     for name in ("tolerance", "level", *QUANTITIES):
         _replace(given, name, _numbers, "numbers with commas between: 0.01,inf")
-    for name in ("steps", "digits", "base", "emin", "emax"):
+    for name in ("steps", "digits", "base", "emin", "emax", "coefficients"):
         _replace(given, name, plain_integer, "a whole number")
     _replace(given, "rounding", lambda text: rounding_named(text).value)
     if given.form and plain_name(given.form) == plain_name(CONSTANT_GAIN):
@@ -205,6 +211,14 @@ def _check(given: argparse.Namespace) -> None:
         if others or {"bound", "probable"} & {*(given.basis or ())}:
             needed = "it without these, and the bases emulation and guarantee"
             raise ValueError(f"got --fixed with {', '.join(others) or '--basis bound or probable'}; needed {needed}")
+    if given.coefficients is not None:
+        if given.mixed or not given.fixed:
+            raise ValueError(
+                f"got --coefficients{' and --mixed' if given.mixed else ''}; needed --fixed with it, without --mixed, "
+                "which finds the bits of the coefficients itself"
+            )
+        if not 1 <= given.coefficients <= 53:
+            raise ValueError(f"got --coefficients {given.coefficients}; needed 1 to 53 significant bits")
     if given.mixed and (given.format or given.digits is not None):
         raise ValueError("got --mixed and one format; needed a search: leave out --format and --digits")
     if given.certificate and "guarantee" not in (given.basis or ()):

@@ -29,8 +29,8 @@ from gpbnb.wordlength.blocks import (
     required_block_precisions,
     required_word_formats,
 )
+from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, FixedAnswer, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.fixed_point import FixedAnswer, required_fraction_bits
 from gpbnb.wordlength.judging import Judgement, judge
 from gpbnb.wordlength.precision import largest_errors, required_precision
 from gpbnb.wordlength.ranges import binary_ranges
@@ -65,7 +65,7 @@ class Report:
     text : the answer in words, with its basis.
     base, rounding, steps, tolerance : the question.
     source : origin of the measurements.
-    answers : one answer for each basis and form, the requested one first.
+    answers : one answer for each basis and form or structure, the requested one first.
     errors : error / tolerance of each state at the answer; None if the tolerance is infinite.
     ranges : name, smallest and largest power of two.
     command : the command that reproduces the report.
@@ -80,6 +80,8 @@ class Report:
     fixed : whether digits are fraction bits of fixed point.
     mixed : the answer for the blocks of a Kalman filter in words; empty if it was not asked for.
     blocks : name of each block, its digits together with the others, and alone; None if there is no answer.
+    structure : structure of a digital filter that gives the answer; empty for another model.
+    lacking : structures that the filter does not have, each with the reason.
     """
 
     name: str
@@ -105,6 +107,8 @@ class Report:
     fixed: bool = False
     mixed: str = ""
     blocks: tuple[tuple[str, int | None, int | None], ...] = ()
+    structure: str = ""
+    lacking: dict[str, str] = field(default_factory=dict)
 
     @property
     def limiting(self) -> int | None:
@@ -140,6 +144,10 @@ class Question:
         :func:`gpbnb.wordlength.blocks.required_block_precisions`. In fixed point, the formats of data, coefficients
         and sums of a linear system.
     fixed : whether to count fraction bits of fixed point, of a linear system.
+    coefficient_bits : significant bits of each coefficient in fixed point.
+    choose : whether the structure that needs the fewest digits on the first basis gives the answer, in place of the
+        first structure.
+    lacking : structures that the filter does not have, each with the reason.
     """
 
     model: LinearModel | LinearSystem
@@ -157,6 +165,9 @@ class Question:
     structures: Mapping[str, LinearSystem] = field(default_factory=dict)
     mixed: bool = False
     fixed: bool = False
+    coefficient_bits: int = COEFFICIENT_BITS
+    choose: bool = False
+    lacking: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def count(self) -> int:
@@ -176,8 +187,12 @@ class Question:
         if isinstance(model, LinearSystem):
             if form is not Form.INNOVATION:
                 raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
-            systems = [(f"{name}, ", each) for name, each in self.structures.items()] or [("", model)]
-            return [_Part(f"{prefix}{basis}", basis, each, form) for prefix, each in systems for basis in self.bases]
+            systems = self.structures or {"": model}
+            return [
+                _Part(part_label(name, basis), basis, each, form, name)
+                for name, each in systems.items()
+                for basis in self.bases
+            ]
         model.check_sizes()
         forms = [form, *(each for each in SIDE_BY_SIDE if each is not form)]
         return [_Part(f"{each}, {basis}", basis, model, each) for each in forms for basis in self.bases]
@@ -204,7 +219,7 @@ class Question:
         """Answer one of the single questions, by a search or by judging the one format."""
         if self.fixed and isinstance(part.model, LinearSystem):
             basis = cast(FixedBasis, part.basis)
-            return required_fraction_bits(part.model, z, self.tolerance, basis, self.rounding)
+            return required_fraction_bits(part.model, z, self.tolerance, basis, self.rounding, self.coefficient_bits)
         if self.fmt is not None:
             return judge(part.model, self.fmt, self.count, self.tolerance, part.form, part.basis, z, self.within)
         return required_precision(
@@ -222,12 +237,12 @@ class Question:
             emax=self.emax,
         )
 
-    def blocks(self, z: Any) -> BlockRequirement | WordRequirement | None:
+    def blocks(self, z: Any, structure: str = "") -> BlockRequirement | WordRequirement | None:
         """Find the digits of each block of a Kalman filter, or of words in fixed point, if they are asked for."""
         if not self.mixed:
             return None
         if isinstance(self.model, LinearSystem):
-            system = next(iter(self.structures.values()), self.model)
+            system = self.structures.get(structure, self.model)
             basis = cast(FixedBasis, self.bases[0])
             return required_word_formats(system, z, self.tolerance, basis, self.rounding)
         given = (self.model, self.count, self.tolerance, self.base, self.rounding, self.form, z)
@@ -241,6 +256,12 @@ class _Part(NamedTuple):
     basis: Basis
     model: LinearModel | LinearSystem
     form: AnyForm
+    structure: str = ""
+
+
+def part_label(structure: str, basis: str) -> str:
+    """Return the label of the answer for a structure, perhaps none, on a basis."""
+    return f"{structure}, {basis}" if structure else basis
 
 
 def study(
@@ -266,16 +287,18 @@ def study(
     OverflowError : for a reason given there.
     """
     parts, z = asked.parts(), asked.measured()
-    found: list[tuple[str, Requirement | Judgement | FixedAnswer]] = []
+    found: list[tuple[_Part, Requirement | Judgement | FixedAnswer]] = []
     for part in parts:
         tell(f"{part.label} …")
         answer = asked.answer(part, z, progress)
-        found.append((part.label, answer))
+        found.append((part, answer))
         tell(f"{part.label}: {answer}")
-    if (blocks := asked.blocks(z)) is not None:
+    for name, why in asked.lacking.items():
+        tell(f"{name}, left out: {why}")
+    first, main = _fewest(found) if asked.choose else found[0]
+    if (blocks := asked.blocks(z, first.structure)) is not None:
         tell(f"blocks: {blocks}")
-    main = found[0][1]
-    met = main.met if isinstance(main, Judgement) else main.fmt is not None
+    met = _met(main)
     model, fmt, within = asked.model, asked.fmt, asked.within
     is_filter = isinstance(model, LinearModel)
     width = model.p if isinstance(model, LinearSystem) else model.n
@@ -285,13 +308,13 @@ def study(
         name=model.name,
         kind="Kalman filter" if is_filter else "linear system",
         digits=_digits(main) if met else None,
-        text=str(main),
+        text=f"{first.structure}: {main}" if len(asked.structures) > 1 else str(main),
         base=asked.base if fmt is None else fmt.base,
         rounding=str(asked.rounding) if fmt is None else fmt.rounding.value,
         steps=asked.count,
         tolerance=tuple(_finite(float(each)) for each in tolerances),
         source=source or origin,
-        answers=tuple(_plain(label, answer) for label, answer in found),
+        answers=tuple(_plain(part.label, answer) for part, answer in found),
         errors=_errors(model, z, main.fmt if met else None, form_named(asked.form), tolerances),
         ranges=_ranges(model, z),
         command=command,
@@ -305,7 +328,26 @@ def study(
         fixed=asked.fixed,
         mixed="" if blocks is None else str(blocks),
         blocks=_digits_of_blocks(blocks) if isinstance(blocks, BlockRequirement) else (),
+        structure=first.structure,
+        lacking=dict(asked.lacking),
     )
+
+
+def _met(answer: Requirement | Judgement | FixedAnswer) -> bool:
+    return answer.met if isinstance(answer, Judgement) else answer.fmt is not None
+
+
+def _fewest(
+    found: Sequence[tuple[_Part, Requirement | Judgement | FixedAnswer]],
+) -> tuple[_Part, Requirement | Judgement | FixedAnswer]:
+    """Return the answer with the fewest digits on the first basis, or the smallest error; the first if none is met."""
+    of_basis = [(part, each) for part, each in found if part.basis == found[0][0].basis]
+    met = [(part, each) for part, each in of_basis if _met(each)]
+
+    def cost(pair: tuple[_Part, Requirement | Judgement | FixedAnswer]) -> float:
+        return pair[1].ratio if isinstance(pair[1], Judgement) else float(_digits(pair[1]) or 0)
+
+    return min(met or of_basis[:1], key=cost)
 
 
 def _digits_of_blocks(found: BlockRequirement) -> tuple[tuple[str, int | None, int | None], ...]:
@@ -449,6 +491,7 @@ def page(report: Report) -> str:
         f"<p>{' '.join(meant)}</p>",
         f"<h2>{what}s and bases compared</h2>",
         _table((f"{what.lower()} and basis", unit, "answer"), rows),
+        *(f"<p>{html.escape(f'Left out: {name}: {why}')}.</p>" for name, why in report.lacking.items()),
         "<h2>Error against precision</h2>",
         _curves(report, unit, what.lower()),
     ]

@@ -41,8 +41,8 @@ class Requirement:
         are finite. The answer shows this reason if it prevented a smaller answer.
     form : form of the filter.
     irregular : precisions that meet the tolerance although a higher one that was run misses it; usually empty.
-    advice : a form that meets the tolerance, if a precision fails although a lower one does not; or the precisions
-        without a bound.
+    advice : a form that meets the tolerance, if a precision fails although a lower one does not; the higher precisions
+        in which no bound was found, and why; or what else helps.
     repairs : changes of the model's covariances, each as text.
     cause : the reason why no precision can be an answer; the limit of the search then does not matter.
     limit : the reason why the search ended at the last precision of `tried`. It is shown if there is no answer.
@@ -51,6 +51,8 @@ class Requirement:
     processors : the largest error / tolerance of a run in binary32, and in binary64 if binary32 has too few bits or
         misses the tolerance. Empty if no run was made: in another base, with directed rounding or a given range, and
         for bounds, which hold for ties to even, too.
+    warnings : reasons why an observed answer may not hold for other inputs; see
+        :func:`gpbnb.wordlength.system.weak_evidence`.
     """
 
     fmt: FloatFormat | MaybeNone
@@ -67,6 +69,7 @@ class Requirement:
     ends: bool = False
     untraced: str = ""
     processors: tuple[tuple[str, float], ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def precision(self) -> int | MaybeNone:
@@ -80,6 +83,7 @@ class Requirement:
             notes.insert(0, f"{listed(self.irregular)} digits meet it, but {listed(missed)} do not")
         if self.advice:
             notes.append(self.advice)
+        notes += self.warnings
         if self.untraced:
             notes.append(f"the function ran operation by operation: {self.untraced}")
         end = "".join(f"; {note}" for note in notes)
@@ -143,6 +147,12 @@ def evidence(basis: Basis, steps: int, ends: bool = False) -> str:
     return _evidence(basis, ends)[0].format(_steps(steps))
 
 
+def without_evidence(basis: Basis, steps: int, ends: bool = False) -> str:
+    """Describe that an error has no number, as "in a run of 60 steps" or "without a guarantee for ever"."""
+    text = _evidence(basis, ends)[1].format(_steps(steps))
+    return text if basis == "emulation" else f"without {text.removeprefix('by ')}"
+
+
 def has_no_bound(found: Search[FloatFormat]) -> bool:
     """Whether no precision that was tried has a finite error."""
     return all(math.isinf(ratio) for _, ratio in found.tried)
@@ -197,7 +207,8 @@ class Asked(NamedTuple):
     ) -> Requirement:
         """Return the result of a search as the answer."""
         if found.undecided and not advice:
-            advice = f"no bound exists in {listed(found.undecided)} digits"
+            reason = found.reasons[found.undecided[-1]]
+            advice = f"the proof does not cover {listed(found.undecided)} digits, in which no bound was found: {reason}"
         tried, irregular, limit = found.tried, found.irregular, found.limit
         processors = self._run_on_processors(found) if self.basis == "emulation" else ()
         return Requirement(

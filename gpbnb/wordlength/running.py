@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED
+from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED, arithmetic
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
@@ -28,12 +28,12 @@ from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.blocks import required_word_formats
 from gpbnb.wordlength.code import VECTORS, AnyFormat, write_code
+from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.fixed_point import required_fraction_bits
 from gpbnb.wordlength.judging import judge
-from gpbnb.wordlength.models import read_measurements, read_model, read_structures
+from gpbnb.wordlength.models import compares_all, lacking_structures, read_measurements, read_model, read_structures
 from gpbnb.wordlength.options import QUANTITIES
-from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, study
+from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, part_label, study
 from gpbnb.wordlength.requirement import Basis
 
 
@@ -70,6 +70,9 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
         structures,
         given.mixed,
         given.fixed,
+        given.coefficients or COEFFICIENT_BITS,
+        given.form != CONSTANT_GAIN and compares_all(given.model),
+        lacking_structures(given.model) if len(structures) > 1 else {},
     )
     return study(asked, source, command, tell)
 
@@ -170,16 +173,20 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
     ------
     ValueError : no precision has a guarantee, or the format is fixed point.
     """
-    digits = next(each.digits for each in report.answers if each.basis == "guarantee")
+    guaranteed = [each for each in report.answers if each.basis == "guarantee"]
+    own = part_label(report.structure, "guarantee")
+    digits = next(each.digits for each in guaranteed if not report.structure or each.label == own)
     fmt = _format(given)
     if digits is None:
         raise ValueError("got no precision with a guarantee; needed one for a certificate; allow a larger tolerance")
     if isinstance(fmt, FixedFormat):
-        raise ValueError(f"got --certificate with {fmt}; needed floating point: the checker covers no fixed point")
+        raise ValueError(
+            f"got --certificate with {arithmetic(fmt)}; needed floating point: the checker covers no fixed point"
+        )
     if fmt is None:
         fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
     model, structures = _filter(given)
-    chosen = next(iter(structures.values()), model)
+    chosen = structures.get(report.structure, model)
     sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
     if isinstance(chosen, LinearModel):
         within = limits(chosen.n, chosen.m, **sizes)
@@ -189,11 +196,11 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
     return from_schedule(made, limits(made.program.n, made.program.m, **sizes), report.steps).certificate()
 
 
-def write_code_of(given: argparse.Namespace) -> tuple[Path, ...]:
+def write_code_of(given: argparse.Namespace, structure: str = "") -> tuple[Path, ...]:
     """Write the filter of a command line as C, into the folder of its option ``--code``.
 
     The format is the one that is judged, or the answer in fixed point, or else the first of binary32 and binary64 that
-    meets the tolerance, on the first basis. A digital filter has the structure that its file names, or the usual one.
+    meets the tolerance, on the first basis. A digital filter has the structure that gives the answer of the report.
 
     Raises
     ------
@@ -202,15 +209,15 @@ def write_code_of(given: argparse.Namespace) -> tuple[Path, ...]:
     OSError : a file cannot be written.
     """
     model, structures = _filter(given)
-    structure, model = next(iter(structures.items()), (None, model))
+    model = structures.get(structure, model)
     bases = _bases(given)
     if given.fixed and isinstance(model, LinearSystem):
         words, largest = _words_within_tolerance(given, model, bases)
-        return _written(given, model, words, largest, structure)
+        return _written(given, model, words, largest, structure or None)
     sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
     within = _limits(model, bases, sizes)
     fmt = _format(given) or _type_within_tolerance(given, model, bases, within)
-    return _written(given, model, fmt, within, structure)
+    return _written(given, model, fmt, within, structure or None)
 
 
 def _written(
@@ -237,8 +244,9 @@ def _words_within_tolerance(
 ) -> tuple[WordFormats, FilterLimits]:
     """Return the formats that a search in fixed point finds on the first basis, and the largest inputs as limits."""
     z, _ = _inputs(given, system, bases)
-    search = required_word_formats if given.mixed else required_fraction_bits
-    words = search(system, z, given.tolerance, cast(FixedBasis, bases[0]), given.rounding or "nearest").words
+    asked = (system, z, given.tolerance, cast(FixedBasis, bases[0]), given.rounding or "nearest")
+    bits = given.coefficients or COEFFICIENT_BITS
+    words = (required_word_formats(*asked) if given.mixed else required_fraction_bits(*asked, bits)).words
     if words is None:
         raise ValueError(f"got --code {given.code}, and no format meets the tolerance; needed a larger tolerance")
     return words, limits(system.n, system.m, measurement=np.abs(z).max(axis=0))

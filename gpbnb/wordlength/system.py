@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.search import CHECKED, Outcome
-from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.arithmetic.search import CHECKED, Outcome, Search
+from gpbnb.bounds.envelope import FilterLimits, eigenvalue_sizes
 from gpbnb.bounds.probable import probable_error
 from gpbnb.bounds.system import output_errors
+from gpbnb.filters.named import named
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.wordlength.requirement import (
     Asked,
@@ -63,11 +64,39 @@ def required_system_precision(
     limited = not system.as_filter().program.is_linear
     cause = "" if found.fmt is not None or limited else system.unstable()
     if not cause:
-        return asked.answer(found, ends=ends)
+        advice = "" if found.fmt is not None else _too_many_digits(system, found)
+        warnings = strategy.warnings() if isinstance(strategy, EmulatedSystem) else ()
+        return replace(asked.answer(found, advice=advice, ends=ends), warnings=warnings)
     if asked.basis == "probable":
         return asked.answer(found, cause=f"{cause}, {_FOR_SOME_STEPS}")
     grow = "grow with every step, whatever the precision" if asked.basis == "emulation" else "add up with every step"
-    return asked.answer(found, advice=f"{cause}, so that errors {grow}: take fewer steps", ends=ends)
+    return asked.answer(
+        found, advice=f"{cause}, so that errors {grow}: take fewer steps{_lost_design(system)}", ends=ends
+    )
+
+
+def _is_long(system: LinearSystem) -> bool:
+    """Whether one recursion of the structure has an order of 3 or more, so that its coefficients move its poles far."""
+    return system.made is not None and "a3" in system.made.program.coefficient_names
+
+
+def _lost_design(system: LinearSystem) -> str:
+    """Return what to do if b and a of a stable design are not stable."""
+    if not _is_long(system):
+        return ""
+    return (
+        "; if its design is stable, b and a have lost it in their rounding to float64: take second-order sections from "
+        'the design tool, as output="sos" of SciPy gives them'
+    )
+
+
+def _too_many_digits(system: LinearSystem, found: Search[FloatFormat]) -> str:
+    """Return how far the largest precision misses the tolerance, and which structure needs fewer digits."""
+    digits, ratio = found.tried[-1]
+    parts = [] if math.isinf(ratio) else [f"{digits} digits give {ratio:.3g} times the tolerance"]
+    if _is_long(system):
+        parts.append("second-order sections usually need fewer digits: their coefficients move the poles less")
+    return "; ".join(parts)
 
 
 _FOR_SOME_STEPS = (
@@ -114,6 +143,39 @@ def system_strategy(
     return BoundedSystem(system, largest, tolerances, asked.steps if keeps else None)
 
 
+_FORGOTTEN = 0.01
+"""Share to which the slowest response must decay within a run."""
+
+
+def weak_evidence(system: LinearSystem, true: NDArray[np.float64], tolerances: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return why the errors of a run may say little about other runs, in a sentence each; empty if nothing does.
+
+    A run that ends before the slowest response has decayed does not show how errors add up. An output that stays within
+    its tolerance would also meet it if it were zero.
+
+    Parameters
+    ----------
+    true : (steps, p, 2), outputs of the system as given. tolerances : (p,).
+    """
+    found = list[str]()
+    entries = system.A.astype(np.float64)
+    radius = float(eigenvalue_sizes(entries).max()) if np.isfinite(entries).all() else math.inf
+    if 0 < radius < 1 and radius ** len(true) > _FORGOTTEN:
+        steps = math.log(_FORGOTTEN) / math.log(radius)
+        digits = max(len(str(int(steps))) - 2, 0)
+        found.append(
+            f"the run of {len(true)} steps is shorter than the memory of the system, whose slowest response takes "
+            f"{math.ceil(steps / 10**digits) * 10**digits} steps to decay to 1 %: take as many, or ask for a guarantee"
+        )
+    largest = np.abs(true[..., 0]).max(axis=0)
+    for i in np.flatnonzero((largest <= tolerances) & np.isfinite(tolerances)):
+        found.append(
+            f"{named('output', int(i), system.output_names)} never exceeds {largest[i]:.3g} in this run, so that zero "
+            f"would be within the tolerance of {tolerances[i]:.3g}: take larger inputs, or a smaller tolerance"
+        )
+    return tuple(found)
+
+
 @dataclass(frozen=True, eq=False)
 class EmulatedSystem:
     """Errors of the outputs for given inputs, (steps, m), against `true`, the outputs of the system as given."""
@@ -122,6 +184,10 @@ class EmulatedSystem:
     u: Any
     true: NDArray[np.float64]
     tolerances: NDArray[np.float64]
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return why the errors of this run may say little about other runs."""
+        return weak_evidence(self.system, self.true, self.tolerances)
 
     def error(self, fmt: FloatFormat) -> Outcome:
         """Return the largest error over its tolerance, or infinity and the reason."""

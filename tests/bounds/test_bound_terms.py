@@ -1,4 +1,4 @@
-"""Every term of what a guarantee adds up, in exact fractions: sums, limits from measurements, caps, blocks, gains."""
+"""Every term of what a guarantee adds up, in exact fractions: sums, limits from measurements, caps, blocks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gpbnb.bounds import gains
 from gpbnb.bounds import guarantee as bound
 from gpbnb.bounds.envelope import GAIN, LOOP, ROUNDING, Certificate, Columns, Disturbances, FilterLimits, Steps, units
 from gpbnb.bounds.guarantee import from_schedule, limits
-from gpbnb.bounds.linear import _peak_gain, filter_schedule
+from gpbnb.bounds.linear import filter_schedule
 from gpbnb.filters import bounded_steps
 from gpbnb.filters.bounded_steps import Bounds
 from gpbnb.filters.factors import covariance_of_factors
@@ -441,56 +441,6 @@ def test_blocks_give_their_disturbances_all_that_is_known(monkeypatch: pytest.Mo
         assert np.isinf(caps).all()
         done += count
     assert done == 6
-
-
-# -- the worst-case peak gain -----------------------------------------------------------------------------------------
-
-
-def test_the_rest_of_a_peak_gain() -> None:
-    """Two states that never meet: the gain from one to the other is zero, and its upper end is the rest alone."""
-    A, B, C = [["1/2", "0"], ["0", "1/4"]], [["3", "0"], ["0", "1"]], [["1", "0"], ["0", "5"]]
-    found, negligible = _peak_gain(A, B, C, None, 256)
-    assert found is not None
-    # The norm of A is 1/2 from the first power on, and 3 the largest entry of B.
-    left, within = F(2), F(3)
-    steps, first, row = 0, 5 * left * within, lambda steps: max(F(1, 2**steps), F(5, 4**steps))
-    while not row(steps) * left * within < first / 2**100:
-        steps += 64
-    tail = row(steps) * left * within
-    up = 1 + F(1, 2**50)
-    same(found.high[0, 1], tail * up, 1e-15)
-    same(found.high[0, 0], 6 * up, 1e-15)
-    same(found.high[1, 1], F(20, 3) * up, 1e-15)
-    assert F(found.high[0, 0]) >= 6 >= F(found.low[0, 0])
-    assert found.low[0, 1] == 0
-    assert negligible == float(first) / 2**100
-
-
-def test_a_peak_gain_counts_the_growth_before_a_power_contracts() -> None:
-    """The norm of A is 8 and that of A² is 17/4: only the fourth power contracts, and B grows to 8 before that."""
-    A = [[F(1, 2), F(15, 2)], [F(0), F(1, 4)]]
-    B, C, D = [[F(0)], [F(1)]], [[F(0), F(0)], [F(1), F(0)]], [[F(7, 8)], [F(-1, 4)]]
-    power, N = np.array(A), 1
-    while not max(abs(power).sum(axis=1)) < 1:
-        power, N = power @ power, 2 * N
-    assert N > 2
-    moving, total = np.array(B), np.zeros((2, 1), dtype=object)
-    for _ in range(N):
-        total, moving = total + abs(moving), np.array(A) @ moving
-    left, within = 1 / (1 - max(abs(power).sum(axis=1))), total.max()
-    found, negligible = _peak_gain(A, B, C, D, 256)
-    assert found is not None
-    same(negligible, left * within / 2**100, 1e-15)
-    row, steps = np.array(C[1]), 0
-    while not abs(row).sum() * left * within < left * within / 2**100:
-        row, steps = row @ np.array(A), steps + 1
-    # The output that sees nothing has its direct term alone, and nothing is left of its own row.
-    assert F(7, 8) < F(found.high[0, 0]) < F(7, 8) * (1 + F(1, 2**48))
-    response, exactly = np.array(B), F(1, 4)
-    for _ in range(400):
-        exactly, response = exactly + abs(response[0, 0]), np.array(A) @ response
-    assert exactly <= F(found.high[1, 0]) < exactly * (1 + F(1, 2**48))
-    assert F(found.low[1, 0]) <= exactly
 
 
 # -- runs with the contraction bound ----------------------------------------------------------------------------------

@@ -89,6 +89,18 @@ def test_on_a_desktop_only_formulas_scroll(page):
     assert scrolling == []
 
 
+def test_a_formula_too_wide_for_a_phone_is_set_smaller_and_grows_back(look_at):
+    read = """[...document.querySelectorAll('article mjx-container[display="true"]')].map((each) =>
+      [parseFloat(getComputedStyle(each).fontSize), each.scrollWidth / each.clientWidth])"""
+    wide, narrow = (look_at("book/kalman.html", size).evaluate(read) for size in ("desktop", "phone"))
+    assert max(ratio for _, ratio in wide + narrow) <= 1
+    shares = [small / large for (small, _), (large, _) in zip(narrow, wide, strict=True)]
+    assert 0.6 <= min(shares) < 0.8
+    assert max(shares) == 1
+    again = look_at("book/kalman.html", "desktop").evaluate(read)
+    assert [size for size, _ in again] == [size for size, _ in wide]
+
+
 def test_only_what_scrolls_is_a_stop_of_the_keyboard(page):
     idle = page.locator("article :is(div, pre, mjx-container)[tabindex='0']").evaluate_all(
         "all => all.filter(e => (e.querySelector(':scope > mjx-math') ?? e).scrollWidth <= e.clientWidth)"

@@ -49,6 +49,7 @@ READ = """id => {
         teeth: svg.querySelector(".teeth")?.getAttribute("d"), rounded: center(".rounded"), here: center(".here"),
         given: svg.querySelector(".given")?.getAttribute("d"), turned: center(".turned"), circles: center("circle"),
         marked: center("circle.curve-0"),
+        range: ["x", "width"].map(key => number(svg.querySelector(".range") ?? svg, key)),
         step: svg.querySelector(".step")?.getAttribute("d"), ulp: svg.querySelector(".ulp")?.getAttribute("d"),
         limits: all(".limit").map(l => number(l, "y1")), ways: all(".way").length,
         bars: all(".share").map(r => [number(r, "x"), number(r, "width"), number(r, "y") + number(r, "height") / 2]),
@@ -130,6 +131,15 @@ def test_a_number_is_rounded_as_the_package_rounds_it(pages, base, t, x, rule):
     assert numbers[0] <= exact <= numbers[-1]
     scale = (marks[-1] - marks[0]) / float(numbers[-1] - numbers[0])
     assert marks == pytest.approx([marks[0] + float(each - numbers[0]) * scale for each in numbers], abs=1e-2)
+    # The shaded part of the lower graph is what the upper one shows, as far as it has the same leading power.
+    left, right = marks[0], marks[-1]
+    power = Fraction(int(base)) ** (math.floor(math.log(exact, int(base)) + 1e-12))
+    shares = [math.log(min(max(each / power, 1), int(base)), int(base)) for each in (numbers[0], numbers[-1])]
+    start, width = found["range"]
+    assert [start, start + width] == pytest.approx(
+        [left + shares[0] * (right - left), left + max(shares[1], shares[0] + 2 / (right - left)) * (right - left)],
+        abs=0.1,
+    )
     tip = float(found["given"][1:].split()[0])
     assert tip == pytest.approx(marks[0] + float(exact - numbers[0]) * scale, abs=0.1)
 

@@ -7,9 +7,8 @@ import os
 import re
 import signal
 import subprocess
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -69,12 +68,6 @@ def test_the_result_does_not_depend_on_the_executor(sweep, tmp_path, chunk):
     assert sweep.run(tmp_path / "serial", chunk=chunk, progress=False) == EXPECTED
     with ThreadPoolExecutor(2) as pool:
         assert sweep.run(tmp_path / "threads", pool, chunk=chunk, progress=False) == EXPECTED
-
-
-def test_processes_give_the_same(sweep, tmp_path):
-    # A forked process may inherit locks that threads of this one hold.
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        assert sweep.run(tmp_path / "processes", pool, chunk=5, progress=False) == EXPECTED
 
 
 def test_dask_gives_the_same(sweep, tmp_path):

@@ -560,7 +560,8 @@ def test_a_part_of_the_state_that_no_measurement_observes_is_found_exactly(Phi, 
 def test_an_unobserved_state_that_grows_is_the_cause_where_there_is_no_answer(basis):
     model = LinearModel([["1.1"]], [[0]], [[1]], [[1]], [0], [[1]])
     within = None if basis == "emulation" else limits(1, 1, state=10, innovation=10)
-    found = required_precision(model, 4000, 1e-3, z=np.zeros((4000, 1)), basis=basis, within=within)
+    steps = 4000 if basis == "emulation" else 400  # after 3700, the variance leaves the range of float64
+    found = required_precision(model, steps, 1e-3, z=np.zeros((steps, 1)), basis=basis, within=within)
     assert found.precision is None
     cause = (
         "no measurement observes a part of the state that does not decay, with an eigenvalue of size 1.1, mostly in "

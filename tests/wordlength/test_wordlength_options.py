@@ -235,7 +235,7 @@ def test_a_judged_format_meets_the_tolerance_where_a_search_finds_fewer_digits(f
     assert main([*given, "--format", "bfloat16"]) == 1
     assert "BFLOAT16 misses the tolerance: " in capsys.readouterr().out
     assert main([*given, "--format", "fixed -3.20"]) == 1
-    assert "misses the tolerance, observed in 60 steps: " in capsys.readouterr().out
+    assert "misses the tolerance, in a run of 60 steps: " in capsys.readouterr().out
     bounds = [
         judge(system, BINARY32, 60, 1e-3, basis=basis, z=u, within=limits(1, 1, measurement=9))
         for basis in ("bound", "guarantee", "probable")

@@ -41,8 +41,36 @@ def test_the_command_compares_structures(filters, capsys):
     assert names == [f"{name}, emulation" for name in [first, *(each for each in SIDE_BY_SIDE if each != first)]]
     digits = {each["label"].removesuffix(", emulation"): each["digits"] for each in answers}
     assert digits["direct form I"] > digits[first]
-    assert told.out.startswith(f"{digits[first]} bits")
+    assert told.out.startswith(f"{first}: {digits[first]} bits")
     assert "Structures and bases compared" in report.read_text(encoding="utf-8")
+
+
+def test_of_all_structures_the_one_with_the_fewest_digits_answers_and_is_written(filters, capsys):
+    """In direct form I, which is the first, this filter needs twice the digits."""
+    path, report, code, proof = (filters / name for name in ("all.toml", "report.html", "code", "proof.json"))
+    path.write_text('structure = "all"\n' + (filters / "sections.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    arguments = [str(path), "--tolerance", "0.00001", "--measurements", str(filters / "u.csv"), "--basis", "emulation"]
+    more = ["--basis", "guarantee", "--measurement", "1", "--certificate", str(proof)]
+    assert main([*arguments, *more, "--report", str(report), "--code", str(code)]) == 0
+    found = json.loads(report.with_suffix(".json").read_text(encoding="utf-8"))
+    digits = {each["label"].split(",")[0]: each["digits"] for each in found["answers"] if each["basis"] == "emulation"}
+    best = found["structure"]
+    assert digits[best] == min(digits.values()) < digits["direct form I"]
+    assert capsys.readouterr().out.startswith(f"{best}: {digits[best]} bits")
+    assert best in next(code.glob("*.h")).read_text(encoding="utf-8")
+    guaranteed = next(each["digits"] for each in found["answers"] if each["label"] == f"{best}, guarantee")
+    assert json.loads(proof.read_text(encoding="utf-8"))["format"]["precision"] == guaranteed
+
+
+def test_structures_that_a_filter_lacks_are_named_with_the_reason(filters, capsys):
+    path, report = filters / "oscillator.toml", filters / "report.html"
+    path.write_text("b = [1]\na = [1, 0, 1]\n", encoding="utf-8")
+    main([str(path), "--tolerance", "0.01", "--simulate", "step", "--basis", "emulation", "--report", str(report)])
+    told = capsys.readouterr().err
+    assert "lattice, left out: got a filter with the reflection coefficient k2 = 1; needed sizes below 1" in told
+    assert "balanced state space, left out: " in told
+    assert [*json.loads(report.with_suffix(".json").read_text())["lacking"]] == ["lattice", "balanced state space"]
+    assert "Left out: lattice: got a filter with the reflection coefficient" in report.read_text(encoding="utf-8")
 
 
 def test_a_file_names_its_structure_or_all(filters):

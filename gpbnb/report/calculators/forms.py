@@ -124,7 +124,7 @@ KALMAN = Calculator(
     lines=tuple(
         Line(name, (f"a{i}", f"b{i}", f"bound{i}", f"digits{i}")) for i, name in enumerate(_KALMAN_NAMES, 1)
     ),
-    sentence="As printed, (125) gives {bound1} and asks for {digits1} digits; with its faults corrected {bound4} and "
+    sentence="As printed, (125) gives {bound1} and asks for {digits1} digits; with its errors corrected {bound4} and "
     "{digits4}; with old inputs forgotten {bound5} and {digits5}.",
     figure=Figure(
         "k",

@@ -178,15 +178,13 @@ def rows() -> tuple[PublishedNumber, ...]:
 
 def table() -> Table:
     """Tabulate published numbers beside ours."""
-    header = ("program and inputs", "quantity", "published", "ours", "remark", "source")
+    header = ("program, inputs and quantity", "published", "ours", "remark and source")
     body = tuple(
         (
-            each.program,
-            each.quantity,
+            f"{each.program}: {each.quantity}",
             "none" if each.published is None else short(each.published, 6),
             "none" if each.ours is None else short(each.ours(), 6),
-            each.note,
-            each.source,
+            "; ".join(filter(None, (each.note, f"source: {each.source}"))),
         )
         for each in rows()
     )

@@ -1,0 +1,253 @@
+"""Peak gains against exact fractions, and guarantees of filters with poles near 1 against plain loops.
+
+The loops are written from the textbook equations of a second-order section, on Python's integers and fractions.
+"""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction as F
+from typing import Any
+
+import numpy as np
+import pytest
+from exact_terms import same
+from flint import ctx
+from scipy import signal
+
+from gpbnb import FloatFormat, LinearSystem, limits, required_precision
+from gpbnb.arithmetic.rational import exact
+from gpbnb.bounds import linear
+from gpbnb.bounds.check import prove
+from gpbnb.bounds.envelope import eigenvalue_sizes
+from gpbnb.bounds.guarantee import from_schedule
+from gpbnb.bounds.linear import filter_schedule, largest_gains, peak_gain
+from gpbnb.bounds.system import output_errors
+
+ONE = 2**300
+"""A unit of fixed point, whose rounding errors are far below those that are measured."""
+
+
+def cascade(order: int, frequency: float, rate: float, kind: str = "lowpass") -> tuple[Any, LinearSystem]:
+    sections = signal.butter(order, frequency, kind, fs=rate, output="sos")
+    return sections, LinearSystem.from_sections(sections)
+
+
+def test_states_that_never_meet_have_no_gain() -> None:
+    A, B, C = [["1/2", "0"], ["0", "1/4"]], [["3", "0"], ["0", "1"]], [["1", "0"], ["0", "5"]]
+    for accuracy in (2.0**-10, 2.0**-40):
+        found = peak_gain(A, B, C, accuracy=accuracy)
+        assert found.low[0, 1] == found.high[0, 1] == found.low[1, 0] == found.high[1, 0] == 0
+        for i, exactly in enumerate((F(6), F(20, 3))):
+            assert F(found.low[i, i]) <= exactly <= F(found.high[i, i]) <= F(found.low[i, i]) * (1 + 2 * F(accuracy))
+
+
+def test_a_peak_gain_counts_the_growth_before_a_power_contracts() -> None:
+    """The norm of A is 8 and that of A squared is 17/4, and B grows to 8 before it decays."""
+    A = [[F(1, 2), F(15, 2)], [F(0), F(1, 4)]]
+    B, C, D = [[F(0)], [F(1)]], [[F(0), F(0)], [F(1), F(0)]], [[F(7, 8)], [F(-1, 4)]]
+    response, exactly = np.array(B), F(1, 4)
+    for _ in range(400):
+        exactly, response = exactly + abs(response[0, 0]), np.array(A) @ response
+    found = peak_gain(A, B, C, D)
+    assert F(7, 8) <= F(found.high[0, 0]) < F(7, 8) * (1 + F(1, 2**48))
+    assert F(found.low[1, 0]) <= exactly <= F(found.high[1, 0]) < exactly * (1 + F(1, 2**39))
+    assert found.low[1, 0] >= float(exactly) * (1 - 2.0**-48)
+
+
+def test_the_rest_of_a_geometric_sum_is_exact() -> None:
+    """After L terms of the sum of r**l, the bound of later terms is r**L / (1 - r), which is their sum."""
+    r = F(999, 1000)
+    before, ctx.prec = ctx.prec, 256
+    try:
+        sums = linear._Sums([[r]], [[F(3)]], [[F(2)]], [[F(-5)]])
+        sums.add(sums.length)
+        left = 3 * r**sums.length / (1 - r)
+        rest = sums.rest()
+        assert rest is not None
+        for (found,), exactly in zip(rest, (left, 2 * left), strict=True):
+            same(float(found.mid()), exactly, 1e-15)
+        sums.add(sums.length)  # the next block begins where the first has ended
+        assert sums.count == 2 * sums.length
+        same(float(sums._sums[0][0]), 3 * (1 - r**sums.count) / (1 - r), 1e-15)
+        same(float(sums._sums[1][0]), 5 + 6 * (1 - r**sums.count) / (1 - r), 1e-15)
+    finally:
+        ctx.prec = before
+
+
+@pytest.mark.parametrize("terms", [1, 2, 255, 256, 257, 700, 1281])
+def test_a_finite_gain_has_as_many_terms_as_asked(terms: int) -> None:
+    """Of two inputs, and of a state that grows; the number of terms need not fill a block."""
+    A, B, C = [[F(1), F(1, 3)], [F(0), F(1)]], [[F(0), F(1)], [F(1), F(-2)]], [[F(1), F(0)]]
+    # The response to the first input is l / 3; to the second it is 1 - 2 l / 3.
+    exactly = [sum((F(k, 3) for k in range(terms)), F(0)), sum((abs(1 - F(2 * k, 3)) for k in range(terms)), F(0))]
+    found = peak_gain(A, B, C, terms=terms)
+    upper = largest_gains(exact(A), exact(B), exact(C), None, terms)
+    for j, each in enumerate(exactly):
+        assert F(found.low[0, j]) <= each <= F(found.high[0, j]) <= each * (1 + F(1, 2**39))
+        assert each <= F(upper[0, j]) <= each * (1 + F(1, 1000))
+
+
+R, NEAR = F(1) - F(1, 150000), F(1, 3) + F(1, 10**20)
+NONE, THIRDS = [[F(0), F(0)], [F(0), F(0)]], (F(1, 3), F(1, 3) + F(1, 10**8))
+
+
+@pytest.mark.parametrize(
+    ("A", "B", "C", "exactly"),
+    [
+        ([[R]], [[F(1)]], [[F(1)]], 1 / (1 - R)),
+        ([[F(1, 2)]], [[F(1)]], [[F(1)]], F(2)),
+        ([[THIRDS[0], 0], [0, THIRDS[1]]], [[F(1)], [F(1)]], [[F(1), F(-1)]], 1 / (1 - THIRDS[1]) - F(3, 2)),
+        ([[F(1, 2), 0], [0, F(1, 2)]], [[F(1, 3)], [NEAR]], [[F(1), F(-1)]], F(2, 10**20)),
+        ([[F(1, 2), 0], [0, F(1, 2)]], [[F(1)], [F(1)]], [[F(1, 3), -NEAR]], F(2, 10**20)),
+        (NONE, [[THIRDS[0]], [THIRDS[1]]], [[F(1), F(-1)]], F(1, 10**8)),
+        (NONE, [[F(1)], [F(1)]], [[THIRDS[0], -THIRDS[1]]], F(1, 10**8)),
+        ([[F(1, 2**300)]], [[F(1)]], [[F(1)]], 1 / (1 - F(1, 2**300))),
+    ],
+)
+def test_a_gain_that_float64_rounds_is_not_below_the_exact_one(A: Any, B: Any, C: Any, exactly: F) -> None:
+    """The distances of entries from float64, and what is left of the slowest mode, are part of the bound."""
+    if A == [[R]]:
+        assert F(float(R)) < R
+        assert exactly / (1 / (1 - F(float(R)))) > 1 + F(1, 2**38)
+    assert F(float(THIRDS[1]) - float(THIRDS[0])) * (1 + F(1, 2**39)) < F(1, 10**8)
+    upper = largest_gains(exact(A), exact(B), exact(C))[0, 0]
+    assert exactly <= F(upper) <= exactly * (1 + F(1, 1000))
+
+
+# -- filters with poles near 1 ----------------------------------------------------------------------------------------
+
+
+def impulse_response(sections: Any, steps: int, scale: int = ONE) -> list[int]:
+    """The response to a unit impulse, in units of 1 / ONE, by the equations of direct form II transposed."""
+    values = [ONE, *[0] * (steps - 1)]
+    for row in sections:
+        b0, b1, b2, _, a1, a2 = (int(F(float(c)) * ONE) for c in row)
+        s1 = s2 = 0
+        for k, u in enumerate(values):
+            y = (b0 * u >> 300) + s1
+            s1, s2 = (b1 * u - a1 * y >> 300) + s2, b2 * u - a2 * y >> 300
+            values[k] = y
+    return values
+
+
+@pytest.mark.parametrize(
+    ("order", "frequency", "rate", "kind"),
+    [
+        (2, 60, 48_000, "lowpass"),
+        (2, 20, 192_000, "lowpass"),
+        (3, 30, 96_000, "highpass"),
+        (8, 100, 48_000, "lowpass"),
+        (8, 20, 48_000, "highpass"),
+    ],
+)
+def test_peak_gains_of_slow_filters_are_those_of_a_plain_loop(
+    order: int, frequency: float, rate: float, kind: str
+) -> None:
+    """The worst input has the signs of the response, and reaches the sum of its sizes."""
+    sections, system = cascade(order, frequency, rate, kind)
+    slowest = max(abs(root) for row in sections for root in np.roots(row[3:]))
+    steps = int(12 / (1 - slowest))  # what is left decays from there, and is below a thousandth
+    reached = float(F(sum(map(abs, impulse_response(sections, steps))), ONE))
+    found = linear._certified((system.A, system.B, system.C, system.D), None)
+    assert found is not None
+    enclosed = peak_gain(system.A, system.B, system.C, system.D)
+    assert reached <= enclosed.low[0, 0] <= enclosed.high[0, 0] <= reached * 1.001
+    assert enclosed.low[0, 0] <= found[-1, 0] <= enclosed.high[0, 0] * 1.001
+    assert enclosed.high[0, 0] <= enclosed.low[0, 0] * (1 + 2.0**-39)
+
+
+@pytest.mark.parametrize("digits", [24, 40, 53])
+def test_gains_of_a_difference_are_those_of_two_plain_loops(digits: int) -> None:
+    """Between a filter as given and as stored: the difference of two responses, without cancellation."""
+    sections, system = cascade(2, 60, 48_000)
+    fmt = FloatFormat(2, digits)
+    stored = [[float(fmt.round(float(c))) for c in row] for row in sections]
+    pairs = zip(impulse_response(sections, 6000), impulse_response(stored, 6000), strict=True)
+    reached = float(F(sum(abs(x - y) for x, y in pairs), ONE))
+    found = linear.transfer_gains(system, system.stored(fmt)).difference[0, 0]
+    assert (reached == 0) == (digits == 53)
+    assert reached <= found <= reached * 1.001
+
+
+def rounded(x: F, digits: int) -> F:
+    """Round to a number of bits, ties away from zero."""
+    if not x:
+        return x
+    p, q = abs(x.numerator), x.denominator
+    exponent = p.bit_length() - q.bit_length()
+    if p << max(-exponent, 0) < q << max(exponent, 0):
+        exponent -= 1
+    shift = digits - 1 - exponent
+    p, q = (p << shift, q) if shift >= 0 else (p, q << -shift)
+    found = F((2 * p + q) // (2 * q)) / F(2) ** shift
+    return found if x > 0 else -found
+
+
+def attacked(sections: Any, digits: int, steps: int) -> float:
+    """The largest error of a section's output where each input of twelve pushes the last error furthest."""
+    b0, b1, b2, _, a1, a2 = (F(float(c)) for c in sections[0])
+    B0, B1, B2, A1, A2 = (rounded(c, digits) for c in (b0, b1, b2, a1, a2))
+    c0, c1, c2, d1, d2 = (int(c * ONE) for c in (b0, b1, b2, a1, a2))
+    move = np.array([[-float(A1), 1.0], [-float(A2), 0.0]])
+    rows = [np.array([1.0, 0.0])]
+    for _ in range(steps):
+        rows.append(rows[-1] @ move)
+    s1 = s2 = F(0)
+    x1 = x2 = 0
+    worst = 0.0
+    for k in range(steps):
+        row, found = rows[steps - 1 - k], []
+        sign = 1 if row @ [float(b1 - a1 * b0), float(b2 - a2 * b0)] >= 0 else -1
+        for i in range(12):
+            u = rounded(sign * (1 - i * F(1, 2**6) - i * F(1, 2**19)), digits)
+            y = rounded(rounded(B0 * u, digits) + s1, digits)
+            into = rounded(rounded(B1 * u, digits) + s2, digits)
+            t1 = rounded(into - rounded(A1 * y, digits), digits)
+            t2 = rounded(rounded(B2 * u, digits) - rounded(A2 * y, digits), digits)
+            v = int(u * ONE)
+            z = (c0 * v >> 300) + x1
+            z1, z2 = (c1 * v - d1 * z >> 300) + x2, c2 * v - d2 * z >> 300
+            off = np.array([float(t1 - F(z1, ONE)), float(t2 - F(z2, ONE))])
+            found.append((row @ off, i, t1, t2, z1, z2, abs(float(y - F(z, ONE)))))
+        _, _, s1, s2, x1, x2, error = max(found)
+        worst = max(worst, error)
+    return worst
+
+
+def test_an_adversary_comes_within_a_factor_of_four_of_a_guarantee_at_60_hertz() -> None:
+    """Measured: 0.30 of the bound after 4000 steps."""
+    sections, system = cascade(2, 60, 48_000)
+    bound = output_errors(system, FloatFormat(2, 31), 1.0)[0]
+    observed = attacked(sections, 31, 3000)
+    assert bound / 4 < observed <= bound
+
+
+@pytest.mark.parametrize(("order", "frequency", "rate"), [(2, 20, 48_000), (2, 20, 192_000), (4, 60, 96_000)])
+def test_low_frequencies_have_a_guarantee_that_the_checker_proves(order: int, frequency: float, rate: float) -> None:
+    _, system = cascade(order, frequency, rate)
+    found = required_precision(
+        system, 100, 1e-3, basis="guarantee", within=limits(system.n, 1, measurement=1), z=np.ones((100, 1))
+    )
+    assert found.fmt is not None
+    assert str(found).endswith("guaranteed for ever")
+    made = filter_schedule(system.as_filter(), found.fmt)
+    proof = from_schedule(made, limits(system.n + 1, 1, measurement=1.0), 1).certificate()
+    assert "after any number of steps" in prove(json.loads(proof))
+
+
+def test_order_eight_at_20_hertz_is_bounded_for_ever() -> None:
+    """NumPy's eigenvalues of the whole matrix reach 1.017; those of its sections stay below 1."""
+    sections, system = cascade(8, 20, 48_000)
+    F_ = system.A.astype(np.float64)
+    assert np.abs(np.linalg.eigvals(F_)).max() > 1
+    poles = sorted(abs(root) for row in sections for root in np.roots(row[3:]))
+    assert sorted(eigenvalue_sizes(F_)) == pytest.approx(poles, rel=1e-9)
+    assert 0 < output_errors(system, FloatFormat(2, 40), 1.0)[0] < 1e-4
+
+
+def test_a_response_that_lasts_too_long_is_named() -> None:
+    slow = [[F(1) - F(1, 10**7)]]
+    for found in (peak_gain, largest_gains):
+        with pytest.raises(ValueError, match="decays too slowly for a bound: its response is not negligible after"):
+            found(exact(slow), exact([[1]]), exact([[1]]))

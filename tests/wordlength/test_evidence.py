@@ -1,0 +1,168 @@
+"""What an answer says about itself: runs that show too little, and what limits a filter in fixed point."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from gpbnb import (
+    FixedFormat,
+    FloatFormat,
+    LinearSystem,
+    WordFormats,
+    limits,
+    required_fraction_bits,
+    required_precision,
+)
+from gpbnb.arithmetic.search import Outcome
+from gpbnb.filters.words import run_words
+from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.requirement import Asked
+
+SLOW = LinearSystem([["0.99997"]], [["0.00003"]], name="slow")
+MEMORY = "shorter than the memory of the system, whose slowest response takes 160000 steps to decay to 1 %"
+SECTIONS = signal.butter(2, 300, fs=48_000, output="sos")
+LOW_PASS = LinearSystem.from_sections(SECTIONS)
+
+
+def answers(steps, tolerance):
+    u = np.random.default_rng(0).standard_normal((steps, 1))
+    yield required_precision(SLOW, steps, tolerance, z=u)
+    yield judge(SLOW, FloatFormat(2, 24), steps, tolerance, z=u)
+    yield required_fraction_bits(SLOW, u, tolerance)
+
+
+def test_a_run_shorter_than_the_memory_of_a_system_says_so():
+    """0.99997**153504 is 1 %; after 1000 steps, the answer is too low by half of its bits."""
+    assert 153_503 < math.log(0.01) / math.log(0.99997) < 153_504
+    for found in answers(1000, 1e-3):
+        assert str(found).count(MEMORY) == 1
+        assert "the run of 1000 steps" in str(found)
+    assert all(MEMORY not in str(found) for found in answers(160_000, 1e-3))
+    long, short = (next(answers(steps, 1e-3)).precision for steps in (160_000, 1000))
+    assert short < long / 2
+
+
+def test_a_bound_and_a_system_that_never_forgets_have_no_such_warning():
+    u = np.ones((1000, 1))
+    assert "memory" not in str(required_precision(SLOW, 1000, 1e-3, z=u, basis="bound"))
+    assert "memory" not in str(required_fraction_bits(SLOW, u, 1e-3, "guarantee"))
+    assert "memory" not in str(required_precision(LinearSystem.sum(running=True), 100, 1, z=u[:100]))
+
+
+def test_an_output_within_its_tolerance_says_that_zero_would_do():
+    system = LinearSystem([["0.5"]], [[1]], [[1], [100]], output_names=["low (V)", "high"])
+    found = str(required_precision(system, 20, [3, 3], z=np.ones((20, 1))))
+    assert 'output "low" never exceeds 2 in this run, so that zero would be within the tolerance of 3' in found
+    assert "high" not in found
+    assert "never exceeds" not in str(required_precision(system, 20, [1, math.inf], z=np.ones((20, 1))))
+
+
+@pytest.mark.parametrize("basis", ["emulation", "guarantee"])
+def test_coefficients_that_limit_a_filter_are_named(basis):
+    u = np.ones((3000, 1))
+    found = required_fraction_bits(LOW_PASS, u, 1e-3, basis)
+    assert found.fmt is None
+    assert found.why.startswith("the coefficients limit the filter, whatever the fraction bits of the data: stored in")
+    assert "15 significant bits, they give 1" in found.why
+    enough = int(found.why.split(";")[1].split()[0])
+    assert required_fraction_bits(LOW_PASS, u, 1e-3, basis, coefficient_bits=enough).fmt is not None
+    assert required_fraction_bits(LOW_PASS, u, 1e-3, basis, coefficient_bits=enough - 1).fmt is None
+
+
+def test_coefficients_in_a_format_and_a_stored_filter_that_is_not_stable_are_named():
+    words = WordFormats(FixedFormat(2, 15), FixedFormat(1, 14))
+    found = required_fraction_bits(LOW_PASS, np.ones((3000, 1)), 1e-3, like=words)
+    assert "stored in fixed point of 16 bits, 14 of them fraction, they give" in found.why
+    near = LinearSystem.from_coefficients(["1e-7"], [1, "-1.9995", "0.99950006"])
+    found = required_fraction_bits(near, np.ones((100, 1)), 1e-3, "guarantee")
+    assert "stored in 15 significant bits, words are refused: the system is stable, but not with" in found.why
+
+
+def test_a_tolerance_below_the_last_bit_still_blames_the_fraction_bits():
+    found = required_fraction_bits(LOW_PASS, np.ones((50, 1)), 1e-30)
+    assert found.why.endswith("fraction bits are the most tried")
+
+
+def test_the_command_takes_the_bits_of_coefficients(tmp_path, capsys):
+    rows = ", ".join(str([float(c) for c in row]) for row in SECTIONS)
+    (tmp_path / "low.toml").write_text(f"sos = [{rows}]\n")
+    given = [str(tmp_path / "low.toml"), "--tolerance", "0.001", "--simulate", "step", "--steps", "3000", "--fixed"]
+    assert main([*given, "--basis", "emulation"]) == 1
+    assert "--coefficients in the command" in capsys.readouterr().out
+    assert main([*given, "--basis", "emulation", "--coefficients", "24", "--code", str(tmp_path / "code")]) == 0
+    assert "fraction bits in a word of" in capsys.readouterr().out
+    assert (tmp_path / "code").is_dir()
+    for more, message in (
+        (["--coefficients", "54"], "got --coefficients 54; needed 1 to 53 significant bits"),
+        (["--coefficients", "24", "--mixed"], "got --coefficients and --mixed; needed --fixed with it, without"),
+    ):
+        assert main([*given, *more]) == 2
+        assert message in capsys.readouterr().err
+    assert main([*given[:-1], "--coefficients", "24"]) == 2
+    assert "got --coefficients; needed --fixed with it" in capsys.readouterr().err
+
+
+# -- what a refusal says ----------------------------------------------------------------------------------------------
+
+
+def test_precisions_above_an_answer_without_a_bound_are_not_said_to_refute_it():
+    def error(fmt):
+        return Outcome(0.5) if fmt.precision < 40 else Outcome(math.inf, "numbers are too large")
+
+    asked = Asked(100, "guarantee", FloatFormat(2, 2))
+    with asked.search((24, 53), bounds=True) as search:
+        found = asked.answer(search(SimpleNamespace(error=error)))
+    assert str(found).endswith(
+        "guaranteed for ever; the proof does not cover 53 digits, in which no bound was found: numbers are too large"
+    )
+
+
+def test_a_design_that_float64_has_made_unstable_is_told_where_to_find_sections():
+    u = np.ones((500, 1))
+    long = LinearSystem.from_coefficients(*signal.butter(12, 0.02))
+    assert long.unstable()
+    advice = 'take second-order sections from the design tool, as output="sos" of SciPy gives them'
+    assert str(required_precision(long, 500, 1e-3, z=u)).endswith(advice)
+    short = LinearSystem.from_coefficients([1], [1, -2.5, 1])
+    assert "sections" not in str(required_precision(short, 500, 1e-3, z=u))
+
+
+def test_a_direct_form_that_no_precision_suits_says_by_how_much_it_misses():
+    long = LinearSystem.from_coefficients(*signal.butter(8, 0.02))
+    found = required_precision(long, 500, 1e-7, z=np.ones((500, 1)))
+    assert f"; 53 digits give {found.tried[-1][1]:.3g} times the tolerance; second-order sections usually" in str(found)
+    lasting = required_precision(long, 500, 1e-3, basis="bound", z=np.ones((500, 1)))
+    assert "an error causes rounding errors as large as itself; second-order sections usually" in str(lasting)
+
+
+@pytest.mark.parametrize("basis", ["emulation", "bound", "guarantee"])
+def test_a_coefficient_beyond_a_format_is_named_alike_on_every_basis(basis):
+    sections = LinearSystem.from_sections(signal.butter(4, 0.02, output="sos"))
+    z, within = np.full((20, 1), 0.5), limits(4, 1, measurement=0.5)
+    found = str(judge(sections, FixedFormat(0, 15), 20, 1e-3, basis=basis, z=z, within=within))
+    assert "coefficient a1_1: got a result of about -1." in found
+    assert "WordFormats(data, coefficients), or --fixed --mixed in the command" in found
+    without = {
+        "emulation": "in a run of 20 steps",
+        "bound": "without a bound on this run of 20 steps",
+        "guarantee": "without a guarantee for ever",
+    }[basis]
+    assert found.startswith(f"fixed point of 16 bits, 15 of them fraction misses the tolerance, {without}: coefficient")
+
+
+def test_refusals_describe_formats_in_words():
+    system = LinearSystem([["0.5"]], [[1]])
+    for basis in ("emulation", "bound", "guarantee"):
+        z, within = np.full((3, 1), 100), limits(1, 1, measurement=100)
+        found = str(judge(system, FixedFormat(3, 12), 3, 1, basis=basis, z=z, within=within))
+        assert "fixed point of 16 bits, 12 of them fraction" in found
+        assert "FixedFormat(" not in found
+    words = WordFormats(FixedFormat(2, 12), FixedFormat(0, 15))
+    with pytest.raises(OverflowError, match="beyond the range of fixed point of 16 bits, 15 of them fraction; needed"):
+        run_words(LOW_PASS, np.ones((3, 1)), words)
