@@ -101,7 +101,7 @@ def panels() -> Iterator[Panel]:
     yield Panel(
         f"1. The report: {observed.printed[0]} digits, or {observed.printed[1]}",
         "Formula (125) of 1984 has two terms. Both printed numbers are wrong. For an error of one milliarcsecond, and "
-        "with every error of the formula corrected, it asks for ever more.",
+        "with every error of the formula corrected, it asks for even more.",
         fig,
     )
     count, passed = stages(everything)["kalman"], inherited(everything)

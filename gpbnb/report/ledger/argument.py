@@ -43,9 +43,9 @@ ALT = (
     "integration stand alone."
 )
 CAPTION = (
-    "The parts of the documents, and how errors pass between four of them. Each box counts the statements of a part "
-    "and the wrong ones among them, whose share its bar shows. An arrow leads to a part that uses results of another. "
-    "The number on it counts the wrong statements at its head that follow from a root error at its tail."
+    "The parts of the documents, and how errors propagate between four of them. Each box gives the number of "
+    "statements in a part, and its bar shows the share that is wrong. An arrow leads to a part that uses results of "
+    "another. Its number counts the wrong statements at its head that follow from a root error at its tail."
 )
 
 
