@@ -21,7 +21,6 @@ from gpbnb import (
 )
 from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.nonlinear import SigmaPoints
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, opened, simulated, true_states
 from gpbnb.filters.run import Run
 from gpbnb.wordlength.blocks import required_block_precisions
