@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -26,8 +25,11 @@ def eigenvalues(A: NDArray[np.float64]) -> NDArray[np.complex128]:
     The eigenvalues of a cascade are those of its sections. Taken from the whole matrix, four low-pass sections with
     poles of size 0.9995 have one of size 1.017, so each group of states that influence each other is taken by itself.
     """
-    count, group = connected_components(A != 0, connection="strong")
-    blocks = [A[np.ix_(group == i, group == i)] for i in range(count)]
+    reached = (A != 0) | np.eye(len(A), dtype=np.bool_)
+    for _ in range(len(A).bit_length()):
+        reached = reached @ reached  # in twice as many steps
+    groups = np.unique(reached & reached.T, axis=0)
+    blocks = [A[np.ix_(group, group)] for group in groups]
     return np.concatenate([np.linalg.eigvals(block).astype(np.complex128) for block in blocks])
 
 
@@ -68,7 +70,7 @@ def stored_response(system: LinearSystem, fmt: FloatFormat | FixedFormat | WordF
 
     Examples
     --------
-    >>> from gpbnb import BINARY16
+    >>> from gpbnb import BINARY16, LinearSystem
     >>> found = stored_response(LinearSystem.from_coefficients(["0.01"], [1, "-0.99"]), BINARY16)
     >>> found.pole, round(found.stored_pole, 4), round(found.change, 2), found.frequency
     (0.99, 0.9902, 0.21, 0.0)
