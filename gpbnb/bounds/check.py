@@ -59,31 +59,34 @@ from math import gcd, inf, isqrt, lcm, nextafter
 from operator import add, le, mul, sub
 from typing import Any
 
-KNOWN, CYCLE, VECTOR = [{Fraction}], [[[Fraction]]], [Fraction]  # a set stands for a value that may be missing
+# What a file looks like: a tuple lists words, a list holds any number of entries, and a set stands for one or none.
+KNOWN, VECTOR, CYCLE = [{Fraction}], [Fraction], [[[Fraction]]]
 LIMITS = {"state": KNOWN, "innovation": KNOWN}
 RULES = {"base": int, "precision": int, "rounding": ("nearest", "even", "chop", "up", "down", "odd")}
-FORMATS = (
-    RULES | {"fraction_bits": int, "overflow": ("raise", "saturate", "wrap")},
-    RULES | {"emin": {int}, "emax": {int}, "subnormal": bool, "largest": {Fraction}},
-)
+FIXED = RULES | {"fraction_bits": int, "overflow": ("raise", "saturate", "wrap")}
+FLOAT = RULES | {"emin": {int}, "emax": {int}, "subnormal": bool, "largest": {Fraction}}
 FORMS = ("innovation", "joseph", "hung", "hung second gain", "ud")
-KALMAN = {"kind": str, "form": FORMS, "repair": bool, "repaired": [str], "x0": VECTOR, "P0": [VECTOR]}
+MODEL = {"Phi": CYCLE, "H": CYCLE, "Q": CYCLE, "R": CYCLE, "x0": VECTOR, "P0": [VECTOR]}
+RECURSION = {"coefficients": VECTOR, "A": [VECTOR], "B": [VECTOR]}
 FILTERS = {
-    "kalman": KALMAN | dict.fromkeys(("Phi", "H", "Q", "R"), CYCLE),
-    "linear": {"kind": str, "states": int, "inputs": int, "operations": [list], "outputs": [int]}
-    | {"coefficients": VECTOR, "A": [VECTOR], "B": [VECTOR]},
+    "kalman": {"kind": str, "form": FORMS, "repair": bool, "repaired": [str]} | MODEL,
+    "linear": {"kind": str, "states": int, "inputs": int, "operations": [list], "outputs": [int]} | RECURSION,
 }
-COUNTS = ("repeat", "period", "first", "back", "keep")
-FILE = {
+COUNTS = {"repeat": int, "period": int, "first": int, "back": int, "keep": int}
+FILE = COUNTS | {
     "certificate": ("rounding guarantee 1",),
+    "name": str,
     "order": ("each product and sum rounded once, sums from left to right",),
-    **{"name": str, "bound": VECTOR, "steps": {int}, "width": [VECTOR], "derived": LIMITS},
-    **{"limits": LIMITS | {"measurement": KNOWN}, **dict.fromkeys(COUNTS, int)},
+    "limits": LIMITS | {"measurement": KNOWN},
+    "derived": LIMITS,
+    "bound": VECTOR,
+    "steps": {int},
+    "width": [VECTOR],
 }
 NUMBER = re.compile(r"-?[0-9]{1,4000}([./][0-9]{1,4000})?", re.ASCII)
 MULTIPLY, ADD, SUBTRACT = "multiply", "add", "subtract"
 ERROR, STATE = "the error may exceed its bound", "a state or an innovation may exceed its limit"
-BLOCK = 8
+BLOCK = 8  # steps that are taken together, for speed
 
 
 class NotProvedError(Exception):
@@ -547,7 +550,10 @@ class Proof:
     def __init__(self, given: Any, scale: int) -> None:
         self.given, self.a, made = given, Arithmetic(given["format"], scale), given["filter"]
         self.steps, self.period, self.first = given["steps"], given["period"], given["first"]
-        need(self.steps != 0 and min(self.steps or 1, *(given[key] for key in COUNTS)) >= 0, "no number of steps")
+        need(
+            self.steps != 0 and min(self.steps or 1, *(given[key] for key in COUNTS)) >= 0,
+            "a number of steps that is none",
+        )
         self.model: Any = Kalman(self.a, made) if made["kind"] == "kalman" else None
         self.exact: Any = ExactCovariance(self.model) if self.model else None
         self.n: int = self.model.n if self.model else made["states"]
@@ -747,7 +753,7 @@ def prove(given: Any) -> str:
     """Return the claim of a certificate as a sentence, proved; or raise NotProvedError or NotImplementedError."""
     try:
         fmt, made = given["format"], given["filter"]
-        parts = {"filter": FILTERS.get(made["kind"], ()), "format": FORMATS["overflow" not in fmt]}
+        parts = {"filter": FILTERS.get(made["kind"], ()), "format": FIXED if "overflow" in fmt else FLOAT}
         content, scale = read(given, FILE | parts), 3 * fmt["precision"] + 40
         while scale < 20_000:
             try:
