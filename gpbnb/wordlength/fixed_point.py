@@ -98,7 +98,7 @@ class FixedAnswer:
         end = "".join(f"; {warning}" for warning in self.warnings)
         basis = self.basis if self.steps is None else f"{self.basis} for {self.steps} steps"
         if self.fmt is None:
-            return f"no format, by {basis}: {self.why}{end}"
+            return f"no format, by {basis}: {self.why}"
         word = 1 + self.fmt.precision
         return f"{self.fmt.fraction_bits} fraction bits in a word of {word} bits, by {basis}; {self.why}{end}"
 
@@ -286,7 +286,7 @@ def required_fraction_bits(
 
     if found.fmt is None:
         why = strategy.blame(largest) or f"{rejection(largest)}; {largest} fraction bits are the most tried"
-        return FixedAnswer(None, basis, found.tried, why, None, strategy.steps, strategy.warnings())
+        return FixedAnswer(None, basis, found.tried, why, None, strategy.steps)
     bits = found.fmt.fraction_bits
     why = rejection(bits - 1 if bits > strategy.least else min(bits + 1, largest))
     words = strategy.words(found.fmt)

@@ -66,7 +66,7 @@ def required_system_precision(
     cause = "" if found.fmt is not None or limited else system.unstable()
     if not cause:
         advice = "" if found.fmt is not None else _too_many_digits(system, found)
-        warnings = strategy.warnings() if isinstance(strategy, EmulatedSystem) else ()
+        warnings = strategy.warnings() if found.fmt is not None and isinstance(strategy, EmulatedSystem) else ()
         return replace(asked.answer(found, advice=advice, ends=ends), warnings=warnings)
     if asked.basis == "probable":
         return asked.answer(found, cause=f"{cause}, {_FOR_SOME_STEPS}")

@@ -143,7 +143,9 @@ def test_other_formats_are_refused():
 
 def test_a_coefficient_beyond_its_range_is_named():
     system = LinearSystem.from_coefficients(["0.5"], [1, "-1.9", "0.95"])
-    with pytest.raises(OverflowError, match=r"got a1 = -1.9, beyond the range of FixedFormat"):
+    with pytest.raises(
+        OverflowError, match=r"got a1 = -1\.9, beyond the range of fixed point of 16 bits, 15 of them fraction"
+    ):
         run_words(system, np.zeros((3, 1)), WordFormats(FixedFormat(4, 15), FixedFormat(0, 15)))
 
 
