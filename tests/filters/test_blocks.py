@@ -250,7 +250,7 @@ def test_a_covariance_in_binary64_beside_binary32_is_that_of_plain_loops():
     rounds = dict.fromkeys(BLOCKS, Rounds(single, single)) | {"covariance": Rounds(double, double)}
     slow = Filter(FRACTIONS, Form.UD, double, rounds)
     blocks = BlockFormats.uniform(BINARY32).with_block("covariance", BINARY64)
-    assert blocks.model == BINARY64
+    assert blocks.model == FloatFormat(2, 53, "even")
     run = Run(MODEL, blocks, Form.UD, range(1, len(Z) + 1))
     run.take(Z)
     x, U = run.exactly(run.X), run.exactly(run.C)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -379,3 +382,37 @@ def test_a_bound_needs_a_format_that_tells_of_an_overflow():
         Run(model(), replace(BFLOAT16, overflow="saturate"), Form.INNOVATION, [1], bounded=True)
     with pytest.raises(ValueError, match="got overflow to infinity; needed 'raise' or 'saturate' for compiled loops"):
         Run(model(), replace(BFLOAT16, overflow="infinity"), Form.INNOVATION, [1])
+
+
+COUNTED = """
+import numpy as np
+from numba.core.runtime import rtsys
+from gpbnb import FloatFormat, LinearModel
+from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.run import Run
+
+fmt = FloatFormat(2, 24)
+blocks = BlockFormats.uniform(fmt).with_block("covariance", FloatFormat(2, 40))
+eye = [[1, 0], [0, 1]]
+model = LinearModel([["1", "0.1"], ["0", "0.9"]], [["1", "0"]], eye, [["2"]], [0, 0], eye)
+random = FloatFormat(2, 20, "stochastic")
+for formats, form in ((fmt, "Joseph"), (fmt, "UD"), (random, "innovation"), (blocks, "UD")):
+    run = Run(model, formats, form, (100,))
+    run.take(np.ones((60, 1)))
+    first = rtsys.get_allocation_stats()
+    run.take(np.ones((40, 1)))
+    last = rtsys.get_allocation_stats()
+    print(last.mi_alloc - first.mi_alloc > 0, last.mi_alloc - last.mi_free, last.alloc - last.free)
+"""
+
+
+def test_a_step_releases_exactly_the_arrays_that_it_makes():
+    """Steps count no references to the arrays that they borrow: one too few would release an array in use."""
+    found = subprocess.run(
+        [sys.executable, "-c", COUNTED],
+        env=os.environ | {"NUMBA_NRT_STATS": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert found.stdout.split() == ["True", "0", "0"] * 4

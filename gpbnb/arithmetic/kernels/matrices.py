@@ -12,7 +12,7 @@ import numpy as np
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.bits import bits, from_bits
-from gpbnb.arithmetic.kernels.compiling import inner
+from gpbnb.arithmetic.kernels.compiling import borrowing, inner
 from gpbnb.arithmetic.kernels.scalar import (
     add,
     can_be_freed,
@@ -43,19 +43,20 @@ from gpbnb.arithmetic.kernels.tags import (
     extents_of_sums,
 )
 
-_INLINE = {"forceinline": True, "no_cfunc_wrapper": True}
+_INLINE = {"forceinline": True, "no_cfunc_wrapper": True, "_nrt": False}
+_MAKES_ARRAYS = {"no_cfunc_wrapper": True, "_nrt": True}
 _MOST = np.int64(2**63 - 1)
 WIDE = 8  # rows and columns, from which on high and low parts are taken apart
 MANY = 2000  # multiplications in a product, from which on a look at the range of its entries pays
 
 
-@inner
+@borrowing
 def is_zero(fmt: Any, x: Any) -> Any:
     """Whether a number is zero."""
     return compare(fmt, x, zero(fmt)) == 0
 
 
-@inner
+@borrowing
 def copy(fmt: Any, a: Any, c: Any) -> None:
     """c = a."""
     for i in range(a.shape[0]):
@@ -63,7 +64,7 @@ def copy(fmt: Any, a: Any, c: Any) -> None:
             put(fmt, c, (i, j), load(fmt, a, (i, j)))
 
 
-@inner
+@borrowing
 def transpose(fmt: Any, a: Any, c: Any) -> None:
     """c = a'; c must not be a."""
     for i in range(a.shape[0]):
@@ -71,7 +72,7 @@ def transpose(fmt: Any, a: Any, c: Any) -> None:
             put(fmt, c, (j, i), load(fmt, a, (i, j)))
 
 
-@inner
+@borrowing
 def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a + b."""
     for i in range(a.shape[0]):
@@ -80,7 +81,7 @@ def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
     guard(fmt, c)
 
 
-@inner
+@borrowing
 def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a - b."""
     for i in range(a.shape[0]):
@@ -89,7 +90,7 @@ def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
     guard(fmt, c)
 
 
-@inner
+@borrowing
 def _extent(x: Any) -> Any:
     """The smallest size of the float64 numbers of a matrix other than zero, infinite if there are none; the largest."""
     smallest, largest = bits(np.inf), np.int64(0)
@@ -145,7 +146,7 @@ def product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     raise TypeError("got a call of product_in_order from Python; needed one from a function compiled by numba")
 
 
-@inner
+@borrowing
 def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, sums: Any) -> Any:
     # Not recursive, because numba cannot cache recursive functions: product k completes every part that it ends.
     count = 0
@@ -162,7 +163,7 @@ def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, sums: Any) -> Any:
     return sums[0]
 
 
-@inner
+@borrowing
 def _blocked(fmt: Any, a: Any, b: Any, i: int, j: int, sums: Any) -> Any:
     for first in range(0, a.shape[1], fmt.sums.block):
         s = multiply(fmt, load(fmt, a, (i, first)), load(fmt, b, (first, j)))
@@ -172,7 +173,7 @@ def _blocked(fmt: Any, a: Any, b: Any, i: int, j: int, sums: Any) -> Any:
     return sums[0]
 
 
-@overload(product_in_order, strict=False)
+@overload(product_in_order, strict=False, jit_options=_MAKES_ARRAYS)
 def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     mixed = getattr(fmt, "instance_class", None) is Mixed
     limited = fmt.types[1] if mixed else fmt
@@ -193,7 +194,7 @@ def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return in_order
 
 
-@inner
+@borrowing
 def _add_multiple(fmt: Any, factor: Any, high: Any, low: Any, sum_high: Any, sum_low: Any) -> None:
     """Add a multiple of one row to another; all four arrays are contiguous, so that the loop is vectorized."""
     for j in range(high.shape[0]):
@@ -207,7 +208,7 @@ def product_in_planes(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     raise TypeError("got a call of product_in_planes from Python; needed one from a function compiled by numba")
 
 
-@overload(product_in_planes, strict=False, jit_options=_INLINE)
+@overload(product_in_planes, strict=False, jit_options=_MAKES_ARRAYS)
 def _product_in_planes(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     def of_pairs(fmt: Any, a: Any, b: Any, c: Any) -> Any:
         p = b.shape[1]
@@ -234,7 +235,7 @@ def _product_in_planes(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return lambda fmt, a, b, c: False
 
 
-@inner(forceinline=True)
+@borrowing(forceinline=True)
 def _add_products(fmt: Any, a: Any, b: Any, c: Any) -> None:
     for i in range(a.shape[0]):
         fresh = True
@@ -254,7 +255,7 @@ def _add_products(fmt: Any, a: Any, b: Any, c: Any) -> None:
                 put(fmt, c, (i, j), zero(fmt))
 
 
-@inner
+@borrowing
 def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry summed from left to right over the nonzero entries of a; c must be neither a nor b."""
     if product_in_order(fmt, a, b, c) or product_in_planes(fmt, a, b, c):
@@ -266,7 +267,7 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
         check(fmt, c)
 
 
-@inner
+@borrowing
 def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """Like :func:`product`, with the same digits, but summed over the nonzero entries of b."""
     if product_in_order(fmt, a, b, c):
@@ -290,7 +291,7 @@ def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@inner
+@borrowing
 def inverse(fmt: Any, a: Any, c: Any) -> Any:
     """c = the inverse of a, by elimination without row exchanges, which a covariance does not need; overwrites a.
 
@@ -323,7 +324,7 @@ def inverse(fmt: Any, a: Any, c: Any) -> Any:
     return answer
 
 
-@inner
+@borrowing
 def factor_ud(fmt: Any, a: Any, u: Any) -> Any:
     """u = the factors of a covariance a = U D U', with D on the diagonal of u; overwrites a.
 

@@ -28,7 +28,7 @@ from numba import types
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, processor, shortdecimal, wide
-from gpbnb.arithmetic.kernels.compiling import inner
+from gpbnb.arithmetic.kernels.compiling import borrowing, inner
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
     PAIRS,
@@ -50,7 +50,7 @@ from gpbnb.arithmetic.kernels.tags import (
     Wide,
 )
 
-_INLINE = {"forceinline": True, "no_cfunc_wrapper": True}
+_INLINE = {"forceinline": True, "no_cfunc_wrapper": True, "_nrt": False}
 _MODULES = {
     Decimal: decimal,
     ShortDecimal: shortdecimal,
@@ -570,7 +570,7 @@ def _repeats(fmt: Any) -> Any:
 # -- sums of products --------------------------------------------------------------------------------
 
 
-@inner
+@borrowing
 def dot(fmt: Any, x: Any, y: Any) -> Any:
     """Inner product from left to right; the first product is not added to zero."""
     n = len(x)
@@ -582,7 +582,7 @@ def dot(fmt: Any, x: Any, y: Any) -> Any:
     return stored_sum(fmt, s)
 
 
-@inner
+@borrowing
 def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry the :func:`dot` of a row and a column; c must be neither a nor b.
 
@@ -609,14 +609,14 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@inner
+@borrowing
 def check(fmt: Any, c: Any) -> None:
     """Settle the matrix c; raises OverflowError if an entry has left the range of its backend."""
     settle(fmt, c)
     guard(fmt, c)
 
 
-@inner
+@borrowing
 def guard(fmt: Any, c: Any) -> None:
     """Raise OverflowError if an entry of the matrix c has left the range of its backend."""
     gone = False

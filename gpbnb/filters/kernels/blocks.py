@@ -80,27 +80,27 @@ def number_taken(fmt: Any, tag: Any, x: Any) -> Any:
     raise _only_compiled("number_taken")
 
 
-@overload(of_state, strict=False)
+@overload(of_state, strict=False, inline="always")
 def _of_state(fmt: Any) -> Any:
     return (lambda fmt: fmt.state) if _is_blocks(fmt) else lambda fmt: fmt
 
 
-@overload(of_gain, strict=False)
+@overload(of_gain, strict=False, inline="always")
 def _of_gain(fmt: Any) -> Any:
     return (lambda fmt: fmt.gain) if _is_blocks(fmt) else lambda fmt: fmt
 
 
-@overload(of_covariance, strict=False)
+@overload(of_covariance, strict=False, inline="always")
 def _of_covariance(fmt: Any) -> Any:
     return (lambda fmt: fmt.covariance) if _is_blocks(fmt) else lambda fmt: fmt
 
 
-@overload(of_innovation, strict=False)
+@overload(of_innovation, strict=False, inline="always")
 def _of_innovation(fmt: Any) -> Any:
     return (lambda fmt: fmt.innovation) if _is_blocks(fmt) else lambda fmt: fmt
 
 
-@overload(taken, strict=False)
+@overload(taken, strict=False, jit_options={"_nrt": False})
 def _taken(fmt: Any, tag: Any, a: Any, own: Any) -> Any:
     def rounded(fmt: Any, tag: Any, a: Any, own: Any) -> Any:
         for i in range(a.shape[0]):
@@ -111,6 +111,6 @@ def _taken(fmt: Any, tag: Any, a: Any, own: Any) -> Any:
     return rounded if _is_blocks(fmt) else lambda fmt, tag, a, own: a
 
 
-@overload(number_taken, strict=False)
+@overload(number_taken, strict=False, jit_options={"_nrt": False})
 def _number_taken(fmt: Any, tag: Any, x: Any) -> Any:
     return (lambda fmt, tag, x: round_(tag, x)) if _is_blocks(fmt) else lambda fmt, tag, x: x

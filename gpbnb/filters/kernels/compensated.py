@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from gpbnb.arithmetic.kernels.compiling import inner
+from gpbnb.arithmetic.kernels.compiling import borrowing
 from gpbnb.arithmetic.kernels.matrices import copy, difference, matrix_sum, product
 
 
-@inner
+@borrowing
 def compensated_update(fmt: Any, increment: Any, h: Any, K: Any, z: Any, x: Any, carried: Any, work: Any) -> None:
     """Add (Phi - I) x + K (z - H Phi x) to x, and carry the rounding error of the addition to the next step.
 

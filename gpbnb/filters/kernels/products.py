@@ -12,7 +12,7 @@ import numpy as np
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.bits import bits, from_bits
-from gpbnb.arithmetic.kernels.compiling import inner
+from gpbnb.arithmetic.kernels.compiling import borrowing
 from gpbnb.arithmetic.kernels.matrices import MANY, product_in_order, product_in_planes, stays_within
 from gpbnb.arithmetic.kernels.scalar import (
     add,
@@ -33,7 +33,7 @@ _MAGNITUDE = np.int64(2**63 - 1)
 _LEAST, _LARGEST = np.int64((1023 - 400) << 52), np.int64((1023 + 400) << 52)
 
 
-@inner
+@borrowing
 def _is_moderate(a: Any) -> Any:
     """Whether all numbers are zero or between 2**-400 and 2**400 in magnitude."""
     least, largest = _LARGEST, np.int64(0)
@@ -50,7 +50,7 @@ def _short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     raise TypeError("got a call of _short_product from Python; needed one from a function compiled by numba")
 
 
-@overload(_short_product, strict=False)
+@overload(_short_product, strict=False, jit_options={"_nrt": False})
 def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     def of_binary(fmt: Any, a: Any, b: Any, c: Any) -> Any:
         # Up to 25 bits, rounding a float64 result again is correct. Nothing leaves the range of float64: products are
@@ -74,7 +74,7 @@ def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return of_binary if getattr(fmt, "instance_class", None) is Binary else lambda fmt, a, b, c: False
 
 
-@inner(forceinline=True)
+@borrowing(forceinline=True)
 def _with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
     for i in range(a.shape[0]):
         fresh = True
@@ -97,7 +97,7 @@ def _with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
                 put(fmt, c, (i, j), zero(fmt))
 
 
-@inner
+@borrowing
 def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry summed from left to right over the nonzero entries of a; c must be neither a nor b."""
     if product_in_order(fmt, a, b, c) or product_in_planes(fmt, a, b, c):
@@ -111,7 +111,7 @@ def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
         check(fmt, c)
 
 
-@inner(forceinline=True)
+@borrowing(forceinline=True)
 def _by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):
@@ -124,7 +124,7 @@ def _by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
                     put(fmt, c, (i, j), multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
 
 
-@inner
+@borrowing
 def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """Like :func:`product_with_units`, with the same digits, but one column of a at a time.
 
@@ -140,7 +140,7 @@ def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
         check(fmt, c)
 
 
-@inner
+@borrowing
 def add_transposed(fmt: Any, a: Any, c: Any) -> None:
     """c = c + a', skipping the zero entries of a."""
     for i in range(a.shape[0]):

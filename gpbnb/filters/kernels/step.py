@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.compiling import compiled, inner
+from gpbnb.arithmetic.kernels.compiling import borrowing, compiled, inner
 from gpbnb.arithmetic.kernels.matrices import (
     copy,
     difference,
@@ -138,7 +138,7 @@ class Workspace(NamedTuple):
 _PREDICTED, _OF_INNOVATION, _INVERSE, _GAIN, _COVARIANCE, _ESTIMATE, _FACTORS = range(len(QUANTITIES))
 
 
-@inner
+@borrowing
 def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: Any) -> Any:
     """Thornton's modified weighted Gram-Schmidt: overwrite U with the factors of Phi U D U' Phi' + UQ DQ UQ'."""
     n = U.shape[0]
@@ -182,7 +182,7 @@ def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: 
     return definite
 
 
-@inner
+@borrowing
 def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any, F: Any, G: Any) -> Any:
     """Bierman's update by one measurement z of h' x with variance r; its gain becomes column i of K.
 
@@ -240,7 +240,7 @@ def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any
     return answer
 
 
-@inner
+@borrowing
 def decorrelate(fmt: Any, UR: Any, a: Any, c: Any) -> None:
     """c = the inverse of U times a, by back substitution, where R = U D U'."""
     for j in range(a.shape[1]):
@@ -275,7 +275,7 @@ def factor_each(fmt: Any, a: Any, U: Any) -> Any:
     return definite
 
 
-@inner
+@borrowing
 def _subtract_gain(fmt: Any, identity: Any, K: Any, hT: Any, KT: Any, T: Any, F: Any, W: Any) -> None:
     """W = I - K H; KT becomes K', and T and F are overwritten."""
     transpose(fmt, K, KT)
@@ -284,7 +284,7 @@ def _subtract_gain(fmt: Any, identity: Any, K: Any, hT: Any, KT: Any, T: Any, F:
     difference(fmt, identity, F, W)
 
 
-@inner
+@borrowing
 def _update_estimate(fmt: Any, model: Any, k: int, z: Any, x: Any, K: Any, work: Any, own: Any) -> None:
     """Overwrite x with the estimate of step k + 1, whose gain is K, in the innovation form or Joseph's."""
     phi, h, state = model.Phi[k % model.Phi.shape[0]], model.H[k % model.H.shape[0]], of_state(fmt)
@@ -298,7 +298,7 @@ def _update_estimate(fmt: Any, model: Any, k: int, z: Any, x: Any, K: Any, work:
         matrix_sum(state, work.u, work.v, x)
 
 
-@inner(inline="always")
+@borrowing
 def _filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any, work: Any, own: Any) -> Any:
     """Take step k + 1 with the measurement z, and overwrite x and P; the gain stays in the workspace.
 
@@ -366,7 +366,7 @@ def _filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any
     return answer
 
 
-@inner
+@borrowing
 def _record_step(fmt: Any, k: int, answer: int, x: Any, K: Any, P: Any, kept: Any, notes: Any) -> Any:
     """Record the result of step k + 1 if it is a checkpoint step; return whether the run continues."""
     checkpoint_steps, X, G, C = kept
@@ -468,33 +468,49 @@ def advance(
         copy(storing, covariances[(z.shape[0] - 1 - returned) % gains.shape[0]], P)
 
 
+@borrowing
+def _step_ud(fmt: Any, model: Any, k: int, z: Any, x: Any, U: Any, work: Any, own: Any) -> Any:
+    """Take step k + 1 with the measurement z in the UD form, and overwrite x and U; the gain stays in the workspace.
+
+    Returns 1 if all variances are positive, -1 if one is not, and 0 if a division by zero ended the step.
+    """
+    Phi, H, _HT, UQ, UR, place = model
+    K, HD, y, u, v, T, W, D, C = work
+    state, covariance, innovation = of_state(fmt), of_covariance(fmt), of_innovation(fmt)
+    place[0] = _PREDICTED
+    phi = Phi[k % Phi.shape[0]]
+    own_phi, uq = taken(fmt, covariance, phi, own.Phi), taken(fmt, covariance, UQ[k % UQ.shape[0]], own.square)
+    answer = 1 if _predict_ud(covariance, own_phi, uq, U, W, D, C, T) else -1
+    place[0] = _FACTORS
+    product(state, taken(fmt, state, phi, own.Phi), x, u)
+    copy(state, u, x)
+    ur = UR[k % UR.shape[0]]
+    decorrelate(state, taken(fmt, state, ur, own.small), z, y)
+    ur = taken(fmt, innovation, ur, own.small)
+    decorrelate(innovation, ur, taken(fmt, innovation, H[k % H.shape[0]], own.H), HD)
+    for i in range(HD.shape[0]):
+        if answer != 0:
+            measured, variance = load(state, y, (i, 0)), load(innovation, ur, (i, i))
+            found = _observe_ud(fmt, i, HD[i], measured, variance, x, U, K, u, v)
+            answer = min(answer, found) if found != 0 else 0
+    return answer
+
+
 @compiled
 def advance_ud(fmt: Any, model: Any, z: Any, first: int, x: Any, U: Any, kept: Any, notes: Any) -> None:
     """Take one step per row of z in the UD form, like :func:`advance`; U holds the factors of the covariance."""
     if z.shape[0] == 0:
         return
-    Phi, H, HT, UQ, UR, place = model
-    K, HD, y, u, v = np.empty_like(HT[0]), np.empty_like(H[0]), z[:1].copy(), np.empty_like(x), np.empty_like(x)
+    K, HD, y, u, v = (
+        np.empty_like(model.HT[0]),
+        np.empty_like(model.H[0]),
+        z[:1].copy(),
+        np.empty_like(x),
+        np.empty_like(x),
+    )
     T, W, D, C = np.empty_like(U), np.concatenate((U, U), axis=1), np.concatenate((x, x)), np.concatenate((x, x))
-    state, covariance, innovation = of_state(fmt), of_covariance(fmt), of_innovation(fmt)
-    own = taken_arrays(U, HD, K, UR[0])
+    own, work, storing = taken_arrays(U, HD, K, model.UR[0]), (K, HD, y[0], u, v, T, W, D, C), of_state(fmt)
     for step in range(z.shape[0]):
-        k = first + step
-        place[0] = _PREDICTED
-        phi = Phi[k % Phi.shape[0]]
-        own_phi, uq = taken(fmt, covariance, phi, own.Phi), taken(fmt, covariance, UQ[k % UQ.shape[0]], own.square)
-        answer = 1 if _predict_ud(covariance, own_phi, uq, U, W, D, C, T) else -1
-        place[0] = _FACTORS
-        product(state, taken(fmt, state, phi, own.Phi), x, u)
-        copy(state, u, x)
-        ur = UR[k % UR.shape[0]]
-        decorrelate(state, taken(fmt, state, ur, own.small), z[step], y[0])
-        ur = taken(fmt, innovation, ur, own.small)
-        decorrelate(innovation, ur, taken(fmt, innovation, H[k % H.shape[0]], own.H), HD)
-        for i in range(HD.shape[0]):
-            if answer != 0:
-                measured, variance = load(state, y[0], (i, 0)), load(innovation, ur, (i, i))
-                found = _observe_ud(fmt, i, HD[i], measured, variance, x, U, K, u, v)
-                answer = min(answer, found) if found != 0 else 0
-        if not _record_step(state, k, answer, x, K, U, kept, notes):
+        answer = _step_ud(fmt, model, first + step, z[step], x, U, work, own)
+        if not _record_step(storing, first + step, answer, x, K, U, kept, notes):
             return

@@ -244,3 +244,15 @@ def test_importing_gpbnb_is_light() -> None:
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
+
+
+def test_compiled_functions_are_loaded_without_what_only_compiling_needs() -> None:
+    code = (
+        "import sys, gpbnb\n"
+        "x = gpbnb.FloatFormat(2, 24).array(['0.1'])\n"
+        "x + x\n"
+        "print([name for name in ('numba', 'numba.np.linalg', 'scipy.linalg', 'sympy') if name in sys.modules])"
+    )
+    for _ in range(2):  # the first run may compile
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "['numba']"
