@@ -318,7 +318,8 @@ def power(x: Any, exponent: Any) -> Any:
 
     A single whole exponent, such as 3, gives :math:`(x x) x` with each multiplication rounded; a negative one gives 1
     divided by the positive power. All other exponents, one number or an array, give the exact power rounded once, as
-    ``np.float_power`` does for each exponent; see :func:`elementary` for the range of arguments.
+    ``np.float_power`` does for each exponent; for the range of arguments, see
+    :func:`~gpbnb.arithmetic.elementary.elementary`.
 
     Raises
     ------
