@@ -96,6 +96,7 @@ exactness: .venv/made-for ## billions of operations compared with independent ar
 	$(PY) -m benchmarks.wide
 	$(PY) -m benchmarks.processors
 	$(PY) -m benchmarks.paths
+	$(PY) -m benchmarks.nonlinear
 	$(PY) -m benchmarks.code
 
 # pychop has no wheel.

@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, linalg, required_precision
+from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.bounds.guarantee import guarantee
 from gpbnb.filters.emulation import emulate
-from gpbnb.filters.named import form_named, rounding_named, whole_number
+from gpbnb.filters.named import form_named, whole_number
 from gpbnb.filters.run import Sums
 from gpbnb.filters.simulation import Simulation
 from gpbnb.report.budget import theory as budget

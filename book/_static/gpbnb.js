@@ -83,7 +83,7 @@ function keepPunctuation(formula) {
 
 // A formula that is too wide even so, such as a matrix on a phone, is set smaller, as far as it can be read.
 const SMALLEST = 0.6;
-function shrinkToLine(boxes) {
+function shrinkToLine(boxes = [...document.querySelectorAll("article mjx-container")]) {
   const wide = boxes.filter((box) => box.matches('[display="true"]') && !box.closest("td"));
   for (const box of wide) if (box.dataset.size) box.style.fontSize = box.dataset.size;
   const shares = wide.map((box) => box.clientWidth / box.scrollWidth);
@@ -159,6 +159,7 @@ async function typesetShown() {
     await pause();
     await typeset(rest.splice(0, batch));
   }
+  shrinkToLine();
   markScrolling();
   window.formulas.shown = { time: performance.now(), count: window.formulas.count() };
 }
@@ -176,7 +177,7 @@ window.formulasTypeset = new Promise((resolve) => {
     let width = null;
     const marked = new ResizeObserver(([{ contentRect }]) => {
       if (contentRect.width !== width) {
-        shrinkToLine([...document.querySelectorAll("article mjx-container")]);
+        shrinkToLine();
         markScrolling();
       }
       width = contentRect.width;
@@ -185,8 +186,11 @@ window.formulasTypeset = new Promise((resolve) => {
   });
 });
 
-// Until its fonts are there a formula may be too wide for its cell.
-document.fonts.addEventListener("loadingdone", () => markScrolling());
+// Until its fonts are there a formula may be too wide for its cell or its line.
+document.fonts.addEventListener("loadingdone", () => {
+  shrinkToLine();
+  markScrolling();
+});
 
 // What was collapsed had no width. Only boxes within it are measured: a print opens hundreds at once, and for each of them
 // the whole page would be laid out again. Its formulas are typeset, and broken into lines, once they are seen.

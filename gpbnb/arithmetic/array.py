@@ -141,6 +141,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
 
     __slots__ = ("_format", "backend", "components")
     __hash__ = None  # type: ignore[assignment]
+    __pandas_priority__ = 10_000  # so that tables of pandas leave the operation to this class, not to float64
 
     _format: NumberFormat
     #: The backend, which computes with the entries.

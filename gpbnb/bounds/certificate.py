@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.bounds.envelope import FilterLimits, eigenvalue_sizes
+from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.gains import Schedule
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, matrices
 from gpbnb.filters.system import LinearFilter
 
@@ -176,7 +177,7 @@ def _back(F: NDArray[np.float64], *sizes: NDArray[np.float64]) -> int:
 
 def _extra(F: NDArray[np.float64]) -> int:
     """Return a number of steps, whole periods, after which the exact covariance is far nearer to its limit."""
-    rate = -2 * math.log(max(float(eigenvalue_sizes(_product(F)).max()), 1e-9))
+    rate = -2 * math.log(max(float(np.abs(eigenvalues(_product(F))).max()), 1e-9))
     return math.ceil(math.log(_NEARER) / rate) * len(F)
 
 
@@ -187,7 +188,7 @@ def _keep(F: NDArray[np.float64], back: int, care: _Care) -> int:
     """
     if back <= _WHOLE:
         return back
-    modes = np.sort(eigenvalue_sizes(_product(F))) ** (1 / len(F))
+    modes = np.sort(np.abs(eigenvalues(_product(F)))) ** (1 / len(F))
     fast = modes[modes < modes[-1] ** 2]
     return 4 + math.ceil(math.log(care.left) / math.log(max(float(fast.max(initial=0.0)), 1e-9)))
 

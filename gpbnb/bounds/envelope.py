@@ -36,7 +36,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -151,17 +150,6 @@ class Disturbances(NamedTuple):
     K: NDArray[np.float64]
     loop: NDArray[np.float64]
     gain: NDArray[np.float64]
-
-
-def eigenvalue_sizes(F: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the sizes of the eigenvalues of a matrix, (n,), in float64.
-
-    The eigenvalues of a cascade are those of its sections. Taken from the whole matrix, four low-pass sections with
-    poles of size 0.9995 have one of size 1.017, so each group of states that influence each other is taken by itself.
-    """
-    count, group = connected_components(F != 0, connection="strong")
-    blocks = [F[np.ix_(group == i, group == i)] for i in range(count)]
-    return np.concatenate([np.abs(np.linalg.eigvals(block)) for block in blocks])
 
 
 def columns(found: Disturbances) -> NDArray[np.float64]:

@@ -52,7 +52,6 @@ from gpbnb.bounds.envelope import (
     certify,
     columns,
     disturbances,
-    eigenvalue_sizes,
     peaks,
     units,
 )
@@ -62,6 +61,7 @@ from gpbnb.bounds.storing import stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LARGEST_EXPONENT, LinearModel
 from gpbnb.filters.named import whole_number
+from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.program import functionals
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "older errors")
@@ -331,7 +331,7 @@ def _radius(given: Schedule) -> float:
     whole = np.eye(given.program.n)
     for each in F:
         whole = each @ whole
-    return float(eigenvalue_sizes(whole).max() ** (1 / len(F)))
+    return float(np.abs(eigenvalues(whole)).max() ** (1 / len(F)))
 
 
 def _enough_lags(radius: float, period: int) -> int:

@@ -20,9 +20,10 @@ from gpbnb.arithmetic.bounds import above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
-from gpbnb.bounds.envelope import LOOP, ROUNDING, Columns, End, certify, eigenvalue_sizes
+from gpbnb.bounds.envelope import LOOP, ROUNDING, Columns, End, certify
 from gpbnb.bounds.gains import Schedule
 from gpbnb.filters.opening import as_packed, widened_array
+from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.program import functionals
 from gpbnb.filters.system import LinearFilter, LinearSystem
 
@@ -290,7 +291,7 @@ def _certified(matrices: tuple[Any, ...], terms: int | None) -> NDArray[np.float
     if not all(_LEAST < each < 1 / _LEAST for each in numbers):
         return None
     (F, F_off), (G, G_off), (rows, rows_off) = (_nearest(X) for X in (A, B, C))
-    radius = float(eigenvalue_sizes(F).max())
+    radius = float(np.abs(eigenvalues(F)).max())
     if terms is None and not radius < 1:
         return None
     lags = terms

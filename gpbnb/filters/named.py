@@ -1,4 +1,4 @@
-"""Read arguments as users write them: forms and roundings by name, and whole numbers."""
+"""Read arguments as users write them: forms by name, and whole numbers."""
 
 from __future__ import annotations
 
@@ -9,21 +9,8 @@ from fractions import Fraction
 from typing import Any
 
 from gpbnb.arithmetic.kernels.exact import size_text
-from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.filters.array_forms import ALIASES, AnyForm, ArrayForm
 from gpbnb.filters.forms import Form, plain_name
-
-__all__ = [
-    "checked_name",
-    "checked_names",
-    "compiled_form",
-    "form_named",
-    "named",
-    "range_text",
-    "rounding_named",
-    "sized",
-    "whole_number",
-]
 
 
 def form_named(form: AnyForm | str) -> AnyForm:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from inspect import signature
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -99,7 +100,7 @@ class NonlinearModel:
 
     Raises
     ------
-    TypeError : an argument that must be a function is not one.
+    TypeError : an argument that must be a function is not one, or takes other arguments.
     ValueError : shapes that do not fit together; an unknown measurement among the angles; angles and a residual
         together; several iterations or a Jacobian for the unscented filter; or for a reason given in ``LinearModel``.
 
@@ -194,7 +195,7 @@ class NonlinearModel:
             "normalize": normalize,
             "iterations": whole_number("iterations", iterations),
             "method": method,
-            "points": SigmaPoints(*points),
+            "points": _points(points),
             "steps": noise.steps,
         }
         for attribute, value in given.items():
@@ -224,6 +225,23 @@ class NonlinearModel:
                     "iterations=1: its sigma points take their place"
                 )
             self.weights()
+        self._check_arguments()
+
+    def _check_arguments(self) -> None:
+        """Reject a function that does not take a state, or a state and inputs."""
+        known = ("x",) if self.u is None else ("x", "u")
+        takes = {**dict.fromkeys("fFhH", known), "residual": ("z", "predicted"), "normalize": ("x",)}
+        for what, arguments in takes.items():
+            try:
+                signature(getattr(self, what) or (lambda *_: None)).bind(*arguments)
+            except TypeError as error:
+                inputs = ", for a model without u" if arguments == ("x",) else ", for a model with u"
+                raise TypeError(
+                    f"got {what} with other arguments: {error}; needed {what}({', '.join(arguments)})"
+                    + (inputs if what in "fFhH" else "")
+                ) from None
+            except ValueError:  # a function of C without a signature
+                pass
 
     def __repr__(self) -> str:
         """Describe the model in three lines: its sizes and method, its noise, and its start."""
@@ -364,8 +382,7 @@ class NonlinearModel:
             return self._checked("normalize", self.normalize(x), x, (self.n,))
 
     def _checked(self, name: str, found: Any, x: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-        if isinstance(found, (list, tuple)) and any(isinstance(each, FloatArray) for each in found):
-            found = np.stack(found)
+        found = _joined(found)
         if isinstance(found, FloatArray) and found.format == x.format and found.shape == shape:
             return found
         if isinstance(found, FloatArray):
@@ -376,6 +393,14 @@ class NonlinearModel:
             f"got {kind} from {name}; needed an array of shape {shape} in {x.format}; compute with the operations of "
             'the state, write constants as x.format.array("0.1"), and join components with np.stack'
         )
+
+
+def _joined(found: Any) -> Any:
+    """Join arrays of a format in lists, or in rows of lists; anything else stays as it is."""
+    if not isinstance(found, (list, tuple)):
+        return found
+    rows = [_joined(each) for each in found]
+    return np.stack(rows) if any(isinstance(each, FloatArray) for each in rows) else found
 
 
 AnyModel = LinearModel | NonlinearModel
@@ -400,8 +425,18 @@ def _inputs(u: Any) -> NDArray[Any]:
     return found
 
 
+def _points(given: Any) -> SigmaPoints:
+    try:
+        points = SigmaPoints(*given)
+        for each in points:
+            exact(each)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"got points {given!r}; needed SigmaPoints(alpha, beta, kappa): {error}") from None
+    return points
+
+
 def _angles(given: Sequence[int | str], noise: LinearModel) -> tuple[int, ...]:
-    if isinstance(given, (str, int)):
+    if given is None or isinstance(given, (str, int)):
         given = [given]
     names, found = noise.measurement_names, []
     for each in given:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
+from gpbnb.arithmetic.kernels.exact import SPECIAL
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_run import (
@@ -64,7 +65,7 @@ class NonlinearRun(SteppedRun):
 
     Raises
     ------
-    ValueError : a form that nonlinear filters, the unscented filter or blocks do not have.
+    ValueError : a form that nonlinear filters, the unscented filter or blocks do not have; a format with infinities.
     OverflowError : the model has entries beyond the range of the format.
     """
 
@@ -78,6 +79,10 @@ class NonlinearRun(SteppedRun):
     ) -> None:
         check_form(model, form, isinstance(fmt, BlockFormats))
         each = [getattr(fmt, name) for name in BLOCKS] if isinstance(fmt, BlockFormats) else [fmt] * len(BLOCKS)
+        if any(one.overflow in SPECIAL for one in each):
+            raise ValueError(
+                "got a format with infinities for a nonlinear filter; needed overflow='raise' or 'saturate'"
+            )
         of_state, of_gain, of_covariance, of_innovation = each
         super().__init__(model.n, model.m, of_state.array, form, checkpoint_steps)
         self.model, self.fmt = model, fmt
@@ -271,7 +276,8 @@ def nonlinear_reference(model: NonlinearModel, z: Any) -> list[Step]:
     ------
     ArithmeticError : results that depend on the number of bits; too many steps.
     """
-    return _reference(model, tuple(map(tuple, exact(z))))
+    measured = exact(z)
+    return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
 
 
 def nonlinear_checkpoints(model: NonlinearModel, z: Any, checkpoint_steps: Sequence[int]) -> Checkpoints:
@@ -281,18 +287,12 @@ def nonlinear_checkpoints(model: NonlinearModel, z: Any, checkpoint_steps: Seque
     return Checkpoints(tuple(checkpoint_steps), x, K, P)
 
 
-@lru_cache(maxsize=4)
-def _reference(model: NonlinearModel, z: tuple[tuple[Any, ...], ...]) -> list[Step]:
-    measured = np.array(z, dtype=object)
-    return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
-
-
-def _steps(model: NonlinearModel, z: NDArray[Any], bits: int) -> list[Step] | None:
-    """Return all steps in some bits; None if the run stops."""
+def _steps(model: NonlinearModel, z: NDArray[Any], bits: int) -> list[Step] | str:
+    """Return all steps in some bits, or why the run stops."""
     run = NonlinearRun(model, FloatFormat(2, bits), Form.INNOVATION, range(1, len(z) + 1))
     run.take(z)
     saved = run.checkpoints()
-    return None if run.stopped is not None else list(zip(saved.x, saved.K, saved.P, strict=True))
+    return run.reason or list(zip(saved.x, saved.K, saved.P, strict=True))
 
 
 def simulated(model: AnyModel, steps: int, seed: int = 0) -> NDArray[np.float64]:

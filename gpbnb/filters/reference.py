@@ -34,6 +34,9 @@ MOST_STEPS = 100_000
 AGREEMENT = 2.0**-104
 """Largest difference of two runs, relative to the largest value of each entry over all steps."""
 
+SINGULAR = "the innovation covariance may be singular"
+"""Why a reference is not determined, unless a run says more."""
+
 Step = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
@@ -57,14 +60,14 @@ def precise_steps(model: LinearModel, z: Any) -> list[Step]:
     return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
 
 
-def agreed(name: str, count: int, steps: Callable[[int], list[Step] | None]) -> list[Step]:
+def agreed(name: str, count: int, steps: Callable[[int], list[Step] | str]) -> list[Step]:
     """Return steps in bits that agree with twice as many.
 
     Parameters
     ----------
     name : name of the model.
     count : number of steps.
-    steps : function that returns all steps in a number of bits, or None if they cannot be computed in them.
+    steps : function that returns all steps in a number of bits, or why they cannot be computed in them.
 
     Raises
     ------
@@ -75,15 +78,16 @@ def agreed(name: str, count: int, steps: Callable[[int], list[Step] | None]) -> 
             f"{name}: its reference needs more than double-double, and {count:,} steps; needed at most "
             f"{MOST_STEPS:,}: R is very small beside H P H', or P0 very large; scale or correct the model"
         )
-    bits, found = BITS, None
+    bits = BITS
+    found: list[Step] | str = SINGULAR
     while bits <= MOST_BITS:
         before, found = found, steps(bits)
-        if before and found and _agree(before, found):
+        if not isinstance(before, str) and not isinstance(found, str) and _agree(before, found):
             return found
         bits *= 2
+    why = found if isinstance(found, str) else SINGULAR
     raise ArithmeticError(
-        f"{name}: its reference is not determined in {MOST_BITS} bits; the innovation covariance may be "
-        "singular: scale or correct the model"
+        f"{name}: its reference is not determined in {MOST_BITS} bits; {why}: scale or correct the model"
     )
 
 
@@ -96,8 +100,8 @@ def _agree(some: list[Step], others: list[Step]) -> bool:
     return True
 
 
-def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> list[Step] | None:
-    """Return all steps in some bits; None if an innovation covariance is singular in them."""
+def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> list[Step] | str:
+    """Return all steps in some bits, or why there are none: an innovation covariance is singular in them."""
     found: list[Step] = []
     with ctx.workprec(bits):
         cycles = [[_Balls.of(each) for each in cycle] for cycle in (model.Phi, model.H, model.Q, model.R)]
@@ -109,7 +113,7 @@ def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> list[Step] | None:
             try:
                 K = gain(_ALGEBRA, H, R, V).K
             except ZeroDivisionError:
-                return None
+                return SINGULAR
             P = updated(_ALGEBRA, Form.INNOVATION, StepModel(Phi, H, Q, R), V, K)
             ahead = Phi @ x + _Balls.of(state[:, None])
             x = corrected(_ALGEBRA, H, K, ahead, _Balls.of((measured - offset)[:, None]))

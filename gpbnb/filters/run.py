@@ -122,34 +122,8 @@ class Run:
             )
         fmt = fmt.model if isinstance(fmt, BlockFormats) else fmt
         self.model, self.fmt, self.form = model, fmt, compiled_form(form)
-        steps = np.array(checkpoint_steps).reshape(-1)
-        if steps.size and steps.dtype.kind not in "iu":
-            raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed whole numbers")
-        self.checkpoint_steps = steps.astype(np.int64)
-        if np.any(np.diff(self.checkpoint_steps, prepend=0) <= 0):
-            raise ValueError(
-                f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more"
-            )
-        if fmt is not None and bounded and fmt.overflow != "raise":
-            raise ValueError(
-                f"got a bound along with a run in {fmt}; needed overflow 'raise': a result that leaves the range "
-                "would be wrong by more than any rounding"
-            )
-        if not isinstance(sums, Sums):
-            raise TypeError(f"sums: got {sums!r}; needed Sums(...), such as Sums(fmt=BINARY32)")
-        if sums.fmt is not None and not isinstance(sums.fmt, (FloatFormat, FixedFormat)):
-            raise TypeError(f"sums: got {sums.fmt!r}; needed a FloatFormat or a FixedFormat")
-        if compensated and self.form not in (Form.INNOVATION, Form.JOSEPH):
-            raise ValueError(
-                f"got compensated summation in the {self.form} form; needed the innovation form or Joseph's"
-            )
-        if sums.order != "left" and self.form is Form.UD:
-            raise ValueError(f"got {sums.order} sums in the UD form; needed another form")
-        if records != 1 and (records < 1 or self.form is Form.UD or bounded or len(steps)):
-            raise ValueError(
-                f"got the {self.form} form and {records} records; needed at least one record, and for many no "
-                "bound, no checkpoints, and a form whose gain does not depend on the measurements: any but UD"
-            )
+        self.checkpoint_steps = _ascending(checkpoint_steps)
+        self._check(sums, compensated, bounded, records)
         #: The arithmetic of the compiled loops.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(*sums)
         start = opening(model, fmt, self.form, self.tag)
@@ -178,6 +152,29 @@ class Run:
             stored = model if fmt is None else model.rounded(fmt)
             first = covariance_of_factors(self.exactly(self.P)) if self.form is Form.UD else None
             self._carried = CarriedBound(stored, self.form, first, self.checkpoint_steps)
+
+    def _check(self, sums: Sums, compensated: bool, bounded: bool, records: int) -> None:
+        """Reject options that the format or the form does not have."""
+        if bounded and self.fmt is not None and self.fmt.overflow != "raise":
+            raise ValueError(
+                f"got a bound along with a run in {self.fmt}; needed overflow 'raise': a result that leaves the range "
+                "would be wrong by more than any rounding"
+            )
+        if not isinstance(sums, Sums):
+            raise TypeError(f"sums: got {sums!r}; needed Sums(...), such as Sums(fmt=BINARY32)")
+        if sums.fmt is not None and not isinstance(sums.fmt, (FloatFormat, FixedFormat)):
+            raise TypeError(f"sums: got {sums.fmt!r}; needed a FloatFormat or a FixedFormat")
+        if compensated and self.form not in (Form.INNOVATION, Form.JOSEPH):
+            raise ValueError(
+                f"got compensated summation in the {self.form} form; needed the innovation form or Joseph's"
+            )
+        if sums.order != "left" and self.form is Form.UD:
+            raise ValueError(f"got {sums.order} sums in the UD form; needed another form")
+        if records != 1 and (records < 1 or self.form is Form.UD or bounded or len(self.checkpoint_steps)):
+            raise ValueError(
+                f"got the {self.form} form and {records} records; needed at least one record, and for many no "
+                "bound, no checkpoints, and a form whose gain does not depend on the measurements: any but UD"
+            )
 
     def _in_blocks(self, start: Opening, formats: BlockFormats) -> Opening:
         """Return a start whose state and covariance are rounded into the formats of their blocks."""
@@ -426,6 +423,16 @@ class Run:
             gains[at] = combined_gain(list(K[at].T), UR[step % len(UR)], H[step % len(H)])
             covariances[at] = covariance_of_factors(U[at])
         return gains, covariances
+
+
+def _ascending(checkpoint_steps: Sequence[int]) -> NDArray[np.int64]:
+    """Return checkpoint steps as an array; reject those that are no whole numbers or do not ascend."""
+    steps = np.array(checkpoint_steps).reshape(-1)
+    if steps.size and steps.dtype.kind not in "iu":
+        raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed whole numbers")
+    if np.any(np.diff(steps.astype(np.int64), prepend=0) <= 0):
+        raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more")
+    return steps.astype(np.int64)
 
 
 def _exact_sum(high: float, low: float) -> Fraction:

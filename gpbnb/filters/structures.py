@@ -251,8 +251,11 @@ def sections_of(sos: Any) -> list[tuple[list[Fraction], list[Fraction]]]:
     """
     entries = exact(sos)
     if entries.ndim != 2 or entries.shape[1:] != (6,) or not len(entries):
+        fives = entries.size % 5 == 0 and entries.shape[-1:] != (6,)
+        cure = "; rows of CMSIS-DSP, b0, b1, b2, -a1, -a2, become b0, b1, b2, 1 and the last two with the other sign"
         raise ValueError(
             f"got sections of shape {entries.shape}; needed (sections, 6), rows of b0, b1, b2, a0, a1, a2 as in SciPy"
+            f"{cure if fives else ''}"
         )
     found = []
     for i, row in enumerate(entries):

@@ -8,12 +8,12 @@ from typing import Any
 
 from gpbnb.arithmetic.conversion import MaybeNone, Numbers
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, rounding_named
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search, largest_compiled
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import compiled_form, rounding_named, whole_number
+from gpbnb.filters.named import compiled_form, whole_number
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, simulated
 from gpbnb.filters.system import LinearSystem

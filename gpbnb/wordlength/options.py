@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import gpbnb
+from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.filters.forms import CONSTANT_GAIN, plain_name
-from gpbnb.filters.named import form_named, rounding_named
+from gpbnb.filters.named import form_named
 from gpbnb.names import NAMED_FORMATS, WITHOUT_LOOPS, format_parts
 from gpbnb.sweeps.numbers import plain_integer, plain_number
 

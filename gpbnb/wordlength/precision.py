@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, rounding_named
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search, largest_by_default, largest_compiled
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.gains import check_deterministic
@@ -26,7 +26,7 @@ from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
 from gpbnb.filters.missing import stored_measurements, without_missing
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_named, named, rounding_named, whole_number
+from gpbnb.filters.named import form_named, named, whole_number
 from gpbnb.filters.nonlinear import NO_GUARANTEE, AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun, check_form, complete, opened, simulated, true_states
 from gpbnb.filters.run import Run

@@ -20,6 +20,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.missing import without_missing
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named
+from gpbnb.filters.poles import stored_response
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem
 from gpbnb.sweeps import machine
@@ -82,6 +83,7 @@ class Report:
     blocks : name of each block, its digits together with the others, and alone; None if there is no answer.
     structure : structure of a digital filter that gives the answer; empty for another model.
     lacking : structures that the filter does not have, each with the reason.
+    stored : what storing its coefficients does to a digital filter at the answer; empty for another model.
     """
 
     name: str
@@ -109,6 +111,7 @@ class Report:
     blocks: tuple[tuple[str, int | None, int | None], ...] = ()
     structure: str = ""
     lacking: dict[str, str] = field(default_factory=dict)
+    stored: str = ""
 
     @property
     def limiting(self) -> int | None:
@@ -299,6 +302,9 @@ def study(
     if (blocks := asked.blocks(z, first.structure)) is not None:
         tell(f"blocks: {blocks}")
     met = _met(main)
+    stored = _stored(asked.structures.get(first.structure), main) if met else ""
+    if stored:
+        tell(f"{first.structure}: {stored}")
     model, fmt, within = asked.model, asked.fmt, asked.within
     is_filter = isinstance(model, LinearModel)
     width = model.p if isinstance(model, LinearSystem) else model.n
@@ -330,7 +336,19 @@ def study(
         blocks=_digits_of_blocks(blocks) if isinstance(blocks, BlockRequirement) else (),
         structure=first.structure,
         lacking=dict(asked.lacking),
+        stored=stored,
     )
+
+
+def _stored(system: LinearSystem | None, answer: Requirement | Judgement | FixedAnswer) -> str:
+    """Return in words what storing the coefficients does to a digital filter at an answer; empty for another model."""
+    fmt = answer.words if isinstance(answer, FixedAnswer) else answer.fmt
+    if system is None or fmt is None or not system.as_filter().program.is_linear:
+        return ""
+    try:
+        return str(stored_response(system, fmt))
+    except (ValueError, OverflowError):  # a filter that is not stable has no response
+        return ""
 
 
 def _met(answer: Requirement | Judgement | FixedAnswer) -> bool:
@@ -475,6 +493,7 @@ def page(report: Report) -> str:
         f"<h1>Wordlength for {html.escape(report.name)}</h1>",
         f'<p class="answer">This {report.kind} {verdict}.</p>',
         f"<p>{html.escape(report.text)}.</p>",
+        f"<p>At this answer, {html.escape(report.stored)}.</p>" if report.stored else "",
         limiting,
         "<h2>Basis of the answer</h2>",
         _table(

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search
-from gpbnb.bounds.envelope import FilterLimits, eigenvalue_sizes
+from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.probable import probable_error
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.named import named
+from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.wordlength.requirement import (
     Asked,
@@ -159,7 +160,7 @@ def weak_evidence(system: LinearSystem, true: NDArray[np.float64], tolerances: N
     """
     found = list[str]()
     entries = system.A.astype(np.float64)
-    radius = float(eigenvalue_sizes(entries).max()) if np.isfinite(entries).all() else math.inf
+    radius = float(np.abs(eigenvalues(entries)).max()) if np.isfinite(entries).all() else math.inf
     if 0 < radius < 1 and radius ** len(true) > _FORGOTTEN:
         steps = math.log(_FORGOTTEN) / math.log(radius)
         digits = max(len(str(int(steps))) - 2, 0)

@@ -193,6 +193,30 @@ def test_a_table_of_pandas_itself():
     assert BINARY128.array(table["count"]).to_fractions().tolist() == [2**53 + 1, 3]
     with pytest.raises(TypeError, match="needed a str, int, float"):
         BINARY64.array(pandas.Series([1, None], dtype="Int64"))
+    x, volt = FloatFormat(10, 3).array([3, 7]), pandas.Series([0.5, 0.25])
+    for found, expected in ((volt / x, ["0.167", "0.0357"]), (x - volt, ["2.5", "6.75"])):
+        assert found.format == x.format
+        assert found.to_fractions().tolist() == [Fraction(each) for each in expected]
+    with pytest.raises(ValueError, match=r"needed a number that .* holds exactly"):
+        table + x
+
+
+class Priority:
+    """What pandas does before it computes: it leaves the operation to an operand of higher priority."""
+
+    __pandas_priority__ = 4000
+
+    def __add__(self, other):
+        assert other.__pandas_priority__ > self.__pandas_priority__
+        return NotImplemented
+
+    def __array__(self, dtype=None, copy=None):
+        return np.array([1.0, 2.0])
+
+
+def test_pandas_leaves_an_operation_to_an_array_of_a_format():
+    found = Priority() + FloatFormat(10, 3).array(["0.001", "0.002"])
+    assert found.to_fractions().tolist() == [1, 2]
 
 
 @pytest.mark.parametrize("fmt", [*FORMATS, FloatFormat(2, 24)], ids=str)

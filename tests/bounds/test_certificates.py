@@ -382,6 +382,7 @@ FORGED: dict[str, tuple[str, Callable[[Content], None]]] = {
     "fixed coefficients of a Kalman filter": ("joseph", set_to("filter", "form", "fixed coefficients")),
 }
 NOT_COVERED = (
+    "an unknown overflow",
     "an overflow beside exponents",
     "an unknown entry of the format",
     "an unknown limit",

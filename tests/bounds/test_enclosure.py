@@ -13,7 +13,8 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.enclosure import FORMS, Enclosed, enclose
-from gpbnb.bounds.guarantee import FilterLimits, Guarantee, guarantee, limits
+from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.bounds.guarantee import Guarantee, guarantee, limits
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel, gain, predicted, updated
 from gpbnb.filters.model import LinearModel

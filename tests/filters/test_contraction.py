@@ -10,7 +10,6 @@ import pytest
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters import contraction
 from gpbnb.filters.kalman_step import StepModel
-from gpbnb.filters.kernels import contraction as kernels_contraction
 from gpbnb.report.kalman import exact_step
 
 UNIT = 2.0**-102
@@ -186,7 +185,7 @@ def test_the_spectral_norm_is_bounded_from_above_and_sharply(n):
         for scale in (0.5, 0.999999, 1.0, 3.0):
             X = Z / np.linalg.svd(Z)[1][0] * scale
             top = np.linalg.svd(X)[1][0]
-            found = kernels_contraction._norm2(X)
+            found = contraction._norm2(X)
             # Its square is sharp to a thousandth of its distance from 1, relatively; numpy's own error is below 1e-13.
             assert top * (1 - 1e-13) <= found <= top * (1 + 0.6e-3 * abs(1 - top**2)) + 1e-11
 

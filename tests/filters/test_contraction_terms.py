@@ -13,8 +13,8 @@ import pytest
 from exact_terms import plain
 
 from gpbnb.filters import contraction
-from gpbnb.filters.kernels import contraction as kernels
-from gpbnb.filters.kernels.contraction import Contraction
+from gpbnb.filters import contraction as kernels
+from gpbnb.filters.contraction import Contraction
 
 SHARE = F(1, 64)
 NAMES = ("_many", "_times", "_norm", "_norm2", "_is_positive", "_weights", "_inverse", "_inverse_general")

@@ -1,18 +1,14 @@
-"""gpbnb.filters.nonlinear: runs against plain loops over fractions, digit for digit.
-
-The loops are written from the equations of each form, with an explicit rounding after each operation. Elementary
-functions come from mpmath, with 300 bits, and are rounded once. Nothing is taken from the package but the answers.
-"""
+"""gpbnb.filters.nonlinear: runs against plain loops over fractions, digit for digit."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 
-import mpmath
 import numpy as np
 import pytest
 
 from gpbnb import (
+    BINARY32,
     FixedFormat,
     FixedIntervalSmoother,
     FloatFormat,
@@ -25,302 +21,21 @@ from gpbnb import (
 )
 from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.nonlinear import SigmaPoints
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, opened, simulated, true_states
 from gpbnb.filters.run import Run
 from gpbnb.wordlength.blocks import required_block_precisions
 from gpbnb.wordlength.precision import survey
 from gpbnb.wordlength.records import survey_records
-from tests.plain_structures import floating
-
-STEPS = 50
-PRECISE = mpmath.mp.clone()
-PRECISE.prec = 300
-
-
-def rounding(base, digits):
-    """A function that rounds to the nearest number with some digits, ties away from zero."""
-    return floating(base, digits, "nearest")
-
-
-def of_mpmath(r, function, *arguments):
-    """The value of a function of mpmath, rounded once."""
-    value = getattr(PRECISE, function)(*(PRECISE.mpf(a.numerator) / a.denominator for a in map(Fraction, arguments)))
-    sign, mantissa, exponent, _ = value._mpf_
-    return r((-1) ** sign * Fraction(int(mantissa)) * Fraction(2) ** exponent)
-
-
-class PlainMatrices:
-    """Matrices of fractions as lists of rows, with every operation rounded."""
-
-    def __init__(self, r):
-        self.r = r
-
-    def times(self, A, B):
-        def entry(row, column):
-            total = self.r(row[0] * column[0])
-            for a, b in zip(row[1:], column[1:], strict=True):
-                total = self.r(total + self.r(a * b))
-            return total
-
-        return [[entry(row, column) for column in zip(*B, strict=True)] for row in A]
-
-    def plus(self, A, B, sign=1):
-        return [[self.r(a + sign * b) for a, b in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
-
-    def take(self, A):
-        return [[self.r(a) for a in row] for row in A]
-
-
-def transposed(A):
-    return [list(row) for row in zip(*A, strict=True)]
-
-
-def eye(n):
-    return [[Fraction(i == j) for j in range(n)] for i in range(n)]
-
-
-def inverse(r, A):
-    """Elimination without exchanges, each operation rounded."""
-    m, A, C = len(A), [row[:] for row in A], eye(len(A))
-    for k in range(m):
-        for i in range(k + 1, m):
-            f = r(A[i][k] / A[k][k])
-            A[i] = [*A[i][: k + 1], *(r(A[i][j] - r(f * A[k][j])) for j in range(k + 1, m))]
-            C[i] = [r(c - r(f * d)) for c, d in zip(C[i], C[k], strict=True)]
-    for k in range(m - 1, -1, -1):
-        for i in range(k + 1, m):
-            C[k] = [r(c - r(A[k][i] * d)) for c, d in zip(C[k], C[i], strict=True)]
-        C[k] = [r(c / A[k][k]) for c in C[k]]
-    return C
-
-
-def factors(A):
-    """Exact factors U D U' of a covariance; D is on the diagonal."""
-    n, A, U = len(A), [row[:] for row in A], [[Fraction(0)] * len(A) for _ in A]
-    for j in range(n - 1, -1, -1):
-        U[j][j] = d = A[j][j]
-        for i in range(j):
-            U[i][j] = A[i][j] / d if d else Fraction(0)
-        for i in range(j):
-            for k in range(j):
-                A[i][k] -= U[i][j] * U[k][j] * d
-    return U
-
-
-class Ranges:
-    """A vehicle that measures range and bearing of a beacon, with its Jacobians written out."""
-
-    def __init__(self, beacon):
-        self.beacon = beacon
-
-    def emulated(self, x, u=None):
-        a, b = (x.format.array(each) - x[i] for i, each in enumerate(self.beacon))
-        return np.stack([np.hypot(a, b), np.arctan2(b, a)])
-
-    def plain(self, r, x, u):
-        a, b = (r(r(Fraction(each)) - x[i]) for i, each in enumerate(self.beacon))
-        c, s = of_mpmath(r, "hypot", a, b), r(r(a * a) + r(b * b))
-        rest = [Fraction(0)] * (len(x) - 2)
-        H = [[r(-a / c), r(-b / c), *rest], [r(b / s), r(-a / s), *rest]]
-        return [c, of_mpmath(r, "atan2", b, a)], H
-
-
-class Moving:
-    """States x and y, moved by known velocities u."""
-
-    n = 2
-
-    def emulated(self, x, u):
-        return x + u
-
-    def plain(self, r, x, u):
-        return [r(a + b) for a, b in zip(x, u, strict=True)], eye(2)
-
-
-class Turning:
-    """States x, y and heading, moved by a distance and a turn."""
-
-    n = 3
-
-    def emulated(self, x, u):
-        return np.stack([x[0] + u[0] * np.cos(x[2]), x[1] + u[0] * np.sin(x[2]), x[2] + u[1]])
-
-    def plain(self, r, x, u):
-        c, s = of_mpmath(r, "cos", x[2]), of_mpmath(r, "sin", x[2])
-        F = eye(3)
-        F[0][2], F[1][2] = r(u[0] * -s), r(u[0] * c)
-        return [r(x[0] + r(u[0] * c)), r(x[1] + r(u[0] * s)), r(x[2] + u[1])], F
-
-
-class Coasting:
-    """States x, y and two velocities, for steps of 0.1 s; the inputs are not used."""
-
-    n = 4
-
-    def emulated(self, x, u):
-        dt = x.format.array("0.1")
-        return np.stack([x[0] + dt * x[2], x[1] + dt * x[3], x[2], x[3]])
-
-    def plain(self, r, x, u):
-        dt = r(Fraction(1, 10))
-        F = eye(4)
-        F[0][2] = F[1][3] = dt
-        return [r(x[0] + r(dt * x[2])), r(x[1] + r(dt * x[3])), x[2], x[3]], F
-
-
-class PlainFilter:
-    """An extended Kalman filter in plain loops."""
-
-    def __init__(self, motion, sight, given, form, r, blocks=None, iterations=1):
-        self.motion, self.sight, self.form, self.iterations = motion, sight, form, iterations
-        blocks = blocks or {}
-        self.state, self.gain, self.covariance, self.innovation = (
-            PlainMatrices(blocks.get(name, r)) for name in ("state", "gain", "covariance", "innovation")
-        )
-        self.r = self.state.r
-        Q, R, x0, P0 = given
-        self.x = [self.r(r(a)) for a in x0]
-        if form is Form.UD:
-            Q, R, P0 = map(factors, (Q, R, P0))
-        self.Q, self.R = ([[r(a) for a in row] for row in each] for each in (Q, R))
-        self.P = self.covariance.take([[r(a) for a in row] for row in P0])
-
-    def step(self, z, u):
-        r = self.r
-        z, u = [r(Fraction(each)) for each in z], [r(Fraction(each)) for each in u]
-        ahead, F = self.motion.plain(r, self.x, u)
-        V = self.predicted(self.covariance.take(F))
-        x = ahead
-        for i in range(self.iterations):
-            expected, H = self.sight.plain(r, x, u)
-            y = [r(a - b) for a, b in zip(z, expected, strict=True)]
-            y[1] = self.wrapped(y[1])
-            if i:
-                moved = [[r(a - b)] for a, b in zip(ahead, x, strict=True)]
-                y = [r(a - b[0]) for a, b in zip(y, self.state.times(H, moved), strict=True)]
-            x, P = self.updated(ahead, V, H, y)
-        self.x, self.P = x, P
-
-    def wrapped(self, y):
-        r = self.r
-        turn = r(2 * of_mpmath(r, "atan2", 0, -1))
-        return r(y - r(round(r(y / turn)) * turn))
-
-    def predicted(self, F):
-        p = self.covariance
-        if self.form is Form.UD:
-            return self.thornton(F)
-        return p.plus(p.times(p.times(F, self.P), transposed(F)), p.take(self.Q))
-
-    def updated(self, ahead, V, H, y):
-        if self.form is Form.UD:
-            return self.bierman(ahead, V, H, y)
-        p, s, g = self.covariance, self.innovation, self.gain
-        VH = s.times(s.take(V), transposed(s.take(H)))
-        S = s.plus(s.times(s.take(H), VH), s.take(self.R))
-        K = g.times(g.take(VH), g.take(inverse(s.r, S)))
-        own = p.take(K)
-        W = p.plus(eye(len(V)), p.times(own, p.take(H)), -1)
-        P = p.times(W, V)
-        if self.form is Form.JOSEPH:
-            P = p.plus(p.times(P, transposed(W)), p.times(p.times(own, p.take(self.R)), transposed(own)))
-        step = self.state.times(self.state.take(K), [[a] for a in y])
-        return [self.r(a + b[0]) for a, b in zip(ahead, step, strict=True)], P
-
-    def thornton(self, F):
-        r, n = self.covariance.r, len(self.P)
-        unit = [[self.P[i][j] if i < j else Fraction(i == j) for j in range(n)] for i in range(n)]
-        Q = self.covariance.take(self.Q)
-        noise = [[Q[i][j] if i < j else Fraction(i == j) for j in range(n)] for i in range(n)]
-        W = [a + b for a, b in zip(self.covariance.times(F, unit), noise, strict=True)]
-        D = [self.P[i][i] for i in range(n)] + [Q[i][i] for i in range(n)]
-        U = [[Fraction(0)] * n for _ in range(n)]
-
-        def dot(a, b):
-            total = Fraction(0)
-            for left, right in zip(a, b, strict=True):
-                total = r(total + r(left * right))
-            return total
-
-        for j in range(n - 1, -1, -1):
-            c = [r(d * w) for d, w in zip(D, W[j], strict=True)]
-            U[j][j] = dot(W[j], c)
-            for i in range(j):
-                U[i][j] = r(dot(W[i], c) / U[j][j]) if U[j][j] else Fraction(0)
-                W[i] = [r(a - r(U[i][j] * b)) for a, b in zip(W[i], W[j], strict=True)]
-        return U
-
-    def bierman(self, ahead, U, H, y):
-        s, p, g, r = self.innovation.r, self.covariance.r, self.gain.r, self.r
-        n, m, U = len(U), len(y), [row[:] for row in U]
-
-        def without_correlation(one, columns):
-            rows = [list(row) for row in columns]
-            for i in range(m - 1, -1, -1):
-                for k in range(i + 1, m):
-                    rows[i] = [one(a - one(one(self.R[i][k]) * b)) for a, b in zip(rows[i], rows[k], strict=True)]
-            return rows
-
-        rows = without_correlation(s, self.innovation.take(H))
-        values = [row[0] for row in without_correlation(r, [[each] for each in y])]
-        change = [Fraction(0)] * n
-        for h, value, i in zip(rows, values, range(m), strict=True):
-            for j in range(n):
-                value = r(value - r(r(h[j]) * change[j]))
-            f = []
-            for j in range(n):
-                total = Fraction(0)
-                for k in range(j + 1):
-                    total = s(total + s(s(U[k][j]) * h[k] if k < j else h[j]))
-                f.append(total)
-            v = [s(s(U[j][j]) * f[j]) for j in range(n)]
-            a, K = s(self.R[i][i]), []
-            for j in range(n):
-                before, a = a, s(a + s(f[j] * v[j]))
-                column = [U[k][j] for k in range(j)]
-                if v[j]:
-                    U[j][j] = p(p(U[j][j] * p(before)) / p(a))
-                    factor = -p(p(f[j]) / p(before))
-                    for k in range(j):
-                        U[k][j] = p(U[k][j] + p(factor * p(K[k])))
-                for k in range(j):
-                    K[k] = g(K[k] + g(g(v[j]) * g(column[k])))
-                K.append(g(v[j]))
-            K = [g(each / g(a)) for each in K]
-            change = [r(c + r(r(k) * value)) for c, k in zip(change, K, strict=True)]
-        return [r(a + b) for a, b in zip(ahead, change, strict=True)], U
-
-
-def case(motion, seed):
-    """A model that passes a beacon, so that its bearing crosses π, with measurements of 50 steps."""
-    rng = np.random.default_rng(seed)
-    n = motion.n
-    Q = np.diag([2.0**-8] * n)
-    R = np.array([[2.0**-4, 2.0**-9], [2.0**-9, 2.0**-8]])
-    P0 = np.eye(n) + 2.0**-3
-    x0 = [4.0, -1.5, 2.0, 0.25][:n]
-    u = np.round(rng.normal(size=(STEPS, 2)) * 0.2, 3) + np.array([-0.2, 0.05])
-    sight = Ranges(["0.3", "0.2"])
-    model = NonlinearModel(motion.emulated, None, sight.emulated, None, Q, R, x0, P0, u=u, angles=[1])
-    x, z = np.array(x0), []
-    for k in range(STEPS):
-        fmt = FloatFormat(2, 53)
-        x = motion.emulated(fmt.array(x), fmt.array(u[k])).to_float() + rng.normal(size=n) / 16
-        a, b = 0.3 - x[0], 0.2 - x[1]
-        bearing = np.arctan2(b, a) + rng.normal() / 16
-        z.append([np.hypot(a, b) + rng.normal() / 4, (bearing + np.pi) % (2 * np.pi) - np.pi])
-    exactly = [[[Fraction(a) for a in row] for row in each] for each in (Q.tolist(), R.tolist(), P0.tolist())]
-    return model, np.round(z, 4), sight, (exactly[0], exactly[1], [Fraction(a) for a in x0], exactly[2]), u
-
-
-MOTIONS = {motion.n: motion for motion in (Moving(), Turning(), Coasting())}
-
-
-def plain_estimates(filter_, z, u):
-    for measured, known in zip(z.tolist(), u.tolist(), strict=True):
-        filter_.step(measured, known)
-        yield list(filter_.x)
+from tests.plain_nonlinear import (
+    MOTIONS,
+    STEPS,
+    UNSCENTED,
+    PlainFilter,
+    PlainUnscented,
+    case,
+    plain_estimates,
+    rounding,
+)
 
 
 @pytest.mark.parametrize(
@@ -456,80 +171,17 @@ def test_blocks_round_in_formats_of_their_own(form):
 
 @pytest.mark.parametrize("form", [Form.INNOVATION, Form.UD])
 def test_an_iterated_update_takes_functions_at_the_last_estimate(form):
-    motion, z, sight, given, u = MOTIONS[2], *case(MOTIONS[2], seed=4)[1:]
-    model = case(motion, seed=4)[0]
-    made = NonlinearModel(
-        model.f, None, model.h, None, model.noise.Q[0], model.noise.R[0], model.noise.x0, model.noise.P0, u=u,
-        angles=[1], iterations=3,
-    )  # fmt: skip
-    run = NonlinearRun(made, FloatFormat(2, 18), form, range(1, STEPS + 1))
+    model, z, sight, given, u = case(MOTIONS[2], seed=4, iterations=3)
+    run = NonlinearRun(model, FloatFormat(2, 18), form, range(1, STEPS + 1))
     run.take(z)
-    plain = PlainFilter(motion, sight, given, form, rounding(2, 18), iterations=3)
+    plain = PlainFilter(MOTIONS[2], sight, given, form, rounding(2, 18), iterations=3)
     assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
-
-
-class PlainUnscented(PlainFilter):
-    """An unscented filter in plain loops, with weights alpha = 1/2, beta = 2, kappa = 1."""
-
-    def step(self, z, u):
-        r, n = self.r, len(self.x)
-        z, u = [r(Fraction(each)) for each in z], [r(Fraction(each)) for each in u]
-        exactly = Fraction(1, 4) * (n + 1)
-        scale, center, other = r(exactly), r(1 - n / exactly + Fraction(11, 4)), r(1 / (2 * exactly))
-        L = self.root([[r(scale * a) for a in row] for row in self.P])
-        X = [self.x]
-        X += [[r(a + b) for a, b in zip(self.x, column, strict=True)] for column in transposed(L)]
-        X += [[r(a - b) for a, b in zip(self.x, column, strict=True)] for column in transposed(L)]
-        Y = [self.motion.plain(r, each, u)[0] for each in X]
-        Z = [self.sight.plain(r, each, u)[0] for each in Y]
-        ahead, D = self.mean(other, Y, lambda a, b: [r(c - d) for c, d in zip(a, b, strict=True)])
-        expected, E = self.mean(other, Z, self.difference)
-        weights = [center, *[other] * (2 * n)]
-        plain = self.state
-        weighted = [[r(a * w) for a, w in zip(column, weights, strict=True)] for column in transposed(D)]
-        V = plain.plus(plain.times(weighted, D), self.Q)
-        across = [[r(a * w) for a, w in zip(column, weights, strict=True)] for column in transposed(E)]
-        S = plain.plus(plain.times(across, E), self.R)
-        K = plain.times(plain.times(weighted, E), inverse(r, S))
-        y = self.difference(z, expected)
-        self.P = plain.plus(V, plain.times(plain.times(K, S), transposed(K)), -1)
-        change = plain.times(K, [[a] for a in y])
-        self.x = [r(a + b[0]) for a, b in zip(ahead, change, strict=True)]
-
-    def difference(self, a, b):
-        y = [self.r(c - d) for c, d in zip(a, b, strict=True)]
-        return [y[0], self.wrapped(y[1])]
-
-    def mean(self, weight, points, difference):
-        r, total = self.r, None
-        for point in points[1:]:
-            part = [r(weight * a) for a in difference(point, points[0])]
-            total = part if total is None else [r(a + b) for a, b in zip(total, part, strict=True)]
-        mean = [r(a + b) for a, b in zip(points[0], total, strict=True)]
-        return mean, [difference(each, mean) for each in points]
-
-    def root(self, A):
-        r, n = self.r, len(A)
-        L = [[Fraction(0)] * n for _ in range(n)]
-        for j in range(n):
-            rest = [A[i][j] for i in range(n)]
-            for k in range(j):
-                rest = [r(a - r(L[i][k] * L[j][k])) for i, a in enumerate(rest)]
-            L[j][j] = of_mpmath(r, "sqrt", rest[j])
-            for i in range(j + 1, n):
-                L[i][j] = r(rest[i] / L[j][j])
-        return L
 
 
 @pytest.mark.parametrize(("n", "base", "digits"), [(2, 2, 24), (3, 10, 7), (4, 2, 14)])
 def test_the_unscented_filter_has_the_digits_of_plain_loops(n, base, digits):
-    model, z, sight, given, u = case(MOTIONS[n], seed=n)
-    noise = model.noise
-    made = NonlinearModel(
-        model.f, None, model.h, None, noise.Q[0], noise.R[0], noise.x0, noise.P0, u=u, angles=[1],
-        method="unscented", points=SigmaPoints("0.5", 2, 1),
-    )  # fmt: skip
-    run = NonlinearRun(made, FloatFormat(base, digits), Form.INNOVATION, range(1, STEPS + 1))
+    model, z, sight, given, u = case(MOTIONS[n], seed=n, **UNSCENTED)
+    run = NonlinearRun(model, FloatFormat(base, digits), Form.INNOVATION, range(1, STEPS + 1))
     run.take(z)
     assert run.stopped is None, run.reason
     plain = PlainUnscented(MOTIONS[n], sight, given, Form.INNOVATION, rounding(base, digits))
@@ -722,6 +374,13 @@ def without_rule(x):
         ({"iterations": 0}, ValueError, "iterations"),
         ({"iterations": 2, "method": "unscented"}, ValueError, "for the unscented filter"),
         ({"points": (0, 2, 0), "method": "unscented"}, ValueError, "needed alpha other than zero"),
+        ({"points": None}, TypeError, r"got points None; needed SigmaPoints\(alpha, beta, kappa\)"),
+        ({"points": ("a", 2, 0)}, ValueError, r"got points \('a', 2, 0\); needed SigmaPoints.*: got 'a'"),
+        ({"angles": None}, ValueError, "got the angle None; needed a measurement, 0 to 1"),
+        ({"h": lambda x, u: x}, TypeError, r"got h with other arguments: .*'u'; needed h\(x\), for a model without u"),
+        ({"u": [[1]]}, TypeError, r"got f with other arguments: .*; needed f\(x, u\), for a model with u"),
+        ({"residual": lambda z: z}, TypeError, r"got residual .*; needed residual\(z, predicted\)$"),
+        ({"normalize": lambda: 1}, TypeError, r"got normalize .*; needed normalize\(x\)$"),
         ({"u": [1, 2]}, ValueError, r"got u of shape \(2,\); needed \(steps, p\)"),
         ({"u": [[1], [2]], "steps": 3}, ValueError, "got u for 2 steps; needed one row for each of the 3"),
         ({"R": [[0, 0], [0, 1]]}, ValueError, "R"),
@@ -754,6 +413,39 @@ def test_a_function_that_leaves_the_format_is_refused(function, error, message):
             NonlinearRun(NonlinearModel(function, slopes, h, None, **NOISE), FloatFormat(2, 24)).take(RECORD)
 
 
+@pytest.mark.parametrize(
+    ("function", "why"),
+    [
+        (lambda x: np.log(x - 5), "an argument outside the domain of a function at step 1"),
+        (lambda x: 1 / x, "a division by zero at step 1"),
+        (lambda x: np.exp(x * 100) ** 2, "overflow at step "),
+    ],
+)
+def test_a_reference_that_stops_says_why(function, why):
+    with pytest.raises(ArithmeticError, match=f"is not determined in 4096 bits; {why}"):
+        required_precision(NonlinearModel(function, None, lambda x: x, None, **NOISE), 60, 0.01, z=RECORD)
+
+
+def test_a_constant_that_changes_changes_the_reference():
+    constants = {"growth": 1}
+
+    def f(x):
+        return x * constants["growth"] / 4
+
+    model = NonlinearModel(f, None, lambda x: x, None, **NOISE)
+    required_precision(model, 60, 0.01, z=RECORD)
+    constants["growth"] = 2
+    alike = NonlinearModel(lambda x: x / 2, None, lambda x: x, None, **NOISE)
+    first, second = (nonlinear_reference(each, RECORD)[-1][0] for each in (model, alike))
+    assert first.tolist() == second.tolist()
+
+
+def test_a_format_with_infinities_is_refused():
+    fmt = FloatFormat(2, 11, emin=-14, emax=15, overflow="infinity")
+    with pytest.raises(ValueError, match="got a format with infinities for a nonlinear filter"):
+        NonlinearRun(by_functions(), fmt)
+
+
 def test_forms_that_a_nonlinear_filter_does_not_have_are_refused():
     fmt = FloatFormat(2, 24)
     for form in (Form.HUNG, Form.HUNG_SECOND_GAIN, ArrayForm.COMPENSATED):
@@ -781,8 +473,15 @@ def test_jacobians_may_be_given():
     def H(x):
         return x.format.array(SEEN)
 
+    def rows(x):
+        return [[x.format.array(each) for each in row] for row in SEEN]
+
     given = by_functions()
     made = NonlinearModel(given.f, F, given.h, H, **NOISE)
+    in_lists = NonlinearModel(given.f, F, given.h, rows, **NOISE)
+    assert NonlinearRun(in_lists, FloatFormat(2, 24)).states(RECORD).shape == (60, 2, 2)
+    assert np.array_equal(in_lists.measured(BINARY32.array([1, 2]), None)[1], BINARY32.array(SEEN))
+    seen.clear()
     states = NonlinearRun(made, FloatFormat(2, 24)).states(RECORD)
     assert np.array_equal(states, NonlinearRun(given, FloatFormat(2, 24)).states(RECORD))
     assert len(seen) == len(RECORD)

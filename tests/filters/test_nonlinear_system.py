@@ -18,6 +18,7 @@ from gpbnb import (
     required_precision,
 )
 from gpbnb.filters.program import steps_in_python
+from tests.plain_nonlinear import drawn
 from tests.plain_structures import fixed, floating, limited
 from tests.step_functions import SYSTEMS, Native, clipped_controller
 
@@ -63,50 +64,19 @@ def test_the_program_has_the_digits_of_the_step(system, fmt):
         assert x == found[k].tolist()
 
 
-OPERATIONS = [
-    lambda a, b, c: a + b,
-    lambda a, b, c: a - b * c,
-    lambda a, b, c: a / (abs(b) + 1),
-    lambda a, b, c: np.sqrt(abs(a)),
-    lambda a, b, c: np.fmod(a, b * b + 1),
-    lambda a, b, c: a % 2,
-    lambda a, b, c: np.where(a < b, c, -a),
-    lambda a, b, c: np.where((a <= b) ^ (b > c), a, b),
-    lambda a, b, c: np.where(~((a == b) | (c != a)) & (c >= 0), abs(c), 0),
-    lambda a, b, c: np.where((a > 0) == (b > 0), b, c),
-    lambda a, b, c: np.clip(a, -1, 2),
-    lambda a, b, c: np.minimum(np.maximum(a, b), 1),
-    lambda a, b, c: np.maximum(-1, np.minimum(2, a)) + c,
-    lambda a, b, c: np.floor(a) / 2 + np.rint(b) / 4,
-    lambda a, b, c: np.sign(a) * np.copysign(b, c),
-]
-
-
-def drawn(seed):
-    """A step of random operations on states, inputs and constants."""
-    random = np.random.default_rng(seed)
-    steps = random.integers(0, 1000, (25, 4)).tolist()
-
-    def step(fmt, x, u):
-        known = [*x, *u, *fmt.array(["0.7", "-1.5", 0, 1])]
-        for kind, *choice in steps:
-            operands = (known[each % len(known)] for each in choice)
-            known.append(OPERATIONS[kind % len(OPERATIONS)](*operands))
-        return [np.clip(each, -4, 4) for each in known[-3:]], known[-8:-3]
-
-    return NonlinearSystem(step, ["0.3", "-0.2", 0], 2)
-
-
 @needs("seed", range(40))
 def test_programs_of_random_steps(seed):
-    system, u = drawn(seed), inputs(SYSTEMS[3], 6, 1.0)
+    (system, plain), u = drawn(seed), inputs(SYSTEMS[3], 6, 1.0)
     fmt, r = PLAIN[seed % len(PLAIN)]
     program, (coefficients,) = system.program(fmt)
     found = np.asarray(system.states(fmt, u).to_fractions())
     x = [*map(r, system.x0), *[Fraction(0)] * program.p]
+    state = x[: system.n]
     for k, row in enumerate(u):
-        x = steps_in_python(program, r, coefficients, x, [r(Fraction(each)) for each in row])
-        assert x == found[k].tolist()
+        given = [r(Fraction(each)) for each in row]
+        x = steps_in_python(program, r, coefficients, x, given)
+        state, outputs = plain(r, state, given)
+        assert x == found[k].tolist() == [*state, *outputs]
 
 
 def test_a_limit_is_one_operation():

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import json
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -129,8 +130,13 @@ def is_basis(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and node.value == "guarantee"
 
 
-def calls(code: str) -> Iterator[str]:
+@cache
+def calls(code: str) -> tuple[str, ...]:
     """Return the calls that compute a guarantee, and the lists of bases that contain it."""
+    return tuple(_calls(code))
+
+
+def _calls(code: str) -> Iterator[str]:
     for node in ast.walk(ast.parse(code)):
         if isinstance(node, ast.Call):
             name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")

@@ -228,7 +228,7 @@ def test_a_year_shows_the_stored_run(pages, t, rule, quantity):
     assert sorted(each for _, each in ends) == sorted(stored)
     heights = [float(f"{last[each]:.3g}") for _, each in sorted(ends)]
     assert heights == sorted(heights, reverse=True)
-    assert np.diff(sorted(y for y, _ in ends)).min() >= 13.9
+    assert np.diff(sorted(y for y, _ in ends)).min() >= 12.5
     step, ulp = (float(found[name][1:].split()[0]) for name in ("step", "ulp"))
     decade = (found["width"] - 72) / -math.floor(math.log10(8192 * 2.0**-53))
     assert (step - ulp) / decade == pytest.approx(math.log10(6606 / 3153600 / 2.0 ** (13 - bits)), abs=0.01)

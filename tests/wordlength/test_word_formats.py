@@ -88,7 +88,7 @@ def test_the_command_answers_in_fraction_bits(tmp_path, capsys):
     printed = capsys.readouterr().out
     system = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"], "direct form I")
     z = np.ones((80, 1))
-    assert printed.startswith(f"{required_fraction_bits(system, z, 0.01)}\n")
+    assert printed.startswith(f"direct form I: {required_fraction_bits(system, z, 0.01)}\n")
     assert str(required_word_formats(system, z, 0.01)) in printed
     for more, message in (
         (["--digits", "9"], "got --fixed with --digits"),

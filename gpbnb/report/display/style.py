@@ -281,7 +281,8 @@ def name_ends(ax: Axes, ends: Mapping[str, tuple[float, str]]) -> list[Annotatio
         far = bool((np.abs(moves) > TEXT / 2).any())
         for note, move in zip(notes, moves, strict=True):
             note.set_position((18 if far else 6, move))
-            note.arrow_patch.set_visible(far)
+            if note.arrow_patch:
+                note.arrow_patch.set_visible(far)
 
     if isinstance(ax.figure, BookFigure):
         ax.figure.last_moves.append(move_apart)

@@ -24,11 +24,18 @@ function compute({ t, chop, quantity }, data) {
   return { t, chop, quantity, bits: run.t, ulp, errors: run.errors, end: errors.at(-1), unit, name, stored, when, place };
 }
 
-// Places at least a line apart, within limits, for the ends of curves from the highest to the lowest.
-function apart(ends, top, bottom) {
-  const line = 14;
-  ends.forEach((each, i) => (each.place = Math.max(each.end, i ? ends[i - 1].place + line : top)));
-  for (let i = ends.length - 1, limit = bottom; i >= 0; i--, limit = ends[i + 1].place - line) ends[i].place = Math.min(ends[i].place, limit);
+// Places a line apart for names of curves, as close as possible to their ends, which are sorted from the highest on.
+function apart(ends, top) {
+  const line = 12.6;
+  for (const each of ends) each.place = each.end;
+  for (let round = 0; round < 200; round++) {
+    for (let i = 1; i < ends.length; i++) {
+      const overlap = Math.max(0, line - (ends[i].place - ends[i - 1].place));
+      ends[i - 1].place -= overlap / 2;
+      ends[i].place += overlap / 2;
+    }
+  }
+  ends.forEach((each, i) => (each.place = Math.max(each.place, i ? ends[i - 1].place + line : top)));
 }
 
 function draw({ add, width, values, data, scale, axes, show, superscript }) {
@@ -52,7 +59,7 @@ function draw({ add, width, values, data, scale, axes, show, superscript }) {
   for (const run of shown) if (run.t !== bits) add("path", { class: "faint", d: curve(run.errors[quantity]) });
   // Each curve has its bits at its end, moved apart where curves end close together.
   const ends = shown.map((run) => ({ bits: run.t, end: y.place(run.errors[quantity].at(-1)) })).sort((a, b) => a.end - b.end);
-  apart(ends, top, bottom);
+  apart(ends, top - 4);
   add("text", { x: width - 4, y: 14, "text-anchor": "end" }, "bits");
   for (const each of ends) {
     add("path", { class: "faint", d: `M${right} ${each.end.toFixed(1)}L${right + 12} ${each.place.toFixed(1)}` });

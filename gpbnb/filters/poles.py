@@ -1,0 +1,117 @@
+"""Poles and frequency response of a digital filter, as given and with its coefficients stored in a format."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
+from gpbnb.filters.program import matrices
+from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.words import WordFormats, integer_program
+
+_FLOOR = 60.0
+"""Decibels below the peak of a response down to which its changes count."""
+
+
+def eigenvalues(A: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Return the eigenvalues of a matrix, (n,), in float64.
+
+    The eigenvalues of a cascade are those of its sections. Taken from the whole matrix, four low-pass sections with
+    poles of size 0.9995 have one of size 1.017, so each group of states that influence each other is taken by itself.
+    """
+    reached = (A != 0) | np.eye(len(A), dtype=np.bool_)
+    for _ in range(len(A).bit_length()):
+        reached = reached @ reached  # in twice as many steps
+    groups = np.unique(reached & reached.T, axis=0)
+    blocks = [A[np.ix_(group, group)] for group in groups]
+    return np.concatenate([np.linalg.eigvals(block).astype(np.complex128) for block in blocks])
+
+
+class StoredResponse(NamedTuple):
+    """What storing its coefficients in a format does to a stable filter.
+
+    Parameters
+    ----------
+    format : the format in words.
+    pole, stored_pole : size of the pole nearest to the unit circle, as given and as stored.
+    change : largest change of the frequency response in dB, where it is at most 60 dB below its peak.
+    frequency : where that change is, in cycles per sample.
+    """
+
+    format: str
+    pole: float
+    stored_pole: float
+    change: float
+    frequency: float
+
+    def __str__(self) -> str:
+        return (
+            f"coefficients stored in {self.format} move the largest pole from size {self.pole:.9g} to "
+            f"{self.stored_pole:.9g}, and the response by up to {self.change:.2g} dB, at {self.frequency:.4g} of the "
+            f"sampling rate, down to {_FLOOR:.0f} dB below its peak"
+        )
+
+
+def stored_response(system: LinearSystem, fmt: FloatFormat | FixedFormat | WordFormats) -> StoredResponse:
+    """Compare poles and frequency response of a stable filter with those of its coefficients as a format stores them.
+
+    The responses are computed in float64, on a grid that is fine near each pole.
+
+    Raises
+    ------
+    ValueError : the filter is not stable, as given or as stored.
+    OverflowError : a coefficient beyond the range of its format.
+
+    Examples
+    --------
+    >>> from gpbnb import BINARY16, LinearSystem
+    >>> found = stored_response(LinearSystem.from_coefficients(["0.01"], [1, "-0.99"]), BINARY16)
+    >>> found.pole, round(found.stored_pole, 4), round(found.change, 2), found.frequency
+    (0.99, 0.9902, 0.21, 0.0)
+    """
+    data = fmt.data if isinstance(fmt, WordFormats) else fmt
+    words = str(fmt) if isinstance(fmt, WordFormats) else arithmetic(fmt)
+    if isinstance(fmt, WordFormats):
+        made, n = integer_program(system.as_filter(), fmt), system.n
+        A, B = matrices(made.program, made.coefficients)
+        stored: tuple[Any, ...] = (A[:n, :n], B[:n], A[n:, :n], B[n:])
+    else:
+        if cause := system.unstable(data):
+            raise ValueError(cause)
+        stored = system.stored(data)
+    near, far = _numbers((system.A, system.B, system.C, system.D)), _numbers(stored)
+    poles, moved = eigenvalues(near[0]), eigenvalues(far[0])
+    if not max(np.abs(poles).max(), np.abs(moved).max()) < 1:
+        raise ValueError(f"got a filter that is not stable, as given or with {words}; needed poles of sizes below 1")
+    at = _frequencies(np.concatenate([poles, moved]))
+    given, other = (np.abs(_response(each, at)) for each in (near, far))
+    heard = given >= given.max(axis=0) * 10 ** (-_FLOOR / 20)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        change = np.where(heard & (given > 0), np.abs(20 * np.log10(other / given)), 0.0).max(axis=(1, 2))
+    k = int(change.argmax())
+    return StoredResponse(words, float(np.abs(poles).max()), float(np.abs(moved).max()), float(change[k]), float(at[k]))
+
+
+def _numbers(given: tuple[Any, ...]) -> list[NDArray[np.float64]]:
+    return [np.asarray(each, dtype=np.float64) for each in given]
+
+
+def _frequencies(poles: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return frequencies from 0 to 1/2, with 33 within four times the distance of each pole from the unit circle."""
+    beside = np.linspace(-4, 4, 33)[:, None] * np.maximum(1 - np.abs(poles), 1e-9) + np.abs(np.angle(poles))
+    everywhere = [np.linspace(0, 0.5, 1001), np.logspace(-7, math.log10(0.5), 500)]
+    found = np.concatenate([*everywhere, beside.ravel() / math.tau])
+    return np.unique(found[(found >= 0) & (found <= 0.5)])
+
+
+def _response(given: list[NDArray[np.float64]], frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Return the response at frequencies in cycles per sample, (k, p, m)."""
+    A, B, C, D = given
+    z = np.exp(1j * math.tau * frequencies)[:, None, None]
+    return np.asarray(C @ np.linalg.solve(z * np.eye(len(A)) - A, np.broadcast_to(B, (len(z), *B.shape))) + D)

@@ -1,0 +1,68 @@
+"""Poles and responses of stored coefficients, against SciPy's evaluation of the same coefficients."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from gpbnb import BINARY16, FixedFormat, FloatFormat, LinearSystem, WordFormats
+from gpbnb.filters.poles import eigenvalues, stored_response
+from gpbnb.wordlength.__main__ import main
+
+
+@pytest.mark.parametrize("digits", [11, 16, 24])
+@pytest.mark.parametrize(("order", "cutoff"), [(2, 0.02), (4, 0.05), (8, 0.2)])
+def test_the_change_of_a_response_is_that_of_scipy(order, cutoff, digits):
+    """Within the pass band, where both grids find the largest change; SciPy evaluates sections, not matrices."""
+    sos = signal.butter(order, cutoff, output="sos")
+    fmt = FloatFormat(2, digits)
+    stored = np.array([[float(fmt.round(float(c))) for c in row] for row in sos])
+    found = stored_response(LinearSystem.from_sections(sos), fmt)
+    grid = np.concatenate([np.linspace(0, 0.5, 20_001), [found.frequency]])
+    given, other = (np.abs(signal.freqz_sos(each, grid, fs=1)[1]) for each in (sos, stored))
+    heard = given >= 1e-3 * given.max()
+    expected = np.abs(20 * np.log10(other[heard] / given[heard]))
+    assert found.change == pytest.approx(expected[-1], rel=1e-6, abs=1e-9)  # float64 evaluates both
+    assert expected.max() * 0.99 - 1e-9 <= found.change
+    assert found.pole == pytest.approx(max(abs(p) for row in sos for p in np.roots(row[3:])), rel=1e-9)
+    assert found.stored_pole == pytest.approx(max(abs(p) for row in stored for p in np.roots(row[3:])), rel=1e-9)
+
+
+def test_coefficients_in_words_have_their_own_format():
+    slow, system = (LinearSystem.from_sections(signal.butter(2, cutoff, output="sos")) for cutoff in (0.02, 0.1))
+    data = FixedFormat(2, 29)
+    short, long = (stored_response(system, WordFormats(data, bits)) for bits in (8, 15))
+    assert short.change > 10 * long.change
+    assert "coefficients of 8 significant bits" in str(short)
+    with pytest.raises(ValueError, match="not stable, as given or with data of 32 bits"):
+        stored_response(slow, WordFormats(data, 8))
+    with pytest.raises(ValueError, match="the system as given is not stable"):
+        stored_response(LinearSystem([[1]], [[1]]), BINARY16)
+
+
+def test_eigenvalues_of_a_cascade_are_those_of_its_sections():
+    A = np.array([[0.999, 0, 0], [1e6, 0.999, 0], [1e12, 1e6, 0.999]])
+    assert np.abs(np.linalg.eigvals(A)).max() == pytest.approx(0.999)
+    assert eigenvalues(A).tolist() == [0.999] * 3
+    turn = np.array([[0, -0.25], [1, 0]])
+    assert sorted(eigenvalues(turn), key=lambda z: z.imag) == pytest.approx([-0.5j, 0.5j])
+
+
+def test_the_command_says_what_storing_does(tmp_path, capsys):
+    (tmp_path / "low.toml").write_text("b = [0.01]\na = [1, -0.99]\n", encoding="utf-8")
+    report = tmp_path / "report.html"
+    given = [str(tmp_path / "low.toml"), "--tolerance", "0.01", "--simulate", "step", "--steps", "2000"]
+    assert main([*given, "--basis", "emulation", "--report", str(report)]) == 0
+    told = capsys.readouterr().err
+    assert "bits move the largest pole from size 0.99 to 0.989990234" in told
+    assert json.loads(report.with_suffix(".json").read_text())["stored"] in told
+    assert "At this answer, coefficients stored in" in report.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("rows", [[[1, 2, 1, 0.5, -0.2]], [1, 2, 1, 0.5, -0.2, 1, 2, 1, 0.5, -0.2]])
+def test_rows_of_five_are_recognised_as_those_of_cmsis(rows):
+    with pytest.raises(ValueError, match="rows of CMSIS-DSP, b0, b1, b2, -a1, -a2, become b0, b1, b2, 1 and the last"):
+        LinearSystem.from_sections(rows)
