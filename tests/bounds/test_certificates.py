@@ -145,6 +145,29 @@ DEGENERATE = (28,)
 """Nothing is measured, and all numbers are zero; but the checker, which rounds outwards, claims positive bounds."""
 
 
+@pytest.mark.parametrize("peak", range(1, 12))
+def test_an_error_that_peaks_within_a_block_of_steps_counts(peak: int) -> None:
+    """The checker moves its set once a block, and bounds the steps between by the first and the last."""
+    cycle = [[["1"]] for _ in range(12)]
+    cycle[peak - 1], cycle[peak] = [["64"]], [["1/64"]]
+    model = LinearModel(cycle, [["1/1024"]], [["1/64"]], [["1"]], ["1"], [["1"]], steps=12)
+    content = written(model, FloatFormat(2, 11), limits(1, 1, state=100, innovation=1))
+    prove(content)
+    scale_bound("0.999")(content)
+    assert f"may exceed its bound after step {peak}" in refused(content)
+
+
+def test_a_row_is_bounded_by_rows_near_it() -> None:
+    rng = np.random.default_rng(41)
+    for _ in range(200):
+        segments, (row, *others) = rng.integers(-99, 100, (5, 3)).tolist(), rng.integers(-9, 10, (3, 3)).tolist()
+        most = lambda row, segments=segments: int(np.abs(np.array(segments) @ row).sum())  # noqa: E731
+        box, shares, whole = [most(unit) for unit in np.eye(3, dtype=int)], rng.integers(-9, 10, 2).tolist(), 7
+        known = [(share, other, most(other)) for share, other in zip(shares, others, strict=True)]
+        assert most(row) <= check.near(row, known, whole, box)
+        assert check.near(row, [(whole, row, most(row))], whole, box) == most(row)
+
+
 def test_a_running_sum_is_proved_for_its_steps() -> None:
     """It keeps its errors, so only a number of steps has a bound."""
     made = LinearSystem([["1"]], [["1"]]).as_filter()
