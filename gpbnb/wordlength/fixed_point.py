@@ -273,7 +273,7 @@ def required_fraction_bits(
         kind = "function" if callable(given) else type(given).__name__
         raise ValueError(f"got like={like!r} for a {kind}; needed a FixedFormat, with integer bits for its numbers")
     else:
-        strategy = _Runs(_of_runs(given, z, tolerance, basis, form, like), like)
+        strategy = _Runs(_of_runs(given, z, tolerance, basis, form, like).error, like)
     largest = LARGEST_FRACTION - 1
     found = Search(strategy.error, strategy.like, (), largest=largest, least=strategy.least)
     ratios = dict(found.tried)
@@ -472,12 +472,12 @@ class _Outputs(_Strategy):
 class _Runs(_Strategy):
     """Errors of the runs of a function or a Kalman filter, against a reference in floating point."""
 
-    def __init__(self, runs: Strategy, like: FixedFormat) -> None:
+    def __init__(self, error: Callable[[Any], Outcome], like: FixedFormat) -> None:
         super().__init__(like, np.ones(1))
-        self._runs = runs
+        self._error = error
 
     def error(self, fmt: FixedFormat) -> Outcome:
-        ratio, why = self._runs.error(fmt)
+        ratio, why = self._error(fmt)
         return Outcome(ratio, why and f"fail: {why}")
 
 
