@@ -81,10 +81,11 @@ function keepPunctuation(formula) {
   kept.append(formula, after);
 }
 
-// A formula that is too wide even so, such as a matrix on a phone, is set smaller, as far as it can be read.
+// A formula that is too wide even so, such as a matrix on a phone or in the ledger, is set smaller, as far as it can be
+// read. Other tables are as wide as their formulas.
 const SMALLEST = 0.6;
 function shrinkToLine(boxes = [...document.querySelectorAll("article mjx-container")]) {
-  const wide = boxes.filter((box) => box.matches('[display="true"]') && !box.closest("td"));
+  const wide = boxes.filter((box) => (box.closest("td") ? box.closest(".ledger-table") : box.matches('[display="true"]')));
   for (const box of wide) if (box.dataset.size) box.style.fontSize = box.dataset.size;
   const shares = wide.map((box) => box.clientWidth / box.scrollWidth);
   wide.forEach((box, i) => {

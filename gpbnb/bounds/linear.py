@@ -137,7 +137,7 @@ def _gains(matrices: tuple[Any, ...], terms: int | None, accuracy: float) -> Int
         raise ValueError(
             f"the gain over {terms + 1} steps cannot be enclosed in balls of {most} bits; take fewer steps"
         )
-    raise ValueError(f"the gain cannot be enclosed in balls of {most} bits; write the filter as a cascade of sections")
+    raise ValueError(f"the gain cannot be enclosed in balls of {most} bits; use another structure")
 
 
 def _check_terms(terms: int | None) -> None:
