@@ -74,8 +74,8 @@ class FloatFormat(Makes[FloatArray]):
     directed toward it; there is only one NaN. E4M3, which has NaN and no infinity, gives NaN in its place. Elementary
     functions, remainders and sorting need finite entries, and treat negative zero as zero.
     :func:`~gpbnb.arithmetic.flags.flags` counts the exceptions of IEEE 754. Such a format computes on Python integers,
-    about a thousand times slower than compiled loops. Filters have compiled loops for "saturate" in base 2 up to 52
-    bits, or 53 unless ties go away from zero, and in base 16.
+    about a thousand times slower than compiled loops. Filters have compiled loops for "saturate" in base 2 up to 53
+    bits, or 52 if ties go away from zero, and in base 16.
 
     References
     ----------

@@ -47,7 +47,7 @@ from gpbnb.wordlength.system import weak_evidence
 Basis = Literal["emulation", "guarantee"]
 LARGEST_FRACTION = 60  # bits
 COEFFICIENT_BITS = 15
-"""Significant bits of a coefficient, if none are given: those of a word of 16 bits."""
+"""Significant bits of a coefficient if none are given, as in a word of 16 bits."""
 LONGEST_COEFFICIENT = 53
 """Significant bits of a coefficient up to which more of them are tried where the coefficients limit a filter."""
 _MORE_INTEGER_BITS = 16
