@@ -270,7 +270,7 @@ class Arithmetic:
         return u
 
 
-class Exact(Arithmetic):
+class ExactArithmetic(Arithmetic):
     """The same algorithms with exact numbers."""
 
     unit, fit = 1, Fraction  # type: ignore[assignment]
@@ -281,11 +281,11 @@ class Exact(Arithmetic):
 
 def definite(given: Any, strictly: bool = False) -> bool:
     """Whether a matrix of exact numbers is symmetric and positive semidefinite or, strictly, definite."""
-    u = Exact().factors(given)
+    u = ExactArithmetic().factors(given)
     return given == turned(given) and u is not None and not (strictly and any(not u[i][i] for i in range(len(u))))
 
 
-class Program:
+class StepOperations:
     """The operations of a step on n states and m measurements; a product has a coefficient and a value."""
 
     def __init__(self, n: int, m: int) -> None:
@@ -353,7 +353,7 @@ class Kalman:
 
     def step(self, k: int, P: Any) -> tuple[Any, Any, list[int]]:
         """The next covariance, or its factors; the operations of step k + 1; and the values that become the states."""
-        made, (Phi, H, Q, R), a = Program(self.n, self.m), self.members(k), self.a
+        made, (Phi, H, Q, R), a = StepOperations(self.n, self.m), self.members(k), self.a
         z = made.z
         if self.form == "ud":
             P, above, rows, gains = self.factor_step(k, P)
@@ -434,7 +434,7 @@ class ExactCovariance:
         n, m, unit, bits = self.n, len(H), self.unit, self.bits
         V = each(add, around(Phi, self.low), Q)
         W = across(H, V)
-        inverse, positive = Exact().inverse(each(add, across(W, H), R))
+        inverse, positive = ExactArithmetic().inverse(each(add, across(W, H), R))
         need(positive, "an innovation covariance is not definite")
         den = lcm(*(x.denominator for row in inverse for x in row))
         T, WT = each(lambda x: int(x * den), inverse), turned(W)
@@ -472,7 +472,7 @@ def near(row: Any, known: Any, whole: int, box: Any) -> int:
     return up(sum(abs(share) * most for share, _, most in known) + size(rest, box), whole)
 
 
-class Reach:
+class ErrorSet:
     """A set that contains an error or a state: segments of the last steps, a box, and an ellipsoid for all before."""
 
     def __init__(self, sizes: Any, loops: int, message: str, start: Any = ()) -> None:
@@ -510,7 +510,7 @@ class Reach:
 
     def advance(self, steps: Any, keep: int, last: int) -> None:
         """Take some steps, after each of which some rows, first those of the states, must be within limits."""
-        new, P, after = Reach(self.sizes, self.loops, self.message), self.one, []
+        new, P, after = ErrorSet(self.sizes, self.loops, self.message), self.one, []
         for F, columns, slack, rows, limits in steps:
             new.move(F)
             new.add(columns, slack, [len(columns)])
@@ -696,7 +696,7 @@ class Proof:
     def run(self) -> None:
         """Take the first steps, and prove that all later ones remain within the limits."""
         parts, first = self.coefficients(), self.first if self.steps is None else self.steps
-        states, errors = Reach(self.X, self.loops, STATE, self.x0), Reach(self.b, self.loops, ERROR)
+        states, errors = ErrorSet(self.X, self.loops, STATE, self.x0), ErrorSet(self.b, self.loops, ERROR)
         rows, most = self.seen(0)
         need(all(states.most(row) <= x << self.loops for row, x in zip(rows, most, strict=True)), STATE)
         for k in range(0, first, BLOCK):
@@ -715,7 +715,7 @@ class Proof:
                 steps = [self.step(0, next(parts), None)]
             self.remain(errors, [step[0] for step in steps])
 
-    def remain(self, reach: Reach, steps: Any) -> None:
+    def remain(self, reach: ErrorSet, steps: Any) -> None:
         """Prove that a vector remains within limits after the steps of a period, and after all later ones."""
         for phase, (*_, rows, limits) in enumerate(steps):
             found = self.later(rows, phase, steps, reach.sizes, reach, limits)
