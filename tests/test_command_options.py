@@ -40,6 +40,7 @@ OPTIONS = {
             "--emax": (None, "exponent of the largest number; default: unlimited"),
             "--form": (None, 'covariance update of a Kalman filter, such as "innovation", "Joseph", "UD"'),
             "--fixed": (False, "answer for a linear system in fraction bits of fixed point"),
+            "--coefficients": (None, "with --fixed: significant bits of each coefficient"),
             "--mixed": (False, "lower each block of a Kalman filter"),
             "--basis": (None, "how to find the precision; may be given more than once; default: emulation and bound"),
             "--state": (None, LIMITS.format("state")),

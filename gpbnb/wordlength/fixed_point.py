@@ -39,7 +39,7 @@ from gpbnb.filters.words import (
     run_integers,
     run_words,
 )
-from gpbnb.wordlength.precision import recorded_strategy
+from gpbnb.wordlength.precision import checked_question, recorded_strategy
 from gpbnb.wordlength.recursion import Recursion, recursion_strategy
 from gpbnb.wordlength.requirement import Asked, Strategy, largest_ratio
 from gpbnb.wordlength.system import weak_evidence
@@ -489,7 +489,8 @@ def _of_runs(
         return recursion_strategy(given, None, tolerance, z, 2, basis, most)
     if basis != "emulation":
         raise ValueError(f'got basis "{basis}" for {given.name}; needed "emulation"; for a LinearModel, use guarantee')
-    return recorded_strategy(given, Asked(len(z) if hasattr(z, "__len__") else 1, basis), tolerance, form, z)
+    tolerances = checked_question(given, [like], tolerance, basis)
+    return recorded_strategy(given, Asked(len(z) if hasattr(z, "__len__") else 1, basis), tolerances, form, z)
 
 
 def _of_system(

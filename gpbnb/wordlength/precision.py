@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.conversion import Numbers
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.rounding import Rounding, rounding_named
@@ -297,7 +298,7 @@ def _checked_largest(model: AnyModel | LinearSystem, largest: int | None, like: 
 
 
 def checked_question(
-    model: AnyModel, formats: Sequence[FloatFormat], tolerance: Any, basis: str
+    model: AnyModel, formats: Sequence[FloatFormat | FixedFormat], tolerance: Any, basis: str
 ) -> NDArray[np.float64]:
     """Check a question about a filter in some formats, and return the tolerance of each state, (n,).
 

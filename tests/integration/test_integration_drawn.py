@@ -10,6 +10,7 @@ import pytest
 from drawn import BLUE, GREEN, GREY, ORANGE, PINK, VIOLET, at, labelled, look, named, near, pictured, points_of
 from matplotlib.colors import to_hex
 from matplotlib.patches import ArrowStyle, Circle, FancyArrowPatch, Rectangle
+from matplotlib.text import Text
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
@@ -382,7 +383,7 @@ def test_names_that_would_collide_move_apart(ax, swept):
     close = np.array([9.0, 3.0, 1.05])
     figures.errors_over_rate(replace(swept, rounding=np.stack([close, close * 1.05])), ax)
     ax.figure.canvas.draw()
-    boxes = {text.get_text(): text.get_window_extent() for text in ax.texts}
+    boxes = {text.get_text(): Text.get_window_extent(text) for text in ax.texts}
     low, middle, high = (boxes[text] for text in ("discretization", "11 bits", "20 bits, chopped"))
     assert low.y1 < middle.y1
     assert middle.y1 < high.y1

@@ -220,7 +220,7 @@ def test_an_answer_below_the_limit_of_compiled_loops_is_found_without_trying_mor
 def test_a_model_ends_at_the_compiled_loops_or_below():
     system, z = LinearSystem([["0.9"]], [["0.1"]]), Z.reshape(-1, 1)
     found = required_precision(system, 200, 1e-30, z=z, rounding="even")
-    assert str(found).startswith("no precision up to 52 digits, the most with compiled loops in base 2, rounded even, ")
+    assert str(found).startswith("no precision up to 53 digits, the most with compiled loops in base 2, rounded even, ")
     assert "up to 9 digits, where largest=9 ends" in str(required_precision(system, 200, 1e-30, z=z, largest=9))
     for model, measured in ((system, z), (examples.tracker(), None)):
         with pytest.raises(ValueError, match=r"got largest=54 for a model; needed at most 53, .* function of a format"):
