@@ -123,9 +123,9 @@ A_YEAR = Picture(
     start={"t": "24", "chop": "to nearest", "quantity": "drift rate"},
     sentence="{stored}With {bits} bits, the error of the {name} {when}. At the end of the year it is {end} {unit}. "
     "{place}.",
-    caption="Above, one run of the filter with circles at its checkpoints, and the other stored runs in grey. Each "
-    "curve ends at its number of bits. Below, what one step adds to a drift angle, beside the last place of that "
-    "angle. Short grey lines mark the last place for the other runs.",
+    caption="Above, one run of the filter with circles at its checkpoints, and the other stored runs in grey. The "
+    "number at the end of each curve gives its bits. Below, what one step adds to a drift angle, beside the last place "
+    "of that angle. Short grey lines mark the last place for the other runs.",
     data=year_data,
     still=_year_still,
     alt="Error of the drift rate over a year, on logarithmic axes, for 18, 24, 32 and 40 bits. More bits give smaller "

@@ -21,7 +21,7 @@ DIP = ("8/17", "-15/17")
 """The horizontal and the upward part of the direction of the magnetic field at the sensor, a dip of about 62°."""
 
 RECORD = Path(__file__).parent / "ngimu.csv"
-"""Two seconds of an inertial sensor turned by hand. The file ngimu_licence.txt names its origin."""
+"""Two seconds of an inertial sensor that rests and is then moved. The file ngimu_licence.txt names its origin."""
 
 _DOUBLE = FloatFormat(2, 53)
 
@@ -134,8 +134,9 @@ def attitude(steps: int = 100) -> tuple[NonlinearModel, NDArray[np.float64]]:
 
     The filter is the extended Kalman filter of AHRS with its default noises. It takes the measured directions from the
     scaled quaternion, and their Jacobian from the quaternion before it is scaled. The noise of the gyroscopes goes
-    through the turn; here, their errors are three more states, which gives the same filter. The sensor, an NGIMU, is
-    turned by hand, 49 times a second.
+    through the turn; here, their errors are three more states, which gives the same filter. The direction of the field,
+    ``DIP``, and the first quaternion are ours; AHRS takes the first quaternion from the first sample. The sensor, an
+    NGIMU, was sampled about 50 times a second.
 
     Returns
     -------
