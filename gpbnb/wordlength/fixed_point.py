@@ -41,7 +41,7 @@ from gpbnb.filters.words import (
 )
 from gpbnb.wordlength.precision import checked_question, recorded_strategy
 from gpbnb.wordlength.recursion import Recursion, recursion_strategy
-from gpbnb.wordlength.requirement import Asked, Strategy, largest_ratio
+from gpbnb.wordlength.requirement import Asked, Strategy, checked_tolerance, largest_ratio
 from gpbnb.wordlength.system import weak_evidence
 
 Basis = Literal["emulation", "guarantee"]
@@ -80,7 +80,8 @@ class FixedAnswer:
     fmt : the format; None if no format tried meets the tolerance.
     tried : fraction bits, and largest error or bound / tolerance, infinite if a number overflows.
     why : why the next smaller format was rejected.
-    words : the formats of data, coefficients and sums; None for a function, or if there is no answer.
+    words : the formats of data, coefficients and sums; None for a function or a Kalman filter, or if there is no
+        answer.
     steps : number of steps for which a guarantee holds, if the system never forgets its errors; None if it holds for
         ever.
     warnings : as of a :class:`gpbnb.wordlength.requirement.Requirement`.
@@ -231,7 +232,7 @@ def required_fraction_bits(
         accuracy does not matter.
     basis : "emulation" of these measurements; or "guarantee", for a system for all inputs that are never larger than
         the largest of `z`, with a proof that nothing overflows, and for a scaled filter for all measurements that do
-        not overflow. For a Kalman filter, call :func:`gpbnb.bounds.guarantee.guarantee` instead.
+        not overflow. For a linear Kalman filter, call :func:`gpbnb.bounds.guarantee.guarantee` instead.
     rounding, coefficient_bits, wide : as for :func:`emulated`.
     like : formats for a system or a function, in place of `rounding`, `coefficient_bits` and `wide`. They set the
         integer bits, the rounding and the overflow. The search changes the fraction bits of the data, and those of the
@@ -264,11 +265,12 @@ def required_fraction_bits(
     if not isinstance(given, ScaledFilter | LinearSystem | LinearModel | NonlinearModel) and not callable(given):
         raise TypeError(f"got a {type(given).__name__}; needed a LinearSystem, a model or a function")
     if isinstance(given, ScaledFilter):
-        goal = _goal(tolerance, given.filter.program.n)
+        goal = checked_tolerance(tolerance, given.filter.program.n, "states", basis)
         strategy = _States(given, z, goal, rounding, (coefficient_bits, wide), basis)
     elif isinstance(given, LinearSystem):
         words = WordFormats(like) if isinstance(like, FixedFormat) else like
-        strategy = _of_system(given, z, _goal(tolerance, given.p), basis, rounding, (coefficient_bits, wide), words)
+        goal = checked_tolerance(tolerance, given.p, "outputs", basis)
+        strategy = _of_system(given, z, goal, basis, rounding, (coefficient_bits, wide), words)
     elif not isinstance(like, FixedFormat):
         kind = "function" if callable(given) else type(given).__name__
         raise ValueError(f"got like={like!r} for a {kind}; needed a FixedFormat, with integer bits for its numbers")
@@ -302,7 +304,7 @@ def words_error(
 
     def error(words: WordFormats) -> Outcome:
         if not made:
-            goal = _goal(tolerance, system.p)
+            goal = checked_tolerance(tolerance, system.p, "outputs", basis)
             made["known"] = _of_system(system, z, goal, basis, words.data.rounding, (1, False), words)
         return made["known"].of_words(words)
 
@@ -378,8 +380,8 @@ class _States(_Strategy):
         if basis == "guarantee":
             try:
                 self._bounds = bound_per_unit(given, *options)
-            except ValueError:
-                self._cause = _without_bound(given, options[0])
+            except ValueError as error:
+                self._cause = _without_bound(given, options[0], error)
                 self._bounds = np.full(len(goal), math.inf)
 
     def errors(self, fmt: FixedFormat) -> NDArray[np.float64]:
@@ -462,10 +464,11 @@ class _Outputs(_Strategy):
         stored = f"{given} significant bits" if isinstance(given, int) else arithmetic(given)
         ratio, refused = self.error(fmt)
         misses = refused and f"words are refused: {refused.removeprefix('are refused: ')}"
+        named = "coefficient_bits, or --coefficients in the command" if self._widens else "coefficients of WordFormats"
         return (
             f"the coefficients limit the filter, whatever the fraction bits of the data: stored in {stored}, "
             f"{misses or f'they give {ratio:.3g} times the tolerance'}; {found.fmt.precision} significant bits of each "
-            "coefficient are enough (coefficient_bits, or --coefficients in the command)"
+            f"coefficient are enough ({named})"
         )
 
 
@@ -487,9 +490,9 @@ def _of_runs(
     if callable(given):
         most = LARGEST_FRACTION + max(like.integer_bits, 0)
         return recursion_strategy(given, None, tolerance, z, 2, basis, most)
+    tolerances = checked_question(given, [like], tolerance, basis)
     if basis != "emulation":
         raise ValueError(f'got basis "{basis}" for {given.name}; needed "emulation"; for a LinearModel, use guarantee')
-    tolerances = checked_question(given, [like], tolerance, basis)
     return recorded_strategy(given, Asked(len(z) if hasattr(z, "__len__") else 1, basis), tolerances, form, z)
 
 
@@ -526,13 +529,6 @@ def with_fraction_bits(words: WordFormats, fraction: int) -> WordFormats:
     )
 
 
-def _goal(tolerance: Any, count: int) -> NDArray[np.float64]:
-    goal = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), (count,))
-    if not (goal > 0).all() or not np.isfinite(goal).any():
-        raise ValueError(f"got tolerance {tolerance}; needed errors above 0, one of them finite")
-    return goal
-
-
 def _words(made: LinearFilter, fmt: FixedFormat, coefficient_bits: int, wide: bool) -> WordFormats:
     """Return formats for coefficients with a binary point each, and with `wide` for sums without roundings."""
     if not wide:
@@ -551,7 +547,7 @@ def _largest_stored(made: LinearFilter, z: NDArray[np.float64], start: NDArray[n
     return float(sizes[kept].max() if wide else sizes.max())
 
 
-def _without_bound(given: ScaledFilter, coefficient_bits: int) -> str:
+def _without_bound(given: ScaledFilter, coefficient_bits: int, error: ValueError) -> str:
     """Return in words why a filter has no bound that holds for ever."""
     program, coefficients = given.filter.program, given.filter.coefficients
     if not is_stable(matrices(program, coefficients)[0]):
@@ -559,7 +555,7 @@ def _without_bound(given: ScaledFilter, coefficient_bits: int) -> str:
     if not is_stable(matrices(program, stored_coefficients(given.filter, coefficient_bits))[0]):
         stored = f"stored in {coefficient_bits} bits"
         return f"the filter is stable, but not with its coefficients {stored}; raise coefficient_bits"
-    return "the filter is stable, but decays too slowly for a bound: its response lasts for millions of steps"
+    return f"the filter is stable, but {error}"
 
 
 def stored_coefficients(made: LinearFilter, bits: int) -> NDArray[Any]:

@@ -81,9 +81,9 @@ class Report:
     fixed : whether digits are fraction bits of fixed point.
     mixed : the answer for the blocks of a Kalman filter in words; empty if it was not asked for.
     blocks : name of each block, its digits together with the others, and alone; None if there is no answer.
-    structure : structure of a digital filter that gives the answer; empty for another model.
+    structure : structure that gives the answer for a digital filter or a constant gain; empty for another model.
     lacking : structures that the filter does not have, each with the reason.
-    stored : what storing its coefficients does to a digital filter at the answer; empty for another model.
+    stored : what storing the coefficients does to a linear system at the answer; empty for another model.
     """
 
     name: str
@@ -341,7 +341,7 @@ def study(
 
 
 def _stored(system: LinearSystem | None, answer: Requirement | Judgement | FixedAnswer) -> str:
-    """Return in words what storing the coefficients does to a digital filter at an answer; empty for another model."""
+    """Return in words what storing the coefficients does to a linear system at an answer; empty for another model."""
     fmt = answer.words if isinstance(answer, FixedAnswer) else answer.fmt
     if system is None or fmt is None or not system.as_filter().program.is_linear:
         return ""
@@ -358,12 +358,21 @@ def _met(answer: Requirement | Judgement | FixedAnswer) -> bool:
 def _fewest(
     found: Sequence[tuple[_Part, Requirement | Judgement | FixedAnswer]],
 ) -> tuple[_Part, Requirement | Judgement | FixedAnswer]:
-    """Return the answer with the fewest digits on the first basis, or the smallest error; the first if none is met."""
+    """Return the answer with the fewest digits on the first basis, in fixed point with the shortest word.
+
+    Among equals, it is the one with the smallest error; the first of all if none is met.
+    """
     of_basis = [(part, each) for part, each in found if part.basis == found[0][0].basis]
     met = [(part, each) for part, each in of_basis if _met(each)]
 
-    def cost(pair: tuple[_Part, Requirement | Judgement | FixedAnswer]) -> float:
-        return pair[1].ratio if isinstance(pair[1], Judgement) else float(_digits(pair[1]) or 0)
+    def cost(pair: tuple[_Part, Requirement | Judgement | FixedAnswer]) -> tuple[float, ...]:
+        answer = pair[1]
+        if isinstance(answer, Judgement):
+            return (answer.ratio,)
+        digits = _digits(answer)
+        if answer.fmt is None or digits is None:
+            return ()
+        return answer.fmt.precision, dict(answer.tried)[digits]
 
     return min(met or of_basis[:1], key=cost)
 

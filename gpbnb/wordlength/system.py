@@ -156,7 +156,8 @@ def weak_evidence(system: LinearSystem, true: NDArray[np.float64], tolerances: N
 
     Parameters
     ----------
-    true : (steps, p, 2), outputs of the system as given. tolerances : (p,).
+    true : (steps, p, 2), outputs of the system as given.
+    tolerances : (p,).
     """
     found = list[str]()
     entries = system.A.astype(np.float64)

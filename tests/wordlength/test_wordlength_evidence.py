@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -106,6 +107,26 @@ def test_the_command_takes_the_bits_of_coefficients(tmp_path, capsys):
         assert message in capsys.readouterr().err
     assert main([*given[:-1], "--coefficients", "24"]) == 2
     assert "got --coefficients; needed --fixed with it" in capsys.readouterr().err
+
+
+def test_of_all_structures_the_one_with_the_shortest_word_answers(tmp_path, capsys):
+    """Here direct form II needs as few fraction bits, but more integer bits, and stands first in the list."""
+    (tmp_path / "low.toml").write_text('b = [0.02, 0.04, 0.02]\na = [1, -1.56, 0.64]\nstructure = "all"\n')
+    given = [str(tmp_path / "low.toml"), "--tolerance", "0.001", "--simulate", "noise", "--steps", "200", "--fixed"]
+    assert main([*given, "--basis", "emulation"]) == 0
+    printed = capsys.readouterr()
+    lines = re.findall(r"^(.+), emulation: \d+ .* in a word of (\d+) bits", printed.out + printed.err, re.MULTILINE)
+    words = {name: int(bits) for name, bits in lines}
+    named, answer = printed.out.splitlines()[-1].split(": ", 1)
+    assert len(words) > 5
+    assert f"in a word of {min(words.values())} bits" in answer
+    assert words[named] == min(words.values())
+
+
+def test_a_tolerance_for_other_outputs_is_refused_in_fixed_point():
+    system = LinearSystem.from_coefficients(["0.1"], [1, "-0.9"])
+    with pytest.raises(ValueError, match="needed an error above 0 for each of the 1 outputs"):
+        required_fraction_bits(system, np.ones((50, 1)), [0.001, 1])
 
 
 # -- what a refusal says ----------------------------------------------------------------------------------------------
