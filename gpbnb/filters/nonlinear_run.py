@@ -81,7 +81,7 @@ class NonlinearRun(SteppedRun):
         each = [getattr(fmt, name) for name in BLOCKS] if isinstance(fmt, BlockFormats) else [fmt] * len(BLOCKS)
         if any(one.overflow in SPECIAL for one in each):
             raise ValueError(
-                "got a format with infinities for a nonlinear filter; needed overflow='raise' or 'saturate'"
+                "got a format with infinities for a nonlinear filter; needed another overflow, such as 'raise'"
             )
         of_state, of_gain, of_covariance, of_innovation = each
         super().__init__(model.n, model.m, of_state.array, form, checkpoint_steps)

@@ -35,7 +35,8 @@ class UnscentedModel(NamedTuple):
     f, h : functions of a state (n,).
     difference : function of two measurements (m,).
     scale : :math:`n + \lambda`.
-    means, covariances : weights (2n + 1,). Q (n, n), R (m, m).
+    means, covariances : weights, (2n + 1,).
+    Q, R : (n, n) and (m, m).
     """
 
     f: Callable[[Matrix], Matrix]

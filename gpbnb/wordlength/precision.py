@@ -266,6 +266,9 @@ def survey_formats(
 ) -> list[Outcome]:
     """Run a filter in each format; return the largest error or bound / tolerance, and the reason if it is infinite."""
     tolerances = checked_question(model, formats, tolerance, basis)
+    if isinstance(model, LinearModel):
+        for fmt in formats:
+            fmt.check_compiled()
     model, z = complete(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):

@@ -251,3 +251,11 @@ def test_a_response_that_lasts_too_long_is_named() -> None:
     for found in (peak_gain, largest_gains):
         with pytest.raises(ValueError, match="decays too slowly for a bound: its response is not negligible after"):
             found(exact(slow), exact([[1]]), exact([[1]]))
+
+
+def test_a_positive_gain_below_the_numbers_of_float64_is_not_bounded_by_zero() -> None:
+    small = F(1, 2**570)
+    found = peak_gain(exact([[0]]), exact([[small]]), exact([[small]]))
+    assert found.low == 0
+    assert small**2 <= F(float(found.high[0, 0]))
+    assert peak_gain(exact([[0]]), exact([[0]]), exact([[1]])).high == 0

@@ -24,7 +24,7 @@ from gpbnb.filters.named import form_named
 from gpbnb.filters.run import Run, reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
 from gpbnb.filters.system import LinearSystem, unobserved
-from gpbnb.wordlength import precision
+from gpbnb.wordlength import examples, precision
 from gpbnb.wordlength.precision import required_precision
 from gpbnb.wordlength.requirement import listed
 
@@ -574,3 +574,9 @@ def test_an_unobserved_state_that_grows_is_the_cause_where_there_is_no_answer(ba
         evidence = "by a guarantee for ever" if basis == "guarantee" else "by three times the probable error"
         instead = 'ask with basis "bound" for a number of steps instead'
         assert str(found) == f"no precision meets the tolerance {evidence}: {cause}; {instead}"
+
+
+def test_a_format_without_compiled_loops_is_refused_and_not_called_too_short():
+    for fmt in (FloatFormat(3, 6), FloatFormat(2, 60)):
+        with pytest.raises(ValueError, match="compiled loops"):
+            precision.survey_formats(examples.tracker(), np.zeros((5, 1)), 0.01, [fmt])
