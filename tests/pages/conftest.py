@@ -82,6 +82,7 @@ def look_at(open_page):
                 page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
                 page.set_viewport_size(tools.PAPER)
                 page.emulate_media(media="print")
+                page.evaluate(tools.RESTED)
             shown = address, page, look
             return page
 
