@@ -176,10 +176,9 @@ def read_structures(source: str | Path | Mapping[str, Any]) -> dict[str, LinearS
     ------
     ValueError, OSError : as for :func:`read_model`.
     """
-    given, where = _read(source)
-    if not _is_design(given):
+    if (found := _read_design(source)) is None:
         return {}
-    design, structure = _design(given, where)
+    design, structure, where = found
     try:
         if structure == "all":
             return design.systems("all")
@@ -196,10 +195,9 @@ def lacking_structures(source: str | Path | Mapping[str, Any]) -> dict[str, str]
     ------
     ValueError, OSError : as for :func:`read_model`.
     """
-    given, where = _read(source)
-    if not _is_design(given):
+    if (found := _read_design(source)) is None:
         return {}
-    design, structure = _design(given, where)
+    design, structure, _ = found
     return design.lacking("all") if structure == "all" else design.lacking()
 
 
@@ -212,6 +210,12 @@ def compares_all(source: str | Path | Mapping[str, Any]) -> bool:
     """
     given, _ = _read(source)
     return _is_design(given) and given.get("structure") == "all"
+
+
+def _read_design(source: str | Path | Mapping[str, Any]) -> tuple[FilterDesign, str | None, str] | None:
+    """Return the design of a digital filter, its structure, and where they stand; None for another model."""
+    given, where = _read(source)
+    return (*_design(given, where), where) if _is_design(given) else None
 
 
 def _read(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:

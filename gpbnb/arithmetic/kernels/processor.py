@@ -123,9 +123,10 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
 
 
 def _with_residuals(fit: Any, exact_product: int) -> dict[str, Any]:
-    """Make the scalar operations that round the nearest float64 p and the sign of a residual by ``fit``.
+    """Make the scalar operations of a format whose results ``fit`` rounds.
 
-    Products of numbers of at most `exact_product` digits have none.
+    ``fit`` takes the nearest float64 to the exact result, and the sign of what is left. Products of numbers of at most
+    `exact_product` digits leave nothing.
     """
 
     @inner(forceinline=True)
