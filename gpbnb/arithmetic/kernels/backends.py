@@ -404,6 +404,8 @@ class Floats(Compiled):
         limited = isinstance(tag, Limited)
         if a.shape[0] * n * b.shape[1] < _MANY or (limited and not isinstance(tag.mode, ShortEven | LongEven)):
             return tag
+        if limited and isinstance(tag.mode, ShortEven) and a.shape[0] == b.shape[1] == 1:
+            return tag  # the range check of a single sum costs nothing
         gradual, least, largest = (tag.gradual, tag.least, tag.largest) if limited else (0.0, LEAST, LIMIT)
         low, high, smallest, biggest = self._extents(a, b)
         low, high = extents_of_sums(n, self.base, self.precision, gradual, low, high)
