@@ -96,7 +96,7 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
     if mode is ShortEven:
         return {**_short(_within), "fused": operations(digits, Even)["fused"]}
     if mode is LongEven:
-        return _with_residuals(_fit_53, 0)
+        return {**_with_residuals(_fit_53, 0), "fused": _fused_of_53}
     dropped = inner(forceinline=True)(_DROPPED[digits])
     round_magnitude = inner(forceinline=True)(_MODES[mode])
 
@@ -316,6 +316,14 @@ def _fused_sum(a: Any, b: Any, c: Any) -> Any:
     zero = (a == 0.0) | (b == 0.0)
     w = w if zero | (abs(p) >= LEAST) else np.nan
     return w, (low if low != 0.0 else lowest), (w == 0.0) & (zero | (c != 0.0))
+
+
+@inner(forceinline=True)
+def _fused_of_53(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    w, rest, zero = _fused_sum(a, b, c)
+    # Where s + v is a tie, the residual `lowest` may make the other neighbour the nearest.
+    near = fma(a, b, c)
+    return _fit_53(fmt, near if w == w else w, rest if near == w else w - near, zero)
 
 
 # -- by the machine ----------------------------------------------------------------------------------
