@@ -20,7 +20,7 @@ from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.arithmetic.rounding import Rounding, rounding_named
+from gpbnb.arithmetic.rounding import Rounding, digits_text, rounding_named
 from gpbnb.arithmetic.search import Outcome, Search
 from gpbnb.bounds.words import WordGuarantee, bounded_rounding, largest_rounding
 from gpbnb.filters.array_forms import AnyForm
@@ -101,7 +101,8 @@ class FixedAnswer:
         if self.fmt is None:
             return f"no format, by {basis}: {self.why}"
         word = 1 + self.fmt.precision
-        return f"{self.fmt.fraction_bits} fraction bits in a word of {word} bits, by {basis}; {self.why}{end}"
+        fraction = digits_text(self.fmt.fraction_bits, kind="fraction")
+        return f"{fraction} in a word of {word} bits, by {basis}; {self.why}{end}"
 
 
 def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilter:
@@ -284,7 +285,8 @@ def required_fraction_bits(
 
     def rejection(bits: int) -> str:
         refused = found.reasons[bits]
-        return f"{bits} fraction bits " + (refused or f"give {ratios[bits]:.3g} times the tolerance")
+        give = "gives" if bits == 1 else "give"
+        return f"{digits_text(bits, kind='fraction')} {refused or f'{give} {ratios[bits]:.3g} times the tolerance'}"
 
     if found.fmt is None:
         why = strategy.blame(largest) or f"{rejection(largest)}; {largest} fraction bits are the most tried"
@@ -461,14 +463,14 @@ class _Outputs(_Strategy):
         self._words_of = words_of
         if found.fmt is None:
             return ""
-        stored = f"{given} significant bits" if isinstance(given, int) else arithmetic(given)
+        stored = digits_text(given, kind="significant") if isinstance(given, int) else arithmetic(given)
         ratio, refused = self.error(fmt)
         misses = refused and f"words are refused: {refused.removeprefix('are refused: ')}"
         named = "coefficient_bits, or --coefficients in the command" if self._widens else "coefficients of WordFormats"
         return (
             f"the coefficients limit the filter, whatever the fraction bits of the data: stored in {stored}, "
-            f"{misses or f'they give {ratio:.3g} times the tolerance'}; {found.fmt.precision} significant bits of each "
-            f"coefficient are enough ({named})"
+            f"{misses or f'they give {ratio:.3g} times the tolerance'}; "
+            f"{digits_text(found.fmt.precision, kind='significant')} of each coefficient are enough ({named})"
         )
 
 

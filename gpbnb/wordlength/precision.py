@@ -15,7 +15,8 @@ from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.rounding import Rounding, rounding_named
+from gpbnb.arithmetic.named import digits
+from gpbnb.arithmetic.rounding import Rounding, digits_text, rounding_named
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search, largest_by_default, largest_compiled
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.gains import check_deterministic
@@ -214,8 +215,8 @@ def _better_form(strategy: Recorded, search: Callable[[Strategy], Search[FloatFo
         return ""
     others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not strategy.form]
     answers = [(other, search(replace(strategy, form=other)).fmt) for other in others]
-    met = [(fmt.precision, str(other)) for other, fmt in answers if fmt is not None]
-    return f"the form {min(met)[1]} needs {min(met)[0]} digits" if met else ""
+    met = [(fmt.precision, str(other), digits(fmt)) for other, fmt in answers if fmt is not None]
+    return f"the form {min(met)[1]} needs {min(met)[2]}" if met else ""
 
 
 def survey(
@@ -251,7 +252,8 @@ def survey(
         return survey_recursion(model, z, tolerance, formats, basis)
     compiled = [isinstance(model, NonlinearModel) or isinstance(fmt.backend, Compiled) for fmt in formats]
     if beyond := [fmt.precision for fmt, has_loops in zip(formats, compiled, strict=True) if not has_loops]:
-        raise ValueError(f"got {beyond} digits of base {base}; needed at most {largest_compiled(like)}")
+        most = digits_text(largest_compiled(like), base)
+        raise ValueError(f"got precisions {beyond} in base {base}; needed at most {most}")
     found = survey_formats(model, z, tolerance, formats, form, basis)
     return tuple((fmt.precision, ratio) for fmt, (ratio, _) in zip(formats, found, strict=True))
 
@@ -294,8 +296,8 @@ def _checked_largest(model: AnyModel | LinearSystem, largest: int | None, like: 
     largest, most = whole_number("largest", largest, 2), largest_compiled(like)
     if largest > most:
         raise ValueError(
-            f"got largest={largest} for a model; needed at most {most}, the most digits with compiled loops in base "
-            f"{like.base}, rounded {like.rounding.value}; a filter written as a function of a format runs in more"
+            f"got largest={largest} for a model; needed at most {digits_text(most, like.base)}, the most with compiled "
+            f"loops, rounded {like.rounding.value}; a filter written as a function of a format runs in more"
         )
     return largest
 

@@ -140,7 +140,7 @@ def test_precisions_above_an_answer_without_a_bound_are_not_said_to_refute_it():
     with asked.search((24, 53), bounds=True) as search:
         found = asked.answer(search(SimpleNamespace(error=error)))
     assert str(found).endswith(
-        "guaranteed for ever; the proof does not cover 53 digits, in which no bound was found: numbers are too large"
+        "guaranteed for ever; the proof does not cover 53 bits, in which no bound was found: numbers are too large"
     )
 
 
@@ -157,7 +157,7 @@ def test_a_design_that_float64_has_made_unstable_is_told_where_to_find_sections(
 def test_a_direct_form_that_no_precision_suits_says_by_how_much_it_misses():
     long = LinearSystem.from_coefficients(*signal.butter(8, 0.02))
     found = required_precision(long, 500, 1e-7, z=np.ones((500, 1)))
-    assert f"; 53 digits give {found.tried[-1][1]:.3g} times the tolerance; second-order sections usually" in str(found)
+    assert f"; 53 bits give {found.tried[-1][1]:.3g} times the tolerance; second-order sections usually" in str(found)
     lasting = required_precision(long, 500, 1e-3, basis="bound", z=np.ones((500, 1)))
     assert "an error causes rounding errors as large as itself; second-order sections usually" in str(lasting)
 
