@@ -143,7 +143,7 @@ class Question:
     emin, emax : range of the formats, as in ``FloatFormat``; by default unlimited.
     fmt : the one format to judge, in place of a search; it replaces base, rounding and range.
     structures : structures of a digital filter to compare, by their names; the first gives the answer, in place of the
-        model. See :func:`gpbnb.wordlength.models.read_structures`.
+        model. See :func:`gpbnb.wordlength.models.read_filter`.
     mixed : whether to find the digits of each block of a Kalman filter as well; see
         :func:`gpbnb.wordlength.blocks.required_block_precisions`. In fixed point, the formats of data, coefficients
         and sums of a linear system.
