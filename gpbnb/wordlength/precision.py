@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,8 +31,16 @@ from gpbnb.filters.missing import stored_measurements, without_missing
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named, named, whole_number
 from gpbnb.filters.nonlinear import NO_GUARANTEE, AnyModel, NonlinearModel
-from gpbnb.filters.nonlinear_run import NonlinearRun, check_form, complete, opened, simulated, true_states
-from gpbnb.filters.run import Run
+from gpbnb.filters.nonlinear_run import (
+    NonlinearRun,
+    check_form,
+    complete,
+    nonlinear_checkpoints,
+    opened,
+    simulated,
+    true_states,
+)
+from gpbnb.filters.run import Run, reference
 from gpbnb.filters.system import LinearSystem, unobserved
 from gpbnb.wordlength.models import ModelSource, model_or_function
 from gpbnb.wordlength.recursion import Recursion, required_recursion_precision, survey_recursion
@@ -367,9 +376,21 @@ class Recorded(ABC):
             return Outcome(math.inf, f"the run is refused: {run.reason}")
         if run.indefinite is not None and not self.bounded:
             lost = f"a computed variance was not positive at step {run.indefinite}"
-            return Outcome(math.inf, f"{lost}; if the model gives a state no variance, give it a little in P0")
+            return Outcome(math.inf, lost + (self.without_variance if run.indefinite == 1 else ""))
         ratio = largest_ratio(np.abs(errors[:, asked]), self.tolerances[asked])
         return Outcome(ratio, "the bound says nothing" if math.isinf(ratio) else "")
+
+    @cached_property
+    def without_variance(self) -> str:
+        """Return in words which state has no variance after the first step without rounding; empty if none lacks it."""
+        first = self.z[:1]
+        if isinstance(self.model, NonlinearModel):
+            found = nonlinear_checkpoints(self.model, first, [1])
+        else:
+            found = reference(self.model, first, [1])
+        lacking = [named("state", i, self.model.state_names) for i in range(self.model.n) if not found.P[0, i, i] > 0]
+        cure = "whatever the precision; give it a little in P0 or Q"
+        return f"; the model gives {' and '.join(lacking)} no variance, {cure}" if lacking else ""
 
     @abstractmethod
     def _errors(self, run: Run | ArrayRun | NonlinearRun, z: Any) -> NDArray[np.float64]:
