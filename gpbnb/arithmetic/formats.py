@@ -20,7 +20,7 @@ from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
 from gpbnb.arithmetic.kernels.selection import Accumulator, check_compiled, mixed_tag, run_tag
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.making import Makes
-from gpbnb.arithmetic.rounding import FLOAT_OVERFLOWS, Limits, Order, Rounding, Rules, rounding_named
+from gpbnb.arithmetic.rounding import FLOAT_OVERFLOWS, Limits, Order, Rounding, Rules, digits_text, rounding_named
 from gpbnb.arithmetic.words import FloatLayout
 
 __all__ = ["FloatFormat", "prints_as"]
@@ -135,7 +135,7 @@ class FloatFormat(Makes[FloatArray]):
         object.__setattr__(self, "rounding", rounding_named(self.rounding))
         if self.precision > LARGEST_BITS / math.log2(self.base):
             raise ValueError(
-                f"precision: got {self.precision} digits; needed at most "
+                f"precision: got {digits_text(self.precision, self.base)}; needed at most "
                 f"{int(LARGEST_BITS / math.log2(self.base))}, or numbers do not fit in memory; use fewer"
             )
 

@@ -17,6 +17,7 @@ from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.definiteness import is_definite
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.covariance import (
@@ -382,7 +383,7 @@ class LinearModel:
         """
         sound = self.definite_in(fmt)
         stored = {letter: array.to_fractions() for letter, array in stored_arrays(sound, fmt).items()}
-        made = replace(self, **stored, name=f"{self.name}, in {fmt}", repair=None)
+        made = replace(self, **stored, name=f"{self.name}, in {format_text(fmt)}", repair=None)
         object.__setattr__(made, "repairs", sound.repairs)
         return made
 
