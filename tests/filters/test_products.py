@@ -60,6 +60,19 @@ def test_products_have_the_digits_of_the_arithmetic(precision, rounding, exponen
         assert (found == expected).all()
 
 
+@pytest.mark.parametrize("columns", range(1, 13))
+@pytest.mark.parametrize("rows", [2, 10])
+def test_products_of_any_width_have_them_too(columns, rows):
+    for precision in (8, 24):
+        fmt = FloatFormat(2, precision)
+        rng = np.random.default_rng([rows, columns, precision])
+        a, b = rng.standard_normal((rows, 10)), rng.standard_normal((10, columns))
+        a[rng.random(a.shape) < 0.3] = 0
+        expected = (fmt.array(a) @ fmt.array(b)).to_fractions()
+        for found in products(fmt, a, b):
+            assert (found == expected).all()
+
+
 def test_decimal_products_too():
     fmt = FloatFormat(10, 4)
     rng = np.random.default_rng(10)

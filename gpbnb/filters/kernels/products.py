@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numba.extending import overload
 
-from gpbnb.arithmetic.kernels.bits import bits, from_bits
+from gpbnb.arithmetic.kernels.bits import ADDING_MULTIPLES, bits
 from gpbnb.arithmetic.kernels.compiling import borrowing
 from gpbnb.arithmetic.kernels.matrices import MANY, product_in_order, product_in_planes, stays_within
 from gpbnb.arithmetic.kernels.scalar import (
@@ -29,6 +29,7 @@ from gpbnb.arithmetic.kernels.scalar import (
 )
 from gpbnb.arithmetic.kernels.tags import SAFE_TWICE, Binary
 
+SOME = 100  # multiplications in a product by a measurement matrix, from which on the same look pays
 _MAGNITUDE = np.int64(2**63 - 1)
 _LEAST, _LARGEST = np.int64((1023 - 400) << 52), np.int64((1023 + 400) << 52)
 
@@ -36,13 +37,31 @@ _LEAST, _LARGEST = np.int64((1023 - 400) << 52), np.int64((1023 + 400) << 52)
 @borrowing
 def _is_moderate(a: Any) -> Any:
     """Whether all numbers are zero or between 2**-400 and 2**400 in magnitude."""
+    numbers = a.reshape(a.size)  # in one loop, which is vectorized
     least, largest = _LARGEST, np.int64(0)
-    for i in range(a.shape[0]):
-        for j in range(a.shape[1]):
-            size = bits(a[i, j]) & _MAGNITUDE
-            least = min(least, size if size != 0 else _LARGEST)
-            largest = max(largest, size)
+    for i in range(numbers.shape[0]):
+        size = bits(numbers[i]) & _MAGNITUDE
+        least = min(least, size if size != 0 else _LARGEST)
+        largest = max(largest, size)
     return least >= _LEAST and largest < _LARGEST
+
+
+_add_4, _add_2, _add_1 = ADDING_MULTIPLES
+
+
+@borrowing(forceinline=True)
+def _add_multiples(c: Any, i: Any, b: Any, k: Any, factor: Any, half: Any, mask: Any) -> None:
+    """Add a multiple of row k of b to row i of c, both contiguous in memory."""
+    width = b.shape[1]
+    i, k, end = i * width, k * width, (i + 1) * width
+    while i + 4 <= end:
+        _add_4(c, i, b, k, factor, half, mask)
+        i, k = i + 4, k + 4
+    if i + 2 <= end:
+        _add_2(c, i, b, k, factor, half, mask)
+        i, k = i + 2, k + 2
+    if i < end:
+        _add_1(c, i, b, k, factor, half, mask)
 
 
 def _short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
@@ -66,12 +85,11 @@ def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
             for i in range(a.shape[0]):
                 factor = a[i, k]
                 if factor != 0.0:
-                    for j in range(b.shape[1]):
-                        p = from_bits((bits(factor * b[k, j]) + half) & mask)
-                        c[i, j] = from_bits((bits(c[i, j] + p) + half) & mask)
+                    _add_multiples(c, i, b, k, factor, half, mask)
         return True
 
-    return of_binary if getattr(fmt, "instance_class", None) is Binary else lambda fmt, a, b, c: False
+    binary = getattr(fmt, "instance_class", None) is Binary and a.layout == b.layout == c.layout == "C"
+    return of_binary if binary else lambda fmt, a, b, c: False
 
 
 @borrowing(forceinline=True)
@@ -102,7 +120,9 @@ def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry summed from left to right over the nonzero entries of a; c must be neither a nor b."""
     if product_in_order(fmt, a, b, c) or product_in_planes(fmt, a, b, c):
         return
-    if a.shape[0] * a.shape[1] * b.shape[1] >= MANY and _short_product(fmt, a, b, c):
+    # A square matrix is one of a transition, mostly zeros and ones, so that few products are rounded.
+    least = MANY if a.shape[0] == a.shape[1] else SOME
+    if a.shape[0] * a.shape[1] * b.shape[1] >= least and _short_product(fmt, a, b, c):
         return
     if stays_within(fmt, a, b, MANY):
         _with_units(freed(fmt), a, b, c)
