@@ -16,6 +16,12 @@ os.environ.setdefault("GPBNB_QUIET", "1")
 
 # What takes longest, longest first: with several processes none of it is left over at the end.
 LONGEST = (
+    "book/rolling.ipynb",
+    "book/nonlinear.ipynb",
+    "book/wordlength.ipynb",
+    "book/integration.ipynb",
+    "book/geometry.ipynb",
+    "book/inversion.ipynb",
     "tests/bounds/test_certificates.py",
     "tests/guarantees/test_guarantees_filters.py",
     "tests/test_types.py",
@@ -88,7 +94,8 @@ def pytest_collection_finish():
 def pytest_cmdline_main(config):
     """Share notebooks among the processors unless told how: a process executes one cell at a time."""
     option = config.option
-    if getattr(option, "nbval", False) and getattr(option, "numprocesses", 0) is None and not option.usepdb:
+    alone = getattr(option, "numprocesses", 0) is None and not hasattr(config, "workerinput")
+    if alone and getattr(option, "nbval", False) and not option.usepdb:
         option.numprocesses, option.dist = min(os.cpu_count() or 1, MOST_PROCESSES), "loadgroup"
 
 

@@ -34,17 +34,18 @@ OUTSIDE = re.compile(r"""["'](\.\./[^"'\n]+)["']""")
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 # The longest first, so that none is left over at the end; others follow.
 LONGEST = (
+    "rolling",
+    "nonlinear",
+    "wordlength",
+    "integration",
     "kalman",
     "year",
     "processors",
-    "wordlength",
     "guarantee",
-    "rolling",
-    "rounding",
-    "integration",
-    "mission",
-    "geometry",
     "inversion",
+    "geometry",
+    "rounding",
+    "mission",
 )
 LEDGER = "the ledger"
 LEDGER_COMMAND = [sys.executable, "-m", "gpbnb.ledger"]

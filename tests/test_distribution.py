@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -42,3 +44,30 @@ def test_the_longest_files_come_first(root, request):
     names = [root.group(item.nodeid) for item in request.session.items]
     longest = [name for name in names if name in root.LONGEST]
     assert names[: len(longest)] == longest == sorted(longest, key=root.LONGEST.index)
+
+
+@pytest.mark.parametrize(
+    ("given", "shared"),
+    [
+        ({"nbval": True}, True),
+        ({"nbval": False}, False),
+        ({"nbval": True, "usepdb": True}, False),
+        ({"nbval": True, "numprocesses": 0}, False),
+        ({"nbval": True, "numprocesses": 3}, False),
+    ],
+)
+def test_notebooks_are_shared_among_the_processors_unless_told_how(root, given, shared):
+    option = SimpleNamespace(**{"numprocesses": None, "dist": "no", "usepdb": False} | given)
+    root.pytest_cmdline_main(SimpleNamespace(option=option))
+    assert (option.dist == "loadgroup") is shared
+    assert (option.numprocesses == min(os.cpu_count(), root.MOST_PROCESSES)) is shared
+
+
+def test_a_process_that_shares_notebooks_does_not_share_them_again(root):
+    option = SimpleNamespace(nbval=True, numprocesses=None, dist="no", usepdb=False)
+    root.pytest_cmdline_main(SimpleNamespace(option=option, workerinput={}))
+    assert option.numprocesses is None
+
+
+def test_without_plugins_nothing_is_shared(root):
+    root.pytest_cmdline_main(SimpleNamespace(option=SimpleNamespace(usepdb=False)))

@@ -34,6 +34,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import display as show
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap, to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -110,17 +111,19 @@ class BookFigure(Figure):
         self._judged = False
 
     def _ipython_display_(self) -> None:
+        picture = svg(self, TEXT)
+        self.set_layout_engine("none")  # it is laid out now, which takes most of the time of a drawing
         self.canvas.draw()
-        show({"image/svg+xml": svg(self, TEXT), "text/plain": repr(self)}, raw=True)
+        show({"image/svg+xml": picture, "text/plain": repr(self)}, raw=True)
 
     def draw(self, renderer: Any) -> None:
         """Draw the figure after the names at its right edge have found their places."""
-        if engine := self.get_layout_engine():
+        if self.last_moves and (engine := self.get_layout_engine()):
             engine.execute(self)
         for move in self.last_moves:
             move()
         super().draw(renderer)
-        if "inline" in plt.get_backend() and not self._judged:
+        if isinstance(self.canvas, FigureCanvasAgg) and "inline" in plt.get_backend() and not self._judged:
             self._judged = True
             for defect in defects(self):
                 warnings.warn(defect, stacklevel=2)
