@@ -249,13 +249,18 @@ def run_tag(rules: Rules, fused: bool, order: Order = "left", block: int = 32) -
     check_compiled(rules)
     if not fused and order == "left":
         return cast(tags.Tag, tag_of(rules))
-    tag = _float_tag(rules, hardware=False) if rules.base in (2, 16) else None
+    tag = fusing_tag(rules)
     if tag is None:
         what = "fused multiply-add" if fused else f"{order} sums"
         raise ValueError(f"got {what} in {_described(rules)}; needed up to 52 bits, or up to 13 base-16 digits")
     products: Any = tags.Fused() if fused else tags.Separate()
     sums = {"left": products, "pairwise": tags.Pairwise(), "blocked": tags.Blocked(block, products)}[order]
-    return cast(tags.Limited, tag._replace(sums=sums))
+    return tag._replace(sums=sums)
+
+
+def fusing_tag(rules: Rules) -> tags.Limited | None:
+    """Return the tag for fused multiply-add, or sums in another order, of float64, if there is one."""
+    return cast(tags.Limited | None, _float_tag(rules, hardware=False) if rules.base in (2, 16) else None)
 
 
 def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:
