@@ -1,21 +1,37 @@
-"""What every number format makes besides ``fmt.array``: zeros, identities, and numbers from their bits."""
+"""What every number format has besides its rules: compiled loops, zeros, and numbers from their bits."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.kernels.exact import ExactKernel
+from gpbnb.arithmetic.conversion import exact_ratio
+from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
+from gpbnb.arithmetic.kernels.exact import ExactKernel, kernel
+from gpbnb.arithmetic.kernels.selection import Accumulator, check_compiled, mixed_tag, run_tag
+from gpbnb.arithmetic.kernels.tags import Tag
+from gpbnb.arithmetic.rounding import Order, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.text import at_entry
 from gpbnb.arithmetic.words import Layout, words
 
 Made = TypeVar("Made", bound=FloatArray)
+
+
+def checked_rounding(rounding: Any) -> Rounding:
+    """Return a rounding, or the one with this name; :class:`TypeError` for anything else."""
+    if not isinstance(rounding, (Rounding, str)):
+        raise TypeError(
+            f"rounding: got {rounding!r} of type {type(rounding).__name__}; "
+            f"needed one of {', '.join(map(str, Rounding))}, or its name"
+        )
+    return rounding_named(rounding)
 
 
 class Makes(ABC, Generic[Made]):
@@ -23,8 +39,8 @@ class Makes(ABC, Generic[Made]):
 
     @property
     @abstractmethod
-    def kernel(self) -> ExactKernel:
-        """The scalar operations of this format."""
+    def rules(self) -> Rules:
+        """All settings that determine the digits of a result."""
 
     @property
     @abstractmethod
@@ -37,12 +53,79 @@ class Makes(ABC, Generic[Made]):
         return linalg.NUMPY
 
     @abstractmethod
-    def round(self, value: Any) -> Fraction:
-        """Round one number."""
-
-    @abstractmethod
     def array(self, values: Any) -> Made:
         """Round numbers into an array."""
+
+    @cached_property
+    def kernel(self) -> ExactKernel:
+        """The scalar operations of this format."""
+        return kernel(self.rules)
+
+    def run_tag(
+        self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
+    ) -> Tag:
+        """Return the tag that selects this format's arithmetic in a compiled loop.
+
+        Stochastic rounding restarts its random numbers from the seed.
+
+        Parameters
+        ----------
+        fused : whether sums of products use fused multiply-add.
+        sums : the format in which sums of products are computed before they are stored; by default this format.
+        order, block : order of the additions in sums of products, as in :func:`gpbnb.arithmetic.linalg.matmul`.
+
+        Raises
+        ------
+        ValueError : the format has no compiled loops, or these do not support the given `fused`, `sums` or `order`; an
+            unknown order.
+        """
+        if sums is not None:
+            return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
+        return run_tag(self.rules, fused, order, block)
+
+    def check_compiled(self) -> None:
+        """Reject a format without compiled loops.
+
+        Raises
+        ------
+        ValueError : the format has no compiled loops; the message names the setting that prevents them, and what to set
+            instead.
+        """
+        check_compiled(self.rules)
+
+    def restart(self) -> None:
+        """Restart the random numbers of stochastic rounding."""
+        self.backend.restart()
+
+    @cached_property
+    def backend(self) -> Backend:
+        """The backend that stores the numbers of an array of this format, compiled if the format allows it."""
+        return backend(self.rules)
+
+    @cached_property
+    def exact_backend(self) -> Exact:
+        """The slow backend that can store every number of this format."""
+        return exact(self.rules)
+
+    def round(self, value: Any) -> Fraction:
+        """Round one number into the format.
+
+        Parameters
+        ----------
+        value : str ("765.4567", "1e-3", "1/3"), int, float (its exact binary value), Decimal,
+            Fraction, or a NumPy integer or float.
+
+        Returns
+        -------
+        The rounded value, as an exact Fraction.
+
+        Raises
+        ------
+        TypeError : `value` is of another type.
+        ValueError : a string that is not a number; NaN or infinity.
+        OverflowError : the result is too long to write out as a Fraction.
+        """
+        return self.kernel.to_fraction(*self.kernel.from_decimal(*exact_ratio(value)))
 
     def zeros(self, shape: int | tuple[int, ...]) -> Made:
         """Return an array of zeros.

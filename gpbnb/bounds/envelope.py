@@ -40,6 +40,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.doubledouble import two_sum
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.program import MULTIPLY, effects, functionals
 
@@ -354,7 +355,7 @@ def _differences(outputs: Any, given: Any, k: int, limits: Any, values: Any, int
 
 @compiled
 def _minus(a: Any, b: Any) -> Any:
-    s, e = _two_sum(a[0], -b[0])
+    s, e = two_sum(a[0], -b[0])
     e += a[1] - b[1]
     high = s + e
     return high, e - (high - s)
@@ -365,17 +366,10 @@ def _plus_product(s: Any, a: Any, b: Any) -> Any:
     p = a[0] * b[0]
     high, low = _two_product(a[0], b[0], p)
     low += a[0] * b[1] + a[1] * b[0]
-    t, e = _two_sum(s[0], high)
+    t, e = two_sum(s[0], high)
     e += s[1] + low
     total = t + e
     return total, e - (total - t)
-
-
-@compiled
-def _two_sum(a: float, b: float) -> Any:
-    s = a + b
-    c = s - a
-    return s, (a - (s - c)) + (b - c)
 
 
 @compiled

@@ -75,7 +75,7 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("base str", lambda: FloatFormat("10", 4), TypeError, "base: got '10' of type str; needed an int of at least 2"),
     ("precision 0", lambda: FloatFormat(10, 0), ValueError, "precision: got 0; needed an int of at least 1"),
     ("precision 2.5", lambda: FloatFormat(10, 2.5), TypeError, "precision: got 2.5 of type float; needed an int of at"),
-    ("precision vast", lambda: FloatFormat(2, 10**12), ValueError, "precision: got 1000000000000 digits; needed at mo"),
+    ("precision vast", lambda: FloatFormat(2, 10**12), ValueError, "precision: got 1000000000000 bits; needed at mo"),
     ("rounding int", lambda: FloatFormat(10, 4, 0), TypeError,
      "rounding: got 0 of type int; needed one of Rounding.NEAREST, Rounding.CHOP"),
     ("rounding None", lambda: FixedFormat(2, 4, None), TypeError,

@@ -12,18 +12,18 @@ from gpbnb.filters.run import Run, Sums
 from gpbnb.filters.system import state_space
 
 REFUSED = [
-    (FloatFormat(2, 54, "even"), "got 54 digits of base 2, rounded even; needed at most 53 "),
-    (FloatFormat(2, 60), "got 60 digits of base 2; needed at most 53 "),
-    (FloatFormat(2, 53, emin=-1022, emax=1023), "got 53 digits of base 2 with a limited range; needed at most 52 "),
-    (FloatFormat(10, 19, "even"), "got 19 digits of base 10, rounded even; needed at most 18 "),
-    (FloatFormat(16, 14, "chop"), "got 14 digits of base 16; needed at most 13 "),
+    (FloatFormat(2, 54, "even"), "got 54 bits, rounded even; needed at most 53 "),
+    (FloatFormat(2, 60), "got 60 bits; needed at most 53 "),
+    (FloatFormat(2, 53, emin=-1022, emax=1023), "got 53 bits with a limited range; needed at most 52 "),
+    (FloatFormat(10, 19, "even"), "got 19 decimal digits, rounded even; needed at most 18 "),
+    (FloatFormat(16, 14, "chop"), "got 14 base-16 digits; needed at most 13 "),
     (FloatFormat(3, 10), "got base 3; needed one with compiled loops: 2, 10, 16"),
-    (FloatFormat(2, 30, "stochastic"), "got 30 digits of base 2, rounded stochastic; needed at most 29 "),
+    (FloatFormat(2, 30, "stochastic"), "got 30 bits, rounded stochastic; needed at most 29 "),
     (FloatFormat(10, 8, "stochastic"), "got stochastic rounding in base 10; needed base 2 "),
     (FloatFormat(2, 24, emin=-5000, emax=5000), r"got a range .* -5000 and up to 5000; needed numbers.*2\*\*-320"),
     (FloatFormat(10, 3, emin=-5, emax=5, largest=Fraction(900000)), "got a largest number that does not end in nines"),
-    (FloatFormat(2, 1, "even"), "got one digit; needed at least 2 "),
-    (FixedFormat(3, 60), "got 63 digits of base 2 in fixed point; needed at most 51 "),
+    (FloatFormat(2, 1, "even"), "got 1 bit; needed at least 2 "),
+    (FixedFormat(3, 60), "got 63 bits in fixed point; needed at most 51 "),
     (FixedFormat(3, 10, overflow="wrap"), "got overflow that wraps around; needed 'raise' or 'saturate' "),
 ]  # fmt: skip
 
@@ -83,5 +83,5 @@ def reason(fmt):
 @pytest.mark.parametrize("options", [{"order": "pairwise"}, {"fused": True}])
 def test_other_sums_in_53_bits_name_the_digits(options):
     model = LinearModel([["0.9"]], [[1]], [[1]], [[1]], [0], [[1]])
-    with pytest.raises(ValueError, match=r"in 53 digits of base 2; needed base 2 up to 52 digits, or 16 up to 13"):
+    with pytest.raises(ValueError, match=r"in 53 bits; needed up to 52 bits, or up to 13 base-16 digits"):
         Run(model, FloatFormat(2, 53), "innovation", (1,), Sums(**options))

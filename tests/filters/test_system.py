@@ -283,7 +283,7 @@ def test_a_system_that_is_unstable_only_as_stored_is_said_to_be(basis):
     found = required_precision(NEAR, 20, 1e-3, z=np.ones((20, 1)), basis=basis, within=within)
     assert found.precision is None
     assert "no precision up to 53 bits, the most with compiled loops" in str(found)
-    assert "in 53 digits the system is stable, but as stored in 53 bits it is not, since A has" in found.why
+    assert "in 53 bits the system is stable, but as stored in 53 bits it is not, since A has" in found.why
     assert "eigenvalue of size 1 or more" in found.why
 
 
@@ -296,12 +296,12 @@ def test_below_the_answer_a_system_that_is_unstable_as_stored_is_named_with_the_
     assert 14 in stable
     asked = {"steps": 20, "tolerance": 1e3, "z": np.ones((20, 1)), "basis": "bound"}
     at_12 = required_precision(system, **asked, largest=12)
-    assert at_12.why == f"in 12 digits {system.unstable(FloatFormat(2, 12))}"
+    assert at_12.why == f"in 12 bits {system.unstable(FloatFormat(2, 12))}"
     assert "the system is stable, but as stored in 12 bits it is not" in at_12.why
     assert at_12.cause == ""
     found = required_precision(system, **asked)
     assert found.why.startswith(
-        "in 14 digits no bound was found: in this precision, an error causes rounding errors as large as itself"
+        "in 14 bits no bound was found: in this precision, an error causes rounding errors as large as itself"
     )
     assert found.precision == 18
     assert system.unstable(found.fmt) == ""
@@ -312,7 +312,7 @@ def test_a_stable_system_without_a_proof_is_not_said_to_be_unstable():
     found = required_precision(system, 20, 1e3, z=np.ones((20, 1)), basis="bound")
     assert found.precision is None
     assert found.cause == ""
-    assert "in 53 digits the system decays too slowly for a bound: its response is not negligible after" in found.why
+    assert "in 53 bits the system decays too slowly for a bound: its response is not negligible after" in found.why
 
 
 def test_errors_that_grow_in_every_step_are_named_where_no_precision_is_enough():
@@ -325,7 +325,7 @@ def test_errors_that_grow_in_every_step_are_named_where_no_precision_is_enough()
     assert "whatever the precision: take fewer steps" in found.advice
     stable = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 5, 1e-30, z=np.ones((5, 1)))
     assert stable.precision is None
-    assert stable.advice == f"53 digits give {stable.tried[-1][1]:.3g} times the tolerance"
+    assert stable.advice == f"53 bits give {stable.tried[-1][1]:.3g} times the tolerance"
     assert stable.cause == ""
 
 
@@ -352,5 +352,5 @@ def test_sizes_beyond_float64_are_named():
             LinearSystem([["0.9"]], [["1e308"]]), 5, 1e300, z=np.ones((5, 1)), basis=basis, within=within
         )
         assert (
-            "in 53 digits got a system whose largest gain is beyond the range of float64; scale its inputs" in found.why
+            "in 53 bits got a system whose largest gain is beyond the range of float64; scale its inputs" in found.why
         )

@@ -177,7 +177,7 @@ def test_digits_needed_for_an_error(method, base):
 @pytest.mark.parametrize(
     ("fmt", "steps", "message"),
     [
-        (FloatFormat(3, 5), [1], "needed base 2, 10 or 16 and at most 53, 18 or 13 digits; take fewer"),
+        (FloatFormat(3, 5), [1], "needed base 2, 10 or 16 and at most 53 bits, 18 or 13 digits; take fewer"),
         (FloatFormat(10, 19), [1], "got FloatFormat"),
         (FloatFormat(10, 8), [], r"got steps \[\]; needed numbers of samples that ascend from 0 or later"),
         (FloatFormat(10, 8), [3, 3], "that ascend"),

@@ -326,7 +326,11 @@ REFUSED = [
     (theory.moving_average, (4.0,), "got a length of 4.0 s; needed at least the interval of 10.0 s"),
     (theory.single_pole, (0.0,), "got a time constant of 0.0 s; needed more than 0"),
     (theory.image_in_fit, (1.0, 77.5, 100), "got 12.9032 turns; needed a whole number of them; shorten the record"),
-    (theory.digits_needed, (lambda beta: 1.0, 10, 0.5), "got a bound above 0.5 at 399 digits; needed one that falls"),
+    (
+        theory.digits_needed,
+        (lambda beta: 1.0, 10, 0.5),
+        "got a bound above 0.5 at 399 decimal digits; needed one",
+    ),
 ]
 
 

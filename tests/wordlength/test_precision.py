@@ -210,10 +210,11 @@ def test_no_precision_may_be_enough(model, base, most):
     found = required_precision(model, 3, 1e-30, base, z=Z[:3])
     assert found.fmt is None
     assert found.tried[-1][0] == most
+    words = {2: "53 bits", 16: "13 base-16 digits"}[base]
     assert str(found) == (
-        f"no precision up to {most} digits, the most with compiled loops in base {base}, rounded nearest, meets the "
+        f"no precision up to {words}, the most with compiled loops in base {base}, rounded nearest, meets the "
         "tolerance in a run of 3 steps"
-        + (f"; {most} digits give {found.tried[-1][1]:.3g} times the tolerance" if model is not MODEL else "")
+        + (f"; {words} give {found.tried[-1][1]:.3g} times the tolerance" if model is not MODEL else "")
     )
 
 

@@ -223,7 +223,7 @@ def test_a_companion_where_the_running_bound_says_nothing():
     found = required_precision(model, 20, 0.01, basis="bound", z=z)
     last = max(digits for digits, ratio in found.tried if math.isinf(ratio) and digits < found.precision)
     assert last >= 40
-    assert found.why == f"in {last} digits the bound says nothing"
+    assert found.why == f"in {last} bits the bound says nothing"
     error, bound = study.companion_run(model, z, FloatFormat(2, 40))
     assert (error <= bound).all()
     assert bound[0] < 0.01

@@ -22,7 +22,7 @@ LEAST, LIMIT = 2.0**-850, 2.0**1000
 
 
 @inner(forceinline=True)
-def _two_sum(a: Any, b: Any) -> Any:
+def two_sum(a: Any, b: Any) -> Any:
     s = a + b
     c = s - a
     return s, (a - (s - c)) + (b - c)
@@ -43,8 +43,8 @@ def _within_range(high: Any, low: Any, exact_zero: Any) -> Any:
 
 @inner(forceinline=True)
 def add(fmt: Any, a: Any, b: Any) -> Any:
-    s, e = _two_sum(a[0], b[0])
-    t, f = _two_sum(a[1], b[1])
+    s, e = two_sum(a[0], b[0])
+    t, f = two_sum(a[1], b[1])
     s, e = _fast_two_sum(s, e + t)
     s, e = _fast_two_sum(s, e + f)
     return _within_range(s, e, True)
@@ -89,7 +89,7 @@ def sqrt(fmt: Any, a: Any) -> Any:
 
 @inner(forceinline=True)
 def round_(fmt: Any, x: Any) -> Any:
-    high, low = _two_sum(x[0], x[1])
+    high, low = two_sum(x[0], x[1])
     return _within_range(high, low, x[0] == 0.0 and x[1] == 0.0)
 
 

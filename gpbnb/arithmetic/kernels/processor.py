@@ -17,6 +17,7 @@ import numpy as np
 
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
 from gpbnb.arithmetic.kernels.compiling import inner
+from gpbnb.arithmetic.kernels.doubledouble import two_sum
 from gpbnb.arithmetic.kernels.tags import (
     AWAY,
     DOWN,
@@ -294,13 +295,6 @@ def _short(within: Any) -> dict[str, Any]:
 
 
 @inner(forceinline=True)
-def _two_sum(a: Any, b: Any) -> Any:
-    s = a + b
-    c = s - a
-    return s, (a - (s - c)) + (b - c)
-
-
-@inner(forceinline=True)
 def _fused_sum(a: Any, b: Any, c: Any) -> Any:
     """a * b + c as its nearest float64 w and a residual with the correct sign, and whether the sum is exactly zero.
 
@@ -310,9 +304,9 @@ def _fused_sum(a: Any, b: Any, c: Any) -> Any:
     """
     p = a * b
     e = fma(a, b, -p)
-    s, r = _two_sum(p, c)
-    v, lowest = _two_sum(r, e)
-    w, low = _two_sum(s, v)
+    s, r = two_sum(p, c)
+    v, lowest = two_sum(r, e)
+    w, low = two_sum(s, v)
     zero = (a == 0.0) | (b == 0.0)
     w = w if zero | (abs(p) >= LEAST) else np.nan
     return w, (low if low != 0.0 else lowest), (w == 0.0) & (zero | (c != 0.0))
@@ -379,7 +373,7 @@ def _machine(rounded: Any) -> dict[str, Any]:
 @inner(forceinline=True)
 def _fused_single(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     # The product is exact, and the sum is rounded to odd, so that the second rounding is correct.
-    s, r = _two_sum(a * b, c)
+    s, r = two_sum(a * b, c)
     u = bits(abs(s)) - np.int64(((r < 0.0) & (s > 0.0)) | ((r > 0.0) & (s < 0.0)))
     odd = from_bits(u | np.int64(r != 0.0))
     return _single(odd if s >= 0.0 else 0.0 - odd)

@@ -275,8 +275,8 @@ def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:
             raise ValueError(f"got sums kept in {sums} with numbers in {stored}; needed base 2 or 16 for both")
     if _digits(sums) < _digits(stored):
         raise ValueError(
-            f"got sums of precision {_digits(sums)} with numbers of precision {_digits(stored)}; needed sums at least "
-            "as precise as the numbers"
+            f"got sums of precision {_digits(sums)} with numbers of precision {_digits(stored)}; needed at least as "
+            "many digits for sums as for numbers"
         )
     return tags.Mixed(stored, sums)
 

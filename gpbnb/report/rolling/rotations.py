@@ -124,7 +124,7 @@ def recursion(
         raise ValueError(f"got steps {steps!r}; needed numbers of samples that ascend from 0 or later")
     backend = fmt.backend
     if not isinstance(backend, Compiled):
-        raise ValueError(f"got {fmt}; needed at most 53 bits, 18 decimal or 13 base-16 digits; take fewer")
+        raise ValueError(f"got {fmt}; needed base 2, 10 or 16 and at most 53 bits, 18 or 13 digits; take fewer")
     angle = fmt.array(list(_exact_turn(1, period, interval)))
     start = fmt.array([1, 0])
     step, state = (backend.pack(a.components) for a in (angle, start))
