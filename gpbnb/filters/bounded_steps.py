@@ -27,7 +27,7 @@ from gpbnb.filters.kernels.bounded import residuals, symmetric_parts, whole_gain
 from gpbnb.filters.kernels.step import NEXT_CHECKPOINT, advance
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import opening, step_arrays
-from gpbnb.filters.replayed import advance_by_replay
+from gpbnb.filters.replayed import advance_by_replay, replay_pays
 
 Array = NDArray[np.float64]
 
@@ -152,7 +152,8 @@ def _repeated(exact: Any, z: Array, first: int, x: Array, P: Array) -> tuple[Any
     others = exact, z, first, x[0].copy(), P[0].copy(), repeated, kept, notes
     loops = tag, int(form), *others
     with contextlib.suppress(OverflowError, ZeroDivisionError):
-        if not advance_by_replay(tag, form, *others, lambda: is_compiled(advance, *loops)):
+        pays = replay_pays(tag, form, exact, z, x[0], lambda: is_compiled(advance, *loops))
+        if not (pays and advance_by_replay(tag, form, *others)):
             advance(*loops)
     done = int(notes[NEXT_CHECKPOINT])
     return tuple(each[:done] for each in (*after, S))

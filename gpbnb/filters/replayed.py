@@ -76,6 +76,32 @@ class _Listed(NamedTuple):
     not_negative: NDArray[np.int64]
 
 
+def replay_pays(
+    tag: Tag, form: Form, model: StepArrays, z: NDArray[Any], x: NDArray[Any], ready: Callable[[], bool]
+) -> bool:
+    """Whether some steps cost less by :func:`advance_by_replay` than to compile or load the loops.
+
+    From the first time that they cost more, they always do, because the loops are there.
+
+    Parameters
+    ----------
+    z, x : measurements, as the loops take them, and the state.
+    ready : whether the loops are compiled already; asked once for each kind of arithmetic.
+    """
+    kind, size = _kind(tag), 6 * (x.shape[0] + z.shape[1]) ** 3  # about the number of operations
+    if kind is None or (kind is DoubleDouble and form is not Form.INNOVATION):
+        return False
+    if x.shape[1] != 1 or model.increment.shape[0] or size > LONGEST:
+        return False
+    if kind not in _compiled:
+        _compiled[kind] = ready()
+    spent = _spent.get(kind, 0.0) + len(z) * (_PER_STEP + size * _PER_OPERATION)
+    limit = _limits[_compiled[kind]]
+    if limit >= 0:
+        _spent[kind] = spent if spent <= limit else math.inf
+    return spent <= limit
+
+
 def advance_by_replay(
     tag: Tag,
     form: Form,
@@ -87,21 +113,12 @@ def advance_by_replay(
     repeated: tuple[NDArray[Any], ...],
     kept: tuple[NDArray[Any], ...],
     notes: NDArray[np.int64],
-    ready: Callable[[], bool],
 ) -> bool:
-    """Take a few steps as :func:`gpbnb.filters.kernels.step.advance` does, and return True; or take none.
+    """Take steps as :func:`gpbnb.filters.kernels.step.advance` does, and return True; or take none.
 
-    It takes none if that costs more than the loops, if it does not know the arithmetic, or if a number has no result in
-    it, so that the loops report where.
-
-    Parameters
-    ----------
-    ready : whether the loops are compiled already; asked once for each kind of arithmetic.
+    It takes none if a number has no result in the arithmetic, so that the loops report where.
     """
     n, m = x.shape[0], z.shape[1]
-    known = x.shape[1] == 1 and not model.increment.shape[0] and 6 * (n + m) ** 3 <= LONGEST
-    if not known or not _pays(tag, form, len(z) * (_PER_STEP + 6 * (n + m) ** 3 * _PER_OPERATION), ready):
-        return False
     listed = _listed(n, m, form, isinstance(tag, DoubleDouble))
     pair, end = x.shape[2:], len(listed.instructions)
     x0, P0, innovation = repeated
@@ -137,19 +154,6 @@ def advance_by_replay(
             after[NEXT_CHECKPOINT] += 1
     x[:, 0], P[:], notes[:] = state, covariance.reshape(P.shape), after
     return True
-
-
-def _pays(tag: Tag, form: Form, seconds: float, ready: Callable[[], bool]) -> bool:
-    """Whether to replay steps that take some seconds; from the first time that it does not pay, it never does again."""
-    kind = _kind(tag)
-    if kind is None or (kind is DoubleDouble and form is not Form.INNOVATION):
-        return False
-    if kind not in _compiled:
-        _compiled[kind] = ready()
-    spent, limit = _spent.get(kind, 0.0) + seconds, _limits[_compiled[kind]]
-    if limit >= 0:
-        _spent[kind] = spent if spent <= limit else math.inf
-    return spent <= limit
 
 
 @contextlib.contextmanager

@@ -41,7 +41,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.opening import Opening, as_packed, opening, step_arrays
 from gpbnb.filters.reference import precise_steps
-from gpbnb.filters.replayed import advance_by_replay
+from gpbnb.filters.replayed import advance_by_replay, replay_pays
 
 LEAST_SHARE = 2.0**-60
 """Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""
@@ -389,8 +389,9 @@ class Run:
             return z, self.steps, x, P, (found[0][:0], found[2][:0], none), (steps, *found), notes
 
         loops = self._step_tag, int(self.form), self._stepped, *arguments(used)
-        few = self.tag, self.form, self.matrices, *arguments(given), lambda: is_compiled(advance, *loops)
-        if advance_by_replay(*few):
+        asked = self.tag, self.form, self.matrices
+        pays = replay_pays(*asked, z, self.x, lambda: is_compiled(advance, *loops))
+        if pays and advance_by_replay(*asked, *arguments(given)):
             return
         try:
             advance(*loops)
