@@ -119,6 +119,7 @@ EXTERNAL = {
     "_asdict",
     "_codegen",
     "_compiled_object",
+    "_compiler",
     "_engine",
     "_ensure_finalized",
     "_fields",

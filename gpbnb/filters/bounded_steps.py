@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.backends import double_doubles
+from gpbnb.arithmetic.kernels.compiling import is_compiled
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.filters.contraction import (
     Contraction,
@@ -26,6 +27,7 @@ from gpbnb.filters.kernels.bounded import residuals, symmetric_parts, whole_gain
 from gpbnb.filters.kernels.step import NEXT_CHECKPOINT, advance
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import opening, step_arrays
+from gpbnb.filters.replayed import advance_by_replay, replay_pays
 
 Array = NDArray[np.float64]
 
@@ -146,9 +148,12 @@ def _repeated(exact: Any, z: Array, first: int, x: Array, P: Array) -> tuple[Any
     steps, n, m = len(z), x.shape[1], z.shape[1]
     after = np.empty((steps, n, 1, 2)), np.empty((steps, n, m, 2)), np.empty((steps, n, n, 2))
     S, notes, every = np.empty((steps, m, m, 2)), np.zeros(4, dtype=np.int64), np.arange(1, steps + 1) + first
-    tag, form = DoubleDouble(), int(Form.INNOVATION)
+    tag, form, repeated, kept = DoubleDouble(), Form.INNOVATION, (x[:-1], P[:-1], S), (every, *after)
+    others = exact, z, first, x[0].copy(), P[0].copy(), repeated, kept, notes
+    loops = tag, int(form), *others
     with contextlib.suppress(OverflowError, ZeroDivisionError):
-        repeated, kept = (x[:-1], P[:-1], S), (every, *after)
-        advance(tag, form, exact, z, first, x[0].copy(), P[0].copy(), repeated, kept, notes)
+        pays = replay_pays(tag, form, exact, z, x[0], lambda: is_compiled(advance, *loops))
+        if not (pays and advance_by_replay(tag, form, *others)):
+            advance(*loops)
     done = int(notes[NEXT_CHECKPOINT])
     return tuple(each[:done] for each in (*after, S))

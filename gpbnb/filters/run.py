@@ -15,6 +15,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.compiling import is_compiled
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Free, Hardware32, Hardware64, Tag
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
@@ -41,6 +42,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.opening import Opening, as_packed, opening, step_arrays
 from gpbnb.filters.reference import precise_steps
+from gpbnb.filters.replayed import advance_by_replay, replay_pays
 
 LEAST_SHARE = 2.0**-60
 """Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""
@@ -382,12 +384,18 @@ class Run:
         steps, *results = kept
         given = [z, self.x, self.P, self.UR[:0], *results]
         used = [each.astype(self._stepped.Phi.dtype, copy=False) for each in given]
-        z, x, P, none, *found = used
+
+        def arguments(arrays: list[NDArray[Any]]) -> tuple[Any, ...]:
+            z, x, P, none, *found = arrays
+            return z, self.steps, x, P, (found[0][:0], found[2][:0], none), (steps, *found), notes
+
+        loops = self._step_tag, int(self.form), self._stepped, *arguments(used)
+        asked = self.tag, self.form, self.matrices
+        pays = replay_pays(*asked, z, self.x, lambda: is_compiled(advance, *loops))
+        if pays and advance_by_replay(*asked, *arguments(given)):
+            return
         try:
-            repeated = found[0][:0], found[2][:0], none
-            advance(
-                self._step_tag, int(self.form), self._stepped, z, self.steps, x, P, repeated, (steps, *found), notes
-            )
+            advance(*loops)
         finally:
             for old, new in zip(given[1:], used[1:], strict=True):
                 if old is not new:

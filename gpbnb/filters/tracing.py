@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,6 +121,8 @@ class Trace:
 
     def __init__(self, n: int, m: int, zero: int, one: int) -> None:
         self.build = Builder(n, m)
+        #: Matrices that were inverted; the first is the innovation covariance.
+        self.inverted: list[Matrix] = []
         self._constants = {0: Traced(self, None, zero), 1: Traced(self, None, one)}
 
     def number(self, given: Any) -> Traced:
@@ -158,6 +160,7 @@ class Trace:
         """Return the algebra of traced numbers; pivots are noted as divisors that should be positive."""
 
         def inverse(a: Matrix, identity: Matrix) -> Inverse:
+            self.inverted.append(a)
             found = inverse_in_order(a, identity)
             for pivot in map(self.loaded, found.pivots):
                 self.build.checks += [(pivot, DIVISOR), (pivot, NOT_NEGATIVE)]
@@ -169,12 +172,31 @@ class Trace:
         return self._matrix([self._constants[int(i == j)] for i in range(n) for j in range(n)], (n, n))
 
 
-def kalman_program(n: int, m: int, form: Form) -> Program:
-    """List the operations of a step of a Kalman filter in a form.
+class TracedStep(NamedTuple):
+    """A step of a Kalman filter on traced numbers.
 
-    The states are x (n), then P (n, n), or the upper triangle of U in the UD form. Coefficients are Phi (n, n), H
-    (m, n), Q (n, n), R (m, m), then 0 and 1; Q and R are factors in the UD form.
+    Parameters
+    ----------
+    trace : its operations. The states are x (n), then the entries of P at `places`, or of U in the UD form.
+        Coefficients are Phi (n, n), H (m, n), Q (n, n), R (m, m), then 0 and 1; Q and R are factors in the UD form.
+    coefficients : names of the coefficients.
+    places : rows and columns of the entries of the covariance that are states.
+    x, P : estimate (n,) and covariance (n, n), or factor, after the step.
+    K, innovation : gain (n, m), and innovation covariance (m, m); in the UD form, which has one for each measurement,
+        they are empty.
     """
+
+    trace: Trace
+    coefficients: list[str]
+    places: list[tuple[int, int]]
+    x: Matrix
+    P: Matrix
+    K: Matrix
+    innovation: Matrix
+
+
+def traced_step(n: int, m: int, form: Form) -> TracedStep:
+    """Take a step of a Kalman filter in a form on traced numbers."""
     (Phi, H, Q, R), zero = coefficient_matrices((n, n), (m, n), (n, n), (m, m))
     upper = form is Form.UD
     places = [(i, j) for i in range(n) for j in range(n) if not upper or i <= j]
@@ -184,22 +206,28 @@ def kalman_program(n: int, m: int, form: Form) -> Program:
     for (i, j), state in zip(places, states[n:], strict=True):
         P[i, j] = Traced(trace, state)
     z, model = trace.values(trace.build.inputs, m), StepModel(*(trace.coefficients(each) for each in (Phi, H, Q, R)))
-    if upper:
-        P, _ = predict_ud(model.Phi, P, model.Q)
-        ahead = product_in_order(model.Phi, x[:, None])[:, 0]
-        x, P, *_ = observed(observe_ud, model.H, model.R, z, ahead, P)
-    else:
-        found = kalman_step(trace.algebra(), form, model, x[:, None], P, z[:, None])
-        x, P = found.x[:, 0], found.P
-        trace.build.checks += [(trace.loaded(P[i, i]), POSITIVE) for i in range(n)]
-    after = [trace.loaded(each) for each in (*x, *(P[place] for place in places))]
     letters = ("Phi", "H", "UQ", "UR") if upper else ("Phi", "H", "Q", "R")
     names = [
         each for letter, matrix in zip(letters, (Phi, H, Q, R), strict=True) for each in entries(letter, *matrix.shape)
     ]
-    covariance = "U" if upper else "P"
+    names += ["zero", "one"]
+    if upper:
+        P, _ = predict_ud(model.Phi, P, model.Q)
+        ahead = product_in_order(model.Phi, x[:, None])[:, 0]
+        x, P, *_ = observed(observe_ud, model.H, model.R, z, ahead, P)
+        return TracedStep(trace, names, places, x, P, trace.values([], 0, m), trace.values([], 0, m))
+    found = kalman_step(trace.algebra(), form, model, x[:, None], P, z[:, None])
+    trace.build.checks += [(trace.loaded(found.P[i, i]), POSITIVE) for i in range(n)]
+    return TracedStep(trace, names, places, found.x[:, 0], found.P, found.K, trace.inverted[0])
+
+
+def kalman_program(n: int, m: int, form: Form) -> Program:
+    """List the operations of a step of a Kalman filter in a form, with the states and coefficients of a TracedStep."""
+    trace, coefficients, places, x, P, *_ = traced_step(n, m, form)
+    after = [trace.loaded(each) for each in (*x, *(P[place] for place in places))]
+    covariance = "U" if form is Form.UD else "P"
     state_names = [*entries("x", n), *(f"{covariance}[{i}][{j}]" for i, j in places)]
-    return trace.build.finish(after, zero + 2, 0, state_names, [*names, "zero", "one"])
+    return trace.build.finish(after, len(coefficients), 0, state_names, coefficients)
 
 
 def without_exact(program: Program, coefficients: NDArray[Any]) -> Program:

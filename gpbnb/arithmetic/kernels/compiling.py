@@ -11,6 +11,7 @@ files that the defining file imports. Several processes wait for each other and 
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import itertools
 import os
@@ -54,6 +55,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     The compiled function releases Python's global interpreter lock.
     """
     dispatcher = njit(nogil=True, no_cfunc_wrapper=True)(function)
+    dispatcher._compiler.compile = _without_collection(dispatcher._compiler.compile)
     sources = imported(Path(function.__code__.co_filename).resolve())
     folder = _folder()
     if folder is not None and not changed_since_import(sources):
@@ -81,6 +83,29 @@ def borrowing(function: Callable[..., Any] | None = None, **options: Any) -> Any
     call one that returns arrays, except for those that borrow, too: numba would release what was never counted.
     """
     return inner(function, _nrt=False, **options)
+
+
+def _without_collection(compile_: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile without Python's garbage collector, which takes a tenth of the time and finds little."""
+
+    def compile_at_once(*arguments: Any) -> Any:
+        enabled = gc.isenabled()
+        gc.disable()
+        try:
+            return compile_(*arguments)
+        finally:
+            if enabled:
+                gc.enable()
+
+    return compile_at_once
+
+
+def is_compiled(function: Any, *arguments: Any) -> bool:
+    """Tell whether a :func:`compiled` function need not be compiled for arguments of these types."""
+    types = tuple(map(function.typeof_pyval, arguments))
+    if types in function.overloads:
+        return True
+    return isinstance(function._cache, _Cache) and function._cache.holds(types, function.targetctx)
 
 
 @lru_cache(maxsize=1)
@@ -144,6 +169,10 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             else:
                 self._release()
         return found
+
+    def holds(self, sig: Any, target_context: Any) -> bool:
+        """Tell whether there is a file for a set of types."""
+        return self._path(self._index_key(sig, target_context.codegen())).is_file()
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:

@@ -394,14 +394,14 @@ def _least_multiple(model: Any) -> Any:
     return found
 
 
-@inner
-def _equal(a: Any, b: Any) -> Any:
+@borrowing
+def _equal(fmt: Any, a: Any, b: Any) -> Any:
     """Whether two matrices have the same numbers."""
-    one, other = a.ravel(), b.ravel()
-    i = 0
-    while i < one.shape[0] and one[i] == other[i]:  # covariances that wander differ in their first entries
-        i += 1
-    return i == one.shape[0]
+    for i in range(a.shape[0]):  # covariances that wander differ in their first entries
+        for j in range(a.shape[1]):
+            if load(fmt, a, (i, j)) != load(fmt, b, (i, j)):
+                return False
+    return True
 
 
 @compiled
@@ -454,7 +454,7 @@ def advance(
             copy(storing, P, covariances[step - returned])
         elif seeks:
             since += 1
-            if since % cycle == 0 and _equal(P, before):
+            if since % cycle == 0 and _equal(storing, P, before):
                 returned, seeks = step + 1, since * P.size <= LARGEST_KEPT
                 if seeks:
                     gains = np.empty((since, *K.shape), K.dtype)

@@ -1,0 +1,223 @@
+"""A few steps of a Kalman filter without compiling its loops: the operations of one step are listed, and replayed.
+
+Compiling :func:`gpbnb.filters.kernels.step.advance` for another arithmetic takes as long as many thousand steps.
+:func:`gpbnb.arithmetic.kernels.replay.replay` compiles in a tenth of this time, for filters of all sizes and forms, and
+takes the same operations. All digits are the same.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.kernels import replay as codes
+from gpbnb.arithmetic.kernels.replay import replay
+from gpbnb.arithmetic.kernels.tags import (
+    Binary,
+    Decimal,
+    DoubleDouble,
+    Hardware32,
+    Hardware64,
+    Hexadecimal,
+    Limited,
+    LimitedDecimal,
+    Random,
+    Separate,
+    ShortDecimal,
+    Tag,
+)
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, StepArrays
+from gpbnb.filters.program import ADD, CONSTANT, DIVIDE, DIVISOR, MULTIPLY, NOT_NEGATIVE, POSITIVE, PRODUCT, SUBTRACT
+from gpbnb.filters.tracing import traced_step
+
+LONGEST = 20_000
+"""Largest number of operations of a step that is listed, which takes a third of a second."""
+
+_PER_STEP, _PER_OPERATION = 30e-6, 12e-9  # seconds
+_CODES = {
+    ADD: codes.ADD,
+    SUBTRACT: codes.SUBTRACT,
+    MULTIPLY: codes.MULTIPLY,
+    PRODUCT: codes.MULTIPLY,
+    DIVIDE: codes.DIVIDE,
+}
+_KINDS = (Binary, Hexadecimal, Decimal, ShortDecimal, DoubleDouble, LimitedDecimal, Hardware32, Hardware64)
+
+# Seconds that a process replays in one kind of arithmetic before it compiles the loops, or loads compiled loops.
+_limits = [3.0, 0.1]
+_spent: dict[Any, float] = {}  # seconds
+_compiled: dict[Any, bool] = {}  # whether the loops of a kind of arithmetic need only be loaded
+
+
+class _Listed(NamedTuple):
+    """The operations of a step, and the places of its numbers: the first are x (n), P (n, n) and z (m)."""
+
+    #: (o, 5), as :func:`replay` takes them.
+    instructions: NDArray[np.intc]
+    #: number of places before the first result; of the first coefficient; of all places. The last two hold 0 and 1.
+    first: int
+    coefficients: int
+    size: int
+    #: places of the results.
+    x: NDArray[np.int64]
+    K: NDArray[np.int64]
+    P: NDArray[np.int64]
+    innovation: NDArray[np.int64]
+    #: divisors, and numbers that should be positive, or not negative.
+    divisors: NDArray[np.int64]
+    positive: NDArray[np.int64]
+    not_negative: NDArray[np.int64]
+
+
+def replay_pays(
+    tag: Tag, form: Form, model: StepArrays, z: NDArray[Any], x: NDArray[Any], ready: Callable[[], bool]
+) -> bool:
+    """Whether some steps cost less by :func:`advance_by_replay` than to compile or load the loops.
+
+    From the first time that they cost more, they always do, because the loops are there.
+
+    Parameters
+    ----------
+    z, x : measurements, as the loops take them, and the state.
+    ready : whether the loops are compiled already; asked once for each kind of arithmetic.
+    """
+    kind, size = _kind(tag), 6 * (x.shape[0] + z.shape[1]) ** 3  # about the number of operations
+    if kind is None or (kind is DoubleDouble and form is not Form.INNOVATION):
+        return False
+    if x.shape[1] != 1 or model.increment.shape[0] or size > LONGEST:
+        return False
+    if kind not in _compiled:
+        _compiled[kind] = ready()
+    spent = _spent.get(kind, 0.0) + len(z) * (_PER_STEP + size * _PER_OPERATION)
+    limit = _limits[_compiled[kind]]
+    if limit >= 0:
+        _spent[kind] = spent if spent <= limit else math.inf
+    return spent <= limit
+
+
+def advance_by_replay(
+    tag: Tag,
+    form: Form,
+    model: StepArrays,
+    z: NDArray[Any],
+    first: int,
+    x: NDArray[Any],
+    P: NDArray[Any],
+    repeated: tuple[NDArray[Any], ...],
+    kept: tuple[NDArray[Any], ...],
+    notes: NDArray[np.int64],
+) -> bool:
+    """Take steps as :func:`gpbnb.filters.kernels.step.advance` does, and return True; or take none.
+
+    It takes none if a number has no result in the arithmetic, so that the loops report where.
+    """
+    n, m = x.shape[0], z.shape[1]
+    listed = _listed(n, m, form, isinstance(tag, DoubleDouble))
+    pair, end = x.shape[2:], len(listed.instructions)
+    x0, P0, innovation = repeated
+    checkpoint_steps, X, G, C = kept
+    state, covariance, after = x[:, 0].copy(), P.reshape(n * n, *pair).copy(), notes.copy()
+    values, truths = np.zeros((listed.size, *pair), x.dtype), np.zeros(2, np.uint8)
+    values[-1] = model.identity[0, 0]
+    for k in range(len(z)):
+        if len(x0):
+            state, covariance = x0[k, :, 0], P0[k].reshape(n * n, *pair)
+        given = [each[(first + k) % len(each)] for each in (model.Phi, model.H, model.Q, model.R)]
+        parts = [matrix.reshape(-1, *pair) for matrix in given]
+        values[: listed.first] = np.concatenate([state, covariance, z[k, :, 0]])
+        values[listed.coefficients : -2] = np.concatenate(parts)
+        try:
+            if replay(tag, listed.instructions, 0, end, values, truths) < end:
+                return False
+        except OverflowError:
+            return False
+        signs = values if values.ndim == 1 else values[:, 0]  # the first part of a number has its sign
+        if np.any(signs[listed.divisors] == 0):
+            return False
+        indefinite = np.any(signs[listed.positive] <= 0) or np.any(signs[listed.not_negative] < 0)
+        state, covariance = values[listed.x], values[listed.P]
+        after[DONE] = first + k + 1
+        if indefinite and not after[INDEFINITE]:
+            after[INDEFINITE] = first + k + 1
+        if len(x0):
+            innovation[k] = values[listed.innovation]
+        at = after[NEXT_CHECKPOINT]
+        if at < len(checkpoint_steps) and checkpoint_steps[at] == first + k + 1:
+            X[at, :, 0], G[at], C[at] = state, values[listed.K], covariance.reshape(P.shape)
+            after[NEXT_CHECKPOINT] += 1
+    x[:, 0], P[:], notes[:] = state, covariance.reshape(P.shape), after
+    return True
+
+
+@contextlib.contextmanager
+def only_compiled() -> Iterator[None]:
+    """Take every step in the compiled loops within a ``with`` block."""
+    before, _limits[:] = _limits.copy(), (-1.0, -1.0)
+    try:
+        yield
+    finally:
+        _limits[:] = before
+
+
+def _kind(tag: Any) -> Any:
+    """Return what the loops are compiled for, or None if a step of this arithmetic is not a list of operations."""
+    if isinstance(tag, Limited):
+        listed = isinstance(tag.sums, Separate) and not isinstance(tag.mode, Random)
+        return (type(tag.digits), type(tag.mode)) if listed else None
+    return type(tag) if isinstance(tag, _KINDS) else None
+
+
+@lru_cache(maxsize=32)
+def _listed(n: int, m: int, form: Form, pairs: bool) -> _Listed:
+    """List the operations of a step.
+
+    Parameters
+    ----------
+    pairs : whether numbers are pairs of float64, whose products depend on the order of factors in their last digit.
+    """
+    step = traced_step(n, m, form)
+    trace = step.trace
+    x, K, P, S = (
+        np.reshape([trace.loaded(each) for each in np.ravel(matrix)], np.shape(matrix))
+        for matrix in (step.x, step.K, step.P, step.innovation)
+    )
+    operations = trace.build.listed()
+    first, coefficients = operations[0][0], operations[-1][0] + 1
+    at = np.arange(coefficients)  # the place of each value; a loaded coefficient has its own
+    turned = _of_gain(operations, K) if pairs else set()
+    rows = []
+    for value, (code, a, b), _ in operations:
+        if code == CONSTANT:
+            at[value] = coefficients + a
+            continue
+        left, right = coefficients + a if code == MULTIPLY else at[a], at[b]
+        rows.append((_CODES[code], *((right, left) if value in turned else (left, right)), 0, value))
+    instructions = np.array(rows, dtype=np.intc)
+    instructions.flags.writeable = False  # as those of a tape, so that the loop is compiled once for both
+    checks = (
+        at[[value for value, kind in trace.build.checks if kind == wanted]]
+        for wanted in (DIVISOR, POSITIVE, NOT_NEGATIVE)
+    )
+    size = coefficients + len(step.coefficients)
+    return _Listed(instructions, first, coefficients, size, at[x], at[K], at[P.ravel()], at[S], *checks)
+
+
+def _of_gain(operations: Sequence[tuple[int, tuple[int, int, int], int]], K: NDArray[np.int64]) -> set[int]:
+    """Return the products that the gain sums up, whose factors the compiled loops take in the other order."""
+    codes_of = {value: operation for value, operation, _ in operations}
+    waiting, found = K.ravel().tolist(), set[int]()
+    while waiting:
+        value = waiting.pop()
+        code, a, b = codes_of[value]
+        if code == ADD:
+            waiting += [a, b]
+        elif code == PRODUCT:
+            found.add(value)
+    return found
