@@ -12,12 +12,9 @@ import numpy as np
 from gpbnb.arithmetic import rational
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_ratio
-from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
-from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
-from gpbnb.arithmetic.kernels.selection import Accumulator, check_compiled, mixed_tag, run_tag
-from gpbnb.arithmetic.kernels.tags import Tag
+from gpbnb.arithmetic.kernels.exact import LARGEST_BITS
 from gpbnb.arithmetic.making import Makes
-from gpbnb.arithmetic.rounding import Limits, Order, Rounding, Rules, rounding_named
+from gpbnb.arithmetic.rounding import Limits, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.words import FixedLayout
 
 _POLICIES = ("raise", "saturate", "wrap")
@@ -141,37 +138,6 @@ class FixedFormat(Makes[FixedArray]):
     def rules(self) -> Rules:
         """All settings that determine the digits of a result."""
         return Rules(2, self.precision, self.rounding, self.limits, self.seed)
-
-    @cached_property
-    def kernel(self) -> ExactKernel:
-        """The scalar operations of this format."""
-        return kernel(self.rules)
-
-    @cached_property
-    def backend(self) -> Backend:
-        """The backend that stores the numbers of an array of this format."""
-        return backend(self.rules)
-
-    @cached_property
-    def exact_backend(self) -> Exact:
-        """The slow backend that can store every number of this format."""
-        return exact(self.rules)
-
-    def run_tag(
-        self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
-    ) -> Tag:
-        """Return the tag for a compiled loop; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
-        if sums is not None:
-            return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
-        return run_tag(self.rules, fused, order, block)
-
-    def check_compiled(self) -> None:
-        """Reject a format without compiled loops; see :meth:`gpbnb.arithmetic.formats.FloatFormat.check_compiled`."""
-        check_compiled(self.rules)
-
-    def restart(self) -> None:
-        """Restart the random numbers of stochastic rounding."""
-        self.backend.restart()
 
     def round(self, value: Any) -> Fraction:
         """Round one number into the format; see :meth:`gpbnb.arithmetic.formats.FloatFormat.round`."""

@@ -15,12 +15,9 @@ import numpy as np
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_fraction, exact_ratio
-from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
-from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
-from gpbnb.arithmetic.kernels.selection import Accumulator, check_compiled, mixed_tag, run_tag
-from gpbnb.arithmetic.kernels.tags import Tag
+from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, kernel
 from gpbnb.arithmetic.making import Makes
-from gpbnb.arithmetic.rounding import FLOAT_OVERFLOWS, Limits, Order, Rounding, Rules, rounding_named
+from gpbnb.arithmetic.rounding import FLOAT_OVERFLOWS, Limits, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.words import FloatLayout
 
 __all__ = ["FloatFormat", "prints_as"]
@@ -289,57 +286,6 @@ class FloatFormat(Makes[FloatArray]):
     def rules(self) -> Rules:
         """All settings that determine the digits of a result."""
         return Rules(self.base, self.precision, self.rounding, self.limits, self.seed)
-
-    @cached_property
-    def kernel(self) -> ExactKernel:
-        """The scalar operations of this format."""
-        return kernel(self.rules)
-
-    def run_tag(
-        self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
-    ) -> Tag:
-        """Return the tag that selects this format's arithmetic in a compiled loop.
-
-        Stochastic rounding restarts its random numbers from the seed.
-
-        Parameters
-        ----------
-        fused : whether sums of products use fused multiply-add.
-        sums : the format in which sums of products are computed before they are stored; by default this format.
-        order, block : order of the additions in sums of products, as in :func:`gpbnb.arithmetic.linalg.matmul`.
-
-        Raises
-        ------
-        ValueError : the format has no compiled loops, or these do not support the given `fused`, `sums` or `order`; an
-            unknown order.
-        """
-        if sums is not None:
-            return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
-        return run_tag(self.rules, fused, order, block)
-
-    def check_compiled(self) -> None:
-        """Reject a format without compiled loops.
-
-        Raises
-        ------
-        ValueError : the format has no compiled loops; the message names the setting that prevents them, and what to set
-            instead.
-        """
-        check_compiled(self.rules)
-
-    def restart(self) -> None:
-        """Restart the random numbers of stochastic rounding."""
-        self.backend.restart()
-
-    @cached_property
-    def backend(self) -> Backend:
-        """The backend that stores the numbers of an array of this format, compiled if the format allows it."""
-        return backend(self.rules)
-
-    @cached_property
-    def exact_backend(self) -> Exact:
-        """The slow backend that can store every number of this format."""
-        return exact(self.rules)
 
     @property
     def unit_roundoff(self) -> Fraction:

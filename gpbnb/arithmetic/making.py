@@ -1,17 +1,22 @@
-"""What every number format makes besides ``fmt.array``: zeros, identities, and numbers from their bits."""
+"""What floating-point and fixed-point formats share: how they compute, and what they make besides ``fmt.array``."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.kernels.exact import ExactKernel
+from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
+from gpbnb.arithmetic.kernels.exact import ExactKernel, kernel
+from gpbnb.arithmetic.kernels.selection import Accumulator, compiled_tag, mixed_tag, run_tag
+from gpbnb.arithmetic.kernels.tags import Tag
+from gpbnb.arithmetic.rounding import Order, Rules
 from gpbnb.arithmetic.text import at_entry
 from gpbnb.arithmetic.words import Layout, words
 
@@ -23,8 +28,8 @@ class Makes(ABC, Generic[Made]):
 
     @property
     @abstractmethod
-    def kernel(self) -> ExactKernel:
-        """The scalar operations of this format."""
+    def rules(self) -> Rules:
+        """All settings that determine the digits of a result."""
 
     @property
     @abstractmethod
@@ -43,6 +48,57 @@ class Makes(ABC, Generic[Made]):
     @abstractmethod
     def array(self, values: Any) -> Made:
         """Round numbers into an array."""
+
+    @cached_property
+    def kernel(self) -> ExactKernel:
+        """The scalar operations of this format."""
+        return kernel(self.rules)
+
+    def run_tag(
+        self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
+    ) -> Tag:
+        """Return the tag that selects this format's arithmetic in a compiled loop.
+
+        Stochastic rounding restarts its random numbers from the seed.
+
+        Parameters
+        ----------
+        fused : whether sums of products use fused multiply-add.
+        sums : the format in which sums of products are computed before they are stored; by default this format.
+        order, block : order of the additions in sums of products, as in :func:`gpbnb.arithmetic.linalg.matmul`.
+
+        Raises
+        ------
+        ValueError : the format has no compiled loops, or these do not support the given `fused`, `sums` or `order`; an
+            unknown order.
+        """
+        if sums is not None:
+            return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
+        return run_tag(self.rules, fused, order, block)
+
+    def check_compiled(self) -> None:
+        """Reject a format without compiled loops.
+
+        Raises
+        ------
+        ValueError : the format has no compiled loops; the message names the setting that prevents them, and what to set
+            instead.
+        """
+        compiled_tag(self.rules)
+
+    def restart(self) -> None:
+        """Restart the random numbers of stochastic rounding."""
+        self.backend.restart()
+
+    @cached_property
+    def backend(self) -> Backend:
+        """The backend that stores the numbers of an array of this format, compiled if the format allows it."""
+        return backend(self.rules)
+
+    @cached_property
+    def exact_backend(self) -> Exact:
+        """The slow backend that can store every number of this format."""
+        return exact(self.rules)
 
     def zeros(self, shape: int | tuple[int, ...]) -> Made:
         """Return an array of zeros.
