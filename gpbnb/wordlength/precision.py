@@ -37,11 +37,12 @@ from gpbnb.wordlength.recursion import Recursion, required_recursion_precision, 
 from gpbnb.wordlength.requirement import (
     Asked,
     Basis,
+    LastingBound,
     Requirement,
     Strategy,
     checked_tolerance,
+    for_ever_or_over,
     format_like,
-    has_no_bound,
     largest_ratio,
 )
 from gpbnb.wordlength.system import required_system_precision
@@ -191,15 +192,13 @@ def _for_ever(
     kind = Guaranteed if basis == "guarantee" else Probable
     strategy = kind(model, form, within, tolerances)
     with asked.search(checks=()) as search:
-        found = search(strategy)
-        if kind is Guaranteed and has_no_bound(found):
-            ended = search(replace(strategy, steps=asked.steps))
-            if ended.fmt is not None or not has_no_bound(ended):
-                return asked.answer(ended, form, repairs=_repairs(model, model, ended.fmt, form), ends=True)
-    cause = "" if found.fmt is not None or model.cycle != 1 else unobserved(model.Phi[0], model.H[0], model.state_names)
+        found, ends = for_ever_or_over(asked.steps, strategy, search)
+    cause = ""
+    if found.fmt is None and not ends and model.cycle == 1:
+        cause = unobserved(model.Phi[0], model.H[0], model.state_names)
     if cause:
         cause += '; ask with basis "bound" for a number of steps instead'
-    return asked.answer(found, form, repairs=_repairs(model, model, found.fmt, form), cause=cause)
+    return asked.answer(found, form, repairs=_repairs(model, model, found.fmt, form), cause=cause, ends=ends)
 
 
 def _repairs(given: AnyModel, sound: AnyModel, fmt: FloatFormat | None, form: AnyForm) -> tuple[str, ...]:
@@ -422,7 +421,7 @@ def _recorded(
 
 
 @dataclass(frozen=True, eq=False)
-class Guaranteed:
+class Guaranteed(LastingBound):
     """The guarantee for all measurements within limits, over some steps or for ever."""
 
     model: LinearModel
@@ -450,6 +449,10 @@ class Guaranteed:
             return Outcome(math.inf, found.why)
         return Outcome(largest_ratio(self._errors(found)[asked], self.tolerances[asked]))
 
+    def over(self, steps: int) -> Guaranteed | None:
+        """Return the guarantee over some steps, which a filter may have that never forgets its errors."""
+        return replace(self, steps=steps) if self.steps is None else None
+
     def _errors(self, found: Guarantee) -> NDArray[np.float64]:
         """Return the error of each state, (n,)."""
         return found.bound
@@ -457,6 +460,9 @@ class Guaranteed:
 
 class Probable(Guaranteed):
     """Three standard deviations of the error that independent roundings would cause."""
+
+    def over(self, steps: int) -> None:
+        """Return None: the probable error is that of a steady state."""
 
     def _errors(self, found: Guarantee) -> NDArray[np.float64]:
         return 3 * probable_error(found)
