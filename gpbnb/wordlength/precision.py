@@ -25,11 +25,10 @@ from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
-from gpbnb.filters.missing import stored_measurements, without_missing
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import form_named, named, whole_number
 from gpbnb.filters.nonlinear import NO_GUARANTEE, AnyModel, NonlinearModel
-from gpbnb.filters.nonlinear_run import NonlinearRun, check_form, complete, opened, simulated, true_states
+from gpbnb.filters.nonlinear_run import NonlinearRun, check_form, opened, simulated, true_states
 from gpbnb.filters.run import Run
 from gpbnb.filters.system import LinearSystem, unobserved
 from gpbnb.wordlength.models import ModelSource, model_or_function
@@ -151,7 +150,7 @@ def required_precision(
 
 def _for_record(model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], form: AnyForm, z: Any) -> Requirement:
     """Find the answer for one measurement record, by emulation or by the bound of each run."""
-    strategy = recorded_strategy(model, asked, tolerances, form, z)
+    strategy = recorded_strategy(model, z, tolerances, form, asked.basis, asked.steps)
     sound = strategy.model
     with asked.search(CHECKED[asked.like.base], bounds=asked.basis == "bound") as search:
         found = search(strategy)
@@ -183,7 +182,7 @@ def _for_ever(
     if model.steps is not None:
         raise ValueError(f'got a model of {model.steps} steps and basis "{basis}"; needed one that goes on for ever')
     if z is not None:
-        sound, filled = without_missing(model, z)
+        sound, filled = model.without_missing(z)
         if sound is not model:
             raise ValueError(
                 f'got missing measurements and basis "{basis}"; needed none: it does not depend on a record'
@@ -268,11 +267,9 @@ def survey_formats(
     if isinstance(model, LinearModel):
         for fmt in formats:
             fmt.check_compiled()
-    model, z = complete(model, z)
-    measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"; the other bases do not depend on a run')
-    strategy = _recorded(model, measured, tolerances, form, basis)
+    strategy = recorded_strategy(model, z, tolerances, form, basis)
     return [strategy.error(fmt) for fmt in formats]
 
 
@@ -395,7 +392,7 @@ class Bounded(Recorded):
 
 
 def recorded_strategy(
-    model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], form: AnyForm, z: Any
+    model: AnyModel, z: Any, tolerances: NDArray[np.float64], form: AnyForm, basis: Basis, steps: int | None = None
 ) -> Recorded:
     """Check one measurement record, (steps, m), and return the strategy that answers a question about it.
 
@@ -403,21 +400,14 @@ def recorded_strategy(
     ------
     ValueError, TypeError : for a reason given in :func:`required_precision`.
     """
-    sound, filled = complete(model, z)
-    measured = _measured(sound, filled, asked.steps)
-    sound.check_steps(asked.steps)
-    return _recorded(sound, measured, tolerances, form, asked.basis)
-
-
-def _recorded(
-    model: AnyModel, z: NDArray[Any], tolerances: NDArray[np.float64], form: AnyForm, basis: Basis
-) -> Recorded:
-    """Return the strategy of a basis that depends on a record."""
+    sound, filled = model.without_missing(z)
+    measured = _measured(sound, filled, steps)
+    sound.check_steps(len(measured))
     if basis == "bound":
-        return Bounded(model, z, form, tolerances)
-    if isinstance(model, NonlinearModel):
-        check_form(model, form)
-    return Emulated(model, z, form, tolerances, true_states(model, z))
+        return Bounded(sound, measured, form, tolerances)
+    if isinstance(sound, NonlinearModel):
+        check_form(sound, form)
+    return Emulated(sound, measured, form, tolerances, true_states(sound, measured))
 
 
 @dataclass(frozen=True, eq=False)
