@@ -38,6 +38,7 @@ LONGEST = (
     "tests/gravity_probe_b/test_year.py",
 )
 
+MOST_PROCESSES = 8
 
 # An opened page is looked at on a desktop, then on a phone, and is printed last.
 OPENED = re.compile(r"(.+?\.html)-(desktop|phone|paper)\b")
@@ -81,6 +82,14 @@ def pytest_collection_finish():
     """Look for garbage less often, and not among the modules and tests, which stay: saves 6 % of the time."""
     gc.freeze()
     gc.set_threshold(20_000, 50, 50)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config):
+    """Share notebooks among the processors unless told how: a process executes one cell at a time."""
+    option = config.option
+    if getattr(option, "nbval", False) and getattr(option, "numprocesses", 0) is None and not option.usepdb:
+        option.numprocesses, option.dist = min(os.cpu_count() or 1, MOST_PROCESSES), "loadgroup"
 
 
 # pytest-xdist has --dist loadgroup, whose groups pytest 9.2 does not let it write into the names of tests.

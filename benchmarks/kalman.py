@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import decimal
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +26,7 @@ from gpbnb.arithmetic.kernels.scalar import divide, load, matmul, multiply, nega
 
 N, M = 10, 2
 STEPS = 20  # in one call of the compiled loop
+C_SOURCE = Path(__file__).parent / "kalman.c"
 
 
 @njit(cache=True, nogil=True)
@@ -134,6 +140,40 @@ def as_decimal(x: Fraction) -> decimal.Decimal:
         return decimal.Decimal(x.numerator) / decimal.Decimal(x.denominator)
 
 
+def c_steps() -> Callable[[Any, Any, Any, Any, Any, int], None] | None:
+    """Compile ``kalman.c``, the same loop written by hand for float, with gcc -O2; None without gcc."""
+    if shutil.which("gcc") is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / "kalman.so"
+        command = ["gcc", "-std=c99", "-O2", "-shared", "-fPIC", f"-DN={N}", f"-DM={M}", "-o", library, C_SOURCE]
+        subprocess.run(command, check=True)
+        function = ctypes.CDLL(str(library)).steps
+    function.restype = None
+
+    def run(model: Any, x0: Any, P0: Any, x: Any, P: Any, steps: int) -> None:
+        function(*(ctypes.c_void_p(a.ctypes.data) for a in (*model, x0, P0, x, P)), ctypes.c_int(steps))
+
+    return run
+
+
+def measure_binary32() -> list[Row]:
+    """Beside NumPy in float32 and C, in the same arithmetic."""
+    single, _ = compiled(named.BINARY32)
+    *given, x0, P0 = (np.ascontiguousarray(a, np.float32) for a in (*model()[0], *model()[1:]))
+    times = medians({"gpbnb": partial(single, 10 * STEPS), "empty": partial(single, 0)}, 200)
+    step = {"gpbnb": (times["gpbnb"] - times["empty"]) / (10 * STEPS)}
+    step |= medians({"numpy float32": lambda: numpy_step(given, x0, P0)}, 2000)
+    if (in_c := c_steps()) is not None:
+        x, P = np.empty_like(x0), np.empty_like(P0)
+        in_c(given, x0, P0, x, P, 1)
+        if any(not np.array_equal(a.astype(float), b) for a, b in zip(single(1), (x, P), strict=True)):
+            raise RuntimeError("gpbnb and C differ")
+        times = medians({"c": partial(in_c, given, x0, P0, x, P, 10 * STEPS)}, 200)
+        step["C, gcc -O2"] = times["c"] / (10 * STEPS)
+    return rows("Kalman step, binary32", step, "gpbnb", {"numpy float32": 1 / 0.15, "C, gcc -O2": 1 / 2})
+
+
 def measure() -> list[Row]:
     """Base 2 at 24 bits beside NumPy unrounded, base 10 beside ``decimal`` in the same order."""
     given, x0, P0 = model()
@@ -168,4 +208,4 @@ def measure() -> list[Row]:
         times = medians({"gpbnb": partial(run, STEPS), "empty": partial(run, 0), "decimal": with_decimal}, 100)
         step = {"gpbnb": (times["gpbnb"] - times["empty"]) / STEPS, "decimal": times["decimal"]}
         table += rows(f"Kalman step, {precision} decimal digits", step, "gpbnb", {"decimal": least})
-    return table
+    return table + measure_binary32()

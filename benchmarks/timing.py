@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import NamedTuple
 
-PACKAGES = ("numpy", "scipy", "numba", "ml_dtypes", "gfloat", "pychop", "mpmath")
+PACKAGES = ("numpy", "scipy", "numba", "ml_dtypes", "apytypes", "gfloat", "pychop", "mpmath", "gmpy2", "python-flint")
 
 
 class Row(NamedTuple):

@@ -1,6 +1,7 @@
 """Compare the longest significands with the exact kernel in every rounding and range: ``python -m benchmarks.wide``.
 
-These are significands of two words, and those of 53 bits that the machine's float64 serves.
+These are significands of two words, and those of 53 bits that the machine's float64 serves. Fused multiply-adds of
+shorter ones are compared, too: those of base 10, and of 53 bits with ties away from zero, take two words.
 
 Operands are those of :mod:`benchmarks.exactness`: random, ties, near-ties, cancellations, carries. In a format with a
 range, a third of the pairs lies at its lower end, where numbers are subnormal or become zero, and a third at its upper
@@ -21,14 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from benchmarks.exactness import OPERATIONS, RESULTS, WIDE, Job, pairs, radicands
+from benchmarks.exactness import OPERATIONS as UNFUSED
+from benchmarks.exactness import RESULTS, WIDE, Draw, Job, pairs, radicands
 from gpbnb.arithmetic.kernels import backends
-from gpbnb.arithmetic.kernels.backends import Backend, Components, Looped, TwoWords, exact
+from gpbnb.arithmetic.kernels.backends import Backend, Components, Exact, Looped, TwoWords, exact
 from gpbnb.arithmetic.kernels.exact import kernel
 from gpbnb.arithmetic.kernels.selection import wide_tag
 from gpbnb.arithmetic.rounding import Limits, Rounding, Rules
 from gpbnb.report.display.tables import Table
 
+OPERATIONS = (*UNFUSED, "fused")
+SHORT = {2: (2, 11, 24, 25, 26, 40, 52, 53), 10: (1, 2, 7, 8, 9, 16, 17, 18), 16: (1, 6, 12, 13)}
+"""Precisions whose fused multiply-adds are compared, though their other operations take one word."""
 BINARY = 53  # bits of float64
 ROUNDINGS = [rounding for rounding in Rounding if rounding is not Rounding.STOCHASTIC]
 RANGES = ("none", "subnormal", "flushed", "saturating", "short", "fixed")
@@ -63,6 +68,17 @@ def formats_of_float64() -> Iterator[Rules]:
             yield Rules(2, precision, rounding, _limits(2, precision, kind, 200))
 
 
+def formats_of_words() -> Iterator[Rules]:
+    """Every rounding and range of shorter significands that compiled loops serve."""
+    for base, precisions in SHORT.items():
+        for precision in precisions:
+            for rounding in ROUNDINGS:
+                for kind in ("none", "subnormal", "flushed"):
+                    rules = Rules(base, precision, rounding, _limits(base, precision, kind, 3000 if base == 10 else 60))
+                    if not isinstance(backends.backend(rules), Exact):
+                        yield rules
+
+
 def _limits(base: int, precision: int, kind: str, far: int = 3000) -> Limits | None:
     if kind == "none":
         return None
@@ -76,13 +92,13 @@ def _limits(base: int, precision: int, kind: str, far: int = 3000) -> Limits | N
     return Limits(emin, kind != "flushed", largest, -largest, "saturate" if kind == "saturating" else "raise")
 
 
-def _in_float64(rules: Rules) -> bool:
-    return rules.base == 2 and rules.precision <= BINARY
+def _in_words(rules: Rules) -> bool:
+    return rules.precision <= SHORT[rules.base][-1]
 
 
 def backend(rules: Rules) -> Looped:
-    """The backend that is compared: significands of two words beyond the bits of float64."""
-    if _in_float64(rules):
+    """The backend that is compared: significands of two words beyond the digits of one."""
+    if _in_words(rules):
         return cast(Looped, backends.backend(rules))
     tag = wide_tag(rules)
     if tag is None:
@@ -92,6 +108,8 @@ def backend(rules: Rules) -> Looped:
 
 def operands(rules: Rules, operation: str, count: int, seed: tuple[int, ...]) -> list[Components]:
     """Significands and exponents of numbers of the format."""
+    if operation == "fused":
+        return fused_operands(rules, count, seed)
     name = operation if operation in ("add", "subtract", "multiply", "divide") else "add"
     job = Job(rules.base, rules.precision, True, name, count, seed)
     if operation == "round":
@@ -113,6 +131,30 @@ def operands(rules: Rules, operation: str, count: int, seed: tuple[int, ...]) ->
     if rules.limits.fixed:
         shift = [ends * 0 + lowest + 1] * 2
     return [_within(rules, m, e + by) for (m, e), by in zip(found, shift, strict=False)]
+
+
+def fused_operands(rules: Rules, count: int, seed: tuple[int, ...]) -> list[Components]:
+    """Two factors; an addend that is random, almost cancels the product, or has about twice its size as a unit."""
+    job = Job(rules.base, rules.precision, True, "multiply", count, seed)
+    m1, e1, m2, e2 = pairs(job)
+    d = Draw(job, count)
+    near = d.rng.integers(0, 2, count) == 0
+    m1, m2 = np.where(near, d.edge() * d.sign(), m1), np.where(near, d.edge(), m2)
+    e = e1 + e2
+    opposite, shift = d.normalized(m1 * m2, e)
+    opposite = -np.where(m1 < 0, -1, 1) * np.where(m1 * m2 == 0, 0, d.into_range(opposite + d.below(7) - 3))
+    m3 = d.choose(d.sign() * d.any(), opposite, d.sign() * d.any(), d.sign() * d.edge())
+    e3 = np.where(m3 == opposite, shift + d.below(2), d.choose(e + d.gap(), e + 2 * d.t + d.below(7) - 3, e + d.gap()))
+    found = [(m1, e1), (m2, e2), (m3, e3)]
+    found = [(m, np.where(m == 0, 0, e)) for m, e in found]
+    if rules.limits is None:
+        return found
+    limited = kernel(rules)
+    ends = np.array([0, limited.quantum, limited.top[0]], object)[d.rng.integers(0, 3, count)]
+    if rules.limits.fixed:
+        ends = ends * 0 + limited.quantum + 1
+    shifts = (ends // 2, ends - ends // 2, ends)
+    return [_within(rules, m, e + by) for (m, e), by in zip(found, shifts, strict=True)]
 
 
 def _within(rules: Rules, m: NDArray[Any], e: NDArray[Any]) -> Components:
@@ -155,11 +197,12 @@ def apply(rules: Rules, operation: str, arrays: list[Components]) -> Components 
     return wide.apply(operation, *stored)
 
 
-def compare(rules: Rules, count: int, seed: int) -> Count:
+def compare(rules: Rules, count: int, seed: int, operations: tuple[str, ...] = OPERATIONS) -> Count:
     """Compare `count` results of each operation in one format."""
     compared = overflowed = 0
     different: list[str] = []
-    for index, operation in enumerate(OPERATIONS):
+    for operation in operations:
+        index = OPERATIONS.index(operation)
         for start in range(0, count, BATCH):
             key = (seed, rules.precision, index, start)
             arrays = operands(rules, operation, min(BATCH, count - start), key)
@@ -185,7 +228,9 @@ def compare(rules: Rules, count: int, seed: int) -> Count:
 
 
 def _family(rules: Rules) -> str:
-    return "base 2, float64" if _in_float64(rules) else f"base {rules.base}, two words"
+    if not _in_words(rules):
+        return f"base {rules.base}, two words"
+    return "base 2, float64" if rules.precision >= BINARY - 1 else f"base {rules.base}, one word"
 
 
 def write(counts: list[Count]) -> None:
@@ -207,7 +252,9 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=COUNT, help="results of each operation in each format")
     parser.add_argument("--seed", type=int, default=754)
     options = parser.parse_args()
-    counts = [compare(rules, options.count, options.seed) for rules in tqdm([*formats(), *formats_of_float64()])]
+    todo = [(rules, OPERATIONS) for rules in (*formats(), *formats_of_float64())]
+    todo += [(rules, ("fused",)) for rules in formats_of_words()]
+    counts = [compare(rules, options.count, options.seed, operations) for rules, operations in tqdm(todo)]
     if options.count >= COUNT:
         write(counts)
     for text in [text for count in counts for text in count.different][:20]:

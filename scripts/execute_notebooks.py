@@ -8,6 +8,7 @@ the package that it imports, the installed packages, or the processor. `make boo
 from __future__ import annotations
 
 import argparse
+import asyncio
 import difflib
 import hashlib
 import json
@@ -113,25 +114,26 @@ def executed(
 
 
 def _execute_all(files: dict[Path, Path], jobs: int, say: Callable[[str], None], findings: bool) -> None:
-    """Execute notebooks, each in a process of its own, which writes its outputs to a file."""
+    """Execute notebooks, each in a kernel of its own, and write their outputs to files."""
     began = time.monotonic()
     running: list[str] = []
     done = 0
     failures: list[Failure] = []
+    environment = os.environ | {"GPBNB_QUIET": "1"}
 
     def run(path: Path | None) -> float:
-        name = LEDGER if path is None else path.stem
+        name = _name(path)
         running.append(name)
         started = time.monotonic()
-        own = [sys.executable, str(Path(__file__).resolve()), "--worker"]
-        command = LEDGER_COMMAND if path is None else [*own, str(path), str(files[path])]
-        environment = os.environ | {"GPBNB_QUIET": "1"}
         try:
-            worker = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True)
+            if path is None:  # pages that show the ledger say what is wrong with it
+                subprocess.run(LEDGER_COMMAND, env=environment, cwd=ROOT, capture_output=True)
+            else:
+                _execute(path, files[path], environment)
+        except Exception as error:
+            raise Failure(f"{name} failed:\n{error}") from error
         finally:
             running.remove(name)
-        if path is not None and worker.returncode != 0:  # pages that show the ledger say what is wrong with it
-            raise Failure(f"{name} failed:\n{worker.stdout}{worker.stderr}")
         return time.monotonic() - started
 
     tasks: list[Path | None] = [None, *files] if findings else [*files]
@@ -150,6 +152,23 @@ def _execute_all(files: dict[Path, Path], jobs: int, say: Callable[[str], None],
             say(f"  [{done}/{len(tasks)}, {now}] {name}: {took}; running: {', '.join(running) or 'none'}")
     if failures:
         raise ExceptionGroup(f"{len(failures)} notebooks failed", failures)
+
+
+def _execute(path: Path, file: Path, environment: dict[str, str]) -> None:
+    """Execute one notebook and write the outputs of its code cells to a file."""
+    notebook = nbformat.read(path, as_version=4)
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.outputs, cell.execution_count = [], None
+    settings = {"timeout": TIMEOUT, "kernel_name": "python3", "record_timing": False, "coalesce_streams": True}
+    client = NotebookClient(notebook, resources={"metadata": {"path": str(path.parent)}}, **settings)
+    client.extra_arguments = ["--log-level=ERROR"]  # it warns of TCP without encryption, on this very machine
+    asyncio.run(client.async_execute(env=environment))
+    # If a source was changed meanwhile, nobody knows what these are the outputs of.
+    caching.forget()
+    if f"{path.stem}.{key_of(notebook)}.json" != file.name:
+        raise RuntimeError(f"{path.name}, or what it depends on, was changed while it ran; run the command again")
+    caching.write(file, json.dumps([c.outputs for c in notebook.cells if c.cell_type == "code"]).encode())
 
 
 def _name(path: Path | None) -> str:
@@ -179,22 +198,6 @@ def _put(notebook: Any, outputs: list[Any]) -> None:
         cell.metadata.pop("execution", None)
     notebook.metadata = nbformat.from_dict({"kernelspec": KERNEL, "language_info": {"name": "python"}})
     nbformat.validate(notebook)
-
-
-def work(path: Path, file: Path) -> None:
-    """Execute one notebook and write the outputs of its code cells to a file."""
-    notebook = nbformat.read(path, as_version=4)
-    name = f"{path.stem}.{key_of(notebook)}.json"
-    for cell in notebook.cells:
-        if cell.cell_type == "code":
-            cell.outputs, cell.execution_count = [], None
-    settings = {"timeout": TIMEOUT, "kernel_name": "python3", "record_timing": False, "coalesce_streams": True}
-    NotebookClient(notebook, resources={"metadata": {"path": str(path.parent)}}, **settings).execute()
-    # If a source was changed meanwhile, nobody knows what these are the outputs of.
-    caching.forget()
-    if f"{path.stem}.{key_of(notebook)}.json" != name or name != file.name:
-        raise RuntimeError(f"{path.name}, or what it depends on, was changed while it ran; run the command again")
-    caching.write(file, json.dumps([c.outputs for c in notebook.cells if c.cell_type == "code"]).encode())
 
 
 def write(path: Path, notebook: Any) -> bool:
@@ -241,12 +244,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--jobs", type=int, help="number of notebooks to run at a time; default: one more than the number of processors"
     )
-    parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--check", action="store_true", help="compare with the stored outputs and change nothing")
     given = parser.parse_args(arguments)
-    if given.worker:
-        work(*given.notebooks)
-        return 0
     try:
         paths = [path.resolve() for path in given.notebooks] or sorted(BOOK.glob("*.ipynb"))
         found = executed(paths, given.jobs, findings=not given.notebooks)

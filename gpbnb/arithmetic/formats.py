@@ -17,7 +17,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_fraction, exact_ratio
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, kernel
 from gpbnb.arithmetic.making import Makes
-from gpbnb.arithmetic.rounding import FLOAT_OVERFLOWS, Limits, Rounding, Rules, rounding_named
+from gpbnb.arithmetic.rounding import FLOAT_OVERFLOWS, Limits, Rounding, Rules, digits_text, rounding_named
 from gpbnb.arithmetic.words import FloatLayout
 
 __all__ = ["FloatFormat", "prints_as"]
@@ -132,7 +132,7 @@ class FloatFormat(Makes[FloatArray]):
         object.__setattr__(self, "rounding", rounding_named(self.rounding))
         if self.precision > LARGEST_BITS / math.log2(self.base):
             raise ValueError(
-                f"precision: got {self.precision} digits; needed at most "
+                f"precision: got {digits_text(self.precision, self.base)}; needed at most "
                 f"{int(LARGEST_BITS / math.log2(self.base))}, or numbers do not fit in memory; use fewer"
             )
 

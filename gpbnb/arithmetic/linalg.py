@@ -20,7 +20,7 @@ from gpbnb.arithmetic.array import FloatArray, NumberFormat
 from gpbnb.arithmetic.exits import lifted
 from gpbnb.arithmetic.kernels.backends import Looped
 from gpbnb.arithmetic.kernels.selection import check_order
-from gpbnb.arithmetic.rounding import Order, Rounding
+from gpbnb.arithmetic.rounding import Order, Rounding, digit_unit
 
 _MOST_PRODUCTS = 1_000_000  # that pairwise and blocked sums form at once
 
@@ -240,7 +240,7 @@ def lu(a: FloatArray, pivot: bool = False) -> LU:
         if head.backend.records:
             _ = 0 / head[0]  # so that a run of the tape stops at a pivot of zero
         elif head[0] == 0:
-            raise np.linalg.LinAlgError(_zero_pivot(k, n, pivot))
+            raise np.linalg.LinAlgError(_zero_pivot(k, n, pivot, a.format.base))
         if k == n - 1:
             break
         ratio = work[1:, 0] / head[0]
@@ -395,7 +395,7 @@ def cholesky(a: FloatArray) -> FloatArray:
         if not pivot > 0:
             raise np.linalg.LinAlgError(
                 f"got a pivot {pivot} in column {k + 1} of {n}; needed one above zero: the matrix is not positive "
-                "definite in this format; use more digits, or another matrix"
+                f"definite in this format; use more {digit_unit(a.format.base)}, or another matrix"
             )
         root = pivot.sqrt()
         below = rest[1:, 0] / root
@@ -424,7 +424,7 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
     except OverflowError:
         return None
     if column >= 0:
-        raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot))
+        raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot, a.format.base))
     return type(a).from_packed(factors, a.format), order
 
 
@@ -479,9 +479,9 @@ def _swap_largest(
     return work[rows], order, multipliers
 
 
-def _zero_pivot(k: int, n: int, pivot: bool) -> str:
+def _zero_pivot(k: int, n: int, pivot: bool, base: int) -> str:
     cure = (
-        "the matrix is singular in this format; use more digits, or another matrix"
+        f"the matrix is singular in this format; use more {digit_unit(base)}, or another matrix"
         if pivot or k == n - 1
         else "try pivot=True; if that fails too, the matrix is singular in this format"
     )

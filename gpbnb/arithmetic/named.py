@@ -22,7 +22,7 @@ from fractions import Fraction
 from gpbnb.arithmetic.array import NumberFormat
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, digits_text
 
 
 def _ieee(base: int, precision: int, emax: int) -> FloatFormat:
@@ -81,8 +81,7 @@ NAMED = {
 
 def digits(fmt: NumberFormat | FixedFormat) -> str:
     """Name the precision of a format, as in "4 decimal digits" or "24 bits"."""
-    unit = {2: "bit", 10: "decimal digit"}.get(fmt.base, f"base-{fmt.base} digit")
-    return f"{fmt.precision} {unit}{'s' if fmt.precision > 1 else ''}"
+    return digits_text(fmt.precision, fmt.base)
 
 
 _ROUNDINGS = {

@@ -1,10 +1,27 @@
-"""Rules of a number format: how it rounds, and its range."""
+"""Rules of a number format: its digits, how it rounds, and its range."""
 
 from __future__ import annotations
 
 from enum import Enum
 from fractions import Fraction
 from typing import Literal, NamedTuple
+
+
+def digit_unit(base: int, count: int | str = "") -> str:
+    """Name what a precision counts in a base, as "bits" or "decimal digits"; without the plural if `count` is 1."""
+    unit = {2: "bit", 10: "decimal digit"}.get(base, f"base-{base} digit")
+    return unit if str(count) == "1" else f"{unit}s"
+
+
+def digits_text(count: int | str, base: int = 2, kind: str = "") -> str:
+    """Count digits in words, as "27 bits" or "1 decimal digit"; `count` may be a text, and `kind` says which digits.
+
+    Examples
+    --------
+    >>> digits_text(27), digits_text(1, 10), digits_text("6, 7", 16), digits_text(1, kind="fraction")
+    ('27 bits', '1 decimal digit', '6, 7 base-16 digits', '1 fraction bit')
+    """
+    return " ".join(filter(None, (str(count), kind, digit_unit(base, count))))
 
 
 class Rounding(Enum):

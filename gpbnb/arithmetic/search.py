@@ -14,7 +14,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, digits_text
 
 Kind = TypeVar("Kind", FloatFormat, FixedFormat)
 """Floating point or fixed point."""
@@ -174,7 +174,7 @@ class Search(Generic[Kind]):
         #: The highest precision that may be tried.
         self.largest = fast if largest is None else largest
         if self.largest < least:
-            raise ValueError(f"got largest={largest}; needed a precision of at least {least} digits")
+            raise ValueError(f"got largest={largest}; needed at least {self._counted(least)}")
 
         def meets(digits: int) -> bool:
             if digits not in self._ratios:
@@ -208,6 +208,9 @@ class Search(Generic[Kind]):
         # a single precision above could be chance
         return most + 1 if most + 1 < largest else None
 
+    def _counted(self, digits: int) -> str:
+        return digits_text(digits, self._like.base, "fraction" if isinstance(self._like, FixedFormat) else "")
+
     @property
     def limit(self) -> str:
         """Return what sets the highest precision that may be tried."""
@@ -230,6 +233,8 @@ class Search(Generic[Kind]):
         """Return why the largest precision that has no finite error, below the answer, has none."""
         below = math.inf if self.fmt is None else self.fmt.precision
         reasons = [
-            f"in {digits} digits {reason}" for digits, reason in sorted(self._why.items()) if reason and digits < below
+            f"in {self._counted(digits)} {reason}"
+            for digits, reason in sorted(self._why.items())
+            if reason and digits < below
         ]
         return reasons[-1] if reasons else ""

@@ -40,6 +40,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel, gain, predicted, updated
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.run import Run
 
 FORMS = (Form.INNOVATION, Form.JOSEPH)
@@ -336,7 +337,7 @@ def _powers(phases: list[_Phase]) -> list[_Powers] | None:
     whole = np.eye(n)
     for phase in phases:
         whole = _middle(phase.loop) @ whole
-    radius = float(np.abs(np.linalg.eigvals(whole)).max()) ** (1 / cycle)
+    radius = float(np.abs(eigenvalues(whole)).max()) ** (1 / cycle)
     if not radius < _SLOWEST:
         return None
     lags = int(np.ceil(np.log(_SMALL) / np.log(max(radius, 1e-3)))) + 8

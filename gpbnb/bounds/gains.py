@@ -23,6 +23,7 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
 from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
+from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.enclosure import enclose
 from gpbnb.filters.forms import Form
@@ -160,7 +161,7 @@ def schedule(
         why = ""
     end = max(bad - bool(run.stopped), 0) if bad else run.steps if repeat is None or period is None else repeat + period
     if end == 0:
-        raise ValueError(f"got {model.name} in {fmt}; needed a filter whose first step can be computed: {why}")
+        raise ValueError(f"got {model.name} in {format_text(fmt)}; needed a first step that can be computed: {why}")
     enclosure = enclose(stored, run, fmt, form) if repeat is None and not bad else None
     if enclosure is not None:
         repeat, period, why = enclosure.start - stored.cycle, stored.cycle, ""
@@ -176,7 +177,7 @@ def schedule(
             K, dK, settled, first = _exact_gains(stored, end if horizon is None else horizon, None, most, fmt)
     steps = len(K)
     if not steps:
-        raise ValueError(f"got {model.name} in {fmt}; needed a filter whose first step can be computed exactly")
+        raise ValueError(f"got {model.name} in {format_text(fmt)}; needed a first step that can be computed exactly")
     rows = _rows(steps, repeat, period)
     program, packed = packed_coefficients(run, rows)
     phases = np.arange(steps)

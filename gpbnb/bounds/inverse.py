@@ -36,7 +36,7 @@ from gpbnb.arithmetic.conversion import exact_fraction
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.linalg import LU
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text
 
 # -- a priori: from the count of roundings --------------------------------------------------------
 
@@ -209,7 +209,8 @@ def a_posteriori(a: Any, x: FloatArray, bits: int | None = None) -> float:
         size = _upper(_column_sum(residual))
         if not size < 1:
             raise ValueError(
-                f"‖I - AX‖ must be below 1 to prove a bound; it may be as large as {size:.3g}. Use more digits."
+                f"‖I - AX‖ must be below 1 to prove a bound; it may be as large as {size:.3g}. Use more "
+                f"{digit_unit(x.format.base)}."
             )
         return _upper(_column_sum(guess * residual) / (1 - flint.arb(size)))
 
@@ -330,9 +331,9 @@ def smallest_precision(
     best = min((each.bound for each in tried.values()), default=math.inf)
     reached = f"the best proved bound is {best:.3g}"
     if best == math.inf:
-        reached = f"no precision gives a bound at all: in {max(why)} digits {why[max(why)]}"
+        reached = f"no precision gives a bound at all: in {digits_text(max(why), base)} {why[max(why)]}"
     raise ValueError(
-        f"got no inverse in at most {largest} base-{base} digits with a proved relative error of at "
+        f"got no inverse in at most {digits_text(largest, base)} with a proved relative error of at "
         f"most {float(tolerance):.3g}; {reached}. Increase largest or the tolerance."
     )
 
@@ -354,5 +355,6 @@ def _relative(bound: float, x: FloatArray) -> float:
     with _working(128):
         norm = flint.arb(flint.fmpq(*column_sum_norm(rationals(x)).as_integer_ratio())) - flint.arb(bound)
         if not norm > 0:
-            raise ValueError("the bound exceeds the norm of the inverse: no relative error is proved; use more digits")
+            more = f"use more {digit_unit(x.format.base)}"
+            raise ValueError(f"the bound exceeds the norm of the inverse: no relative error is proved; {more}")
         return _upper(flint.arb(bound) / norm)

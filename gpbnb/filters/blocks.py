@@ -26,7 +26,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.tags import Blocks
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, digit_unit
 
 BLOCKS = ("state", "gain", "covariance", "innovation")
 """Blocks that store numbers; the innovation block holds the innovation covariance."""
@@ -116,5 +116,4 @@ class BlockFormats:
     def __str__(self) -> str:
         each = [f"{name} {getattr(self, name).precision}" for name in BLOCKS]
         each += [] if self.sums is None else [f"sums {self.sums.precision}"]
-        unit = {2: "bits", 10: "decimal digits", 16: "hexadecimal digits"}[self.state.base]
-        return f"{', '.join(each)} {unit}"
+        return f"{', '.join(each)} {digit_unit(self.state.base)}"

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.definiteness import is_definite
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_text
 
 REPAIR_TOLERANCE = 2.0**-26
 """The largest repair of a covariance in float64, relative to the variances. It is half the digits of float64."""
@@ -61,7 +62,7 @@ class Repair(NamedTuple):
         if self.shift:
             kind = "definite" if self.letter == "R" else "semidefinite"
             done.append(f"made {kind} (its variances were raised by {self.shift:.1g} of themselves)")
-        stored = "" if self.fmt is None else f", stored in {self.fmt},"
+        stored = "" if self.fmt is None else f", stored in {format_text(self.fmt)},"
         return f"{self.letter}{stored} was {' and '.join(done)}"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from gpbnb.filters.named import checked_names
 from gpbnb.filters.structures import (
@@ -22,6 +22,13 @@ SIDE_BY_SIDE = ("direct form I", USUAL, f"cascade of {USUAL}", "lattice", "balan
 """Structures that are compared if none are named."""
 
 _NAMED = ("input", "output")
+
+
+class Structures(NamedTuple):
+    """A filter in its structures, and the reason why it does not have the others, both by name."""
+
+    systems: dict[str, LinearSystem]
+    lacking: dict[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,10 +119,7 @@ class FilterDesign:
         ------
         ValueError : a structure is unknown, or the filter has none of them.
         """
-        found, why = self._tried(structures)
-        if not found:
-            raise ValueError("; ".join(f"{name}: {reason}" for name, reason in why.items()))
-        return found
+        return self.compared(structures).systems
 
     def lacking(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> dict[str, str]:
         """Return the structures that the filter does not have, by their names, each with the reason.
@@ -125,9 +129,21 @@ class FilterDesign:
         >>> list(FilterDesign(b=[1], a=[1, 0, 1]).lacking("all"))
         ['lattice', 'balanced state space']
         """
-        return self._tried(structures)[1]
+        return self._tried(structures).lacking
 
-    def _tried(self, structures: Sequence[str] | str) -> tuple[dict[str, LinearSystem], dict[str, str]]:
+    def compared(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> Structures:
+        """Return what :meth:`systems` and :meth:`lacking` return, each structure tried once.
+
+        Raises
+        ------
+        ValueError : as for :meth:`systems`.
+        """
+        found = self._tried(structures)
+        if not found.systems:
+            raise ValueError("; ".join(f"{name}: {reason}" for name, reason in found.lacking.items()))
+        return found
+
+    def _tried(self, structures: Sequence[str] | str) -> Structures:
         names = STRUCTURES if structures == "all" else [structures] if isinstance(structures, str) else structures
         found, why = dict[str, LinearSystem](), dict[str, str]()
         for name in map(structure_named, names):
@@ -135,4 +151,4 @@ class FilterDesign:
                 found[name] = self.system(name)
             except ValueError as error:
                 why[name] = str(error)
-        return found, why
+        return Structures(found, why)

@@ -18,6 +18,7 @@ from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.definiteness import is_definite
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.blocks import BlockFormats
@@ -433,7 +434,7 @@ class LinearModel:
         stored = {letter: array.to_fractions() for letter, array in stored_arrays(sound, fmt).items()}
         for letter, strictly in _COVARIANCES.items():
             _check_cycle(letter, stored[letter], strictly)
-        return sound._changed(**stored, name=f"{self.name}, in {fmt}", repair=None)
+        return sound._changed(**stored, name=f"{self.name}, in {format_text(fmt)}", repair=None)
 
     def arrays(self, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
         """Return the model as a dict of arrays, by letter, with each entry rounded into the format.

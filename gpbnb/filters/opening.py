@@ -28,7 +28,9 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.tags import Tag
+from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.records import pairs_as_double_doubles
@@ -109,9 +111,10 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
     except ZeroDivisionError:
         definite = False
     if not definite:
+        words, unit = ("double-double", "bits") if fmt is None else (format_text(fmt), digit_unit(fmt.base))
         raise ValueError(
-            f"got {model.name} in {fmt}; needed covariances that stay definite when their factors are computed in "
-            "this format; use more digits, or add a little to the diagonals of Q and P0"
+            f"got {model.name} in {words}; needed covariances that stay definite when their factors are computed in "
+            f"this format; use more {unit}, or add a little to the diagonals of Q and P0"
         )
     return Opening(Phi, H, Q, R, x0, P0, UQ, UR, U0, RI, tuple(raised), (*stored.repairs, *raised))
 

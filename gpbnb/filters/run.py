@@ -16,6 +16,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Free, Hardware32, Hardware64, Tag
+from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.filters.blocks import BlockFormats
@@ -156,8 +157,8 @@ class Run:
         """Reject options that the format or the form does not have."""
         if bounded and self.fmt is not None and self.fmt.overflow != "raise":
             raise ValueError(
-                f"got a bound along with a run in {self.fmt}; needed overflow 'raise': a result that leaves the range "
-                "would be wrong by more than any rounding"
+                f"got a bound along with a run in {format_text(self.fmt)}; needed overflow 'raise': a result that "
+                "leaves the range would be wrong by more than any rounding"
             )
         if not isinstance(sums, Sums):
             raise TypeError(f"sums: got {sums!r}; needed Sums(...), such as Sums(fmt=BINARY32)")
@@ -365,6 +366,10 @@ class Run:
             notes[STOPPED] = notes[DONE] + 1
             kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
             self.reason = f"{kind} in {QUANTITIES[int(self.matrices.place[0])]} at step {notes[STOPPED]}"
+            if self.form is Form.UD and isinstance(self.fmt, FixedFormat) and isinstance(error, OverflowError):
+                self.reason += (
+                    "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
+                )
         else:
             if notes[STOPPED]:
                 self.reason = f"a zero pivot in the innovation covariance at step {notes[STOPPED]}"

@@ -7,6 +7,7 @@ silently: pairing and order are arguments.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -148,6 +149,28 @@ def scaled(sections: Sequence[Coefficients], inner: bool = False) -> list[Coeffi
         moved = power
     b, a = sections[-1]
     return [*found, ([each * Fraction(2) ** moved for each in b], [*a])]
+
+
+def rescaled(names: Sequence[str], coefficients: NDArray[Any], inner: bool) -> NDArray[Any] | None:
+    """Return the coefficients of a cascade after :func:`scaled`; None if they are no cascade's, or stay the same.
+
+    Parameters
+    ----------
+    names : names of the coefficients, as of :func:`gpbnb.filters.structures.cascade`: b0_1, b1_1, …, a1_1, …, b0_2, ….
+    inner : as of :func:`scaled`.
+    """
+    sections = dict[str, Coefficients]()
+    for name, value in zip(names, coefficients.tolist(), strict=False):
+        if not (of := re.fullmatch(r"([ab])\d+_(\d+)", name)):
+            return None
+        b, a = sections.setdefault(of[2], ([], []))
+        (b if of[1] == "b" else a).append(value)
+    try:
+        found = scaled([*sections.values()], inner)
+    except (ValueError, IndexError):  # the filter does not decay, or has no sections
+        return None
+    made = exact([each for b, a in found for each in (*b, *a)])
+    return None if (made == coefficients).all() else made
 
 
 def _length(sections: Sequence[Coefficients]) -> int:

@@ -36,7 +36,9 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_steps import observe_carlson, observed, predict_root, root_of_factors
 from gpbnb.filters.factors import upper_factors
@@ -253,8 +255,9 @@ class FixedIntervalSmoother:
             steps = self._by_roots(fmt) if self.form is ArrayForm.CARLSON else self._by_covariances(fmt)
         except ZeroDivisionError:
             raise ZeroDivisionError(
-                f"got a singular innovation covariance or predicted covariance of {self.model.name} in {fmt}; needed "
-                "pivots other than zero; use more digits, or add a little to the diagonals of Q and P0"
+                f"got a singular innovation covariance or predicted covariance of {self.model.name} in "
+                f"{format_text(fmt)}; needed pivots other than zero; use more {digit_unit(fmt.base)}, or add a little "
+                "to the diagonals of Q and P0"
             ) from None
         x: Any = np.stack([step.x.reshape(self.model.n) for step in steps])
         P: Any = np.stack([step.P for step in steps])

@@ -26,7 +26,7 @@ from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.tags import Double
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.filters.program import (
     ADD,
     AT_LEAST,
@@ -129,7 +129,7 @@ class WordFormats:
         if isinstance(self.coefficients, FixedFormat):
             text += f", coefficients of {named(self.coefficients)}"
         elif self.coefficients is not None:
-            text += f", coefficients of {self.coefficients} significant bits"
+            text += f", coefficients of {digits_text(self.coefficients, kind='significant')}"
         return text + (f", sums of {named(self.sums)}" if self.sums is not None else "")
 
 
@@ -177,7 +177,7 @@ def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
             stored[i] = FloatFormat(2, fmt).round(value) if isinstance(fmt, int) else fmt.round(value)
         except OverflowError:
             name = program.coefficient_names[i] if program.coefficient_names else f"coefficient {i}"
-            text = arithmetic(fmt) if isinstance(fmt, FixedFormat) else f"{fmt} significant bits"
+            text = arithmetic(fmt) if isinstance(fmt, FixedFormat) else digits_text(fmt, kind="significant")
             raise OverflowError(
                 f"got {name} = {float(value):.6g}, beyond the range of {text}; needed coefficients with more integer "
                 "bits, or a number of significant bits"

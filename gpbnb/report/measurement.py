@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import Any, Literal
 
 import numpy as np
@@ -106,8 +107,10 @@ def rotation(angles: ArrayLike, sequence: Sequence[int] = SEQUENCE) -> Floats:
     each = _angles("angles", angles, 3)
     if sorted(sequence) != [1, 2, 3]:
         raise ValueError(f"got sequence {tuple(sequence)}; needed each of 1, 2, 3 once, as in (3, 2, 1)")
-    first, second, third = (_turn(axis, each[..., axis - 1]) for axis in sequence)
-    return np.asarray(third @ second @ first)
+    turns = [_turn(axis, each[..., axis - 1]) for axis in sequence if each[..., axis - 1].any()]
+    if not turns:
+        return np.zeros((*each.shape, 3)) + np.eye(3)
+    return reduce(lambda product, turn: np.asarray(turn @ product), turns)
 
 
 def small_rotation(angles: ArrayLike) -> Floats:

@@ -23,7 +23,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.named import BINARY32, BINARY64, format_text, rounding_text
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import check_limits, guarantee
 from gpbnb.bounds.system import output_errors
@@ -182,7 +182,7 @@ def format_words(fmt: AnyFormat) -> str:
     if isinstance(words.coefficients, FixedFormat) and words.coefficients != words.data:
         text += f"; coefficients of {_word(words.coefficients)}"
     elif isinstance(words.coefficients, int):
-        text += f"; coefficients of {words.coefficients} significant bits"
+        text += f"; coefficients of {digits_text(words.coefficients, kind='significant')}"
     return text if words.sums is None else f"{text}; sums of {_word(words.sums)}"
 
 
@@ -207,7 +207,7 @@ def _type_of(fmt: Any) -> str:
     if fmt.base == 2 and fmt.precision in (24, 53):
         cure = f"BINARY{32 if fmt.precision == 24 else 64}, which rounds ties to even and has a range"
     elif fmt.base == 2 and fmt.precision < 53:
-        cure = f"BINARY{32 if fmt.precision < 24 else 64}, which has more digits"
+        cure = f"BINARY{32 if fmt.precision < 24 else 64}, which has more bits"
     raise ValueError(f"got {format_text(fmt)}, for which C99 has no type; needed {cure}, or fixed point")
 
 

@@ -20,7 +20,7 @@ from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.arithmetic.rounding import Rounding, rounding_named
+from gpbnb.arithmetic.rounding import Rounding, digits_text, rounding_named
 from gpbnb.arithmetic.search import Outcome, Search
 from gpbnb.bounds.words import WordGuarantee, bounded_rounding, largest_rounding
 from gpbnb.filters.array_forms import AnyForm
@@ -30,6 +30,7 @@ from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.program import innovation_program, matrices
 from gpbnb.filters.run import log_spaced, reference
+from gpbnb.filters.sections import rescaled
 from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable, system_inputs
 from gpbnb.filters.words import (
     WordFormats,
@@ -85,6 +86,7 @@ class FixedAnswer:
     steps : number of steps for which a guarantee holds, if the system never forgets its errors; None if it holds for
         ever.
     warnings : as of a :class:`gpbnb.wordlength.requirement.Requirement`.
+    advice : what scaling the sections of a cascade would save; empty if it saves nothing.
     """
 
     fmt: FixedFormat | MaybeNone
@@ -94,14 +96,16 @@ class FixedAnswer:
     words: WordFormats | None = None
     steps: int | None = None
     warnings: tuple[str, ...] = ()
+    advice: str = ""
 
     def __str__(self) -> str:
-        end = "".join(f"; {warning}" for warning in self.warnings)
+        end = "".join(f"; {note}" for note in (self.advice, *self.warnings) if note)
         basis = self.basis if self.steps is None else f"{self.basis} for {self.steps} steps"
         if self.fmt is None:
-            return f"no format, by {basis}: {self.why}"
+            return f"no format, by {basis}: {self.why}{end}"
         word = 1 + self.fmt.precision
-        return f"{self.fmt.fraction_bits} fraction bits in a word of {word} bits, by {basis}; {self.why}{end}"
+        fraction = digits_text(self.fmt.fraction_bits, kind="fraction")
+        return f"{fraction} in a word of {word} bits, by {basis}; {self.why}{end}"
 
 
 def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilter:
@@ -284,16 +288,19 @@ def required_fraction_bits(
 
     def rejection(bits: int) -> str:
         refused = found.reasons[bits]
-        return f"{bits} fraction bits " + (refused or f"give {ratios[bits]:.3g} times the tolerance")
+        give = "gives" if bits == 1 else "give"
+        return f"{digits_text(bits, kind='fraction')} {refused or f'{give} {ratios[bits]:.3g} times the tolerance'}"
 
     if found.fmt is None:
-        why = strategy.blame(largest) or f"{rejection(largest)}; {largest} fraction bits are the most tried"
-        return FixedAnswer(None, basis, found.tried, why, None, strategy.steps)
+        blame = strategy.blame(largest)
+        why = blame or f"{rejection(largest)}; {largest} fraction bits are the most tried"
+        advice = "" if blame else strategy.advice(None)
+        return FixedAnswer(None, basis, found.tried, why, None, strategy.steps, advice=advice)
     bits = found.fmt.fraction_bits
     why = rejection(bits - 1 if bits > strategy.least else min(bits + 1, largest))
     words = strategy.words(found.fmt)
     fmt = found.fmt if words is None else words.data
-    return FixedAnswer(fmt, basis, found.tried, why, words, strategy.steps, strategy.warnings())
+    return FixedAnswer(fmt, basis, found.tried, why, words, strategy.steps, strategy.warnings(), strategy.advice(fmt))
 
 
 def words_error(
@@ -360,6 +367,10 @@ class _Strategy:
         """Return why the errors of the run may say little about other runs."""
         return ()
 
+    def advice(self, fmt: FixedFormat | None) -> str:
+        """Return in words what makes a format shorter than this answer enough, or any if there is none."""
+        return ""
+
 
 class _States(_Strategy):
     """Errors of a scaled filter in a run, or with `bounds` their bound, to which every other is proportional."""
@@ -397,7 +408,10 @@ class _States(_Strategy):
 
 
 class _Outputs(_Strategy):
-    """Errors of the outputs of a system in a run, or with a proof of its range their bounds."""
+    """Errors of the outputs of a system in a run, or with a proof of its range their bounds.
+
+    `scaled` makes the strategy for the system with its sections scaled; None if they cannot be.
+    """
 
     def __init__(
         self,
@@ -408,6 +422,7 @@ class _Outputs(_Strategy):
         like: FixedFormat,
         basis: Basis,
         widens: bool,
+        scaled: Callable[[], _Outputs | None],
     ) -> None:
         super().__init__(like, goal)
         self._system, self._inputs, self._words_of, self._widens = system, inputs, words_of, widens
@@ -417,6 +432,7 @@ class _Outputs(_Strategy):
             self.steps = len(inputs)
         self._proof = WordGuarantee(system, largest, self.steps) if basis == "guarantee" else None
         self._more = dict[int, int]()
+        self._scaled = scaled
 
     def errors(self, fmt: FixedFormat) -> NDArray[np.float64]:
         if self._proof is None:
@@ -461,15 +477,31 @@ class _Outputs(_Strategy):
         self._words_of = words_of
         if found.fmt is None:
             return ""
-        stored = f"{given} significant bits" if isinstance(given, int) else arithmetic(given)
+        stored = digits_text(given, kind="significant") if isinstance(given, int) else arithmetic(given)
         ratio, refused = self.error(fmt)
         misses = refused and f"words are refused: {refused.removeprefix('are refused: ')}"
         named = "coefficient_bits, or --coefficients in the command" if self._widens else "coefficients of WordFormats"
         return (
             f"the coefficients limit the filter, whatever the fraction bits of the data: stored in {stored}, "
-            f"{misses or f'they give {ratio:.3g} times the tolerance'}; {found.fmt.precision} significant bits of each "
-            f"coefficient are enough ({named})"
+            f"{misses or f'they give {ratio:.3g} times the tolerance'}; "
+            f"{digits_text(found.fmt.precision, kind='significant')} of each coefficient are enough ({named})"
         )
+
+    def advice(self, fmt: FixedFormat | None) -> str:
+        """Return in words that scaled sections need a shorter word, or what limits these; empty if neither helps."""
+        largest = LARGEST_FRACTION - 1 if fmt is None else fmt.fraction_bits - 1
+        other = self._scaled()
+        if other is None or largest < other.least:
+            return ""
+        found = Search(other.error, other.like, (), largest=largest, least=other.least)
+        words = None if found.fmt is None else other.words(found.fmt)
+        if words is None:
+            limit = "" if fmt is not None else other.blame(largest)
+            return limit and f"with its sections scaled by powers of two (scale=True), {limit}"
+        if fmt is not None and words.data.precision >= fmt.precision:
+            return ""
+        fraction, word = digits_text(words.data.fraction_bits, kind="fraction"), 1 + words.data.precision
+        return f"with its sections scaled by powers of two (scale=True), {fraction} in a word of {word} bits are enough"
 
 
 class _Runs(_Strategy):
@@ -507,15 +539,32 @@ def _of_system(
 ) -> _Outputs:
     """Return the strategy for a system: in formats such as `like`, or with integer bits that its numbers need."""
     inputs, made = system_inputs(system, z), system.as_filter()
+
+    def of_scaled() -> _Outputs | None:
+        found = scaled_sections(system)
+        return None if found is None else _of_system(found, z, goal, basis, rounding, options, like)
+
     if like is not None:
         given = like
-        return _Outputs(
-            system, inputs, goal, lambda fmt: with_fraction_bits(given, fmt.fraction_bits), like.data, basis, False
-        )
+
+        def moved(fmt: FixedFormat) -> WordFormats:
+            return with_fraction_bits(given, fmt.fraction_bits)
+
+        return _Outputs(system, inputs, goal, moved, like.data, basis, False, of_scaled)
     start = np.concatenate([system.x0.astype(np.float64), np.zeros(system.p)])
     before = _bits_for(_largest_stored(made, inputs.astype(np.float64), start, options[1]))
     fmt = FixedFormat(before, LARGEST_FRACTION, rounding)
-    return _Outputs(system, inputs, goal, lambda fmt: _words(made, fmt, *options), fmt, basis, True)
+    return _Outputs(system, inputs, goal, lambda fmt: _words(made, fmt, *options), fmt, basis, True, of_scaled)
+
+
+def scaled_sections(system: LinearSystem) -> LinearSystem | None:
+    """Return a cascade with its sections scaled as by ``scale=True``; None if it is none at rest, or scaled already."""
+    if system.made is None or any(system.x0):
+        return None
+    program = system.made.program
+    inner = program.state_names[:1] == ("w1_1",)  # of the direct form II
+    coefficients = rescaled(program.coefficient_names, system.made.coefficients, inner)
+    return None if coefficients is None else LinearSystem.from_filter(replace(system.made, coefficients=coefficients))
 
 
 def with_fraction_bits(words: WordFormats, fraction: int) -> WordFormats:

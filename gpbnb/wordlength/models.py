@@ -9,7 +9,8 @@ import tomllib
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias, cast
+from types import MappingProxyType
+from typing import Any, NamedTuple, Protocol, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,10 +101,8 @@ def read_model(
     >>> model.name, model.n
     ('halves', 1)
     """
-    if isinstance(source, (str, Path)):
-        return _from_mapping(_toml(Path(source)), Path(source).name, u, structure)
-    if isinstance(source, Mapping):
-        return _from_mapping(source, "the mapping", u, structure)
+    if isinstance(source, (str, Path, Mapping)):
+        return _from_mapping(*_read(source), u, structure)
     library, kind = type(source).__module__.partition(".")[0], type(source).__name__
     if library == "filterpy" and kind in FILTERS:
         return _from_filterpy(source, u)
@@ -162,60 +161,46 @@ def _from_filterpy(given: Any, u: Any) -> LinearModel:
     return LinearModel(F, H, Q, R, x.reshape(-1), P, kind, B=B, u=u)
 
 
-def read_structures(source: str | Path | Mapping[str, Any]) -> dict[str, LinearSystem]:
-    """Read a digital filter in several structures, beginning with the one that its file names.
+class FilterSource(NamedTuple):
+    """A filter as a file or a mapping gives it.
 
-    The others are those in :data:`gpbnb.filters.design.SIDE_BY_SIDE` or, with ``structure = "all"``, all that the
-    filter has.
+    Parameters
+    ----------
+    model : a digital filter in the structure that the source names, or else in its usual one.
+    structures : a digital filter in several structures by name, beginning with the one that the source names; the
+        others are those in :data:`gpbnb.filters.design.SIDE_BY_SIDE` or, with ``structure = "all"``, all that the
+        filter has. Empty for another model.
+    lacking : structures that the filter does not have, by name, each with the reason.
+    compares_all : whether the source has ``structure = "all"``, so that none of its structures is the given one.
+    """
 
-    Returns
-    -------
-    systems : by the name of their structure; empty for another model.
+    model: LinearModel | LinearSystem
+    structures: Mapping[str, LinearSystem] = MappingProxyType({})
+    lacking: Mapping[str, str] = MappingProxyType({})
+    compares_all: bool = False
+
+
+def read_filter(source: str | Path | Mapping[str, Any], u: Numbers | None = None) -> FilterSource:
+    """Read a filter, and a digital filter in several structures, from a TOML file or a mapping.
+
+    The arguments are those of :func:`read_model`.
 
     Raises
     ------
     ValueError, OSError : as for :func:`read_model`.
     """
-    if (found := _read_design(source)) is None:
-        return {}
-    design, structure, where = found
+    given, where = _read(source)
+    if not _is_design(given):
+        return FilterSource(_from_mapping(given, where, u, None))
+    design, named = _design(given, where, u)
     try:
-        if structure == "all":
-            return design.systems("all")
-        first = structure_named(design.usual if structure is None else structure)
-        return {first: design.system(first), **{name: each for name, each in design.systems().items() if name != first}}
+        if named == "all":
+            return FilterSource(design.system(), *design.compared("all"), compares_all=True)
+        first = structure_named(design.usual if named is None else named)
+        model, (others, lacking) = design.system(first), design.compared()
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None
-
-
-def lacking_structures(source: str | Path | Mapping[str, Any]) -> dict[str, str]:
-    """Return the structures that :func:`read_structures` leaves out, by name, each with the reason.
-
-    Raises
-    ------
-    ValueError, OSError : as for :func:`read_model`.
-    """
-    if (found := _read_design(source)) is None:
-        return {}
-    design, structure, _ = found
-    return design.lacking("all") if structure == "all" else design.lacking()
-
-
-def compares_all(source: str | Path | Mapping[str, Any]) -> bool:
-    """Whether a source is a digital filter with ``structure = "all"``, so that none of its structures is the given one.
-
-    Raises
-    ------
-    OSError, ValueError : a file cannot be read, or is not TOML.
-    """
-    given, _ = _read(source)
-    return _is_design(given) and given.get("structure") == "all"
-
-
-def _read_design(source: str | Path | Mapping[str, Any]) -> tuple[FilterDesign, str | None, str] | None:
-    """Return the design of a digital filter, its structure, and where they stand; None for another model."""
-    given, where = _read(source)
-    return (*_design(given, where), where) if _is_design(given) else None
+    return FilterSource(model, {first: model} | {name: each for name, each in others.items() if name != first}, lacking)
 
 
 def _read(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
@@ -227,8 +212,10 @@ def _is_design(given: Mapping[str, Any]) -> bool:
     return "sos" in given or ("b" in given and not any(key in given for key in (*KALMAN, *SYSTEM)))
 
 
-def _design(given: Mapping[str, Any], where: str) -> tuple[FilterDesign, str | None]:
-    """Return a design, and the structure that a file names, perhaps "all"."""
+def _design(given: Mapping[str, Any], where: str, u: Any) -> tuple[FilterDesign, str | None]:
+    """Return a design, and the structure that a file names, perhaps "all"; there must be no known inputs `u`."""
+    if u is not None:
+        raise ValueError(f"{where}: got known inputs for a digital filter; needed none: its measurements are inputs")
     own = {name: NAMES[name] for name in ("inputs", "outputs")}
     if unknown := sorted(map(str, set(given) - {*DESIGN, *own, "name"})):
         allowed = ", ".join((*DESIGN[3:], *own, "name"))
@@ -318,11 +305,7 @@ def _toml(path: Path) -> dict[str, Any]:
 
 def _from_mapping(given: Mapping[str, Any], where: str, u: Any, structure: str | None) -> LinearModel | LinearSystem:
     if _is_design(given):
-        if u is not None:
-            raise ValueError(
-                f"{where}: got known inputs for a digital filter; needed none: its measurements are inputs"
-            )
-        design, named = _design(given, where)
+        design, named = _design(given, where, u)
         try:
             return design.system(structure or (None if named == "all" else named))
         except (TypeError, ValueError) as error:

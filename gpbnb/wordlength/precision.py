@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,7 +16,8 @@ from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.rounding import Rounding, rounding_named
+from gpbnb.arithmetic.named import digits
+from gpbnb.arithmetic.rounding import Rounding, digits_text, rounding_named
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search, largest_by_default, largest_compiled
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.gains import check_deterministic
@@ -28,8 +30,15 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import form_named, named, whole_number
 from gpbnb.filters.nonlinear import NO_GUARANTEE, AnyModel, NonlinearModel
-from gpbnb.filters.nonlinear_run import NonlinearRun, check_form, opened, simulated, true_states
-from gpbnb.filters.run import Run
+from gpbnb.filters.nonlinear_run import (
+    NonlinearRun,
+    check_form,
+    nonlinear_checkpoints,
+    opened,
+    simulated,
+    true_states,
+)
+from gpbnb.filters.run import Run, reference
 from gpbnb.filters.system import LinearSystem, unobserved
 from gpbnb.wordlength.models import ModelSource, model_or_function
 from gpbnb.wordlength.recursion import Recursion, required_recursion_precision, survey_recursion
@@ -212,8 +221,8 @@ def _better_form(strategy: Recorded, search: Callable[[Strategy], Search[FloatFo
         return ""
     others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not strategy.form]
     answers = [(other, search(replace(strategy, form=other)).fmt) for other in others]
-    met = [(fmt.precision, str(other)) for other, fmt in answers if fmt is not None]
-    return f"the form {min(met)[1]} needs {min(met)[0]} digits" if met else ""
+    met = [(fmt.precision, str(other), digits(fmt)) for other, fmt in answers if fmt is not None]
+    return f"the form {min(met)[1]} needs {min(met)[2]}" if met else ""
 
 
 def survey(
@@ -249,7 +258,8 @@ def survey(
         return survey_recursion(model, z, tolerance, formats, basis)
     compiled = [isinstance(model, NonlinearModel) or isinstance(fmt.backend, Compiled) for fmt in formats]
     if beyond := [fmt.precision for fmt, has_loops in zip(formats, compiled, strict=True) if not has_loops]:
-        raise ValueError(f"got {beyond} digits of base {base}; needed at most {largest_compiled(like)}")
+        most = digits_text(largest_compiled(like), base)
+        raise ValueError(f"got precisions {beyond} in base {base}; needed at most {most}")
     found = survey_formats(model, z, tolerance, formats, form, basis)
     return tuple((fmt.precision, ratio) for fmt, (ratio, _) in zip(formats, found, strict=True))
 
@@ -290,8 +300,8 @@ def _checked_largest(model: AnyModel | LinearSystem, largest: int | None, like: 
     largest, most = whole_number("largest", largest, 2), largest_compiled(like)
     if largest > most:
         raise ValueError(
-            f"got largest={largest} for a model; needed at most {most}, the most digits with compiled loops in base "
-            f"{like.base}, rounded {like.rounding.value}; a filter written as a function of a format runs in more"
+            f"got largest={largest} for a model; needed at most {digits_text(most, like.base)}, the most with compiled "
+            f"loops, rounded {like.rounding.value}; a filter written as a function of a format runs in more"
         )
     return largest
 
@@ -361,9 +371,21 @@ class Recorded(ABC):
             return Outcome(math.inf, f"the run is refused: {run.reason}")
         if run.indefinite is not None and not self.bounded:
             lost = f"a computed variance was not positive at step {run.indefinite}"
-            return Outcome(math.inf, f"{lost}; if the model gives a state no variance, give it a little in P0")
+            return Outcome(math.inf, lost + (self.without_variance if run.indefinite == 1 else ""))
         ratio = largest_ratio(np.abs(errors[:, asked]), self.tolerances[asked])
         return Outcome(ratio, "the bound says nothing" if math.isinf(ratio) else "")
+
+    @cached_property
+    def without_variance(self) -> str:
+        """Return in words which state has no variance after the first step without rounding; empty if none lacks it."""
+        first = self.z[:1]
+        if isinstance(self.model, NonlinearModel):
+            found = nonlinear_checkpoints(self.model, first, [1])
+        else:
+            found = reference(self.model, first, [1])
+        lacking = [named("state", i, self.model.state_names) for i in range(self.model.n) if not found.P[0, i, i] > 0]
+        cure = "whatever the precision; give it a little in P0 or Q"
+        return f"; the model gives {' and '.join(lacking)} no variance, {cure}" if lacking else ""
 
     @abstractmethod
     def _errors(self, run: Run | ArrayRun | NonlinearRun, z: Any) -> NDArray[np.float64]:

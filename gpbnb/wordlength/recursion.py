@@ -17,6 +17,7 @@ from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import kept_in, lifted
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import CHECKED, Outcome, largest_by_default
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.model import real_numbers
@@ -150,9 +151,10 @@ def recursion_strategy(
     off = found.share(short - true)
     if not off <= SETTLED:
         raise ValueError(
-            f"got a function whose reference in {digits} digits of base {base} is {off:.2g} times the tolerance from "
+            f"got a function whose reference in {digits_text(digits, base)} is {off:.2g} times the tolerance from "
             f"that in {digits * 3 // 2}; needed one that settles; do comparisons, or the format itself, decide between "
-            f"results far apart? If errors only grow, try largest={2 * digits}, which gives the reference more digits"
+            f"results far apart? If errors only grow, try largest={2 * digits}, which gives the reference more "
+            f"{digit_unit(base)}"
         )
     return found
 
@@ -163,7 +165,9 @@ def _reference(
     try:
         return _outputs(run, fmt, z, steps)
     except _STOPS as fault:
-        raise type(fault)(f"the function stops in its reference of {fmt.precision} digits: {fault}") from None
+        raise type(fault)(
+            f"the function stops in its reference of {digits_text(fmt.precision, fmt.base)}: {fault}"
+        ) from None
 
 
 def _largest(errors: NDArray[Any]) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ import numpy as np
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
+from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.forms import Form
@@ -141,7 +142,7 @@ class Question:
     emin, emax : range of the formats, as in ``FloatFormat``; by default unlimited.
     fmt : the one format to judge, in place of a search; it replaces base, rounding and range.
     structures : structures of a digital filter to compare, by their names; the first gives the answer, in place of the
-        model. See :func:`gpbnb.wordlength.models.read_structures`.
+        model. See :func:`gpbnb.wordlength.models.read_filter`.
     mixed : whether to find the digits of each block of a Kalman filter as well; see
         :func:`gpbnb.wordlength.blocks.required_block_precisions`. In fixed point, the formats of data, coefficients
         and sums of a linear system.
@@ -479,9 +480,9 @@ _MEANINGS = {
 
 def page(report: Report) -> str:
     """Return a report as a self-contained HTML page."""
-    unit = {2: "bits", 10: "decimal digits", 16: "hexadecimal digits"}[report.base]
-    unit = "fraction bits" if report.fixed else unit
-    answer = f"{report.digits} {unit}" if report.digits is not None else "no precision that can be run"
+    kind, base = ("fraction", 2) if report.fixed else ("", report.base)
+    unit = f"{kind} {digit_unit(base)}".strip()
+    answer = digits_text(report.digits, base, kind) if report.digits is not None else "no precision that can be run"
     verdict = f"needs <strong>{html.escape(answer)}</strong> to keep rounding errors within the tolerance"
     if report.format:
         verdict = f"{'keeps' if report.met else 'does not keep'} rounding errors within the tolerance in "

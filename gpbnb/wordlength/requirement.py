@@ -17,7 +17,7 @@ from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.arithmetic.search import Outcome, Search
 from gpbnb.filters.array_forms import AnyForm
 
@@ -54,6 +54,7 @@ class Requirement:
         for bounds, which hold for ties to even, too.
     warnings : reasons why an observed answer may not hold for other inputs; see
         :func:`gpbnb.wordlength.system.weak_evidence`.
+    base : base of the formats tried.
     """
 
     fmt: FloatFormat | MaybeNone
@@ -71,6 +72,7 @@ class Requirement:
     untraced: str = ""
     processors: tuple[tuple[str, float], ...] = ()
     warnings: tuple[str, ...] = ()
+    base: int = 2
 
     @property
     def precision(self) -> int | MaybeNone:
@@ -78,10 +80,10 @@ class Requirement:
         return None if self.fmt is None else self.fmt.precision
 
     def __str__(self) -> str:
-        notes = [*self.repairs]
+        notes, base = [*self.repairs], self.base if self.fmt is None else self.fmt.base
         if self.irregular:
             missed = [digits for digits, ratio in self.tried if not ratio <= 1 and digits > self.irregular[0]]
-            notes.insert(0, f"{listed(self.irregular)} digits meet it, but {listed(missed)} do not")
+            notes.insert(0, f"{digits_text(listed(self.irregular), base)} meet it, but {listed(missed)} do not")
         if self.advice:
             notes.append(self.advice)
         notes += self.warnings
@@ -92,7 +94,7 @@ class Requirement:
         if self.fmt is None and self.cause:
             return f"no precision meets the tolerance {by_evidence}: {self.cause}{end}"
         if self.fmt is None:
-            most, why = f"{self.tried[-1][0]} digits", f"; {self.why}" if self.why else ""
+            most, why = digits_text(self.tried[-1][0], base), f"; {self.why}" if self.why else ""
             if self.limit:
                 most += f", {self.limit},"
             met = "reliably meets the tolerance" if self.irregular else "meets the tolerance"
@@ -241,7 +243,8 @@ class Asked(NamedTuple):
         """Return the result of a search as the answer."""
         if found.undecided and not advice:
             reason = found.reasons[found.undecided[-1]]
-            advice = f"the proof does not cover {listed(found.undecided)} digits, in which no bound was found: {reason}"
+            undecided = digits_text(listed(found.undecided), self.like.base)
+            advice = f"the proof does not cover {undecided}, in which no bound was found: {reason}"
         tried, irregular, limit = found.tried, found.irregular, found.limit
         processors = self._run_on_processors(found) if self.basis == "emulation" else ()
         return Requirement(
@@ -259,6 +262,7 @@ class Asked(NamedTuple):
             ends,
             untraced,
             processors,
+            base=self.like.base,
         )
 
     def _run_on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:

@@ -31,7 +31,7 @@ from gpbnb.wordlength.code import VECTORS, AnyFormat, write_code
 from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
 from gpbnb.wordlength.judging import judge
-from gpbnb.wordlength.models import compares_all, lacking_structures, read_measurements, read_model, read_structures
+from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
 from gpbnb.wordlength.options import QUANTITIES
 from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, part_label, study
 from gpbnb.wordlength.requirement import Basis
@@ -50,9 +50,9 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
     ValueError, ArithmeticError : for a reason given in :func:`gpbnb.wordlength.report.study`.
     OSError : a file cannot be read.
     """
-    model, structures = _filter(given)
-    bases = _bases(given)
-    z, source = _inputs(given, model, bases)
+    read, own = _filter(given)
+    model, bases = read.model, _bases(given)
+    z, source = _inputs(given, model, bases, own)
     asked = Question(
         model,
         given.tolerance,
@@ -66,30 +66,30 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
         given.emin,
         given.emax,
         _format(given),
-        structures,
+        read.structures,
         given.mixed,
         given.fixed,
         given.coefficients or COEFFICIENT_BITS,
-        given.form != CONSTANT_GAIN and compares_all(given.model),
-        lacking_structures(given.model) if len(structures) > 1 else {},
+        read.compares_all,
+        read.lacking if len(read.structures) > 1 else {},
     )
     return study(asked, source, command, tell)
 
 
-def _filter(given: argparse.Namespace) -> tuple[LinearModel | LinearSystem, dict[str, LinearSystem]]:
-    """Return the filter of a command line, and its structures; with a constant gain, a linear system is its only one.
+def _filter(given: argparse.Namespace) -> tuple[FilterSource, LinearModel | LinearSystem]:
+    """Return the filter of a command line, with a constant gain as a linear system; and the model in its file.
 
     Raises
     ------
     ValueError : a constant gain for a linear system, or for a filter whose gain does not settle.
     """
-    model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
+    read = read_filter(given.model, read_measurements(given.inputs) if given.inputs else None)
     if given.form != CONSTANT_GAIN:
-        return model, read_structures(given.model)
-    if isinstance(model, LinearSystem):
+        return read, read.model
+    if isinstance(read.model, LinearSystem):
         raise _no_form(given)
-    settled = settled_filter(model)
-    return settled, {CONSTANT_GAIN: settled}
+    settled = settled_filter(read.model)
+    return FilterSource(settled, {CONSTANT_GAIN: settled}), read.model
 
 
 def _form(given: argparse.Namespace) -> str:
@@ -106,8 +106,16 @@ def _bases(given: argparse.Namespace) -> Sequence[Basis]:
     return given.basis or ("emulation", "guarantee" if given.fixed else "bound")
 
 
-def _inputs(given: argparse.Namespace, model: LinearModel | LinearSystem, bases: Sequence[Basis]) -> tuple[Any, str]:
-    """Return the measurements or inputs of a command line, None if a model simulates them, and their origin."""
+def _inputs(
+    given: argparse.Namespace,
+    model: LinearModel | LinearSystem,
+    bases: Sequence[Basis],
+    own: LinearModel | LinearSystem,
+) -> tuple[Any, str]:
+    """Return the measurements or inputs of a command line, None if a model simulates them, and their origin.
+
+    `own` is the model in its file, which simulates the measurements of its filter with a constant gain.
+    """
     z = read_measurements(given.measurements) if given.measurements else None
     source = (
         str(given.measurements).encode(errors="surrogateescape").decode(errors="backslashreplace")
@@ -124,8 +132,8 @@ def _inputs(given: argparse.Namespace, model: LinearModel | LinearSystem, bases:
         if given.simulate and given.form == CONSTANT_GAIN:
             raise _simulates_itself(given)
         if given.form == CONSTANT_GAIN and z is None:
-            kalman = cast(LinearModel, read_model(given.model))
-            return simulated_measurements(kalman, given.steps or DEFAULT_STEPS), "simulated by the model, seed 0"
+            z = simulated_measurements(cast(LinearModel, own), given.steps or DEFAULT_STEPS)
+            return z, "simulated by the model, seed 0"
         if given.simulate:
             z = simulated_inputs(given.simulate, _level(given), given.steps or DEFAULT_STEPS, model.m)
             source = f"simulated, {given.simulate} of level {_shown(_level(given))}"
@@ -184,8 +192,8 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
         )
     if fmt is None:
         fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
-    model, structures = _filter(given)
-    chosen = structures.get(report.structure, model)
+    read, _ = _filter(given)
+    chosen = read.structures.get(report.structure, read.model)
     if isinstance(chosen, LinearModel):
         within = limits(chosen.n, chosen.m, **_sizes(given))
         form = form_named(_form(given))
@@ -206,41 +214,39 @@ def write_code_of(given: argparse.Namespace, structure: str = "") -> tuple[Path,
         :func:`gpbnb.wordlength.code.write_code`.
     OSError : a file cannot be written.
     """
-    model, structures = _filter(given)
-    model = structures.get(structure, model)
-    bases = _bases(given)
+    read, own = _filter(given)
+    model: LinearModel | LinearSystem = read.structures.get(structure, read.model)
+    z, _ = _inputs(given, model, bases := _bases(given), own)
     if given.fixed and isinstance(model, LinearSystem):
-        words, largest = _words_within_tolerance(given, model, bases)
-        return _written(given, model, words, largest, structure or None)
+        words, largest = _words_within_tolerance(given, model, bases, z)
+        return _written(given, model, own, z, words, largest, structure or None)
     within = _limits(given, model, bases)
-    fmt = _format(given) or _type_within_tolerance(given, model, bases, within)
-    return _written(given, model, fmt, within, structure or None)
+    fmt = _format(given) or _type_within_tolerance(given, model, bases, within, z)
+    return _written(given, model, own, z, fmt, within, structure or None)
 
 
 def _written(
     given: argparse.Namespace,
     model: LinearModel | LinearSystem,
+    own: LinearModel | LinearSystem,
+    z: Any,
     fmt: AnyFormat,
     within: FilterLimits | None,
     structure: str | None,
 ) -> tuple[Path, ...]:
     """Write the code of a filter; vectors of a Kalman filter are its first measurements, if none of them is missing."""
-    of_kalman = isinstance(model, LinearModel) or given.form == CONSTANT_GAIN
-    if not of_kalman:
+    if not isinstance(own, LinearModel):
         return write_code(model, fmt, None, given.code, within=within, structure=structure)
-    kalman = cast(LinearModel, read_model(given.model, read_measurements(given.inputs) if given.inputs else None))
-    z, _ = _inputs(given, model, _bases(given))
     if z is None:
-        z = simulated_measurements(kalman, given.steps or DEFAULT_STEPS)
+        z = simulated_measurements(own, given.steps or DEFAULT_STEPS)
     vectors = None if np.isnan(z[:VECTORS]).any() else z[:VECTORS]
-    return write_code(kalman, fmt, given.form, given.code, inputs=vectors, within=within)
+    return write_code(own, fmt, given.form, given.code, inputs=vectors, within=within)
 
 
 def _words_within_tolerance(
-    given: argparse.Namespace, system: LinearSystem, bases: Sequence[Basis]
+    given: argparse.Namespace, system: LinearSystem, bases: Sequence[Basis], z: Any
 ) -> tuple[WordFormats, FilterLimits]:
     """Return the formats that a search in fixed point finds on the first basis, and the largest inputs as limits."""
-    z, _ = _inputs(given, system, bases)
     asked = (system, z, given.tolerance, cast(FixedBasis, bases[0]), given.rounding or "nearest")
     bits = given.coefficients or COEFFICIENT_BITS
     words = (required_word_formats(*asked) if given.mixed else required_fraction_bits(*asked, bits)).words
@@ -250,10 +256,13 @@ def _words_within_tolerance(
 
 
 def _type_within_tolerance(
-    given: argparse.Namespace, model: LinearModel | LinearSystem, bases: Sequence[Basis], within: FilterLimits | None
+    given: argparse.Namespace,
+    model: LinearModel | LinearSystem,
+    bases: Sequence[Basis],
+    within: FilterLimits | None,
+    z: Any,
 ) -> FloatFormat:
     """Return binary32 if it meets the tolerance of a command line, else binary64."""
-    z, _ = _inputs(given, model, bases)
     steps = given.steps or (DEFAULT_STEPS if z is None else len(z))
     if z is None and isinstance(model, LinearModel):
         z = simulated_measurements(model, steps)

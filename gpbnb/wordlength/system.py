@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.probable import probable_error
@@ -62,7 +63,7 @@ def required_system_precision(
     limited = not system.as_filter().program.is_linear
     cause = "" if found.fmt is not None or limited else system.unstable()
     if not cause:
-        advice = "" if found.fmt is not None else _too_many_digits(system, found)
+        advice = "" if found.fmt is not None else _too_many_digits(system, found, asked.like.base)
         warnings = strategy.warnings() if found.fmt is not None and isinstance(strategy, EmulatedSystem) else ()
         return replace(asked.answer(found, advice=advice, ends=ends), warnings=warnings)
     if asked.basis == "probable":
@@ -88,12 +89,13 @@ def _lost_design(system: LinearSystem) -> str:
     )
 
 
-def _too_many_digits(system: LinearSystem, found: Search[FloatFormat]) -> str:
+def _too_many_digits(system: LinearSystem, found: Search[FloatFormat], base: int) -> str:
     """Return how far the largest precision misses the tolerance, and which structure needs fewer digits."""
     digits, ratio = found.tried[-1]
-    parts = [] if math.isinf(ratio) else [f"{digits} digits give {ratio:.3g} times the tolerance"]
+    parts = [] if math.isinf(ratio) else [f"{digits_text(digits, base)} give {ratio:.3g} times the tolerance"]
     if _is_long(system):
-        parts.append("second-order sections usually need fewer digits: their coefficients move the poles less")
+        fewer = f"fewer {digit_unit(base)}"
+        parts.append(f"second-order sections usually need {fewer}: their coefficients move the poles less")
     return "; ".join(parts)
 
 

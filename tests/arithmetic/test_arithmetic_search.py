@@ -108,5 +108,5 @@ def test_the_reason_is_that_of_the_highest_precision_below_the_answer_that_has_o
     found = Search(error, FloatFormat(2, 5), ())
     stopped = [digits for digits, _ in found.tried if digits < 39]
     assert len(stopped) > 1
-    assert found.why == f"in {max(stopped)} digits the run stops at step {max(stopped)}"
+    assert found.why == f"in {max(stopped)} bits the run stops at step {max(stopped)}"
     assert Search(lambda fmt: (0.5, ""), FloatFormat(2, 5), ()).why == ""

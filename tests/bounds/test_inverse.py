@@ -322,16 +322,16 @@ class TestSmallestPrecision:
 
     def test_none_is_enough(self):
         with pytest.raises(
-            ValueError, match=r"at most 8 base-10 digits .* relative error of at most 1e-12; the best proved bound is"
+            ValueError, match=r"at most 8 decimal digits .* relative error of at most 1e-12; the best proved bound is"
         ):
             bounds.smallest_precision(self.HILBERT, 1e-12, 10, largest=8)
-        with pytest.raises(ValueError, match=r"no precision gives a bound at all: in 2 digits .*‖I - AX‖ must be"):
+        with pytest.raises(
+            ValueError, match=r"no precision gives a bound at all: in 2 decimal digits .*‖I - AX‖ must be"
+        ):
             bounds.smallest_precision(self.HILBERT, 1e-12, 10, largest=2)
         # The default limit is 60 digits; these two rows differ only in the 70th.
-        for base, digits in ((10, 60), (2, 200), (16, 50)):
-            with pytest.raises(
-                ValueError, match=f"at most {digits} base-{base} digits .* in {digits} digits got a zero piv"
-            ):
+        for base, most in ((10, "60 decimal digits"), (2, "200 bits"), (16, "50 base-16 digits")):
+            with pytest.raises(ValueError, match=f"at most {most} .* in {most} got a zero piv"):
                 bounds.smallest_precision([["1", "1"], ["1", "1." + 69 * "0" + "1"]], 1e-3, base)
 
     def test_without_a_base_it_answers_in_bits_as_the_search_for_filters_does(self):

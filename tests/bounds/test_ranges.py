@@ -77,6 +77,17 @@ def test_a_run_names_what_overflows(form, given, reason):
     assert run.reason == f"overflow in {reason}"
 
 
+def test_the_ud_form_needs_range_for_products_of_variances():
+    """The variance of the innovation, 6.1, fits below 8, but not its product with that of a state, as UD forms it."""
+    model = LinearModel([[1, "0.5"], [0, 1]], [[1, 0]], [["0.1", 0], [0, "0.1"]], [[1]], [0, 0], [[4, 0], [0, 4]])
+    z = np.ones((20, 1))
+    found = emulate(model, z, FixedFormat(3, 12), "UD")
+    assert found.stopped == 1
+    assert "; the UD form multiplies variances by each other, so scale the states or use more integer " in found.reason
+    assert emulate(model, z, FixedFormat(3, 12), "innovation").stopped is None
+    assert emulate(model, z, FixedFormat(5, 10), "UD").stopped is None
+
+
 def test_more_range_gives_an_answer():
     assert required_precision(uncertain("1e5"), 20, 0.01, emin=-126, emax=127, rounding="even").precision < 53
 

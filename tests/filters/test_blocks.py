@@ -290,7 +290,7 @@ def test_an_overflow_names_the_quantity_of_the_block_whose_range_it_leaves():
         ({"gain": FixedFormat(2, 8)}, TypeError, "got gain FixedFormat"),
         ({"gain": FloatFormat(10, 5)}, ValueError, "got base 10 for gain and 2 for state; needed one base"),
         ({"gain": FloatFormat(2, 8, "stochastic")}, ValueError, "got stochastic rounding for gain"),
-        ({"gain": FloatFormat(2, 60)}, ValueError, "60 digits"),
+        ({"gain": FloatFormat(2, 60)}, ValueError, "60 bits"),
         ({"sums": FloatFormat(2, 20)}, ValueError, "needed at least as many digits"),
     ],
 )

@@ -74,7 +74,7 @@ def test_the_variances_are_raised_no_more_than_necessary():
     if repair.shift > unit:
         raised[i, i] = model.Q[0].diagonal() * (1 + Fraction(repair.shift / 2))
         assert not is_definite(fmt.array(raised).to_fractions())
-    assert "Q, stored in FloatFormat(base=2, precision=24" in str(repair)
+    assert "Q, stored in 24 bits" in str(repair)
 
 
 def test_a_definite_model_is_stored_as_it_is():

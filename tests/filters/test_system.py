@@ -282,7 +282,7 @@ def test_a_system_that_is_unstable_only_as_stored_is_said_to_be(basis):
     within = None if basis == "bound" else limits(2, 1, measurement=1)
     found = required_precision(NEAR, 20, 1e-3, z=np.ones((20, 1)), basis=basis, within=within)
     assert found.precision is None
-    assert "no precision up to 53 digits, the most with compiled loops" in str(found)
+    assert "no precision up to 53 bits, the most with compiled loops" in str(found)
     assert "in 53 digits the system is stable, but as stored in 53 bits it is not, since A has" in found.why
     assert "eigenvalue of size 1 or more" in found.why
 

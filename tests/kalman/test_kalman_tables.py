@@ -415,7 +415,7 @@ def test_what_a_bound_costs():
     assert by_header(table)[1] == {
         "bound": "running bound",
         "processor time": "8 times the run",
-        "extra digits": "106 bits, to repeat each step",
+        "extra precision": "106 bits, to repeat each step",
         "bound / error, 24 bits": "8",
     }
     beta = float(fmt.unit_roundoff)

@@ -87,7 +87,7 @@ def test_the_order_of_sums_changes_digits_and_little_else() -> None:
         (BINARY32, Form.HUNG, {"order": "random"}, "needed 'left', 'pairwise' or 'blocked'"),
         (BINARY32, Form.HUNG, {"order": "blocked", "block": 0}, "needed at least 1"),
         (BINARY32, Form.HUNG, {"order": "pairwise", "fused": True}, "needed one of the two"),
-        (FloatFormat(10, 8), Form.HUNG, {"order": "pairwise"}, "needed base 2 up to 52 digits"),
+        (FloatFormat(10, 8), Form.HUNG, {"order": "pairwise"}, "needed up to 52 bits"),
     ],
     ids=["UD", "unknown", "no block", "fused", "decimal"],
 )

@@ -66,7 +66,7 @@ def test_sums_may_have_a_format_of_their_own():
 def test_without_an_answer_in_one_format_there_is_none_for_the_blocks():
     found = required_block_precisions(CART, STEPS, 1e-30, z=Z)
     assert found.formats is None
-    assert str(found).startswith("no precision up to 53 digits")
+    assert str(found).startswith("no precision up to 53 bits")
 
 
 def test_only_kalman_filters_have_blocks():

@@ -416,7 +416,7 @@ def test_a_name_cannot_end_a_comment(tmp_path):
     ("given", "fmt", "form", "message"),
     [
         (BIQUAD, FloatFormat(2, 24), None, "no type; needed BINARY32, which rounds ties to even"),
-        (BIQUAD, FloatFormat(2, 19), None, "no type; needed BINARY32, which has more digits"),
+        (BIQUAD, FloatFormat(2, 19), None, "no type; needed BINARY32, which has more bits"),
         (BIQUAD, BINARY16, None, "got BINARY16, for which C99 has no type"),
         (BIQUAD, DECIMAL32, None, "no type; needed BINARY32 or BINARY64, or fixed point"),
         (BIQUAD, FixedFormat(1, 63), None, "got data of 65 bits; needed at most 64"),

@@ -141,7 +141,7 @@ def test_a_stable_system_is_bounded_for_ever_and_another_only_for_its_steps():
 def test_a_bound_over_steps_that_no_precision_meets_names_the_cause():
     found = required_precision(LinearSystem([[2]], [[1]]), 200, 1e-3, basis="bound", z=np.full((200, 1), 0.1))
     assert found.precision is None
-    assert "no precision up to 53 digits" in str(found)
+    assert "no precision up to 53 bits" in str(found)
     assert "A has an eigenvalue of size 2, mostly in state 0, so that errors add up with every" in str(found)
     with pytest.raises(OverflowError, match="largest gain over 5000 steps is beyond the range of float64; take fewer"):
         output_errors(LinearSystem([[2]], [[1]]), FloatFormat(2, 24), 1.0, 5000)

@@ -20,6 +20,7 @@ from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel, real_numbers
 from gpbnb.filters.named import form_named
+from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.run import Run, reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
 from gpbnb.filters.system import LinearSystem, unobserved
@@ -252,7 +253,7 @@ def test_stochastic_rounding_is_searched_as_far_as_it_has_loops():
     found = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 5, 1e-30, z=np.ones((5, 1)), rounding="stochastic")
     assert found.fmt is None
     assert found.tried[-1][0] == 29
-    assert "no precision up to 29 digits" in str(found)
+    assert "no precision up to 29 bits" in str(found)
 
 
 def test_a_seed_selects_the_random_roundings_of_a_run():
@@ -332,7 +333,7 @@ def test_what_is_refused(arguments, message):
         ({"basis": "hope"}, "got basis 'hope'"),
         ({"base": 3}, "got base 3"),
         ({"form": 2}, "got form 2"),
-        ({"precisions": [10, 54, 60]}, r"got \[54, 60\] digits of base 2; needed at most 53"),
+        ({"precisions": [10, 54, 60]}, r"got precisions \[54, 60\] in base 2; needed at most 53 bits"),
         ({"z": Z[:0]}, "got 0 measurements"),
         ({"z": Z[:, 0]}, "write z.reshape"),
         ({"z": Z * math.inf}, "inf for measurement 0 of step 1"),
@@ -348,12 +349,36 @@ def test_a_survey_of_what_is_neither_model_nor_function_says_what_is_needed():
         precision.survey(3, Z, 1e-3, [10])
 
 
+@pytest.mark.parametrize("form", ["innovation", "Joseph", "UD"])
+def test_a_state_without_variance_is_named(form):
+    """P0 = Q = 0: the gain is zero, and so is the variance, without any rounding."""
+    known = LinearModel([["0.9", 0], [0, "0.8"]], [[1, 1]], [[0, 0], [0, 0]], [[1]], [1, 1], [[0, 0], [0, 1]])
+    found = required_precision(known, 5, 1e-3, z=np.ones((5, 1)), form=form)
+    assert found.fmt is None
+    assert "the model gives state 0 no variance, whatever the precision; give it a little in P0 or Q" in found.why
+    little = replace(known, P0=[["1e-6", 0], [0, 1]])
+    assert required_precision(little, 5, 1e-3, z=np.ones((5, 1)), form=form).fmt is not None
+
+
+def test_a_state_of_a_nonlinear_filter_without_variance_is_named():
+    still = NonlinearModel(lambda x: x, None, lambda x: x * x, None, [[0]], [[1]], [1], [[0]])
+    found = required_precision(still, 5, 1e-3, z=np.ones((5, 1)))
+    assert found.fmt is None
+    assert "the model gives state 0 no variance, whatever the precision; give it a little in P0 or Q" in found.why
+
+
+def test_a_variance_lost_to_rounding_does_not_blame_the_model():
+    sure = LinearModel([[1]], [[1]], [[0]], [["1e-9"]], [0], [[1]])
+    found = precision.survey_formats(sure, np.ones((2, 1)), 1e-3, [FloatFormat(2, 12)])[0]
+    assert found.why == "a computed variance was not positive at step 1"
+
+
 def test_an_answer_says_why_fewer_digits_were_refused():
     """A state without a variance, in which no run can go on; and a Q of rank one, which few bits make indefinite."""
     known = LinearModel(MODEL.Phi, MODEL.H, [[0, 0], [0, 0]], MODEL.R, MODEL.x0, [[2, 0], [0, 0]])
     found = required_precision(known, 5, 1e-3, z=Z[:5])
     assert found.fmt is None
-    assert "in 53 digits a computed variance was not positive at step 1; " in str(found)
+    assert "in 53 bits a computed variance was not positive at step 1; the model gives state 1 no varia" in str(found)
     thin = Fraction("0.35") * np.array([[Fraction(1, 2500), Fraction(1, 50)], [Fraction(1, 50), Fraction(1)]])
     single = LinearModel(MODEL.Phi, MODEL.H, thin, MODEL.R, MODEL.x0, MODEL.P0, repair=False)
     with pytest.raises(ValueError, match=r"; it misses that by no more than roundings may: .* to its diagonal, \d"):
@@ -388,7 +413,7 @@ def test_an_answer_that_higher_precisions_miss_is_refused():
     assert found.fmt is None
     assert found.precision is None
     assert found.irregular == (50, 51)
-    assert "50, 51 digits meet it, but 52, 53 do not" in str(found)
+    assert "50, 51 bits meet it, but 52, 53 do not" in str(found)
     assert "reliably" in str(found)
     other = found.advice.split()[2]
     assert required_precision(ALMOST_KNOWN, 100, 0.1, form=other).precision == int(found.advice.split()[-2])

@@ -102,7 +102,7 @@ def test_shares_and_what_is_enough():
         ({"formats": []}, "got 0 formats"),
         ({"formats": [FORMATS[0]] * 2}, "got 2 formats, 1 different"),
         ({"formats": [24]}, "got 24; needed a FloatFormat"),
-        ({"formats": [FloatFormat(2, 113)]}, "got 113 digits of base 2; needed at most 53 for compiled loops"),
+        ({"formats": [FloatFormat(2, 113)]}, "got 113 bits; needed at most 53 for compiled loops"),
         ({"basis": "guarantee"}, 'got basis "guarantee"; needed "emulation" or "bound"'),
         ({"tolerance": 0}, "got tolerance 0"),
         ({"chunk": 0}, "got 0 chunk; needed a whole number"),

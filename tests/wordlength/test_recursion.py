@@ -121,7 +121,7 @@ REFUSED = [
     (lambda fmt, z: FloatFormat(2, 300).array(Z), TypeError, "got a FloatArray in .*300"),
     (lambda fmt, z: z[:50], ValueError, r"got outputs of shape \(50, 1\) from the function; needed \(200,\)"),
     (lambda fmt, z: [x * 0.1 for x in z], ValueError, "got the operand 0.1; needed a number that .* holds exactly"),
-    (lambda fmt, z: z * (1 if fmt.precision < 300 else 2), ValueError, "got a function whose reference in 237 digits"),
+    (lambda fmt, z: z * (1 if fmt.precision < 300 else 2), ValueError, "got a function whose reference in 237 bits"),
 ]
 
 
@@ -193,10 +193,11 @@ def test_the_answer_names_the_limit_that_ended_the_search():
     found = required_precision(muller(32), 32, 1e-3, base=10, largest=40)
     assert found.precision is None
     assert str(found) == (
-        "no precision up to 40 digits, where largest=40 ends the search, meets the tolerance in a run of 32 steps"
+        "no precision up to 40 decimal digits, where largest=40 ends the search, "
+        "meets the tolerance in a run of 32 steps"
     )
     assert str(required_precision(muller(46), 46, 1e-3, base=10)).startswith(
-        "no precision up to 60 digits, where largest=60"
+        "no precision up to 60 decimal digits, where largest=60"
     )
     met = {digits: muller_error(FloatFormat(10, digits), 46) <= Fraction(1, 1000) for digits in range(58, 66)}
     least = min(digits for digits in range(58, 65) if met[digits] and met[digits + 1])
@@ -204,7 +205,7 @@ def test_the_answer_names_the_limit_that_ended_the_search():
 
 
 def test_without_digits_for_its_reference_a_function_is_refused_with_the_limit_to_raise():
-    with pytest.raises(ValueError, match=r"in 72 digits of base 10 .* that in 108; .* try largest=144") as caught:
+    with pytest.raises(ValueError, match=r"in 72 decimal digits .* that in 108; .* try largest=144") as caught:
         required_precision(muller(50), 50, 1e-3, base=10)
     assert "If errors only grow" in str(caught.value)
     assert required_precision(muller(50), 50, 1e-3, base=10, largest=144).precision > 60
@@ -220,10 +221,12 @@ def test_an_answer_below_the_limit_of_compiled_loops_is_found_without_trying_mor
 def test_a_model_ends_at_the_compiled_loops_or_below():
     system, z = LinearSystem([["0.9"]], [["0.1"]]), Z.reshape(-1, 1)
     found = required_precision(system, 200, 1e-30, z=z, rounding="even")
-    assert str(found).startswith("no precision up to 53 digits, the most with compiled loops in base 2, rounded even, ")
-    assert "up to 9 digits, where largest=9 ends" in str(required_precision(system, 200, 1e-30, z=z, largest=9))
+    assert str(found).startswith("no precision up to 53 bits, the most with compiled loops in base 2, rounded even, ")
+    assert "up to 9 bits, where largest=9 ends" in str(required_precision(system, 200, 1e-30, z=z, largest=9))
     for model, measured in ((system, z), (examples.tracker(), None)):
-        with pytest.raises(ValueError, match=r"got largest=54 for a model; needed at most 53, .* function of a format"):
+        with pytest.raises(
+            ValueError, match=r"got largest=54 for a model; needed at most 53 bits, .* function of a format"
+        ):
             required_precision(model, 200, 1e-3, z=measured, largest=54)
     for wrong in (1, 2.5, "20"):
         with pytest.raises(ValueError, match=r"got .* largest; needed a whole number, at least 2"):
@@ -242,13 +245,13 @@ def test_leaving_the_domain_of_a_function_is_a_lack_of_digits():
     found = required_precision(angles, 2, 0.02, z=[1, 2])
     assert found.precision == 14
     assert dict(found.tried)[13] == np.inf
-    assert "in 13 digits the function stops: got np.arcsin of 1.000244140625" in str(found)
+    assert "in 13 bits the function stops: got np.arcsin of 1.000244140625" in str(found)
     with pytest.raises(DomainError, match=r"the function stops in its reference of .* np.arcsin of 1.6"):
         required_precision(lambda fmt, z: np.arcsin(z + fmt.array("0.6")), 1, 0.02, z=[1])
 
 
 def test_a_function_that_stops_in_its_reference_says_so():
     with pytest.raises(
-        ZeroDivisionError, match=r"the function stops in its reference of 237 digits: .* division by zero"
+        ZeroDivisionError, match=r"the function stops in its reference of 237 bits: .* division by zero"
     ):
         required_precision(lambda fmt, z: 1 / (z - z), 200, 1e-3, z=Z)

@@ -18,10 +18,10 @@ NONE = Requirement(None, "emulation", 60, ((52, 3.0), (53, 2.0)))
 
 def test_an_answer_says_its_format_its_error_and_its_basis():
     assert str(FOUND) == "9 decimal digits, chopped: 0.46 of the tolerance, proved for this run of 60 steps"
-    assert str(NONE) == "no precision up to 53 digits meets the tolerance in a run of 60 steps"
+    assert str(NONE) == "no precision up to 53 bits meets the tolerance in a run of 60 steps"
     ended = replace(NONE, limit="where largest=53 ends the search")
     assert str(ended) == (
-        "no precision up to 53 digits, where largest=53 ends the search, meets the tolerance in a run of 60 steps"
+        "no precision up to 53 bits, where largest=53 ends the search, meets the tolerance in a run of 60 steps"
     )
 
 
@@ -36,12 +36,13 @@ def test_notes_follow_in_the_order_of_their_weight():
     noted = replace(FOUND, irregular=(6, 7), tried=((6, 0.9), (7, 0.9), (8, 2.0), (9, 0.4)))
     noted = replace(noted, repairs=("Q made symmetric",), advice="Joseph meets it")
     assert str(noted).endswith(
-        ", proved for this run of 60 steps; 6, 7 digits meet it, but 8 do not; Q made symmetric; Joseph meets it"
+        ", proved for this run of 60 steps; 6, 7 decimal digits meet it, but 8 do not; "
+        "Q made symmetric; Joseph meets it"
     )
     irregular = replace(NONE, irregular=(50,), tried=((50, 0.5), (51, 2.0), (52, 3.0), (53, float("nan"))))
     assert str(irregular) == (
-        "no precision up to 53 digits reliably meets the tolerance in a run of 60 steps; "
-        "50 digits meet it, but 51–53 do not"
+        "no precision up to 53 bits reliably meets the tolerance in a run of 60 steps; "
+        "50 bits meet it, but 51–53 do not"
     )
 
 
@@ -109,7 +110,7 @@ def test_binary32_is_enough_only_if_the_processor_itself_stays_within_the_tolera
 )
 def test_each_basis_says_what_the_answer_rests_on(basis, met, missed):
     assert str(replace(FOUND, basis=basis)) == f"9 decimal digits, chopped: 0.46 of the tolerance, {met}"
-    assert str(replace(NONE, basis=basis)) == f"no precision up to 53 digits meets the tolerance {missed}"
+    assert str(replace(NONE, basis=basis)) == f"no precision up to 53 bits meets the tolerance {missed}"
     unobserved = replace(NONE, basis=basis, cause="a state is never observed")
     assert str(unobserved) == f"no precision meets the tolerance {missed}: a state is never observed"
 

@@ -139,7 +139,7 @@ def test_measurements_are_the_source_of_the_answer(files, monkeypatch):
 def test_no_answer_has_an_exit_status_of_its_own(files, capsys):
     given = [str(files[0] / "model.toml"), "--tolerance", "1e-30", "--steps", "20", "--basis", "emulation"]
     assert main(given) == 1
-    assert "no precision up to 53 digits" in capsys.readouterr().out
+    assert "no precision up to 53 bits" in capsys.readouterr().out
 
 
 def test_a_guarantee_takes_limits_and_shows_them(files, capsys):

@@ -20,8 +20,10 @@ from gpbnb import (
     required_precision,
 )
 from gpbnb.arithmetic.search import Outcome
+from gpbnb.filters.structures import DIRECT
 from gpbnb.filters.words import run_words
 from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.fixed_point import scaled_sections
 from gpbnb.wordlength.judging import judge
 from gpbnb.wordlength.requirement import Asked
 
@@ -85,6 +87,39 @@ def test_coefficients_in_a_format_and_a_stored_filter_that_is_not_stable_are_nam
     assert "stored in 15 significant bits, words are refused: the system is stable, but not with" in found.why
 
 
+@pytest.mark.parametrize("basis", ["emulation", "guarantee"])
+def test_a_cascade_says_what_scaling_its_sections_saves(basis):
+    """A low-pass of order 8, whose sections have gains from about 1e-5 to 1e3."""
+    sos, u = signal.butter(8, 0.05, output="sos"), np.random.default_rng(1).uniform(-1, 1, (300, 1))
+    given, scaled = (LinearSystem.from_sections(sos, scale=scale) for scale in (False, True))
+    found, best = (required_fraction_bits(each, u, 1e-4, basis, coefficient_bits=24) for each in (given, scaled))
+    word = 1 + best.fmt.precision
+    assert word < found.fmt.precision - 10
+    saved = f"(scale=True), {best.fmt.fraction_bits} fraction bits in a word of {word} bits are enough"
+    assert str(found).count(f"; with its sections scaled by powers of two {saved}") == 1
+    assert best.advice == ""
+
+
+def test_a_cascade_without_an_answer_says_whether_scaling_gives_one():
+    sos, u = signal.butter(8, 0.01, output="sos"), np.random.default_rng(1).uniform(-1, 1, (2000, 1))
+    found = required_fraction_bits(LinearSystem.from_sections(sos), u, 1e-6, coefficient_bits=40)
+    assert found.fmt is None
+    best = required_fraction_bits(LinearSystem.from_sections(sos, scale=True), u, 1e-6, coefficient_bits=40)
+    assert f"(scale=True), {best.fmt.fraction_bits} fraction bits in a word of" in str(found)
+    assert "scale" not in str(required_fraction_bits(LOW_PASS, np.ones((50, 1)), 1e-30))
+
+
+@pytest.mark.parametrize("form", DIRECT)
+def test_the_sections_of_a_cascade_are_scaled_as_its_design_scales_them(form):
+    sos = signal.ellip(6, 1, 60, 0.1, output="sos")
+    given, scaled = (LinearSystem.from_sections(sos, form, scale=scale) for scale in (False, True))
+    assert (scaled_sections(given).made.coefficients == scaled.made.coefficients).all()
+    assert scaled_sections(scaled) is None
+    assert scaled_sections(LinearSystem.from_sections(sos, "lattice")) is None
+    moving = LinearSystem.from_filter(given.made, x0=np.ones(given.n))
+    assert scaled_sections(moving) is None
+
+
 def test_a_tolerance_below_the_last_bit_still_blames_the_fraction_bits():
     found = required_fraction_bits(LOW_PASS, np.ones((50, 1)), 1e-30)
     assert found.why.endswith("fraction bits are the most tried")
@@ -140,7 +175,7 @@ def test_precisions_above_an_answer_without_a_bound_are_not_said_to_refute_it():
     with asked.search((24, 53), bounds=True) as search:
         found = asked.answer(search(SimpleNamespace(error=error)))
     assert str(found).endswith(
-        "guaranteed for ever; the proof does not cover 53 digits, in which no bound was found: numbers are too large"
+        "guaranteed for ever; the proof does not cover 53 bits, in which no bound was found: numbers are too large"
     )
 
 
@@ -157,7 +192,7 @@ def test_a_design_that_float64_has_made_unstable_is_told_where_to_find_sections(
 def test_a_direct_form_that_no_precision_suits_says_by_how_much_it_misses():
     long = LinearSystem.from_coefficients(*signal.butter(8, 0.02))
     found = required_precision(long, 500, 1e-7, z=np.ones((500, 1)))
-    assert f"; 53 digits give {found.tried[-1][1]:.3g} times the tolerance; second-order sections usually" in str(found)
+    assert f"; 53 bits give {found.tried[-1][1]:.3g} times the tolerance; second-order sections usually" in str(found)
     lasting = required_precision(long, 500, 1e-3, basis="bound", z=np.ones((500, 1)))
     assert "an error causes rounding errors as large as itself; second-order sections usually" in str(lasting)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, run_words
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.fixed_point import required_fraction_bits, with_fraction_bits
-from gpbnb.wordlength.models import read_model, read_structures
+from gpbnb.wordlength.models import read_filter, read_model
 
 SOS = signal.butter(4, 0.1, output="sos")
 B, A = signal.butter(4, 0.1)
@@ -73,17 +74,29 @@ def test_structures_that_a_filter_lacks_are_named_with_the_reason(filters, capsy
     assert "Left out: lattice: got a filter with the reflection coefficient" in report.read_text(encoding="utf-8")
 
 
+def test_the_command_reads_its_file_once(filters, monkeypatch):
+    read, plain = list[str](), Path.read_bytes
+
+    def noted(path):
+        read.append(path.name)
+        return plain(path)
+
+    monkeypatch.setattr(Path, "read_bytes", noted)
+    main([str(filters / "sections.toml"), "--tolerance", "0.01", "--simulate", "step", "--steps", "20"])
+    assert read.count("sections.toml") == 1
+
+
 def test_a_file_names_its_structure_or_all(filters):
     text = (filters / "sections.toml").read_text(encoding="utf-8")
     path = filters / "lattice.toml"
     path.write_text('structure = "lattice"\n' + text, encoding="utf-8")
-    assert next(iter(read_structures(path))) == "lattice"
+    assert next(iter(read_filter(path).structures)) == "lattice"
     lattice = read_model(path)
     assert lattice.as_filter().program.coefficient_names[:2] == ("k1", "k2")
     assert read_model(path, structure="direct form I").as_filter().program.coefficient_names[:2] == ("b0", "b1")
     path.write_text('structure = "all"\n' + text, encoding="utf-8")
-    assert list(read_structures(path)) == list(STRUCTURES)
-    assert read_structures({"A": [[0.5]], "B": [[1]]}) == {}
+    assert list(read_filter(path).structures) == list(STRUCTURES)
+    assert read_filter({"A": [[0.5]], "B": [[1]]}).structures == {}
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel
-from gpbnb.arithmetic.kernels.selection import tag_of, wide_tag
+from gpbnb.arithmetic.kernels.selection import fusing_tag, tag_of, wide_tag
 from gpbnb.arithmetic.kernels.tags import (
     FARTHEST,
     LEAST,
@@ -188,7 +188,6 @@ class Looped(Backend):
     """Common part of the backends with compiled loops."""
 
     count: int  # number of components
-    fuses = False  # whether it has a fused multiply-add
     tag: Tag
 
     def __init__(self, rules: Rules, tag: Tag) -> None:
@@ -200,17 +199,29 @@ class Looped(Backend):
         return backend, (self.rules,)
 
     def apply(self, name: str, *operands: Components) -> Components | None:
-        if name == "fused" and not self.fuses:
-            return None
+        tag = self.fusing_tag if name == "fused" else self.tag
+        if tag is None:
+            return self._fused_in_two_words(*operands)
         shape = _shape(*operands)
         size = math.prod(shape)
         out = self._empty(size)
         inputs = [self._seen(tuple([_flat(part, shape) for part in components])) for components in operands]
         try:
-            gone = _loops().ENTRIES[name](self.tag, size, *inputs, self._seen(out))
+            gone = _loops().ENTRIES[name](tag, size, *inputs, self._seen(out))
         except OverflowError:
             return None
         return None if gone else tuple(part.reshape(shape) for part in out)
+
+    @property
+    def fusing_tag(self) -> Tag | None:
+        """The tag for fused multiply-add on the same numbers, if there is one."""
+        return None
+
+    def _fused_in_two_words(self, *operands: Components) -> Components | None:
+        if self.wide is None:
+            return None
+        found = TwoWords(self.rules, self.wide).apply("fused", *map(self.in_two_words, operands))
+        return None if found is None else self.from_two_words(found)
 
     def fold(self, name: str, components: Components) -> Components | None:
         shape = components[0].shape
@@ -254,6 +265,10 @@ class Looped(Backend):
     def wide(self) -> Wide | None:
         """The tag of the same format with significands of two words, if it has one; conversions use it."""
         return wide_tag(self.rules)
+
+    @abstractmethod
+    def in_two_words(self, components: Components) -> Components:
+        """Return numbers as the components of :class:`TwoWords`."""
 
     @abstractmethod
     def from_two_words(self, components: Components) -> Components | None:
@@ -331,7 +346,6 @@ class Floats(Compiled):
     def __init__(self, rules: Rules, tag: Tag) -> None:
         super().__init__(rules, tag)
         self.bits = rules.base.bit_length() - 1
-        self.fuses = not isinstance(tag, Binary | Hexadecimal)
         if isinstance(tag, Hardware64):
             self.lowest_power, self.highest_power = -1074, 1024
 
@@ -349,10 +363,14 @@ class Floats(Compiled):
         return (np.asarray(np.ldexp(m.astype(np.float64), self.bits * e.astype(np.int64))),)
 
     def to_exact(self, components: Components) -> Components:
+        m, _, e = self.in_two_words(components)
+        return m.astype(object), e.astype(object)
+
+    def in_two_words(self, components: Components) -> Components:
         x = components[0]
         e = (np.frexp(x)[1].astype(np.int64) - 1) // self.bits - (self.precision - 1)
         e = np.where(x == 0, 0, e)
-        return np.ldexp(x, -self.bits * e).astype(np.int64).astype(object), e.astype(object)
+        return np.ldexp(x, -self.bits * e).astype(np.int64), np.zeros(x.shape, np.int64), e
 
     def from_numbers(self, values: Array, exactly: bool) -> Components | None:
         kind, size = values.dtype.kind, values.dtype.itemsize
@@ -381,6 +399,10 @@ class Floats(Compiled):
             return (np.asarray(np.abs(operands[0][0])),)
         return super().apply(name, *operands)
 
+    @cached_property
+    def fusing_tag(self) -> Tag | None:
+        return fusing_tag(self.rules) if isinstance(self.tag, Binary | Hexadecimal) else self.tag
+
     @property
     def matrix_tag(self) -> Tag:
         return Free(self.tag) if isinstance(self.tag, Hardware32 | Hardware64) else self.tag
@@ -402,6 +424,8 @@ class Floats(Compiled):
         limited = isinstance(tag, Limited)
         if a.shape[0] * n * b.shape[1] < _MANY or (limited and not isinstance(tag.mode, ShortEven | LongEven)):
             return tag
+        if limited and isinstance(tag.mode, ShortEven) and a.shape[0] == b.shape[1] == 1:
+            return tag  # the range check of a single sum costs nothing
         gradual, least, largest = (tag.gradual, tag.least, tag.largest) if limited else (0.0, LEAST, LIMIT)
         low, high, smallest, biggest = self._extents(a, b)
         low, high = extents_of_sums(n, self.base, self.precision, gradual, low, high)
@@ -482,7 +506,6 @@ class Pairs(Compiled):
         return super().from_backend(other, components)
 
     def in_two_words(self, components: Components) -> Components:
-        """Return numbers as the components of :class:`TwoWords`."""
         return components[0], np.zeros(components[0].shape, np.int64), components[1]
 
     def from_two_words(self, components: Components) -> Components:
@@ -558,8 +581,11 @@ class TwoWords(Looped):
         return super().from_backend(other, components)
 
     def in_two_words(self, components: Components) -> Components:
-        """Return numbers as the components of this class."""
         return components
+
+    @property
+    def fusing_tag(self) -> Tag:
+        return self.tag
 
     def from_two_words(self, components: Components) -> Components:
         return components

@@ -10,7 +10,7 @@ import numpy as np
 
 from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel
-from gpbnb.arithmetic.rounding import DRAW_BITS, Order, Rounding, Rules
+from gpbnb.arithmetic.rounding import DRAW_BITS, Order, Rounding, Rules, digits_text
 
 LARGEST_PRECISION = {2: 53, 10: 18, 16: 13}  # with compiled loops for filters
 _WIDEST = {2: 113, 10: 34, 16: 28}  # digits of Wide
@@ -222,7 +222,7 @@ def compiled_tag(rules: Rules) -> tags.Tag:
     elif precision > (most := _longest(base, rounding, limits is not None) - (limits is not None and limits.fixed)):
         why = f"{_described(rules)}; needed at most {most} for compiled loops"
     elif precision == 1:
-        why = "one digit; needed at least 2 for compiled loops"
+        why = f"{digits_text(1, base)}; needed at least 2 for compiled loops"
     elif base == 10:
         why = "a largest number that does not end in nines; needed one that does, for compiled loops of base 10"
     else:
@@ -235,7 +235,7 @@ def compiled_tag(rules: Rules) -> tags.Tag:
 
 def _described(rules: Rules) -> str:
     """Describe digits, base and what else limits the digits of compiled loops."""
-    text = f"{rules.precision} digits of base {rules.base}"
+    text = digits_text(rules.precision, rules.base)
     if rules.rounding not in Rounding.documented():
         text += f", rounded {rules.rounding.value}"
     if rules.limits is not None:
@@ -249,13 +249,18 @@ def run_tag(rules: Rules, fused: bool, order: Order = "left", block: int = 32) -
     plain = compiled_tag(rules)
     if not fused and order == "left":
         return plain
-    tag = _float_tag(rules, hardware=False) if rules.base in (2, 16) else None
+    tag = fusing_tag(rules)
     if tag is None:
         what = "fused multiply-add" if fused else f"{order} sums"
-        raise ValueError(f"got {what} in {_described(rules)}; needed base 2 up to 52 digits, or 16 up to 13")
+        raise ValueError(f"got {what} in {_described(rules)}; needed up to 52 bits, or up to 13 base-16 digits")
     products: Any = tags.Fused() if fused else tags.Separate()
     sums = {"left": products, "pairwise": tags.Pairwise(), "blocked": tags.Blocked(block, products)}[order]
-    return cast(tags.Limited, tag._replace(sums=sums))
+    return tag._replace(sums=sums)
+
+
+def fusing_tag(rules: Rules) -> tags.Limited | None:
+    """Return the tag for fused multiply-add, or sums in another order, of float64, if there is one."""
+    return cast(tags.Limited | None, _float_tag(rules, hardware=False) if rules.base in (2, 16) else None)
 
 
 def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:
@@ -270,8 +275,8 @@ def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:
             raise ValueError(f"got sums kept in {sums} with numbers in {stored}; needed base 2 or 16 for both")
     if _digits(sums) < _digits(stored):
         raise ValueError(
-            f"got sums of {_digits(sums)} digits with numbers of {_digits(stored)}; needed at least as many digits "
-            "for sums as for numbers"
+            f"got sums of precision {_digits(sums)} with numbers of precision {_digits(stored)}; needed sums at least "
+            "as precise as the numbers"
         )
     return tags.Mixed(stored, sums)
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.kernels.bits import from_bits, leading_zeros, trailing_zeros
+from gpbnb.arithmetic.kernels.bits import from_bits, high_product, leading_zeros, select, trailing_zeros
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.decimal import increment
 from gpbnb.arithmetic.kernels.integers import (
@@ -48,10 +48,12 @@ _POWER, _DIVISOR = _table(_POWERS), _table(_NORMAL)
 _SHIFT = np.array([128 - p.bit_length() for p in _POWERS], np.int64)
 _RECIPROCAL = np.array([(2**192 - 1) // d - 2**64 for d in _NORMAL], np.uint64)
 _FIVE = _table([5**k for k in range(56)])
+_SPARE = 3  # digits that a product and an addend keep below those of the larger one
 _MOST_PLACES = 55  # 5**55 has 128 bits
 
-_U0, _U1, _U2 = np.uint64(0), np.uint64(1), np.uint64(2)
+_U0, _U1 = np.uint64(0), np.uint64(1)
 _ROOT = math.sqrt(2.0**63)
+_CUT, _BELOW_62 = 2.0**16, 2.0**62 * (1 - 2.0**-51)
 _OFFSET = 2.0**16 - 2.0**-20  # makes numbers positive, which a conversion to integers chops
 _LOW_60 = np.uint64(2**60 - 1)
 
@@ -125,6 +127,35 @@ def _enlarged(fmt: Any, n: Any, k: Any) -> Any:
 
 
 @inner(forceinline=True)
+def _longer(fmt: Any, high: Any, low: Any, k: Any) -> Any:
+    """Multiply 256 bits by ``base**k``, for a power below 2**64 and a result below 2**256."""
+    if fmt.bits > 0:
+        return shifted_left(high, low, k * fmt.bits)
+    carry, low = product(low, _entry(_POWER, k))
+    return high * _entry(_POWER, k) + carry, low
+
+
+@inner
+def _without(fmt: Any, n: Any, k: Any) -> Any:
+    """Divide n, of at most t digits, by ``base**k``, k >= 0: quotient, and whether there is a rest unless n is zero."""
+    if k <= 0:
+        return n, False
+    if k > fmt.precision:
+        return wide(_U0), True
+    q, rest = _lowered(fmt, n, k)
+    return q, rest != 0
+
+
+@inner(forceinline=True)
+def _beyond_room(fmt: Any, high: Any, low: Any) -> Any:
+    """How many digits 256 bits have beyond `room`, or one more."""
+    size = 128 + length(high) if high != wide(_U0) else length(low)
+    if fmt.bits > 0:
+        return max((size - 127) // fmt.bits + 1, 0)
+    return max(((size * 1233) >> 12) + 1 - fmt.room, 0)
+
+
+@inner(forceinline=True)
 def number(fmt: Any, high: Any, low: Any, e: Any) -> Any:
     """The number of three int64."""
     # The lower part has less than 64 bits, and a shift by a number below 64 takes half as many instructions.
@@ -160,7 +191,8 @@ def _in_range(fmt: Any, negative: Any, n: Any, e: Any) -> Any:
     """The number of these t digits if the format has it, or what replaces it."""
     if fmt.small == ABRUPT and e < fmt.quantum:
         return zero()
-    if _exceeds(fmt, n, e, fmt.lowest if negative else fmt.largest):
+    # The first comparison is predicted, the sign is not.
+    if e >= min(fmt.lowest[2], fmt.largest[2]) and _exceeds(fmt, n, e, fmt.lowest if negative else fmt.largest):
         return _beyond(fmt, negative)
     if e < -FARTHEST:
         raise OverflowError("got a result with an exponent below -2**60; needed one above; scale the numbers")
@@ -204,81 +236,94 @@ def rounded(fmt: Any, negative: Any, n: Any, more: Any, e: Any) -> Any:
 
 
 @inner(forceinline=True)
+def _one_word(fmt: Any) -> Any:
+    """Whether words serve, also for a sum with another digit and bit: base 2 up to 61 bits, 16 up to 14 digits."""
+    return (fmt.bits > 0) & (fmt.bits * (fmt.precision + 1) <= 62)
+
+
+@inner(forceinline=True)
 def _rounded_word(fmt: Any, negative: Any, n: Any, more: Any, e: Any) -> Any:
-    """:func:`rounded` for one word n in base 2, if the format's numbers have one, too."""
+    """:func:`rounded` for a word n, if the format's numbers are words, too."""
     if n == _U0:
         return zero()
-    t = np.int64(fmt.precision)
-    drop = 64 - leading_zeros(n) - t
+    t, digit = np.int64(fmt.precision), fmt.bits >> 1
+    drop = ((63 - leading_zeros(n)) >> digit) + 1 - t
     if fmt.small == FIXED:
         drop = fmt.quantum - e
     elif fmt.small == GRADUAL:
         drop = max(drop, fmt.quantum - e)
     if drop > 0:
         e += drop
-        if drop > 64:
-            n, more, drop = _U0, True, np.int64(64)
-        last = np.uint64(drop - 1)
+        if drop > 64 >> digit:
+            n, more, drop = _U0, True, np.int64(64 >> digit)
+        last = np.uint64((drop << digit) - 1)
         q = n >> last
         more |= (q << last) != n
         n, half = q >> _U1, (q & _U1) == _U1
         n += increment(fmt, n, half, half & (not more), half | more, negative)
         if n == _U0:
             return zero()
-    if (n >> np.uint64(t)) != _U0:  # a power of two after a carry, or too large for fixed point
+    if (n >> np.uint64(t << digit)) != _U0:  # a power of the base after a carry, or too large for fixed point
         return rounded(fmt, negative, wide(n), False, e)
-    up = leading_zeros(n) - (64 - t)
-    return _in_range(fmt, negative, wide(n << np.uint64(up)), e - up)
+    up = t - 1 - ((63 - leading_zeros(n)) >> digit)
+    return _in_range(fmt, negative, wide(n << np.uint64(up << digit)), e - up)
 
 
 @inner(forceinline=True)
-def _one_word(fmt: Any) -> Any:
-    """Whether sums, with two bits more, and products cut to 63 bits serve as words: base 2 up to 61 bits."""
-    return (fmt.bits == 1) & (fmt.precision <= 61)
+def _rounded_bits(fmt: Any, negative: Any, n: Any, more: Any, e: Any, k: Any) -> Any:
+    """:func:`_rounded_word` of ``(n + f) * base**e * 2**k``, where n has 62 bits."""
+    if fmt.bits == 1:
+        return _rounded_word(fmt, negative, n, more, e + k)
+    s = np.uint64(-k & 3)
+    cut = n >> s
+    return _rounded_word(fmt, negative, cut, more | ((cut << s) != n), e + ((k + 3) >> 2))
+
+
+@inner(forceinline=True)
+def _up(fmt: Any, n: Any) -> Any:
+    """By how many bits to shift a significand to the left, so that it has 61."""
+    return leading_zeros(n) - 3 if fmt.bits == 4 else np.int64(61 - fmt.precision)
 
 
 @inner(forceinline=True)
 def _add_words(fmt: Any, a: Any, b: Any) -> Any:
-    negative, x, e = a[0], low_word(a[1]) << _U2, a[2] - 2
-    other, y, f = b[0], low_word(b[1]) << _U2, b[2] - 2
-    if e < f:
-        negative, x, e, other, y, f = other, y, f, negative, x, e
-    # The smaller number is cut off two bits below the last digit of the larger one.
-    s = np.uint64(min(e - f, 63))
+    # Which number is the larger, and which of the signs, no processor predicts, so that branches would cost more.
+    spare, digit, swapped = np.int64(2 if fmt.bits == 1 else 1), fmt.bits >> 1, a[2] < b[2]
+    up = np.uint64(spare << digit)
+    m, k = low_word(a[1]) << up, low_word(b[1]) << up
+    negative, other = select(swapped, b[0], a[0]), select(swapped, a[0], b[0])
+    x, y, e = select(swapped, k, m), select(swapped, m, k), max(a[2], b[2])
+    # The smaller number is cut off two digits below the last of the larger one in base 2, one in base 16.
+    s = np.uint64(min(abs(a[2] - b[2]), 63 >> digit) << digit)
     lower = y >> s
-    more = (lower << s) != y
-    if negative == other:
-        n = x + lower
-    elif x >= lower:
-        n = x - lower - np.uint64(more)
-    else:
-        n, negative = lower - x, other
-    return _rounded_word(fmt, negative, n, more, e)
+    more, opposed, less = (lower << s) != y, negative != other, x < lower
+    n = select(less, lower - x, x - lower - np.uint64(more))  # nothing is cut off if x is less
+    n = select(opposed, n, x + lower)
+    if more & (fmt.bits == 4) and (n >> np.uint64(fmt.precision << digit)) == _U0:
+        return _add_long(fmt, a, b)  # a digit less is left, so that digits which were cut off decide
+    return _rounded_word(fmt, select(opposed & less, other, negative), n, more, e - spare)
+
+
+@inner(forceinline=True)
+def add(fmt: Any, a: Any, b: Any) -> Any:
+    if a[1] == wide(_U0):
+        return round_(fmt, b)  # the opposite of a lowest number, if it was subtracted
+    if b[1] == wide(_U0):
+        return a
+    return _add_words(fmt, a, b) if _one_word(fmt) else _add_long(fmt, a, b)
 
 
 @inner
-def add(fmt: Any, a: Any, b: Any) -> Any:
+def _add_long(fmt: Any, a: Any, b: Any) -> Any:
     negative, x, e = a
     other, y, f = b
-    if x == wide(_U0):
-        return round_(fmt, b)  # the opposite of a lowest number, if it was subtracted
-    if y == wide(_U0):
-        return a
-    if _one_word(fmt):
-        return _add_words(fmt, a, b)
     if e < f:
         negative, x, e, other, y, f = other, y, f, negative, x, e
     # The larger number gets more digits at its end, and the smaller one is cut off at the last of them.
-    d, more = e - f, False
+    d = e - f
     k = min(d, fmt.room - fmt.precision)
     x, e = _raised(fmt, x, k), e - k
-    if d > k:
-        k = d - k
-        if k > fmt.precision:
-            y, more = wide(_U0), True
-        else:
-            y, rest = _lowered(fmt, y, k)
-            more = rest != 0
+    y, more = _without(fmt, y, d - k)
     if negative == other:
         n = x + y
     elif x >= y:
@@ -300,14 +345,20 @@ def opposite(a: Any) -> Any:
     return (not a[0]) & (a[1] != wide(_U0)), a[1], a[2]
 
 
-@inner
+@inner(forceinline=True)
 def multiply(fmt: Any, a: Any, b: Any) -> Any:
     if a[1] == wide(_U0) or b[1] == wide(_U0):
         return zero()
     if _one_word(fmt):
-        p, k = words_product(low_word(a[1]), low_word(b[1])), 2 * fmt.precision - 63
-        n = p >> k if k > 0 else p
-        return _rounded_word(fmt, a[0] != b[0], low_word(n), k > 0 and (n << k) != p, a[2] + b[2] + max(k, 0))
+        k = np.int64(64 - fmt.bits * fmt.precision)
+        x, y = low_word(a[1]) << np.uint64(k), low_word(b[1]) << np.uint64(k)
+        e = a[2] + b[2] + ((64 - 2 * k) >> (fmt.bits >> 1))
+        return _rounded_word(fmt, a[0] != b[0], high_product(x, y), x * y != _U0, e)
+    return _multiply_long(fmt, a, b)
+
+
+@inner
+def _multiply_long(fmt: Any, a: Any, b: Any) -> Any:
     k = max(2 * fmt.precision - fmt.room, 0)
     high, low = product(a[1], b[1])
     n, more = _cut(fmt, high, low, k)
@@ -315,16 +366,76 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
 
 
 @inner
+def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """``a * b + c``, rounded once."""
+    if a[1] == wide(_U0) or b[1] == wide(_U0):
+        return round_(fmt, c)
+    if c[1] == wide(_U0):
+        return multiply(fmt, a, b)
+    negative, t, more = a[0] != b[0], fmt.precision, False
+    high, low = product(a[1], b[1])
+    upper, lower, e = wide(_U0), c[1], a[2] + b[2]
+    # The number that ends higher gets more digits at its end, so that the other one is only cut off where both cannot
+    # cancel: the sum then keeps more digits than t.
+    d = e - c[2]
+    if d >= 0:
+        k = min(d, _SPARE)
+        high, low = _longer(fmt, high, low, k)
+        e -= k
+        lower, more = _without(fmt, lower, d - k)
+    elif -d <= t + _SPARE:
+        upper, lower = _enlarged(fmt, lower, -d)
+    else:
+        low, more = _cut(fmt, high, low, t)
+        high, lower, e = wide(_U0), _raised(fmt, lower, np.int64(_SPARE)), c[2] - _SPARE
+        low, further = _without(fmt, low, -d - t - _SPARE)
+        more |= further
+    if negative == c[0]:
+        low = low + lower
+        high = high + upper + wide(np.uint64(low < lower))
+    else:
+        if high < upper or (high == upper and low < lower):
+            negative, high, low, upper, lower = c[0], upper, lower, high, low
+        high = high - upper - wide(np.uint64(low < lower))
+        low = low - lower
+        if more:  # then the number that was not cut off is larger
+            high = high - wide(np.uint64(low == wide(_U0)))
+            low = low - wide(_U1)
+    k = _beyond_room(fmt, high, low)
+    n, further = _cut(fmt, high, low, k)
+    return rounded(fmt, negative, n, more | further, e + k)
+
+
+@inner(error_model="numpy", forceinline=True)
+def _quotient_of_words(x: Any, y: Any) -> Any:
+    """floor(2**62 x / y) for 2**60 <= x, y < 2**61, a word below 2**63, and whether there is a rest."""
+    # float64 gives 50 bits. Its quotient of what is left gives the others, with a margin for errors, so that at most 1
+    # is missing. The factor keeps the first below 2**63 where x is rounded to 2**61.
+    reciprocal = 1.0 / np.float64(np.int64(y))
+    q = np.uint64(np.int64(np.float64(np.int64(x)) * reciprocal * _BELOW_62))
+    rest = np.float64(np.int64(low_word(((wide(x) << 62) - words_product(q, y)) >> 16))) * _CUT
+    q += np.uint64(np.int64(rest * reciprocal + _OFFSET) - np.int64(_OFFSET + 1.0))
+    r = (x << np.uint64(62)) - q * y  # below 2 y
+    one = r >= y
+    return q + np.uint64(one), (r != _U0) & (r != y)
+
+
+@inner(forceinline=True)
 def divide(fmt: Any, a: Any, b: Any) -> Any:
     if b[1] == wide(_U0):
         raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
     if a[1] == wide(_U0):
         return zero()
-    if _one_word(fmt):  # a quotient of 63 or 64 bits is long enough
+    if _one_word(fmt):
         x, y = low_word(a[1]), low_word(b[1])
-        up, s = leading_zeros(x), leading_zeros(y)
-        digit, left = divided_by_word(x << (up - 1), _U0, y << s)
-        return _rounded_word(fmt, a[0] != b[0], digit, left != _U0, a[2] - b[2] - 63 - up + s)
+        k, s = _up(fmt, x), _up(fmt, y)
+        q, more = _quotient_of_words(x << np.uint64(k), y << np.uint64(s))
+        return _rounded_bits(fmt, a[0] != b[0], q, more, a[2] - b[2], s - k - 62)
+    return _divide_long(fmt, a, b)
+
+
+@inner
+def _divide_long(fmt: Any, a: Any, b: Any) -> Any:
     k = fmt.room - 1
     high, low = _enlarged(fmt, a[1], k)
     s = 128 - length(b[1])
@@ -346,18 +457,36 @@ def _root_of_126_bits(n: Any) -> Any:
     return s + np.uint64(n - words_product(s, s) > wide(s) << 1)
 
 
-@inner
+@inner(error_model="numpy", forceinline=True)
+def _root_of_word(x: Any) -> Any:
+    """floor(sqrt(2**62 x)) for 2**60 <= x < 2**62, a word below 2**62, and whether there is a rest."""
+    near = math.sqrt(np.float64(np.int64(x))) * 2.0**31
+    s = np.uint64(np.int64(near))
+    rest = np.float64(np.int64(low_word(((wide(x) << 62) - words_product(s, s)) >> 16))) * 2.0**15
+    s += np.uint64(np.int64(rest / near + _OFFSET) - np.int64(_OFFSET + 1.0))
+    r = (x << np.uint64(62)) - s * s  # below 2**64
+    twice = s + s
+    return s + np.uint64(r > twice), (r != _U0) & (r != twice + _U1)
+
+
+@inner(forceinline=True)
 def sqrt(fmt: Any, a: Any) -> Any:
     if a[0]:
         raise ValueError("got the square root of a negative number; needed x >= 0")
     if a[1] == wide(_U0):
         return zero()
     if _one_word(fmt):
-        k = np.int64(125 - fmt.precision)
-        k += (a[2] - k) & 1
-        n = a[1] << k
-        root = _root_of_126_bits(n)
-        return _rounded_word(fmt, False, root, words_product(root, root) != n, (a[2] - k) >> 1)
+        half = a[2] >> 1
+        odd = (a[2] & 1) * fmt.bits  # the number is base**(2 half) * 2**odd times the significand
+        k = _up(fmt, low_word(a[1]))
+        k += (odd - k) & 1
+        root, more = _root_of_word(low_word(a[1]) << np.uint64(k))
+        return _rounded_bits(fmt, False, root, more, half, (odd - k - 62) >> 1)
+    return _root_long(fmt, a)
+
+
+@inner
+def _root_long(fmt: Any, a: Any) -> Any:
     # The root of a number with 2t + 1 or 2t + 2 digits and an even exponent has t + 1.
     k = fmt.precision + 2 - ((a[2] - fmt.precision) & 1)
     high, low = _enlarged(fmt, a[1], k)

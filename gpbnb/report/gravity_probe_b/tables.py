@@ -233,5 +233,5 @@ def bound_costs(
         (f"{time:.0f} times the run", "106 bits, for a second run"),
     )
     body = tuple((name, *cost, *cells) for (name, cells), cost in zip(ratios.items(), costs, strict=True))
-    head = ("bound", "processor time", "extra digits", *(f"bound / error, {arithmetic(fmt)}" for fmt, _ in found))
+    head = ("bound", "processor time", "extra precision", *(f"bound / error, {arithmetic(fmt)}" for fmt, _ in found))
     return Table(f"what a bound costs, after {k} steps", head, body)

@@ -17,7 +17,7 @@ from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, round_, store
 from gpbnb.arithmetic.kernels.tags import Double
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, digit_unit
 from gpbnb.report.integration import theory
 from gpbnb.report.integration.arguments import positive_number
 from gpbnb.report.integration.theory import Cycle, Process, Rule
@@ -417,7 +417,9 @@ def emulate(
     """
     for fmt in formats:
         if fmt.precision * math.log2(fmt.base) > 40:
-            raise ValueError(f"got {fmt}; needed at most 40 bits, or float64 is no reference; use fewer digits")
+            raise ValueError(
+                f"got {fmt}; needed at most 40 bits, or float64 is no reference; use fewer {digit_unit(fmt.base)}"
+            )
     process = theory.first_order(sigma_x, omega_bw)
     cycles = round(positive_number("duration", duration) * positive_number("f_c", f_c))
     running = [Integrator(fmt, 1 / f_c, paths) for fmt in formats]

@@ -16,7 +16,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import Rounding, rounding_named
+from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text, rounding_named
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.report.integration.arguments import Floats, bandwidth_ratio, positive_array, positive_number
 from gpbnb.report.integration.walk import discretize, error_variance
@@ -176,7 +176,7 @@ def best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
     if total(found.x) > math.sqrt(2 * duration / omega_bw) / 2:
         raise ValueError(
             f"got {fmt}, {duration:g} s, {omega_bw:g} rad/s; needed an error below half of the integral at some rate; "
-            "use more digits"
+            f"use more {digit_unit(fmt.base)}"
         )
     return math.exp(found.x)
 
@@ -206,7 +206,8 @@ def needed_precision(
     found = smallest_precision(enough, like.base, like.rounding, largest=most, monotone=True)
     if found is None:
         raise ValueError(
-            f"got share = {share}, {f_c:g} Hz, {duration:g} s; needed at most {most} digits; allow a larger share"
+            f"got share = {share}, {f_c:g} Hz, {duration:g} s; needed at most {digits_text(most, base)}; "
+            "allow a larger share"
         )
     return found.precision
 

@@ -18,6 +18,7 @@ from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
 from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
+from gpbnb.arithmetic.rounding import digits_text
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
@@ -123,7 +124,7 @@ def recursion(
         raise ValueError(f"got steps {steps!r}; needed numbers of samples that ascend from 0 or later")
     backend = fmt.backend
     if not isinstance(backend, Compiled):
-        raise ValueError(f"got {fmt}; needed base 2, 10 or 16 and at most 53, 18 or 13 digits; take fewer")
+        raise ValueError(f"got {fmt}; needed at most 53 bits, 18 decimal or 13 base-16 digits; take fewer")
     angle = fmt.array(list(_exact_turn(1, period, interval)))
     start = fmt.array([1, 0])
     step, state = (backend.pack(a.components) for a in (angle, start))
@@ -182,5 +183,5 @@ def _digits_needed_observed(
 
     found = smallest_precision(within, base, least=2, largest=most)
     if found is None:
-        raise ValueError(f"got an error of {error:g} mas; needed one that base {base} reaches within {most} digits")
+        raise ValueError(f"got an error of {error:g} mas; needed one reached within {digits_text(most, base)}")
     return found.precision

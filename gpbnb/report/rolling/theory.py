@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import digits_text
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.report.measurement import YEAR
 
@@ -497,4 +498,6 @@ def digits_needed(bound: Callable[[Fraction], float], base: int, largest: float)
     found = smallest_precision(meets, base, least=2, largest=399, monotone=True)
     if found is not None:
         return found.precision
-    raise ValueError(f"got a bound above {largest:g} at 399 digits; needed one that falls with the unit roundoff")
+    raise ValueError(
+        f"got a bound above {largest:g} at {digits_text(399, base)}; needed one that falls with the unit roundoff"
+    )

@@ -46,6 +46,21 @@ def test_53_bits_in_float64_agree_with_the_exact_kernel() -> None:
     assert sum(count.overflowed for count in counts) > 200
 
 
+def test_fused_multiply_adds_of_shorter_significands_agree_with_the_exact_kernel() -> None:
+    formats = list(wide.formats_of_words())
+    counts = [wide.compare(rules, 40, 9, ("fused",)) for rules in formats[:: len(formats) // 40 + 1]]
+    assert [text for count in counts for text in count.different] == []
+    assert sum(count.compared for count in counts) > 1000
+    assert sum(count.overflowed for count in counts) > 20
+
+
+def test_a_sum_next_to_a_tie_of_float64_is_rounded_once() -> None:
+    fmt = FloatFormat(2, 53, "even")
+    x, y = fmt.array(1 + 2.0**-30), fmt.array(1 - 2.0**-30)  # the product is 2**-60 below 1, half a unit of the addend
+    for sign in (1, -1):
+        assert (sign * x).multiply_add(y, fmt.array(sign * (2.0**53 + 2))).to_float() == sign * (2.0**53 + 2)
+
+
 @pytest.mark.parametrize(
     ("factor", "other", "units"), [(3 + 3 * 2.0**-30, 1 - 2.0**-30, 1), (5 + 5 * 2.0**-27, 1 - 2.0**-27 + 2.0**-53, 3)]
 )
