@@ -172,6 +172,11 @@ class FloatArray(ComponentArray, NumPyProtocols):
         self.components = tuple(_frozen(part, backend.dtype) for part in components)
         return self
 
+    @classmethod
+    def from_packed(cls, packed: NDArray[Any], fmt: Any) -> Self:
+        """Make an array from what compiled loops of the format return; ``fmt.backend.pack`` is the inverse."""
+        return cls.from_components(fmt.backend, fmt.backend.unpack(packed), fmt)
+
     def on_exact_backend(self) -> FloatArray:
         """Return the same numbers on the backend that can store every exponent."""
         return self.from_components(self.format.exact_backend, self.backend.to_exact(self.components), self.format)
@@ -186,12 +191,11 @@ class FloatArray(ComponentArray, NumPyProtocols):
         return m, e
 
     @classmethod
-    def from_values(cls, values: Any, fmt: Any) -> Self:
-        """See :meth:`gpbnb.arithmetic.formats.FloatFormat.array`."""
-        return cls._read(values, fmt, exactly=False)
+    def from_values(cls, values: Any, fmt: Any, exactly: bool = False) -> Self:
+        """Round numbers of any kind, as ``fmt.array`` does, or with `exactly` reject those that are not in the format.
 
-    @classmethod
-    def _read(cls, values: Any, fmt: Any, exactly: bool) -> Self:
+        See :meth:`gpbnb.arithmetic.formats.FloatFormat.array`.
+        """
         if isinstance(values, FloatArray):
             if values.format == fmt and isinstance(values, cls):
                 return values
@@ -222,7 +226,12 @@ class FloatArray(ComponentArray, NumPyProtocols):
                     continue
                 ratio = exact_ratio(value)
                 if random or ratio not in known:
-                    known[ratio] = cls._rounded(value, ratio, fmt, exactly)
+                    known[ratio] = pair = fmt.kernel.from_decimal(*ratio)
+                    if exactly and not fmt.kernel.is_exactly(pair, *ratio):
+                        raise ValueError(
+                            f"got the operand {value!r}; needed a number that {fmt} holds exactly; round it first: "
+                            "fmt.array(...)"
+                        )
             except (TypeError, ValueError, OverflowError) as error:
                 raise type(error)(f"{at_entry(np.unravel_index(i, given.shape))}{error}") from None
             read.append(known[ratio])
@@ -239,15 +248,6 @@ class FloatArray(ComponentArray, NumPyProtocols):
             check_exit(values, "to_pairs()")
         components: Components | None = fmt.backend.from_backend(values.backend, values.components)
         return components
-
-    @staticmethod
-    def _rounded(value: Any, ratio: tuple[int, int, int], fmt: Any, exactly: bool) -> tuple[int, int]:
-        pair: tuple[int, int] = fmt.kernel.from_decimal(*ratio)
-        if exactly and not fmt.kernel.is_exactly(pair, *ratio):
-            raise ValueError(
-                f"got the operand {value!r}; needed a number that {fmt} holds exactly; round it first: fmt.array(...)"
-            )
-        return pair
 
     @staticmethod
     def _special(value: float, fmt: Any, exactly: bool) -> tuple[Any, int]:
@@ -339,7 +339,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
                     "convert one of them: fmt.array(x)"
                 )
             return other
-        return self._read(other, self.format, exactly=True)
+        return self.from_values(other, self.format, exactly=True)
 
     def _binary(self, name: str, left: Any, right: Any) -> FloatArray:
         other = right if left is self else left
@@ -631,10 +631,13 @@ def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:
             "rows; needed equal numbers; transpose or reshape one of them"
         )
     broadcast("matmul", rows.shape[:-2], columns.shape[:-2])
+    components = None
+    if n and rows.ndim == columns.ndim == 2 and rows.backend is columns.backend:
+        components = rows.backend.matmul(rows.components, columns.components)
     if n == 0:
         stack = np.broadcast_shapes(rows.shape[:-2], columns.shape[:-2])
         c = a._zeros((*stack, rows.shape[-2], columns.shape[-1]))
-    elif rows.ndim == columns.ndim == 2 and (components := _product(rows, columns)) is not None:
+    elif components is not None:
         c = a.from_components(a.backend, components, a.format)
     else:
         c = rows[..., :, 0, np.newaxis] * columns[..., np.newaxis, 0, :]
@@ -643,8 +646,3 @@ def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:
     if a.ndim == 1:
         c = c[..., 0, :]
     return c if b.ndim > 1 else c[..., 0]
-
-
-def _product(rows: FloatArray, columns: FloatArray) -> Components | None:
-    """Return the components of the product of two matrices if their backend can compute it."""
-    return rows.backend.matmul(rows.components, columns.components) if rows.backend is columns.backend else None

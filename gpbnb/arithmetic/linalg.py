@@ -425,7 +425,7 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
         return None
     if column >= 0:
         raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot, a.format.base))
-    return type(a).from_components(backend, backend.unpack(factors), a.format), order
+    return type(a).from_packed(factors, a.format), order
 
 
 def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
@@ -442,7 +442,7 @@ def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
         _loops().substitute(tag, factors, columns)
     except OverflowError:
         return None
-    return type(a).from_components(backend, backend.unpack(columns), a.format)
+    return type(a).from_packed(columns, a.format)
 
 
 @lru_cache(maxsize=1)

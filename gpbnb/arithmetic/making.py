@@ -1,4 +1,4 @@
-"""What every number format has besides its rules: compiled loops, zeros, and numbers from their bits."""
+"""What floating-point and fixed-point formats share: how they compute, and what they make besides ``fmt.array``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import ExactKernel, kernel
-from gpbnb.arithmetic.kernels.selection import Accumulator, check_compiled, mixed_tag, run_tag
+from gpbnb.arithmetic.kernels.selection import Accumulator, compiled_tag, mixed_tag, run_tag
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.rounding import Order, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.text import at_entry
@@ -91,7 +91,7 @@ class Makes(ABC, Generic[Made]):
         ValueError : the format has no compiled loops; the message names the setting that prevents them, and what to set
             instead.
         """
-        check_compiled(self.rules)
+        compiled_tag(self.rules)
 
     def restart(self) -> None:
         """Restart the random numbers of stochastic rounding."""

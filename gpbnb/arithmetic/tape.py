@@ -248,17 +248,14 @@ class Tape:
                 if _replay()(backend.tag, instructions, begin, end, values, truths) < end:
                     return None
                 if call is not None:
-                    taken = [
-                        first.from_components(backend, backend.unpack(values[each]), first.format)
-                        for each in call.operands
-                    ]
+                    taken = [first.from_packed(values[each], first.format) for each in call.operands]
                     made = call.function(*taken)
                     if made.backend is not backend:
                         return None
                     values[call.results] = backend.pack(made.components)
         except (OverflowError, ZeroDivisionError):
             return None
-        return first.from_components(backend, backend.unpack(values[results]), first.format)
+        return first.from_packed(values[results], first.format)
 
     def _exact(self, given: Sequence[FloatArray], places: Sequence[Places], results: Places) -> FloatArray:
         """Run with integers of Python, which hold the numbers of every format."""

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.emulation import History, compare_runs
 from gpbnb.filters.forms import Form
-from gpbnb.filters.missing import stored_measurements
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.run import Run, log_spaced, reference
 
 

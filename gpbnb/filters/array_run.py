@@ -11,7 +11,7 @@ import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.filters import array_steps
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_steps import ONE_FORMAT, BlockStorage
@@ -39,7 +39,7 @@ from gpbnb.filters.kalman_step import (
     second_gain,
 )
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.opening import opening
+from gpbnb.filters.opening import double_doubles_of, opening
 from gpbnb.filters.run import Checkpoints
 
 ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
@@ -104,7 +104,7 @@ class SteppedRun(ABC):
 
     def states(self, z: Any) -> NDArray[np.float64]:
         """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
-        found = [_double_doubles(x) for x in self._steps_taken(z)]
+        found = [double_doubles_of(x) for x in self._steps_taken(z)]
         return np.array(found, dtype=np.float64).reshape(-1, self._size[0], 2)
 
     def _steps_taken(self, z: Any) -> Iterator[FloatArray]:
@@ -283,17 +283,13 @@ class ArrayRun(SteppedRun):
         """Compute factors of P0, Q and R as the compiled UD form does."""
         start = opening(self.model.without_inputs(), self.fmt, Form.UD, self.fmt.run_tag())
         self.repairs += start.raised
-        first, Q, R = (self._unpacked(each) for each in (start.U0, start.UQ, start.UR))
+        first, Q, R = (FloatArray.from_packed(each, self.fmt) for each in (start.U0, start.UQ, start.UR))
         self._given["UR"] = list(R)
         if self.form in ROOTS:
             self.P = array_steps.root_of_factors(first)
             self._given["UQ"] = [array_steps.root_of_factors(each) for each in Q]
         else:
             self.P, self._given["UQ"] = first, list(Q)
-
-    def _unpacked(self, packed: NDArray[Any]) -> FloatArray:
-        backend = cast(Compiled, self.fmt.backend)
-        return FloatArray.from_components(backend, backend.unpack(packed), self.fmt)
 
     def _whole_gain(self, k: int, gain: Any) -> NDArray[Any]:
         """Return the gain for all measurements together, from those of the decorrelated measurements one by one."""
@@ -343,13 +339,13 @@ class _BoundTaker:
     def _wide_state(self, known: NDArray[Any] | None) -> NDArray[np.float64]:
         """Return the estimate minus a known input as double-double, (n, 1, 2)."""
         if known is None:
-            return _double_doubles(self.run.x.reshape(-1, 1))
+            return double_doubles_of(self.run.x.reshape(-1, 1))
         return double_doubles((self.run.x.to_fractions() - known).reshape(-1, 1))
 
     def _wide_covariance(self) -> NDArray[np.float64]:
         if self.run.form in FACTORED:
             return double_doubles(self.run.covariance(self.run.P))
-        return _double_doubles(self.run.P)
+        return double_doubles_of(self.run.P)
 
 
 def block_algebra(formats: Sequence[FloatFormat], stored: BlockStorage) -> BlockAlgebra:
@@ -361,10 +357,3 @@ def block_algebra(formats: Sequence[FloatFormat], stored: BlockStorage) -> Block
 
 def _algebra(fmt: FloatFormat) -> Algebra:
     return Algebra(cache(lambda n: fmt.array(np.eye(n, dtype=int))), operator.matmul)
-
-
-def _double_doubles(a: FloatArray) -> NDArray[np.float64]:
-    if a.format.base == 2 and isinstance(a.backend, Compiled):
-        high = np.asarray(a.to_float(), dtype=np.float64)  # exact: at most 53 bits
-        return np.stack([high, np.zeros_like(high)], axis=-1)
-    return double_doubles(a.to_fractions())

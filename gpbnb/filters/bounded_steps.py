@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.compiling import is_compiled
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.filters.contraction import (
@@ -26,7 +25,7 @@ from gpbnb.filters.kalman_step import StepModel
 from gpbnb.filters.kernels.bounded import residuals, symmetric_parts, whole_gain
 from gpbnb.filters.kernels.step import NEXT_CHECKPOINT, advance
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.opening import opening, step_arrays
+from gpbnb.filters.opening import as_packed, opening, step_arrays
 from gpbnb.filters.replayed import advance_by_replay, replay_pays
 
 Array = NDArray[np.float64]
@@ -78,7 +77,7 @@ class CarriedBound:
         given = stored.to_float()
         self._plain = given["Phi"], given["H"], given["Q"], given["R"]
         start = opening(stored, None, Form.INNOVATION, DoubleDouble())
-        self._exact = step_arrays(start, double_doubles(np.eye(stored.n, dtype=int)))
+        self._exact = step_arrays(start, as_packed(None, np.eye(stored.n)))
         n, m, count = stored.n, stored.m, len(checkpoint_steps)
         #: Bounds at the checkpoint steps.
         self.saved = Bounds(*(np.full((count, *shape), np.inf) for shape in ((n,), (n, m), (n, n))))

@@ -15,11 +15,10 @@ from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
-from gpbnb.filters.missing import stored_measurements
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
-from gpbnb.filters.nonlinear_run import NonlinearRun, complete, nonlinear_checkpoints, opened
+from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_checkpoints, opened
 from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums, log_spaced, reference
 
 
@@ -141,7 +140,7 @@ def emulate(
     if not isinstance(fmt, (FloatFormat, FixedFormat, BlockFormats)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or BlockFormats")
     if not hasattr(z, "to_fractions"):
-        model, z = complete(model, z)
+        model, z = model.without_missing(z)
     if not isinstance(fmt, BlockFormats):
         fmt.restart()
     measured: Any = z if hasattr(z, "to_fractions") else stored_measurements(z, fmt)

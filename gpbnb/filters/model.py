@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -20,6 +21,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.covariance import (
     REPAIR_TOLERANCE,
     Repair,
@@ -201,9 +203,7 @@ class LinearModel:
                 least = REPAIR_TOLERANCE if tolerance is None else tolerance
                 object.__setattr__(self, letter, _repaired_cycle(letter, matrices, strictly, least, repairs))
                 continue
-            different = {tuple(matrix.flat): matrix for matrix in matrices.reshape(-1, *matrices.shape[-2:])}
-            for matrix in different.values():
-                check_covariance(letter, matrix, strictly)
+            _check_cycle(letter, matrices, strictly)
         object.__setattr__(self, "repairs", tuple(repairs))
 
     def _evaluate_functions(self) -> None:
@@ -271,7 +271,56 @@ class LinearModel:
 
     def without_inputs(self) -> LinearModel:
         """Return the same model without known inputs and offsets."""
-        return replace(self, B=None, u=None, b=None, d=None, input_names=()) if self.has_inputs else self
+        return self._changed(B=None, u=None, b=None, d=None, input_names=()) if self.has_inputs else self
+
+    def without_missing(self, z: Any) -> tuple[LinearModel, Any]:
+        """Return a model for the measurements of each step, and the measurements with zeros in place of missing ones.
+
+        A missing measurement gets a row of zeros in H, and its noise is uncorrelated with the others. Its column of the
+        gain is then exactly zero in every form and format, so estimate and covariance are those of a step without it.
+
+        Parameters
+        ----------
+        z : (steps, m), with NaN for missing measurements, or a masked array.
+
+        Returns
+        -------
+        model, z : unchanged if nothing is missing.
+        """
+        if isinstance(z, np.ma.MaskedArray):
+            missing = np.array(np.ma.getmaskarray(z))
+            given = np.array(np.ma.getdata(z))
+            given[missing] = 0
+            given = real_numbers(given)
+        else:
+            given = real_numbers(z)
+            missing = np.zeros(given.shape, dtype=bool)
+        if given.dtype.kind == "f":
+            missing |= np.isnan(given)
+        if given.ndim != 2 or given.shape[1] != self.m or not missing.any():
+            return self, given
+        H, R = [], []
+        for k, gone in enumerate(missing):
+            h, r = self.H[k % len(self.H)], self.R[k % len(self.R)]
+            if gone.any():
+                h, r = h.copy(), r.copy()
+                h[gone] = Fraction(0)
+                apart = (gone[:, None] | gone[None, :]) & ~np.eye(self.m, dtype=bool)
+                r[apart] = Fraction(0)
+            H.append(h)
+            R.append(r)
+        filled = given.copy()
+        filled[missing] = 0
+        return self._changed(H=np.array(H, dtype=object), R=np.array(R, dtype=object)), filled
+
+    def _changed(self, **entries: Any) -> LinearModel:
+        """Return a copy with other entries, which need no check: Fractions of the same shapes, covariances definite."""
+        made = copy(self)
+        for name, value in entries.items():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            object.__setattr__(made, name, value)
+        return made
 
     def known(self, k: int) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the exact input of step k + 1, :math:`Bu + b`, (n,), and the measurement offset d, (m,)."""
@@ -383,9 +432,9 @@ class LinearModel:
         """
         sound = self.definite_in(fmt)
         stored = {letter: array.to_fractions() for letter, array in stored_arrays(sound, fmt).items()}
-        made = replace(self, **stored, name=f"{self.name}, in {format_text(fmt)}", repair=None)
-        object.__setattr__(made, "repairs", sound.repairs)
-        return made
+        for letter, strictly in _COVARIANCES.items():
+            _check_cycle(letter, stored[letter], strictly)
+        return sound._changed(**stored, name=f"{self.name}, in {format_text(fmt)}", repair=None)
 
     def arrays(self, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
         """Return the model as a dict of arrays, by letter, with each entry rounded into the format.
@@ -398,7 +447,9 @@ class LinearModel:
         ------
         OverflowError : an entry is beyond the range of the format.
         """
-        fmt.restart()
+        random = fmt.rounding is Rounding.STOCHASTIC
+        if random:
+            fmt.restart()
         made: dict[str, FloatArray] = {}
         for letter in (*_LETTERS, *_INPUTS):
             if (given := getattr(self, letter)) is None:
@@ -407,7 +458,7 @@ class LinearModel:
                 made[letter] = fmt.array(given)
             except OverflowError as error:
                 raise OverflowError(f"{letter}: {error}") from None
-            if letter in _COVARIANCES and fmt.rounding is Rounding.STOCHASTIC:
+            if letter in _COVARIANCES and random:
                 made[letter] = made[letter].moved(_mirrored)
         return made
 
@@ -433,6 +484,48 @@ def stored_arrays(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[st
 @lru_cache(maxsize=8)
 def _arrays_once(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
     return model.arrays(replace(fmt))  # a format of its own, for which no search refuses conversions
+
+
+def stored_measurements(z: Any, fmt: FloatFormat | FixedFormat | BlockFormats) -> FloatArray:
+    """Round measurements into a format.
+
+    Raises
+    ------
+    OverflowError : a measurement beyond the range of the format.
+    """
+    try:
+        return fmt.array(z)
+    except OverflowError as error:
+        raise OverflowError(f"measurements: {error}") from None
+
+
+def real_numbers(values: Any) -> NDArray[Any]:
+    """Return measurements as an array of float64 or whole numbers, or of Fractions if those cannot hold them exactly.
+
+    Raises
+    ------
+    ValueError, TypeError : an entry is masked, or is not a real number; rows have different lengths; a longdouble that
+        float64 does not hold, beside one that is NaN or infinite.
+    """
+    if np.ma.is_masked(values):
+        raise ValueError("got measurements of which some are masked; needed a number for each")
+    try:
+        given = np.asarray(values)
+    except ValueError:
+        raise ValueError("got measurements in rows of different lengths; needed (steps, m) numbers") from None
+    if given.dtype.kind in "iu":
+        return given
+    if given.dtype.kind == "f":
+        with np.errstate(over="ignore", under="ignore"):
+            nearest = given.astype(np.float64, copy=False)
+        if np.array_equal(nearest, given, equal_nan=True):
+            return nearest
+    try:
+        return exact(given if given.dtype.kind == "f" else values)
+    except TypeError as error:
+        raise TypeError(f"measurements: {error}") from None
+    except ValueError as error:
+        raise ValueError(f"measurements: {error}") from None
 
 
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
@@ -488,9 +581,14 @@ def _definite_in(model: LinearModel, fmt: FloatFormat | FixedFormat) -> LinearMo
                 changed[letter] = members.reshape(matrices.shape)
     if not changed:
         return model
-    made = replace(model, **changed)  # type: ignore[arg-type]
-    object.__setattr__(made, "repairs", (*model.repairs, *repairs))
-    return made
+    return model._changed(**changed, repairs=(*model.repairs, *repairs))
+
+
+def _check_cycle(letter: str, matrices: NDArray[Any], strictly: bool) -> None:
+    """Check each different covariance of a cycle, or the only one; see :func:`check_covariance`."""
+    different = {tuple(matrix.flat): matrix for matrix in matrices.reshape(-1, *matrices.shape[-2:])}
+    for matrix in different.values():
+        check_covariance(letter, matrix, strictly)
 
 
 def _repaired_cycle(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from fractions import Fraction
 from inspect import signature
@@ -18,7 +19,6 @@ from gpbnb.arithmetic.elementary import elementary
 from gpbnb.arithmetic.exits import kept_in
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.covariance import Repair
-from gpbnb.filters.missing import without_missing
 from gpbnb.filters.model import Entries, LinearModel
 from gpbnb.filters.named import range_text, sized, whole_number
 
@@ -296,12 +296,11 @@ class NonlinearModel:
 
         A missing measurement gets an innovation of zero and a row of zeros in H.
         """
-        noise, filled = without_missing(self.noise, z)
+        noise, filled = self.noise.without_missing(z)
         if noise is self.noise:
             return self, filled
-        made = object.__new__(NonlinearModel)
-        for attribute, value in {**vars(self), "noise": noise}.items():
-            object.__setattr__(made, attribute, value)
+        made = copy(self)
+        object.__setattr__(made, "noise", noise)
         return made, filled
 
     def seen(self, k: int) -> NDArray[np.bool_] | None:

@@ -30,7 +30,6 @@ from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.factors import combined_gain, upper_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import corrected_by, measured_in, predicted_in
-from gpbnb.filters.missing import without_missing
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.reference import Step, agreed
 from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums, reference_states
@@ -248,11 +247,6 @@ def opened(
             f"{', '.join(map(str, Form))}"
         )
     return ArrayRun(model, fmt, form, checkpoint_steps, bounded)
-
-
-def complete(model: AnyModel, z: Any) -> tuple[Any, Any]:
-    """Return a model that ignores missing measurements, and the measurements with zeros in their place."""
-    return model.without_missing(z) if isinstance(model, NonlinearModel) else without_missing(model, z)
 
 
 def true_states(model: AnyModel, z: Any) -> NDArray[np.float64]:

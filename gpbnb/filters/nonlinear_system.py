@@ -22,7 +22,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.tape import CODES, Call, Tape
 from gpbnb.arithmetic.traced import TracedFunction
-from gpbnb.filters.missing import real_numbers
+from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, whole_number
 from gpbnb.filters.program import (
     ADD,

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled, Floats, Pairs, double_doubles
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
@@ -166,13 +166,9 @@ def as_packed(fmt: FloatFormat | FixedFormat | None, values: Any) -> NDArray[Any
 
 def double_doubles_of(array: FloatArray) -> NDArray[np.float64]:
     """Round the numbers of an array to the nearest double-doubles, (..., 2); exact in base 2 and 16."""
-    backend, parts = array.backend, array.components
-    if isinstance(backend, Floats):
-        return np.stack([parts[0], np.zeros_like(parts[0])], axis=-1)
-    out = np.empty((array.size, 2))
-    if isinstance(backend, Pairs) and pairs_as_double_doubles(parts[0].ravel(), parts[1].ravel(), out) == array.size:
-        return out.reshape(*array.shape, 2)
-    return double_doubles(array.to_fractions())
+    if isinstance(array.backend, Compiled):
+        return widened_array(array.backend.pack(array.components))
+    return double_doubles(exact(array))
 
 
 def packed_array(array: FloatArray) -> NDArray[Any]:
@@ -196,17 +192,12 @@ def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
     """Convert packed numbers of any format to double-double, exactly in base 2 and 16, to the nearest in base 10."""
     if packed.dtype == np.float64:
         return np.stack([packed, np.zeros_like(packed)], axis=-1)
-    significands, exponents = packed[..., 0], packed[..., 1]
-    out = np.empty((*significands.shape, 2))
-    known: dict[tuple[int, int], tuple[float, float]] = {}
-    for index in np.ndindex(significands.shape):
-        pair = int(significands[index]), int(exponents[index])
-        if pair not in known:
-            value = Fraction(pair[0]) * Fraction(10) ** pair[1]
-            high = float(value)
-            known[pair] = high, float(value - Fraction(high))
-        out[index] = known[pair]
-    return out
+    m, e = (np.ascontiguousarray(packed[..., i]).ravel() for i in range(2))
+    out = np.empty((m.size, 2))
+    if pairs_as_double_doubles(m, e, out) < m.size:
+        numbers = [Fraction(int(each)) * Fraction(10) ** int(power) for each, power in zip(m, e, strict=True)]
+        out = double_doubles(np.array(numbers, dtype=object))
+    return out.reshape(packed.shape)
 
 
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")

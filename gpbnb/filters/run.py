@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.compiling import is_compiled
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Free, Hardware32, Hardware64, Tag
 from gpbnb.arithmetic.named import format_text
@@ -143,9 +143,8 @@ class Run:
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, records), (n, m), (n, n))
         )
         self.notes = np.zeros(4, dtype=np.int64)
-        identity = np.eye(n, dtype=int)
-        increment = as_packed(self.fmt, model.Phi - identity) if compensated else None
-        self.matrices = step_arrays(start, as_packed(self.fmt, identity), increment)
+        increment = as_packed(self.fmt, model.Phi - np.eye(n, dtype=int)) if compensated else None
+        self.matrices = step_arrays(start, as_packed(self.fmt, np.eye(n)), increment)
         self._step_tag: Tag = Free(self.tag) if isinstance(self.tag, Hardware32 | Hardware64) else self.tag
         self._stepped = self._as_stepped(self.matrices)
         #: Why the run stopped, if it did.
@@ -241,14 +240,7 @@ class Run:
         if self._carried is not None:
             self._take_bounded(self._carried, self.pack_measurements(z))
             return
-        try:
-            self.advance(self.pack_measurements(z), (self.checkpoint_steps, self.X, self.G, self.C), self.notes)
-        except (OverflowError, ZeroDivisionError) as error:
-            self.notes[STOPPED] = self.steps + 1
-            self.reason = self.stopped_by(error)
-        else:
-            if self.stopped:
-                self.reason = f"a zero pivot in the innovation covariance at step {self.stopped}"
+        self.advance(self.pack_measurements(z), (self.checkpoint_steps, self.X, self.G, self.C), self.notes)
 
     def _take_bounded(self, carried: CarriedBound, z: NDArray[Any]) -> None:
         """Take steps with packed measurements, keep the results of a block at a time, and take the bound over it."""
@@ -349,38 +341,43 @@ class Run:
         x[0], P[0] = self.x, self.P
         every, notes = np.arange(first + 1, first + len(z) + 1), self.notes.copy()
         notes[NEXT_CHECKPOINT] = 0
-        failure: ArithmeticError | None = None
-        try:
-            self.advance(z, (every, x[1:], K[1:], P[1:]), notes)
-        except (OverflowError, ZeroDivisionError) as error:
-            notes[STOPPED], failure = notes[DONE] + 1, error
+        self.advance(z, (every, x[1:], K[1:], P[1:]), notes)
         done = int(notes[DONE]) - first
         notes[NEXT_CHECKPOINT] = np.searchsorted(self.checkpoint_steps, notes[DONE], side="right")
         saved = slice(at, notes[NEXT_CHECKPOINT])
         rows = self.checkpoint_steps[saved] - first
         self.X[saved], self.G[saved], self.C[saved], self.notes[:] = x[rows], K[rows], P[rows], notes
-        if self.stopped:
-            pivot = f"a zero pivot in the innovation covariance at step {self.stopped}"
-            self.reason = self.stopped_by(failure) if failure else pivot
         return x[: done + 1], K[: done + 1], P[: done + 1]
 
     def advance(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
-        """Take one step per packed measurement, (steps, m, columns of x).
+        """Take one step per packed measurement, (steps, m, columns of x), up to one that ends the run.
 
         Parameters
         ----------
         kept : the checkpoint steps; arrays for estimates, gains and covariances, or factors, at them.
         notes : the status of the run, which is brought up to date.
-
-        Raises
-        ------
-        OverflowError, ZeroDivisionError : the step after the last one noted as done overflowed or divided by zero.
         """
-        if self.form is Form.UD:
-            each = self.matrices
-            factors = FactorArrays(each.Phi, each.H, each.HT, self.UQ, self.UR, each.place)
-            advance_ud(self.tag, factors, z, self.steps, self.x, self.P, kept, notes)
-            return
+        try:
+            if self.form is Form.UD:
+                each = self.matrices
+                factors = FactorArrays(each.Phi, each.H, each.HT, self.UQ, self.UR, each.place)
+                advance_ud(self.tag, factors, z, self.steps, self.x, self.P, kept, notes)
+            else:
+                self._advance_covariances(z, kept, notes)
+        except (OverflowError, ZeroDivisionError) as error:
+            notes[STOPPED] = notes[DONE] + 1
+            kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
+            self.reason = f"{kind} in {QUANTITIES[int(self.matrices.place[0])]} at step {notes[STOPPED]}"
+            if self.form is Form.UD and isinstance(self.fmt, FixedFormat) and isinstance(error, OverflowError):
+                self.reason += (
+                    "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
+                )
+        else:
+            if notes[STOPPED]:
+                self.reason = f"a zero pivot in the innovation covariance at step {notes[STOPPED]}"
+
+    def _advance_covariances(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
+        """Take steps of a form with covariances, on numbers of the type that its compiled step takes."""
         steps, *results = kept
         given = [z, self.x, self.P, self.UR[:0], *results]
         used = [each.astype(self._stepped.Phi.dtype, copy=False) for each in given]
@@ -401,23 +398,12 @@ class Run:
                 if old is not new:
                     old[...] = new
 
-    def stopped_by(self, error: ArithmeticError) -> str:
-        """Name the cause that ended the last step, as in "overflow in the gain at step 812"."""
-        kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
-        text = f"{kind} in {QUANTITIES[int(self.matrices.place[0])]} at step {self.stopped}"
-        if self.form is Form.UD and isinstance(self.fmt, FixedFormat) and isinstance(error, OverflowError):
-            text += "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
-        return text
-
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Convert results of the compiled loops to exact Fractions."""
         if self.fmt is None:
             high, low = (part.astype(object) for part in (packed[..., 0], packed[..., 1]))
             return np.asarray(np.frompyfunc(_exact_sum, 2, 1)(high, low), dtype=object)
-        backend = cast(Compiled, self.fmt.backend)
-        return np.asarray(
-            FloatArray.from_components(backend, backend.unpack(packed), self.fmt).to_fractions(), dtype=object
-        )
+        return np.asarray(FloatArray.from_packed(packed, self.fmt).to_fractions(), dtype=object)
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""

@@ -44,7 +44,6 @@ from gpbnb.filters.array_steps import observe_carlson, observed, predict_root, r
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel, corrected, gain, predicted, updated
-from gpbnb.filters.missing import without_missing
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named
 
@@ -228,7 +227,7 @@ class FixedIntervalSmoother:
         form = form_named(self.form)
         if form not in SMOOTHER_FORMS:
             raise ValueError(f'got the {form} form; needed "innovation", "Joseph" or "square root" for a smoother')
-        model, filled = without_missing(self.model, self.z)
+        model, filled = self.model.without_missing(self.z)
         self.model.check_measurements(filled, 0)
         if not len(filled):
             raise ValueError("got no measurements; needed one step or more")

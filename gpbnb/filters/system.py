@@ -24,7 +24,7 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact, rationals
-from gpbnb.filters.missing import real_numbers
+from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
 from gpbnb.filters.opening import as_packed, widened_array
 from gpbnb.filters.program import AT_MOST, Program, advance, matrices

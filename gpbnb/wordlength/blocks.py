@@ -115,7 +115,7 @@ def required_block_precisions(
     tolerances = checked_question(model, [like], tolerance, asked.basis)
     if z is None:
         z = simulated(model, asked.steps, whole_number("seed", seed, 0))
-    strategy = recorded_strategy(model, asked, tolerances, form, z)
+    strategy = recorded_strategy(model, z, tolerances, form, asked.basis, asked.steps)
     most = replace(like, precision=largest_compiled(like))
     tried = list[tuple[BlockFormats, float]]()
 

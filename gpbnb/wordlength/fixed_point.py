@@ -42,7 +42,7 @@ from gpbnb.filters.words import (
 )
 from gpbnb.wordlength.precision import checked_question, recorded_strategy
 from gpbnb.wordlength.recursion import Recursion, recursion_strategy
-from gpbnb.wordlength.requirement import Asked, Strategy, checked_tolerance, largest_ratio
+from gpbnb.wordlength.requirement import Strategy, checked_tolerance, largest_ratio
 from gpbnb.wordlength.system import weak_evidence
 
 Basis = Literal["emulation", "guarantee"]
@@ -525,7 +525,7 @@ def _of_runs(
     tolerances = checked_question(given, [like], tolerance, basis)
     if basis != "emulation":
         raise ValueError(f'got basis "{basis}" for {given.name}; needed "emulation"; for a LinearModel, use guarantee')
-    return recorded_strategy(given, Asked(len(z) if hasattr(z, "__len__") else 1, basis), tolerances, form, z)
+    return recorded_strategy(given, z, tolerances, form, basis)
 
 
 def _of_system(

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
-from gpbnb.arithmetic.search import Outcome
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import check_limits
 from gpbnb.filters.forms import Form
@@ -17,8 +15,16 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form, form_named
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.precision import Guaranteed, Probable, survey_formats
-from gpbnb.wordlength.requirement import Asked, Basis, checked_tolerance, evidence, without_evidence
-from gpbnb.wordlength.system import BoundedSystem, EmulatedSystem, over_steps, system_strategy
+from gpbnb.wordlength.requirement import (
+    Asked,
+    Basis,
+    LastingBound,
+    Strategy,
+    checked_tolerance,
+    evidence,
+    without_evidence,
+)
+from gpbnb.wordlength.system import EmulatedSystem, system_strategy
 
 
 class Judgement(NamedTuple):
@@ -72,29 +78,22 @@ def judge(
     fmt.check_compiled()
     kind = cast(FloatFormat, fmt)  # strategies take fixed point, too, where there are loops for it
     asked = Asked(steps, basis, kind, None, False)
-    ends, warnings = False, tuple[str, ...]()
-    if isinstance(model, LinearSystem):
-        of_system = system_strategy(model, asked, tolerance, z, within)
-        found = of_system.error(kind)
-        ends = isinstance(of_system, BoundedSystem) and of_system.steps is not None
-        if math.isinf(found.ratio) and (later := over_steps(of_system, asked)):
-            found, ends = _or(found, later.error(kind))
-        warnings = of_system.warnings() if isinstance(of_system, EmulatedSystem) else ()
-    elif basis in ("emulation", "bound"):
+    if isinstance(model, LinearModel) and basis in ("emulation", "bound"):
         (found,) = survey_formats(model, z, tolerance, [kind], form_named(form), basis)
+        return Judgement(fmt, basis, steps, *found)
+    strategy: Strategy
+    if isinstance(model, LinearSystem):
+        strategy = system_strategy(model, asked, tolerance, z, within)
     else:
         if within is None:
             raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
         check_limits(within, model.n, model.m, model.x0)
         tolerances = checked_tolerance(tolerance, model.n, "states", basis)
-        strategy = Guaranteed if basis == "guarantee" else Probable
-        of_model = strategy(model, compiled_form(form), within, tolerances)
-        found = of_model.error(kind)
-        if math.isinf(found.ratio) and basis == "guarantee":
-            found, ends = _or(found, replace(of_model, steps=steps).error(kind))
+        limited = Guaranteed if basis == "guarantee" else Probable
+        strategy = limited(model, compiled_form(form), within, tolerances)
+    found, ends = strategy.error(kind), isinstance(strategy, LastingBound) and strategy.steps is not None
+    if isinstance(strategy, LastingBound) and math.isinf(found.ratio) and (later := strategy.over(steps)) is not None:
+        ended = later.error(kind)
+        found, ends = (found, ends) if math.isinf(ended.ratio) else (ended, True)
+    warnings = strategy.warnings() if isinstance(strategy, EmulatedSystem) else ()
     return Judgement(fmt, basis, steps, *found, ends, warnings)
-
-
-def _or(for_ever: Outcome, for_steps: Outcome) -> tuple[Outcome, bool]:
-    """Return the outcome for some steps, if it is finite, in place of one for ever, and whether it was taken."""
-    return (for_ever, False) if math.isinf(for_steps.ratio) else (for_steps, True)

@@ -27,14 +27,12 @@ from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
-from gpbnb.filters.missing import stored_measurements, without_missing
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import form_named, named, whole_number
 from gpbnb.filters.nonlinear import NO_GUARANTEE, AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import (
     NonlinearRun,
     check_form,
-    complete,
     nonlinear_checkpoints,
     opened,
     simulated,
@@ -47,11 +45,12 @@ from gpbnb.wordlength.recursion import Recursion, required_recursion_precision, 
 from gpbnb.wordlength.requirement import (
     Asked,
     Basis,
+    LastingBound,
     Requirement,
     Strategy,
     checked_tolerance,
+    for_ever_or_over,
     format_like,
-    has_no_bound,
     largest_ratio,
 )
 from gpbnb.wordlength.system import required_system_precision
@@ -160,7 +159,7 @@ def required_precision(
 
 def _for_record(model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], form: AnyForm, z: Any) -> Requirement:
     """Find the answer for one measurement record, by emulation or by the bound of each run."""
-    strategy = recorded_strategy(model, asked, tolerances, form, z)
+    strategy = recorded_strategy(model, z, tolerances, form, asked.basis, asked.steps)
     sound = strategy.model
     with asked.search(CHECKED[asked.like.base], bounds=asked.basis == "bound") as search:
         found = search(strategy)
@@ -192,7 +191,7 @@ def _for_ever(
     if model.steps is not None:
         raise ValueError(f'got a model of {model.steps} steps and basis "{basis}"; needed one that goes on for ever')
     if z is not None:
-        sound, filled = without_missing(model, z)
+        sound, filled = model.without_missing(z)
         if sound is not model:
             raise ValueError(
                 f'got missing measurements and basis "{basis}"; needed none: it does not depend on a record'
@@ -201,15 +200,13 @@ def _for_ever(
     kind = Guaranteed if basis == "guarantee" else Probable
     strategy = kind(model, form, within, tolerances)
     with asked.search(checks=()) as search:
-        found = search(strategy)
-        if kind is Guaranteed and has_no_bound(found):
-            ended = search(replace(strategy, steps=asked.steps))
-            if ended.fmt is not None or not has_no_bound(ended):
-                return asked.answer(ended, form, repairs=_repairs(model, model, ended.fmt, form), ends=True)
-    cause = "" if found.fmt is not None or model.cycle != 1 else unobserved(model.Phi[0], model.H[0], model.state_names)
+        found, ends = for_ever_or_over(asked.steps, strategy, search)
+    cause = ""
+    if found.fmt is None and not ends and model.cycle == 1:
+        cause = unobserved(model.Phi[0], model.H[0], model.state_names)
     if cause:
         cause += '; ask with basis "bound" for a number of steps instead'
-    return asked.answer(found, form, repairs=_repairs(model, model, found.fmt, form), cause=cause)
+    return asked.answer(found, form, repairs=_repairs(model, model, found.fmt, form), cause=cause, ends=ends)
 
 
 def _repairs(given: AnyModel, sound: AnyModel, fmt: FloatFormat | None, form: AnyForm) -> tuple[str, ...]:
@@ -280,11 +277,9 @@ def survey_formats(
     if isinstance(model, LinearModel):
         for fmt in formats:
             fmt.check_compiled()
-    model, z = complete(model, z)
-    measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"; the other bases do not depend on a run')
-    strategy = _recorded(model, measured, tolerances, form, basis)
+    strategy = recorded_strategy(model, z, tolerances, form, basis)
     return [strategy.error(fmt) for fmt in formats]
 
 
@@ -419,7 +414,7 @@ class Bounded(Recorded):
 
 
 def recorded_strategy(
-    model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], form: AnyForm, z: Any
+    model: AnyModel, z: Any, tolerances: NDArray[np.float64], form: AnyForm, basis: Basis, steps: int | None = None
 ) -> Recorded:
     """Check one measurement record, (steps, m), and return the strategy that answers a question about it.
 
@@ -427,25 +422,18 @@ def recorded_strategy(
     ------
     ValueError, TypeError : for a reason given in :func:`required_precision`.
     """
-    sound, filled = complete(model, z)
-    measured = _measured(sound, filled, asked.steps)
-    sound.check_steps(asked.steps)
-    return _recorded(sound, measured, tolerances, form, asked.basis)
-
-
-def _recorded(
-    model: AnyModel, z: NDArray[Any], tolerances: NDArray[np.float64], form: AnyForm, basis: Basis
-) -> Recorded:
-    """Return the strategy of a basis that depends on a record."""
+    sound, filled = model.without_missing(z)
+    measured = _measured(sound, filled, steps)
+    sound.check_steps(len(measured))
     if basis == "bound":
-        return Bounded(model, z, form, tolerances)
-    if isinstance(model, NonlinearModel):
-        check_form(model, form)
-    return Emulated(model, z, form, tolerances, true_states(model, z))
+        return Bounded(sound, measured, form, tolerances)
+    if isinstance(sound, NonlinearModel):
+        check_form(sound, form)
+    return Emulated(sound, measured, form, tolerances, true_states(sound, measured))
 
 
 @dataclass(frozen=True, eq=False)
-class Guaranteed:
+class Guaranteed(LastingBound):
     """The guarantee for all measurements within limits, over some steps or for ever."""
 
     model: LinearModel
@@ -473,6 +461,10 @@ class Guaranteed:
             return Outcome(math.inf, found.why)
         return Outcome(largest_ratio(self._errors(found)[asked], self.tolerances[asked]))
 
+    def over(self, steps: int) -> Guaranteed | None:
+        """Return the guarantee over some steps, which a filter may have that never forgets its errors."""
+        return replace(self, steps=steps) if self.steps is None else None
+
     def _errors(self, found: Guarantee) -> NDArray[np.float64]:
         """Return the error of each state, (n,)."""
         return found.bound
@@ -480,6 +472,9 @@ class Guaranteed:
 
 class Probable(Guaranteed):
     """Three standard deviations of the error that independent roundings would cause."""
+
+    def over(self, steps: int) -> None:
+        """Return None: the probable error is that of a steady state."""
 
     def _errors(self, found: Guarantee) -> NDArray[np.float64]:
         return 3 * probable_error(found)

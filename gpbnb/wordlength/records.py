@@ -19,8 +19,7 @@ from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.search import Outcome, least_from_which_on
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.forms import Form
-from gpbnb.filters.missing import real_numbers
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, real_numbers
 from gpbnb.filters.named import form_named, whole_number
 from gpbnb.filters.nonlinear import NO_GUARANTEE, AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import simulated

@@ -20,7 +20,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import CHECKED, Outcome, largest_by_default
 from gpbnb.arithmetic.traced import TracedFunction
-from gpbnb.filters.missing import real_numbers
+from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.wordlength.requirement import Asked, Basis, Requirement, checked_tolerance, largest_ratio

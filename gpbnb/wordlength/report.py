@@ -18,7 +18,6 @@ from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.forms import Form
-from gpbnb.filters.missing import without_missing
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named
 from gpbnb.filters.poles import stored_response
@@ -212,7 +211,7 @@ class Question:
             return self.z
         if self.z is None:
             return simulated_measurements(self.model, self.count)
-        if {*self.bases} & {"guarantee", "probable"} and without_missing(self.model, self.z)[0] is not self.model:
+        if {*self.bases} & {"guarantee", "probable"} and self.model.without_missing(self.z)[0] is not self.model:
             raise ValueError(
                 "got measurements of which some are missing, and a basis that holds for ever; needed measurements "
                 "without gaps; leave them out for this basis, which does not depend on them"
@@ -391,7 +390,7 @@ def _ranges(model: LinearModel | LinearSystem, z: Any) -> tuple[tuple[str, int, 
     """Return name, smallest and largest power of two of the quantities of a Kalman filter."""
     if isinstance(model, LinearSystem):
         return ()
-    sound, filled = without_missing(model, z)
+    sound, filled = model.without_missing(z)
     return tuple((each.name, each.least, each.largest) for each in binary_ranges(sound, filled))
 
 
@@ -405,7 +404,7 @@ def _errors(
     """Return the largest error / tolerance of each state of a Kalman filter at the answer."""
     if fmt is None or isinstance(model, LinearSystem):
         return ()
-    sound, filled = without_missing(model, z)
+    sound, filled = model.without_missing(z)
     largest = largest_errors(sound, filled, cast(FloatFormat, fmt), form)
     return tuple(_finite(float(e / t)) if math.isfinite(t) else None for e, t in zip(largest, tolerances, strict=True))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -155,11 +156,6 @@ def without_evidence(basis: Basis, steps: int, ends: bool = False) -> str:
     return text if basis == "emulation" else f"without {text.removeprefix('by ')}"
 
 
-def has_no_bound(found: Search[FloatFormat]) -> bool:
-    """Whether no precision that was tried has a finite error."""
-    return all(math.isinf(ratio) for _, ratio in found.tried)
-
-
 def _steps(count: int) -> str:
     return f"{count} step{'s' if count != 1 else ''}"
 
@@ -169,6 +165,43 @@ class Strategy(Protocol):
 
     def error(self, fmt: FloatFormat) -> Outcome:
         """Return the largest error or bound as a multiple of the tolerance; or infinity, with the reason."""
+
+
+class LastingBound(ABC):
+    """A strategy that bounds errors for ever or, with `steps`, over these steps."""
+
+    steps: int | None
+
+    @abstractmethod
+    def error(self, fmt: FloatFormat) -> Outcome:
+        """Return the largest bound as a multiple of the tolerance; or infinity, with the reason."""
+
+    def over(self, steps: int) -> LastingBound | None:
+        """Return what bounds the errors over some steps where nothing bounds them for ever; None if nothing does."""
+        return None
+
+
+def for_ever_or_over(
+    steps: int, strategy: Strategy, search: Callable[[Strategy], Search[FloatFormat]]
+) -> tuple[Search[FloatFormat], bool]:
+    """Search with a strategy; if no precision has a bound for ever, search for one over some steps.
+
+    Returns
+    -------
+    found : the result of the search.
+    ends : whether it holds only for the steps.
+    """
+    found, ends = search(strategy), isinstance(strategy, LastingBound) and strategy.steps is not None
+    if isinstance(strategy, LastingBound) and _has_no_bound(found) and (later := strategy.over(steps)) is not None:
+        ended = search(later)
+        if not _has_no_bound(ended):
+            return ended, True
+    return found, ends
+
+
+def _has_no_bound(found: Search[FloatFormat]) -> bool:
+    """Whether no precision that was tried has a finite error."""
+    return all(math.isinf(ratio) for _, ratio in found.tried)
 
 
 class Asked(NamedTuple):

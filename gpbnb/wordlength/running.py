@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -53,7 +53,6 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
     read, own = _filter(given)
     model, bases = read.model, _bases(given)
     z, source = _inputs(given, model, bases, own)
-    sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
     asked = Question(
         model,
         given.tolerance,
@@ -63,7 +62,7 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
         given.rounding or "nearest",
         _form(given),
         bases,
-        None if given.fixed else _limits(model, bases, sizes),
+        None if given.fixed else _limits(given, model, bases),
         given.emin,
         given.emax,
         _format(given),
@@ -195,13 +194,12 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
         fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
     read, _ = _filter(given)
     chosen = read.structures.get(report.structure, read.model)
-    sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
     if isinstance(chosen, LinearModel):
-        within = limits(chosen.n, chosen.m, **sizes)
+        within = limits(chosen.n, chosen.m, **_sizes(given))
         form = form_named(_form(given))
         return guarantee(chosen, fmt, within, form, horizon=report.steps).certificate()
     made = filter_schedule(chosen.as_filter(), fmt)
-    return from_schedule(made, limits(made.program.n, made.program.m, **sizes), report.steps).certificate()
+    return from_schedule(made, limits(made.program.n, made.program.m, **_sizes(given)), report.steps).certificate()
 
 
 def write_code_of(given: argparse.Namespace, structure: str = "") -> tuple[Path, ...]:
@@ -222,8 +220,7 @@ def write_code_of(given: argparse.Namespace, structure: str = "") -> tuple[Path,
     if given.fixed and isinstance(model, LinearSystem):
         words, largest = _words_within_tolerance(given, model, bases, z)
         return _written(given, model, own, z, words, largest, structure or None)
-    sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
-    within = _limits(model, bases, sizes)
+    within = _limits(given, model, bases)
     fmt = _format(given) or _type_within_tolerance(given, model, bases, within, z)
     return _written(given, model, own, z, fmt, within, structure or None)
 
@@ -308,12 +305,19 @@ def _format(given: argparse.Namespace) -> FloatFormat | FixedFormat | None:
     return fmt if rounding is None else replace(fmt, rounding=rounding)
 
 
-def _limits(model: LinearModel | LinearSystem, bases: Sequence[Basis], sizes: Mapping[str, Any]) -> FilterLimits | None:
+def _sizes(given: argparse.Namespace) -> dict[str, Any]:
+    """Return the largest sizes of a command line, by the quantity that each limits."""
+    return {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
+
+
+def _limits(
+    given: argparse.Namespace, model: LinearModel | LinearSystem, bases: Sequence[Basis]
+) -> FilterLimits | None:
     """Return the limits that the bases need; None if they need none."""
     asked = [each for each in bases if each in ("guarantee", "probable")]
     if not asked:
         return None
-    of_system = isinstance(model, LinearSystem)
+    of_system, sizes = isinstance(model, LinearSystem), _sizes(given)
     needed = "--measurement" if of_system else "--state and --innovation, or --measurement"
     if not sizes or (of_system and set(sizes) != {"measurement"}):
         options = ", ".join(f"--{each}" for each in sizes)

@@ -26,10 +26,11 @@ from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.wordlength.requirement import (
     Asked,
+    LastingBound,
     Requirement,
     Strategy,
     checked_tolerance,
-    has_no_bound,
+    for_ever_or_over,
     largest_ratio,
 )
 
@@ -58,11 +59,7 @@ def required_system_precision(
     """
     strategy = system_strategy(system, asked, tolerance, u, within)
     with asked.search(CHECKED[asked.like.base], bounds=asked.basis != "emulation") as search:
-        found = search(strategy)
-        if (later := over_steps(strategy, asked)) and has_no_bound(found):
-            ended = search(later)
-            strategy, found = (strategy, found) if has_no_bound(ended) else (later, ended)
-    ends = isinstance(strategy, BoundedSystem) and strategy.steps is not None
+        found, ends = for_ever_or_over(asked.steps, strategy, search)
     limited = not system.as_filter().program.is_linear
     cause = "" if found.fmt is not None or limited else system.unstable()
     if not cause:
@@ -106,13 +103,6 @@ _FOR_SOME_STEPS = (
     'so that an error of rounding never decays; ask with basis "bound" or "guarantee" for a number of steps instead, '
     "or reset the state now and then"
 )
-
-
-def over_steps(strategy: Strategy, asked: Asked) -> BoundedSystem | None:
-    """Return the strategy that bounds the errors of a system that limits its values over the steps asked for."""
-    if not isinstance(strategy, BoundedSystem) or isinstance(strategy, ProbableSystem) or strategy.steps is not None:
-        return None
-    return None if strategy.system.as_filter().program.is_linear else replace(strategy, steps=asked.steps)
 
 
 def system_strategy(
@@ -205,7 +195,7 @@ class EmulatedSystem:
 
 
 @dataclass(frozen=True, eq=False)
-class BoundedSystem:
+class BoundedSystem(LastingBound):
     """Bounds of the errors of the outputs for all inputs up to the largest, (m,), over some steps or for ever."""
 
     system: LinearSystem
@@ -221,6 +211,11 @@ class BoundedSystem:
         except (ValueError, OverflowError) as fault:
             return Outcome(math.inf, str(fault))
 
+    def over(self, steps: int) -> BoundedSystem | None:
+        """Return the bound over some steps of a system that limits its values; a linear one has it from the start."""
+        limited = self.steps is None and not self.system.as_filter().program.is_linear
+        return replace(self, steps=steps) if limited else None
+
     def _bounds(self, fmt: FloatFormat) -> NDArray[np.float64]:
         """Bound the error of each output, (p,)."""
         return output_errors(self.system, fmt, self.largest, self.steps)
@@ -228,6 +223,9 @@ class BoundedSystem:
 
 class ProbableSystem(BoundedSystem):
     """As :class:`BoundedSystem`, with three standard deviations of the error of rounding in place of its bound."""
+
+    def over(self, steps: int) -> None:
+        """Return None: the probable error is that of a steady state."""
 
     def _bounds(self, fmt: FloatFormat) -> NDArray[np.float64]:
         if not self.system.as_filter().program.is_linear:

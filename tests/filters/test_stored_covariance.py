@@ -16,13 +16,14 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters import bounded_steps
 from gpbnb.filters.array_forms import ArrayForm
-from gpbnb.filters.array_run import ArrayRun, _double_doubles
+from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.array_steps import predict_root, predict_ud
 from gpbnb.filters.covariance import Repair, raised_until
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.factors import covariance_of_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.opening import double_doubles_of
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.wordlength.precision import required_precision
@@ -176,7 +177,7 @@ def test_the_search_for_the_least_change():
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 53), FloatFormat(2, 80), FloatFormat(10, 18)], ids=str)
 def test_bounds_start_from_all_digits_of_an_array(fmt):
     a = fmt.array([["1/3", "-2/7"], ["1e5", "1/1234567"]])
-    for found, true in zip(_double_doubles(a).reshape(-1, 2), a.to_fractions().ravel(), strict=True):
+    for found, true in zip(double_doubles_of(a).reshape(-1, 2), a.to_fractions().ravel(), strict=True):
         assert abs(sum(map(Fraction, found.tolist())) / true - 1) < Fraction(1, 2**100)
 
 

@@ -18,8 +18,7 @@ from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
-from gpbnb.filters.missing import real_numbers, without_missing
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, real_numbers
 from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.run import Run, reference
@@ -497,7 +496,7 @@ def test_a_missing_measurement_changes_nothing_but_the_prediction():
     by_nan = required_precision(two, 12, 1e-4, z=with_nan)
     assert by_nan == required_precision(two, 12, 1e-4, z=np.ma.MaskedArray(z, silent))
     assert by_nan != required_precision(two, 12, 1e-4, z=z)
-    replaced, filled = without_missing(two, with_nan)
+    replaced, filled = two.without_missing(with_nan)
     assert np.array_equal(filled, np.where(silent, 0, z))
     found = reference(replaced, filled, [3, 4, 8])
     assert not found.K[1][:, 0].any()
@@ -511,6 +510,14 @@ def test_a_missing_measurement_changes_nothing_but_the_prediction():
     within = limits(2, 2, state=100, innovation=20)
     with pytest.raises(ValueError, match='got missing measurements and basis "guarantee"'):
         required_precision(two, 12, 1e-4, basis="guarantee", within=within, z=with_nan)
+
+
+def test_a_missing_measurement_keeps_the_repairs_of_the_model():
+    asymmetric = np.array([[1.0, 0.1], [0.1 * (1 + 2.0**-50), 1.0]])
+    model, z = replace(MODEL, P0=asymmetric), np.where(np.arange(len(Z)) == 3, np.nan, Z[:, 0])[:, np.newaxis]
+    repairs = tuple(map(str, model.repairs))
+    assert len(repairs) == 1
+    assert emulate(model, z, FloatFormat(2, 24)).repairs == emulate(model, Z, FloatFormat(2, 24)).repairs == repairs
 
 
 WHOLE, WITH_INPUTS = np.round(Z[:12] * 4), replace(MODEL, d=["0.5"])

@@ -10,7 +10,6 @@ import pytest
 from scipy.signal import dlti
 
 from gpbnb import BINARY16, BINARY32, FloatFormat, LinearModel, LinearSystem, limits, read_model, required_precision
-from gpbnb.filters.missing import without_missing
 from gpbnb.filters.system import unobserved
 from gpbnb.wordlength.examples import TILT_STATES, tilt
 from gpbnb.wordlength.records import survey_records
@@ -75,7 +74,7 @@ def replace_ratios(found):
 
 def test_names_stay_with_a_model_that_is_changed():
     z = np.array([[1.0], [math.nan], [2.0]])
-    for changed in (CART.rounded(BINARY32), without_missing(CART, z)[0], replace(CART, steps=2, u=CART.u[:2])):
+    for changed in (CART.rounded(BINARY32), CART.without_missing(z)[0], replace(CART, steps=2, u=CART.u[:2])):
         assert (changed.state_names, changed.measurement_names) == (CART.state_names, CART.measurement_names)
         assert changed.input_names == CART.input_names
     assert CART.without_inputs().input_names == ()

@@ -295,7 +295,7 @@ class Looped(Backend):
         return self._product(self.tag, a, b)
 
     def _product(self, tag: Tag, a: Components, b: Components) -> Components | None:
-        x, y = (self._packed(each, tag) for each in (a, b))
+        x, y = (self.pack(each, tag, copy=None) for each in (a, b))
         c = np.empty((a[0].shape[0], b[0].shape[1], *x.shape[2:]), x.dtype)
         try:
             _loops().product(tag, _read_only(x), _read_only(y), c)
@@ -308,17 +308,15 @@ class Looped(Backend):
         """The tag for loops over matrices that look for lost results only at their end."""
         return self.tag
 
-    def pack(self, components: Components, tag: Tag | None = None) -> Array:
-        """Pack components into a new array, in the layout that compiled loops take and return, for this tag or ours."""
-        packed = self._packed(components, tag)
-        return packed.copy() if np.may_share_memory(packed, components[0]) else packed
+    def pack(self, components: Components, tag: Tag | None = None, copy: bool | None = True) -> Array:
+        """Pack components in the layout that compiled loops take and return, for this tag or ours.
 
-    def _packed(self, components: Components, tag: Tag | None) -> Array:
-        """Pack components, without a copy where their memory has the layout."""
-        if self.count == 1:
-            single = isinstance(tag, Free) and isinstance(tag.tag, Hardware32)
-            return np.ascontiguousarray(components[0], np.float32 if single else self.dtype)
-        return np.ascontiguousarray(np.stack(components, axis=-1))
+        The array is new; without `copy`, only if the components do not have this layout.
+        """
+        if self.count > 1:
+            return np.ascontiguousarray(np.stack(components, axis=-1))
+        single = isinstance(tag, Free) and isinstance(tag.tag, Hardware32)
+        return np.array(components[0], np.float32 if single else self.dtype, order="C", copy=copy)
 
     def unpack(self, array: Array) -> Components:
         """Unpack an array that :meth:`pack` made into components, as new arrays."""

@@ -198,16 +198,16 @@ def check_order(order: Order, fused: bool, block: int) -> None:
         raise ValueError("got pairwise sums with fused multiply-add; needed one of the two; use 'left' or 'blocked'")
 
 
-def check_compiled(rules: Rules) -> None:
-    """Reject a format without compiled loops.
+def compiled_tag(rules: Rules) -> tags.Tag:
+    """Return the tag of a format's arithmetic, as :func:`tag_of`; reject a format without compiled loops.
 
     Raises
     ------
     ValueError : the format has no compiled loops; the message names the setting that prevents them, and what to set
         instead.
     """
-    if tag_of(rules) is not None:
-        return
+    if (tag := tag_of(rules)) is not None:
+        return cast(tags.Tag, tag)
     base, precision, rounding, limits, _ = rules
     if base not in LARGEST_PRECISION:
         why = f"base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}"
@@ -244,11 +244,11 @@ def _described(rules: Rules) -> str:
 
 
 def run_tag(rules: Rules, fused: bool, order: Order = "left", block: int = 32) -> tags.Tag:
-    """Return the tag for a separate compiled loop; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
+    """Return the tag for a separate compiled loop; see :meth:`gpbnb.arithmetic.making.Makes.run_tag`."""
     check_order(order, fused, block)
-    check_compiled(rules)
+    plain = compiled_tag(rules)
     if not fused and order == "left":
-        return cast(tags.Tag, tag_of(rules))
+        return plain
     tag = fusing_tag(rules)
     if tag is None:
         what = "fused multiply-add" if fused else f"{order} sums"

@@ -130,7 +130,7 @@ def recursion(
     step, state = (backend.pack(a.components) for a in (angle, start))
     out = np.empty((len(marks), *step.shape), dtype=step.dtype)
     _rotate(backend.tag, step, state, marks, out)
-    values = FloatArray.from_components(backend, backend.unpack(out), fmt).to_fractions()
+    values = FloatArray.from_packed(out, fmt).to_fractions()
     bounds = np.array([theory.recursion_bound(int(n), fmt.unit_roundoff) for n in marks])
     return _compared(fmt, period, interval, "recursion", marks, values, bounds)
 
