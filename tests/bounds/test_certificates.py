@@ -121,6 +121,8 @@ def test_a_filter_that_settles_slowly_is_proved() -> None:
     content = written(model, FORMAT, limits(2, 1, state=[10, 1], innovation=1))
     assert content["first"] > 1_000
     prove(content)
+    wide = content | {"width": [[factor(each, "16") for each in row] for row in content["width"]]}
+    assert "may exceed its bound later" in refused(wide)
     scale_bound("0.99")(content)
     refused(content)
 
