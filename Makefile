@@ -57,7 +57,7 @@ book: .venv/made-for ## execute the notebooks and build the HTML book; what has 
 
 test: .venv/made-for ## unit and property tests, the examples in docstrings, and every notebook against its stored outputs
 	$(PY) scripts/execute_notebooks.py --check
-	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder --ignore=tests/pages tests
+	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -p no:nbval --ignore=tests/pages tests
 
 certificates: .venv/made-for ## write a certificate of every guarantee in the book and check it; WORDS="tracker Nile" picks filters
 	$(PY) -m gpbnb.report.guarantees.certificates $(WORDS)

@@ -85,18 +85,18 @@ def compared(name: str, fmt: Any, arguments: list[Any]) -> int:
     kept = [i for i, value in enumerate(expected) if value is not None]
     found = getattr(np, name)(*(each[kept] for each in arguments)).to_fractions()
     wrong = [(values[i], expected[i], got) for i, got in zip(kept, found, strict=True) if got != expected[i]]
-    assert wrong == []
+    assert wrong == [], fmt
     return len(kept)
 
 
-@pytest.mark.parametrize("fmt", FORMATS.values(), ids=FORMATS)
 @pytest.mark.parametrize("name", [*ELEMENTARY, *ELEMENTARY_PAIRS, *WHOLE, "fmod"])
-def test_functions_agree_with_mpfr(name: str, fmt: Any) -> None:
-    arguments = drawn(name, fmt, 60)
-    if name == "fmod":
-        kept = np.flatnonzero(arguments[1] != 0)
-        arguments = [each[kept] for each in arguments]
-    assert compared(name, fmt, arguments) >= 30
+def test_functions_agree_with_mpfr(name: str) -> None:
+    for fmt in FORMATS.values():
+        arguments = drawn(name, fmt, 60)
+        if name == "fmod":
+            kept = np.flatnonzero(arguments[1] != 0)
+            arguments = [each[kept] for each in arguments]
+        assert compared(name, fmt, arguments) >= 30, fmt
 
 
 DIRECTIONS = [Rounding.EVEN, Rounding.CHOP, Rounding.UP, Rounding.DOWN]

@@ -117,10 +117,12 @@ def test_a_long_cycle_is_proved() -> None:
 
 def test_a_filter_that_settles_slowly_is_proved() -> None:
     """Its interval of covariances was once 16 times as wide, and gains of any covariance in it were too far apart."""
-    model = small(Phi=[["0.9", "0.1"], [0, 1]], H=[[1, 0]], Q=[["0.01", 0], [0, "1e-6"]], R=[["0.01"]], x0=[0, 0])
+    model = small(Phi=[["0.9", "0.1"], [0, 1]], H=[[1, 0]], Q=[["0.01", 0], [0, "1e-4"]], R=[["0.01"]], x0=[0, 0])
     content = written(model, FORMAT, limits(2, 1, state=[10, 1], innovation=1))
-    assert content["first"] > 5_000
+    assert content["first"] > 1_000
     prove(content)
+    wide = content | {"width": [[factor(each, "16") for each in row] for row in content["width"]]}
+    assert "may exceed its bound later" in refused(wide)
     scale_bound("0.99")(content)
     refused(content)
 

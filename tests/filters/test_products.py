@@ -44,20 +44,20 @@ def products(fmt, a, b):
     return run.exactly(c), run.exactly(d)
 
 
-@pytest.mark.parametrize("rounding", Rounding.documented(), ids=lambda rounding: rounding.value)
 @pytest.mark.parametrize("precision", [1, 2, 8, 24, 25, 26, 53])
 @pytest.mark.parametrize("exponent", [0, -390, 390, -430, 440])
-def test_products_have_the_digits_of_the_arithmetic(precision, rounding, exponent):
-    fmt = FloatFormat(2, precision, rounding)
+def test_products_have_the_digits_of_the_arithmetic(precision, exponent):
     rng = np.random.default_rng([precision, abs(exponent)])
     a, b = rng.standard_normal((5, 6)), rng.standard_normal((6, 9)) * 2.0**exponent
     a[rng.random(a.shape) < 0.3] = 0
     a[rng.random(a.shape) < 0.3] = 1
     b[:, 3] = 0
     a[2] = 0
-    expected = (fmt.array(a) @ fmt.array(b)).to_fractions()
-    for found in products(fmt, a, b):
-        assert (found == expected).all()
+    for rounding in Rounding.documented():
+        fmt = FloatFormat(2, precision, rounding)
+        expected = (fmt.array(a) @ fmt.array(b)).to_fractions()
+        for found in products(fmt, a, b):
+            assert (found == expected).all(), rounding
 
 
 @pytest.mark.parametrize("columns", range(1, 13))

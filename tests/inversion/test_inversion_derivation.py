@@ -189,19 +189,20 @@ def test_a_row_is_exact_in_products_of_its_errors(terms):
     assert sp.expand(value.subs(none) - right + sum(products)) == 0
 
 
-@pytest.mark.parametrize("equation", [76, 77, 78, 79])
-def test_printed_lines_leave_nothing_of_first_order(equation):
-    assert derivation.leftover(equation) == 0
-
-
-def test_77_of_1984_lacks_a_hat():
-    a, (_, _, x3), _, _ = derivation.triangle()
-    assert sp.simplify(derivation.leftover(77, hats=False) + a[1, 2] * x3 * EPS) == 0
-
-
-def test_there_is_no_other_leftover():
-    with pytest.raises(ValueError, match=r"got equation \(80\); needed one of \(76\) to \(79\)"):
-        derivation.leftover(80)
+def test_printed_lines_leave_nothing_of_first_order():
+    """Both sides of (76) to (79); with the true x_3 in place of the computed one, as 1984 prints it, (77) fails."""
+    a, (x1, x2, x3), b, (y1, y2, y3) = derivation.triangle()
+    a12, a13, a22, a23 = a[0, 1], a[0, 2], a[1, 1], a[1, 2]
+    inside = 3 * EPS * b[0] - 2 * EPS * b[1] * a12 / a22 - 4 * EPS * a12 * y2
+    for equation, left, right in (
+        (76, x2, y2 - (2 * EPS * b[1] - 4 * EPS * a23 * y3 / (1 + EPS)) / a22),
+        (77, a22 * y2 + a23 * (1 + 3 * EPS) * y3, b[1] * (1 + 2 * EPS)),
+        (78, x1, y1 - (inside + 4 * EPS / (1 + EPS) * (a12 * a23 / a22 - a13) * y3) / a[0, 0]),
+        (79, a[0, 0] * y1 + a12 * (1 + 4 * EPS) * y2 + a13 * (1 + 3 * EPS) * y3, b[0] * (1 + 3 * EPS)),
+    ):
+        assert sp.simplify(derivation.linear(left - right)) == 0, equation
+    without_hat = a22 * y2 + a23 * (1 + 3 * EPS) * x3 - b[1] * (1 + 2 * EPS)
+    assert sp.simplify(derivation.linear(without_hat) + a23 * x3 * EPS) == 0
 
 
 def test_the_triangle_solves_itself_without_errors():

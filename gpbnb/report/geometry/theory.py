@@ -214,27 +214,6 @@ def line_fit_leak(amplitude: float, rolls: float, samples: float | None = None) 
     return 6 / (rolls * spread) * abs(amplitude)
 
 
-def ramp_leak(rate: float, roll_period: float, samples: int | None = None) -> float:
-    r"""Return the constant error of the mean over a roll due to an offset in the spacecraft that grows at `rate`.
-
-    .. math:: |\Delta\varphi| = \frac{\text{rate}\;T}{2\pi}, \qquad
-        \text{or } \frac{\text{rate}\;T}{2n\sin(\pi/n)} \text{ for the mean of n samples}
-
-    Parameters
-    ----------
-    rate : in any unit per second.
-    roll_period : T, seconds.
-    samples : n, samples per roll, at least 2; infinitely many by default.
-    """
-    if not roll_period > 0 or (samples is not None and samples < 2):
-        raise ValueError(
-            f"got a roll period of {roll_period} s with {samples} samples; needed a period above 0 s, and "
-            "2 or more samples"
-        )
-    whole = abs(rate) * roll_period
-    return whole / (2 * math.pi) if samples is None else whole / (2 * samples * math.sin(math.pi / samples))
-
-
 SINGLE = ("alpha1", "alpha2", "alpha3", "beta1", "beta2", "beta3", "gamma1", "gamma2", "gamma3")
 """Angles whose small-angle form is examined."""
 

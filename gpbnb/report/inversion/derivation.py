@@ -451,28 +451,6 @@ def printed_before_78() -> sp.Expr:
     return EPSILON * inside / a[0, 0]
 
 
-def leftover(equation: int, hats: bool = True) -> sp.Expr:
-    """Return the first-order difference between both sides of (76), (77), (78) or (79), zero if the equation holds.
-
-    Without `hats`, (77) has the true x_3 in place of the computed one, as printed in 1984.
-    """
-    a, (x1, x2, x3), b, (y1, y2, y3) = triangle()
-    e = EPSILON
-    a12, a13, a22, a23 = a[0, 1], a[0, 2], a[1, 1], a[1, 2]
-    if equation == 76:
-        sides = x2, y2 - (2 * e * b[1] - 4 * e * a23 * y3 / (1 + e)) / a22
-    elif equation == 77:
-        sides = a22 * y2 + a23 * (1 + 3 * e) * (y3 if hats else x3), b[1] * (1 + 2 * e)
-    elif equation == 78:
-        inside = 3 * e * b[0] - 2 * e * b[1] * a12 / a22 - 4 * e * a12 * y2
-        sides = x1, y1 - (inside + 4 * e / (1 + e) * (a12 * a23 / a22 - a13) * y3) / a[0, 0]
-    elif equation == 79:
-        sides = a[0, 0] * y1 + a12 * (1 + 4 * e) * y2 + a13 * (1 + 3 * e) * y3, b[0] * (1 + 3 * e)
-    else:
-        raise ValueError(f"got equation ({equation}); needed one of (76) to (79)")
-    return sp.simplify(linear(sides[0] - sides[1]))
-
-
 def back_substitution() -> Derivation:
     """Derive (72)-(79): three rows with one ε; b_1 and b_2 are expressed by the true solution."""
     a, x, _, (y1, y2, _) = triangle()

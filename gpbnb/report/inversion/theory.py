@@ -74,18 +74,6 @@ def printed_first_relative_bound(inverse: Any, residual: Any, change: Any = None
     return bound if change is None else bound + norm(_matrix(inverse, "inverse")) * norm(_matrix(change, "change"))
 
 
-def strict_first_bound(inverse: Any, residual: Any, change: Any = None, norm: Norm = column_sum) -> Any:
-    r"""Strict form of (43): (43) divided by :math:`1 - \|A^{-1}\|\|\Delta A\|`.
-
-    Raises
-    ------
-    ValueError : the divisor is not positive.
-    """
-    size = norm(_matrix(inverse, "inverse"))
-    product = 0 if change is None else size * norm(_matrix(change, "change"))
-    return printed_first_bound(inverse, residual, change, norm) / _rest(product, "‖A⁻¹‖‖ΔA‖", "a smaller change")
-
-
 def residual_bound(x: Any, residual: Any, norm: Norm = column_sum) -> Any:
     r"""Bound of ‖E‖ from the computed inverse alone, :math:`\|X\|\|R\|/(1-\|R\|)`; to every order.
 
@@ -136,16 +124,6 @@ def printed_triangularization_norm(stages: Sequence[Any], beta: Any, norm: Norm 
     matrices = _stages(stages)
     pairs = ((trailing(matrices[k], k), trailing(matrices[k - 1], k)) for k in range(1, len(matrices)))
     return sum((_like(beta, matrices) * (3 * norm(new) + 2 * norm(old)) for new, old in pairs), start=Fraction(0))
-
-
-def printed_right_side_norms(rights: Sequence[Any], beta: Any) -> NDArray[Any]:
-    r"""Bounds (p,) of ‖b̃‖, largest entry, of each right-hand side; hung1984, ch. II, (62)."""
-    columns = _rights(rights)
-    total = np.zeros_like(columns[0][0])
-    for k in range(1, len(columns)):
-        new, old = (abs(trailing(columns[i], k, columns=False)).max(axis=0) for i in (k, k - 1))
-        total = total + _like(beta, columns) * (3 * new + 2 * old)
-    return total
 
 
 def triangularization_bounds(stages: Sequence[Any], beta: Any) -> NDArray[Any]:

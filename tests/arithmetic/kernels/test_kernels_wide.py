@@ -172,19 +172,17 @@ NARROW = {
 ALL = FORMATS | NARROW
 
 
-@pytest.mark.parametrize("target", ALL)
 @pytest.mark.parametrize("source", ALL)
-def test_conversion_between_formats_rounds_once(source: str, target: str) -> None:
-    if source == target:
-        pytest.skip("nothing is rounded")
+def test_conversion_between_formats_rounds_once(source: str) -> None:
     tiny = [Fraction(1, 10**9), Fraction(3, 10**25)] if not isinstance(ALL[source], FixedFormat) else []
     halves = [Fraction(2 * n + 1, 2**k) for k in (9, 25, 54) for n in (0, 6)]
     x = ALL[source].array([*(Fraction(n, 97) for n in range(-96, 97, 5)), *tiny, *halves])
-    found, expected = ALL[target].array(x), ALL[target].array(x.to_fractions())
-    assert np.all(found == expected)
-    assert found.backend is expected.backend
-    if type(x.backend) is not type(found.backend) or ALL[source].base != ALL[target].base:
-        assert ALL[target].backend.from_backend(x.backend, x.components) is not None
+    for target in ALL.keys() - {source}:
+        found, expected = ALL[target].array(x), ALL[target].array(x.to_fractions())
+        assert np.all(found == expected), target
+        assert found.backend is expected.backend, target
+        if type(x.backend) is not type(found.backend) or ALL[source].base != ALL[target].base:
+            assert ALL[target].backend.from_backend(x.backend, x.components) is not None, target
 
 
 @pytest.mark.parametrize("name", ["binary128", "decimal128", "IBM, 14 digits"])
