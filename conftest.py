@@ -16,9 +16,9 @@ os.environ.setdefault("GPBNB_QUIET", "1")
 
 # What takes longest, longest first: with several processes none of it is left over at the end.
 LONGEST = (
+    "book/wordlength.ipynb",
     "book/rolling.ipynb",
     "book/nonlinear.ipynb",
-    "book/wordlength.ipynb",
     "book/integration.ipynb",
     "book/geometry.ipynb",
     "book/inversion.ipynb",

@@ -34,9 +34,9 @@ OUTSIDE = re.compile(r"""["'](\.\./[^"'\n]+)["']""")
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 # The longest first, so that none is left over at the end; others follow.
 LONGEST = (
+    "wordlength",
     "rolling",
     "nonlinear",
-    "wordlength",
     "integration",
     "kalman",
     "year",

@@ -423,8 +423,12 @@ def exact_functionals(program: Program, coefficients: Sequence[Any] | NDArray[An
         elif code in (ADD, SUBTRACT):
             row = dict(rows[a])
             for j, c in rows[b].items():
-                row[j] = row.get(j, 0) + (c if code == ADD else -c)
-            rows.append({j: c for j, c in row.items() if c})
+                total = row.get(j, 0) + (c if code == ADD else -c)
+                if total:
+                    row[j] = total
+                else:
+                    del row[j]  # it was the opposite
+            rows.append(row)
         else:
             rows.append(rows[b])
     return rows

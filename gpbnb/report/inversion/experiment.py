@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, cached_property, partial
 from itertools import product
@@ -432,8 +432,14 @@ def worst(bound: str, sweep: str = "variants") -> InverseTrial:
         raise ValueError(f"got bound {bound!r}; needed one of {', '.join(SWEEPS[sweep][1])}")
     row = min(rows, key=lambda row: float(row["smallest_regular"]))
     (cell,) = (cell for cell in SWEEPS[sweep][0]() if all(row[key] == text for key, text in _where(cell).items()))
-    regular = (one for one in cell.trials((bound,)) if one is not None and one.error and one.regular)
-    return min(regular, key=lambda one: one.overestimation(bound))
+    regular = _regular_trials(cell, tuple(map(str, PRINTED)) if bound in map(str, PRINTED) else (bound,))
+    found = min(regular, key=lambda one: one.overestimation(bound))
+    return replace(found, bounds={bound: found.bounds[bound]})
+
+
+@cache  # printed readings, which are evaluated together, often have their worst matrix in one cell
+def _regular_trials(cell: InverseCell, names: tuple[str, ...]) -> tuple[InverseTrial, ...]:
+    return tuple(one for one in cell.trials(names) if one is not None and one.error and one.regular)
 
 
 def format_name(fmt: FloatFormat) -> str:
