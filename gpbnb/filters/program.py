@@ -13,7 +13,7 @@ several purposes, so that they cannot disagree:
 
 A step that also computes the covariance is not linear: it multiplies and divides values. :mod:`gpbnb.filters.tracing`
 lists its operations with the same codes, and :mod:`gpbnb.filters.nonlinear_system` those of a step of your own, for C
-code and for :func:`steps_in_python`; the compiled functions here take linear programs and limits.
+code; the compiled functions here take linear programs and limits.
 
 The coefficients are arguments and not part of the program, because they may change from step to step. A product with a
 zero coefficient is exact, and so is a sum with this product; the compiled kernels omit both.
@@ -21,9 +21,7 @@ zero coefficient is exact, and so is a sum with this product; the compiled kerne
 
 from __future__ import annotations
 
-import math
-import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -353,58 +351,6 @@ def advance(fmt: Any, operations: Any, outputs: Any, coefficients: Any, start: A
         row = k if k < rows else start + (k - start) % (rows - start)
         execute(fmt, operations, outputs, coefficients[row], x, z[k], values)
         X[k] = x
-
-
-def steps_in_python(
-    program: Program, round_: Callable[[Any], Any], coefficients: Any, x: Sequence[Any], z: Sequence[Any]
-) -> list[Any]:
-    """Take one step with numbers of any type, each result rounded by a function; slow and obvious.
-
-    A ROOT takes Fractions, and rounds to formats with at most 1000 bits after the binary point.
-    """
-    values = [*x, *z]
-    for (code, a, b), guard in zip(
-        program.operations.tolist(), program.guards or (-1,) * len(program.operations), strict=True
-    ):
-        chosen = guard < 0 or values[guard] != 0
-        if code == CHOOSE:
-            values.append(values[a] if chosen else values[b])
-        elif not chosen:
-            values.append(None)
-        elif code in _EXACT:
-            values.append(round_(_EXACT[code](*(values[each] for each in values_of(code, a, b)))))
-        elif code == MULTIPLY:
-            values.append(round_(coefficients[a] * values[b]))
-        elif code == CONSTANT:
-            values.append(coefficients[a])
-        else:
-            values.append(max(coefficients[a], values[b]) if code == AT_LEAST else min(coefficients[a], values[b]))
-    return [values[i] for i in program.outputs]
-
-
-def _root(x: Fraction) -> Fraction:
-    """Return a number that rounds as the square root does: the root itself, or one between the same long numbers."""
-    whole = math.isqrt(math.floor(x * 4**_ROOT_BITS))
-    exact = Fraction(whole, 2**_ROOT_BITS) ** 2 == x
-    return Fraction(2 * whole + (not exact), 2 ** (_ROOT_BITS + 1))
-
-
-_ROOT_BITS = 1100
-
-_EXACT: dict[int, Callable[..., Any]] = {
-    ADD: operator.add,
-    SUBTRACT: operator.sub,
-    PRODUCT: operator.mul,
-    DIVIDE: operator.truediv,
-    LESS: lambda a, b: int(a < b),
-    EQUAL: lambda a, b: int(a == b),
-    MODULO: lambda a, b: a - b * math.trunc(a / b),
-    ROOT: _root,
-    FLOOR: math.floor,
-    CEILING: math.ceil,
-    TRUNCATE: math.trunc,
-    NEAREST: round,
-}
 
 
 # -- linear functions -------------------------------------------------------------------------------------------------

@@ -160,16 +160,16 @@ def numbers(found):
     return list(map(numbers, found)) if isinstance(found, list) else np.asarray(found.to_fractions()).tolist()
 
 
-@pytest.mark.parametrize("name", FORMATS)
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda each: each.__name__)
-def test_traced_functions_have_the_digits_of_the_function(function, name, monkeypatch):
-    fmt, traced = FORMATS[name], TracedFunction(function)
-    expected = numbers((fmt.restart(), function(fmt, fmt.array(Z)))[1])
-    for few in (0, 10**9):  # in compiled code where the format has it, and in integers of Python
-        monkeypatch.setattr(tape, "FEW_OPERATIONS", few)
-        assert numbers((fmt.restart(), traced(fmt, Z))[1]) == expected
-        assert traced.refusal == ""
-        assert bool(traced.reason) == (name == "stochastic")
+def test_traced_functions_have_the_digits_of_the_function(function, monkeypatch):
+    for name, fmt in FORMATS.items():
+        traced = TracedFunction(function)
+        expected = numbers((fmt.restart(), function(fmt, fmt.array(Z[:50])))[1])
+        for few in (0, 10**9):  # in compiled code where the format has it, and in integers of Python
+            monkeypatch.setattr(tape, "FEW_OPERATIONS", few)
+            assert numbers((fmt.restart(), traced(fmt, Z[:50]))[1]) == expected, name
+            assert traced.refusal == ""
+            assert bool(traced.reason) == (name == "stochastic")
 
 
 @pytest.mark.parametrize(

@@ -27,10 +27,11 @@ from gpbnb.filters.factors import covariance_of_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.bounded import widened
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.program import Builder, Program, steps_in_python
+from gpbnb.filters.program import Builder, Program
 from gpbnb.filters.run import Run
 from gpbnb.filters.system import LinearFilter, state_space
 from gpbnb.report.gravity_probe_b import horizon
+from tests.plain_program import steps_in_python
 
 FMT = FloatFormat(2, 24)
 

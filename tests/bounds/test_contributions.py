@@ -13,9 +13,9 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.contributions import contributions
 from gpbnb.bounds.guarantee import PARTS, guarantee, limits
 from gpbnb.filters.forms import Form
-from gpbnb.filters.program import steps_in_python
 from gpbnb.report.guarantees import published
 from gpbnb.wordlength.examples import cyclic, tracker
+from tests.plain_program import steps_in_python
 
 TRACKER = tracker(), limits(n=2, m=1, state=[1000, 30], innovation=8)
 

@@ -22,13 +22,14 @@ from gpbnb.bounds.probable import probable_error, separate_roundings
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
-from gpbnb.filters.program import advance, innovation_program, loop_program, sequential_program, steps_in_python
+from gpbnb.filters.program import advance, innovation_program, loop_program, sequential_program
 from gpbnb.filters.run import Run
 from gpbnb.filters.system import biquad, controller, state_space
 from gpbnb.report.guarantees import derivation
 from gpbnb.report.guarantees.published import fixif_longitudinal, nile_local_level
 from gpbnb.report.kalman.exact_step import exact_step
 from gpbnb.wordlength.precision import required_precision
+from tests.plain_program import steps_in_python
 
 FORMATS = [
     FloatFormat(2, 24),

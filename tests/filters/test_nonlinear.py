@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import pytest
@@ -78,12 +79,24 @@ def test_every_digit_in_fixed_point_is_that_of_plain_loops(form):
     assert run.P.to_fractions().tolist() == plain.P
 
 
-def largest_error(form, r, count=20):
+@cache
+def in_120_bits(stored=None):
+    """The first 20 estimates of plain loops in 120 bits, from measurements as they are or as a format stores them."""
+    _, z, sight, given, u = case(MOTIONS[3], seed=3)
+    true = PlainFilter(MOTIONS[3], sight, given, Form.INNOVATION, rounding(2, 120))
+    seen = z[:20] if stored is None else as_stored(z[:20], stored)
+    return list(plain_estimates(true, seen, u[:20]))
+
+
+def as_stored(z, r):
+    return np.array([[r(Fraction(each)) for each in row] for row in z.tolist()], dtype=object)
+
+
+def largest_error(form, r):
     """The largest error of any state in the first steps of plain loops, against loops in 120 bits."""
     _, z, sight, given, u = case(MOTIONS[3], seed=3)
     run = PlainFilter(MOTIONS[3], sight, given, form, r)
-    true = PlainFilter(MOTIONS[3], sight, given, Form.INNOVATION, rounding(2, 120))
-    both = zip(*(plain_estimates(each, z[:count], u[:count]) for each in (run, true)), strict=True)
+    both = zip(plain_estimates(run, z[:20], u[:20]), in_120_bits(), strict=True)
     return max(float(abs(a - b)) for x, exact in both for a, b in zip(x, exact, strict=True))
 
 
@@ -129,10 +142,8 @@ def test_emulate_compares_with_the_filter_in_many_digits(form, fmt, r):
     model, z, sight, given, u = case(MOTIONS[3], seed=3)
     z, u, steps = z[:20], u[:20], (1, 7, 20)
     found = emulate(model, z, fmt, form, steps)
-    run = PlainFilter(MOTIONS[3], sight, given, form, r)
-    true = PlainFilter(MOTIONS[3], sight, given, Form.INNOVATION, rounding(2, 120))
-    stored = np.array([[r(Fraction(each)) for each in row] for row in z.tolist()], dtype=object)
-    computed, exact = (list(plain_estimates(one, seen, u)) for one, seen in ((run, z), (true, stored)))
+    computed = list(plain_estimates(PlainFilter(MOTIONS[3], sight, given, form, r), z, u))
+    exact = in_120_bits(r)
     errors = [[float(a - b) for a, b in zip(computed[k - 1], exact[k - 1], strict=True)] for k in steps]
     assert found.steps.tolist() == list(steps)
     # The references differ by far less than float64 shows.

@@ -17,8 +17,8 @@ from gpbnb import (
     required_fraction_bits,
     required_precision,
 )
-from gpbnb.filters.program import steps_in_python
 from tests.plain_nonlinear import drawn
+from tests.plain_program import steps_in_python
 from tests.plain_structures import fixed, floating, limited
 from tests.step_functions import SYSTEMS, Native, clipped_controller
 

@@ -32,7 +32,6 @@ from gpbnb import (
 )
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.design import FilterDesign
-from gpbnb.filters.program import steps_in_python
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
 from gpbnb.filters.simulation import simulated_measurements
@@ -45,6 +44,7 @@ from gpbnb.wordlength.c_source import places
 from gpbnb.wordlength.code import _in_long_words, model_coefficients, prepared
 from gpbnb.wordlength.models import read_model
 from gpbnb.wordlength.precision import required_precision
+from tests.plain_program import steps_in_python
 
 CASES = list(cases())
 STEPS = 3_000
@@ -302,11 +302,11 @@ def blind(form):
 
 
 @needs_compiler
-@pytest.mark.parametrize("fmt", [BINARY32, FixedFormat(8, 23, "even", "raise")], ids=str)
-@pytest.mark.parametrize("form", Form, ids=str)
-def test_what_is_chosen_by_a_zero_is_chosen_in_the_code(form, fmt):
-    (found,) = compare([Case("", "", blind(form), fmt, form)], 50, settings_of(installed()[:1]))
-    assert found.faults == ()
+def test_what_is_chosen_by_a_zero_is_chosen_in_the_code():
+    formats = BINARY32, FixedFormat(8, 23, "even", "raise")
+    cases = [Case("", f"{form}, {fmt}", blind(form), fmt, form) for form in Form for fmt in formats]
+    found = compare(cases, 50, settings_of(installed()[:1]))
+    assert {each.case.label: each.faults for each in found} == {case.label: () for case in cases}
 
 
 @needs_compiler

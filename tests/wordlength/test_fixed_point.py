@@ -11,11 +11,11 @@ import pytest
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.program import steps_in_python
 from gpbnb.filters.simulation import Simulation
 from gpbnb.filters.system import biquad, controller, state_space
 from gpbnb.wordlength import examples, fixed_point
 from gpbnb.wordlength.fixed_point import ScaledFilter
+from tests.plain_program import steps_in_python
 
 MODES = [mode for mode in Rounding if mode is not Rounding.STOCHASTIC]
 
