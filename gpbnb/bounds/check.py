@@ -28,12 +28,11 @@ the file: filter, format, form, limits. It verifies the answer: the bound b, and
     (3) A computed covariance that recurs after a whole number of the model's cycles recurs for ever, with all
     coefficients.
 
-    (4) Let E be the exact step of a covariance, A symmetric, S = H (Phi A Phi' + Q) H' + R definite, K the gain of A,
-    F = (I - KH) Phi, and P - A between 0 and D, as symmetric matrices. The gain of P minimizes its E. So
-    E(A) <= E(P), and E(P) <= E(A) + F (P - A) F' <= E(A) + F D F', because K is only one of the gains for P. If some
-    steps lead from the interval [A, A + D] into itself, covariances stay there. The gain of P differs from K by
-    F (P - A) Phi' H' / S_P, where |1/S_P|_ij^2 <= T_ii T_jj for T = 1/S; so by Cauchy and Schwarz its entry i, j
-    differs by at most the square root of (F D F')_ii T_jj, times the sum of those of (H Phi D Phi' H')_tt T_tt.
+    (4) The exact step of a covariance, E(P) = V - V H' (H V H' + R)^-1 H V with V = Phi P Phi' + Q, is the least of
+    (I - KH) V (I - KH)' + K R K' over all K. So it keeps the order of symmetric matrices: if A <= P <= B, then
+    E(A) <= E(P) <= E(B), if H V H' + R is definite for A. If some steps lead A and B back between A and B, covariances
+    stay there. The gain is E(P) H' R^-1. With D = E(B) - E(A) and row c_j of R^-1 H, its entry i, j differs from that
+    of A by at most the square root of D_ii times c_j D c_j', by the inequality of Cauchy and Schwarz.
 
     (5) A result within M is rounded by at most h(M): half a unit in the last place of M, or a whole one unless to
     nearest. M holds the exact filter's limits, b, and earlier roundings of the step. For the last operation of
@@ -51,11 +50,12 @@ import argparse
 import json
 import re
 from bisect import bisect_right
+from collections.abc import Iterator
 from copy import copy
 from fractions import Fraction
 from functools import reduce
-from itertools import cycle, product, repeat
-from math import gcd, inf, isqrt, lcm, nextafter
+from itertools import combinations, combinations_with_replacement, cycle, islice, repeat
+from math import inf, isqrt, lcm, nextafter
 from operator import add, le, mul, sub
 from typing import Any
 
@@ -85,7 +85,6 @@ FILE = COUNTS | {
 }
 NUMBER = re.compile(r"-?[0-9]{1,4000}([./][0-9]{1,4000})?", re.ASCII)
 MULTIPLY, ADD, SUBTRACT = "multiply", "add", "subtract"
-ERROR, STATE = "the error may exceed its bound", "a state or an innovation may exceed its limit"
 BLOCK = 8  # steps that are taken together, for speed
 
 
@@ -184,11 +183,11 @@ class Arithmetic:
         """The exponent of the last digit of a number of q units."""
         return self.finest if q < self.low else max(self.finest, bisect_right(self.tops, q))
 
-    def error(self, most: int, exact: bool, aligned: bool) -> int:
+    def error(self, most: int, aligned: bool) -> int:
         """The largest error of rounding results of at most so many units; sums have no digit below the finest."""
         need(most <= self.largest, "a number of a step may exceed the largest")
         place = self.last_place(max(most - 1, 0))
-        if exact or not most or (aligned and self.finest and place == self.finest):
+        if not most or (aligned and self.finest and place == self.finest):
             return 0
         return max(self.normal, up(self.powers[place], 1 + self.nearest))
 
@@ -213,8 +212,8 @@ class Arithmetic:
     def store(self, x: Fraction) -> int:
         return int(self.fit(x.numerator * self.unit, x.denominator))
 
-    def add(self, x: Any, y: Any) -> Any:
-        return self.fit(x + y) if x and y else x + y
+    def add(self, x: Any, y: Any, sign: int = 1) -> Any:
+        return self.fit(x + sign * y) if x and y else x + sign * y
 
     def multiply(self, x: Any, y: Any) -> Any:
         return self.fit(x * y, self.unit) if x and y else 0
@@ -229,30 +228,24 @@ class Arithmetic:
     def product(self, a: Any, b: Any) -> Any:
         return [[self.dot(row, column) for column in turned(b)] for row in a]
 
-    def complement(self, K: Any, H: Any) -> Any:
-        """I - KH."""
-        KH = self.product(K, H)
-        return each(lambda x, y: self.add(x, -y), diagonal(len(KH), self.unit), KH)
+    def sum(self, a: Any, b: Any, sign: int = 1) -> Any:
+        return each(lambda x, y: self.add(x, y, sign), a, b)
 
     def shorter(self, a: Any, i: int, factor: Any, k: int, first: int = 0) -> None:
         """Subtract a multiple of row k from row i, from a column on."""
         pair = zip(a[i][first:], a[k][first:], strict=True)
-        a[i][first:] = [self.add(x, -self.multiply(factor, y)) for x, y in pair]
+        a[i][first:] = [self.add(x, self.multiply(factor, y), -1) for x, y in pair]
 
     def inverse(self, given: Any) -> Any:
         """Eliminate without exchanges and substitute back; return also whether all pivots are positive."""
-        m, a = len(given), [list(row) for row in given]
-        c = diagonal(m, self.unit)
-        for k, i in product(range(m), range(m)):
-            if i > k:
-                factor = self.divide(a[i][k], a[k][k])
-                self.shorter(a, i, factor, k, k + 1)
-                self.shorter(c, i, factor, k)
+        m, a = len(given), list(map(add, given, diagonal(len(given), self.unit)))
+        for k, i in combinations(range(m), 2):
+            self.shorter(a, i, self.divide(a[i][k], a[k][k]), k, k + 1)
         for k in reversed(range(m)):
             for i in range(k + 1, m):
-                self.shorter(c, k, a[k][i], i)
-            c[k] = [self.divide(x, a[k][k]) for x in c[k]]
-        return c, all(a[i][i] > 0 for i in range(m))
+                self.shorter(a, k, a[k][i], i, m)
+            a[k][m:] = [self.divide(x, a[k][k]) for x in a[k][m:]]
+        return [row[m:] for row in a], all(a[i][i] > 0 for i in range(m))
 
     def factors(self, given: Any) -> Any:
         """U of U D U', with D on its diagonal; None if a pivot is negative, or zero beside another number."""
@@ -264,9 +257,8 @@ class Arithmetic:
                 return None
             for i in range(j if d else 0):
                 u[i][j] = self.divide(a[i][j], d)
-            for i, k in product(range(j if d else 0), range(j)):
-                if k <= i:
-                    a[k][i] = self.add(a[k][i], -self.multiply(u[k][j], a[i][j]))
+            for k, i in combinations_with_replacement(range(j if d else 0), 2):
+                a[k][i] = self.add(a[k][i], self.multiply(u[k][j], a[i][j]), -1)
         return u
 
 
@@ -285,48 +277,62 @@ def definite(given: Any, strictly: bool = False) -> bool:
     return given == turned(given) and u is not None and not (strictly and any(not u[i][i] for i in range(len(u))))
 
 
-class StepOperations:
-    """The operations of a step on n states and m measurements; a product has a coefficient and a value."""
+class Step(ExactArithmetic):
+    """The same algorithms with values of a step: their factors, in units of 1 / one, of its inputs and roundings.
 
-    def __init__(self, n: int, m: int) -> None:
-        self.first, self.operations = n + m, list[Any]()
-        self.x, self.z = list(range(n)), list(range(n, n + m))
+    Inputs are the error of the last estimate, the innovation, and the state of the exact filter.
+    """
 
-    def emit(self, kind: str, p: int, q: int) -> int:
-        self.operations.append((kind, p, q))
-        return self.first + len(self.operations) - 1
+    def __init__(self, a: Arithmetic, depth: int, ends: Any, caps: Any, *sizes: Any) -> None:
+        self.a, self.unit, self.one, self.ends, self.caps = a, a.unit, a.unit**depth, ends, caps
+        self.sizes, self.start = [list(each) for each in sizes], [0] * len(sizes)
 
-    def plus(self, p: int, q: int) -> int:
-        return self.emit(ADD, p, q)
+    def rounded(self, value: Any, aligned: bool, end: Any) -> Any:
+        """Round a value that is at most `end`, and at most any start and the sizes of its inputs and roundings."""
+        sums = [up(sum([abs(f) * sizes[i] for i, f in value.items()]), self.one) for sizes in self.sizes]
+        error = self.a.error(min(*map(add, sums, self.start), end), aligned)
+        if error:
+            value[len(self.sizes[0])] = self.one
+            for sizes in self.sizes:
+                sizes.append(error)
+        return value
 
-    def minus(self, p: int, c: int, q: int) -> int:
-        return self.emit(SUBTRACT, p, self.emit(MULTIPLY, c, q))
+    def add(self, x: Any, y: Any, sign: int = 1, end: Any = inf) -> Any:
+        value = dict(x or {})
+        for i, f in y.items():
+            value[i] = value.get(i, 0) + sign * f
+        return self.rounded(value, True, end) if x and y else value
 
-    def sums(self, rows: Any, values: Any) -> list[int]:
-        return [
-            reduce(self.plus, [self.emit(MULTIPLY, c, v) for c, v in zip(row, values, strict=True)]) for row in rows
-        ]
+    def multiply(self, x: Any, y: Any, end: Any = inf) -> Any:
+        """A number times a value."""
+        value = {i: x * f // self.unit for i, f in y.items()} if x else {}
+        return self.rounded(value, False, end) if value and abs(x) not in self.a.exact else value
+
+    def last(self, x: Any, y: Any) -> Any:
+        """The sums that are the new states."""
+        return [[self.add(p, q, 1, end)] for (p,), (q,), end in zip(x, y, self.ends, strict=True)]
 
 
 class Kalman:
     """The model as a format stores it; variances are raised until stored covariances and their factors are definite."""
 
-    def __init__(self, a: Arithmetic, given: Any) -> None:
+    def __init__(self, a: Arithmetic, form: str, repair: bool, **given: Any) -> None:
         roundoff = Fraction(1, a.base ** (a.digits - 1) * (1 + a.nearest))
         least = Fraction(2.0**-58 if a.fixed else float(roundoff))
-        count = int(1 / least).bit_length() - 1 if given["repair"] else 0
-        self.shares, self.a, self.form = [0, *(least * 2**k for k in range(count))], a, given["form"]
+        count = int(1 / least).bit_length() - 1 if repair else 0
+        self.shares, self.a, self.form = [0, *(least * 2**k for k in range(count))], a, form
         Phi, H, Q, R, x0, P0 = (given[key] for key in ("Phi", "H", "Q", "R", "x0", "P0"))
         self.n, self.m = n, m = len(P0), len(R[0])
+        self.depth = 3 * m  # the most products with coefficients in a row
         sizes = ((Phi, n, n), (H, m, n), (Q, n, n), (R, m, m), ([P0], n, n), ([[x0]], 1, n))
         fits = all([*map(len, c)] == [columns] * rows for given, rows, columns in sizes for c in given)
         need(fits, "matrices that do not fit together")
         Q, (P0,), R = ([self.sound(c, strictly) for c in cs] for cs, strictly in ((Q, False), ([P0], False), (R, True)))
         self.stored = [[each(a.store, c) for c in given] for given in (Phi, H, Q, R, [P0])]
         self.x0, self.start, self.cycle = [a.store(x) for x in x0], self.stored[4][0], lcm(*map(len, self.stored))
-        self.RI = [a.inverse(c) for c in self.stored[3] if self.form == "hung second gain"]
+        self.RI = [a.inverse(c) for c in self.stored[3] if form == "hung second gain"]
         need(all(positive for _, positive in self.RI), "R loses its definiteness when it is inverted")
-        if self.form == "ud":
+        if form == "ud":
             self.UQ, self.UR, (self.start,) = map(self.factored, (Q, R, [P0]))
 
     def raised(self, c: Any, share: Any) -> Any:
@@ -351,51 +357,46 @@ class Kalman:
         """Phi, H, Q and R of step k + 1."""
         return [c[k % len(c)] for c in self.stored[:4]]
 
-    def step(self, k: int, P: Any) -> tuple[Any, Any, list[int]]:
-        """The next covariance, or its factors; the operations of step k + 1; and the values that become the states."""
-        made, (Phi, H, Q, R), a = StepOperations(self.n, self.m), self.members(k), self.a
-        z = made.z
+    def step(self, k: int, P: Any, step: Step, x: Any, v: Any) -> Any:
+        """The next covariance, or its factors; the states after step k + 1; its measurements, and Phi."""
+        a, (Phi, H, Q, R) = self.a, self.members(k)
+        for (value,), row in zip(v, across(H, turned(Phi)), strict=True):  # v, and what was predicted
+            value |= {self.n + self.m + i: f * step.one // a.unit**2 for i, f in enumerate(row)}
+        z = [list(row) for row in v]  # decorrelated in place
         if self.form == "ud":
-            P, above, rows, gains = self.factor_step(k, P)
-            u = made.sums(Phi, made.x)
-            for i, r in product(reversed(range(self.m)), range(self.m)):
-                z[i] = made.minus(z[i], above[i][r], z[r]) if r > i else z[i]
-            for y, row, K in zip(z, rows, gains, strict=True):
-                for c, v in zip(row, u, strict=True):
-                    y = made.minus(y, c, v)
-                u = [made.plus(v, made.emit(MULTIPLY, c, y)) for c, v in zip(K, u, strict=True)]
-            return P, made.operations, u
-        V = each(a.add, a.product(a.product(Phi, P), turned(Phi)), Q)
+            return *self.factor_step(k, P, step, step.product(Phi, x), z), v, Phi
+        V = a.sum(a.product(a.product(Phi, P), turned(Phi)), Q)
         PHt = a.product(V, turned(H))
-        K = a.product(PHt, a.inverse(each(a.add, a.product(H, PHt), R))[0])
-        W = a.complement(K, H)
+        K = a.product(PHt, a.inverse(a.sum(a.product(H, PHt), R))[0])
+        W = a.sum(diagonal(self.n, a.unit), a.product(K, H), -1)
         P = a.product(W, V)
         if self.form == "joseph":
-            P = each(a.add, a.product(P, turned(W)), a.product(a.product(K, R), turned(K)))
+            P = a.sum(a.product(P, turned(W)), a.product(a.product(K, R), turned(K)))
         if self.form == "hung second gain":
             K = a.product(a.product(P, turned(H)), self.RI[k % len(self.RI)][0])
-            W = a.complement(K, H)
-        u = made.sums(a.product(W, Phi) if self.form.startswith("hung") else Phi, made.x)
+            W = a.sum(diagonal(self.n, a.unit), a.product(K, H), -1)
+        x = step.product(a.product(W, Phi) if self.form.startswith("hung") else Phi, x)
         if not self.form.startswith("hung"):
-            z = [made.emit(SUBTRACT, x, y) for x, y in zip(z, made.sums(H, u), strict=True)]
-        return P, made.operations, list(map(made.plus, u, made.sums(K, z)))
+            z = step.sum(z, step.product(H, x), -1)
+        return P, step.last(x, step.product(K, z)), v, Phi
 
-    def factor_step(self, k: int, U: Any) -> Any:
+    def factor_step(self, k: int, U: Any, step: Step, x: Any, z: Any) -> Any:
         """Thornton's prediction, then Bierman's update by one decorrelated measurement after the other."""
         a, n, m, (Phi, H, _, _) = self.a, self.n, self.m, self.members(k)
-        UQ, UR, h, gains = self.UQ[k % len(self.UQ)], self.UR[k % len(self.UR)], [list(row) for row in H], []
+        UQ, UR, h = self.UQ[k % len(self.UQ)], self.UR[k % len(self.UR)], [list(row) for row in H]
         D = [u[i][i] for u in (U, UQ) for i in range(n)]
         one = [[[x if i < j else a.unit * (i == j) for j, x in enumerate(r)] for i, r in enumerate(u)] for u in (U, UQ)]
-        W, U = [x + y for x, y in zip(a.product(Phi, one[0]), one[1], strict=True)], diagonal(n, 0)
+        W, U = list(map(add, a.product(Phi, one[0]), one[1])), diagonal(n, 0)
         for j in reversed(range(n)):
             C = list(map(a.multiply, D, W[j]))
             U[j][j] = a.dot(W[j], C)
             for i in range(j):
                 U[i][j] = a.divide(a.dot(W[i], C), U[j][j]) if U[j][j] else 0
                 a.shorter(W, i, U[i][j], j)
-        for i, r in product(reversed(range(m)), range(m)):
-            if r > i:
+        for i in reversed(range(m)):
+            for r in range(i + 1, m):
                 a.shorter(h, i, UR[i][r], r)
+                step.shorter(z, i, UR[i][r], r)
         for i in range(m):
             f = [a.add(a.dot([U[r][j] for r in range(j)], h[i][:j]), h[i][j]) for j in range(n)]
             g, alpha, K = [a.multiply(U[j][j], f[j]) for j in range(n)], UR[i][i], [0] * n
@@ -407,61 +408,99 @@ class Kalman:
                         u, U[r][j] = U[r][j], a.add(U[r][j], a.multiply(factor, K[r]))
                         K[r] = a.add(K[r], a.multiply(g[j], u))
                 K[j] = g[j]
-            gains.append([a.divide(x, alpha) for x in K])
-        return U, UR, h, gains
+            for c, (value,) in zip(h[i], x, strict=True):
+                z[i] = [step.add(z[i][0], step.multiply(c, value), -1)]
+            terms = step.product([[a.divide(c, alpha)] for c in K], [z[i]])
+            x = step.sum(x, terms) if i < m - 1 else step.last(x, terms)
+        return U, x
+
+
+class Linear:
+    """Operations with fixed coefficients, which must compute the recursion that the file states."""
+
+    cycle, start = 1, None
+
+    def __init__(self, a: Arithmetic, **given: Any) -> None:
+        self.n, self.m, self.outputs = n, m, outputs = given["states"], given["inputs"], given["outputs"]
+        c, self.operations, sound = given["coefficients"], list[Any](), len(outputs) == n and min(outputs) >= 0
+        for v, (kind, p, q) in enumerate(given["operations"], n + m):
+            if kind not in (MULTIPLY, ADD, SUBTRACT):
+                raise NotImplementedError(f"the operation {kind!r}")
+            sound = sound and type(p) is type(q) is int and 0 <= q < v and 0 <= p < (len(c) if kind == MULTIPLY else v)
+            need(sound, "operations on values that are not known")
+            self.operations.append((kind, a.store(c[p]) if kind == MULTIPLY else p, q))
+        self.depth = 1 + len(self.operations)
+        self.x0, self.stated = [0] * n, list(map(add, given["A"], given["B"]))
+
+    def step(self, k: int, P: Any, step: Step, x: Any, v: Any) -> Any:
+        """No covariance; the states after a step; all values but the first, and no exact loop."""
+        values, ends = [value for (value,) in x + v], dict[int, int]()
+        for output, limit in zip(self.outputs, step.ends, strict=True):
+            ends[output] = min(limit, ends.get(output, limit))
+        for i, (kind, p, q) in enumerate(self.operations):
+            step.start[2:], end = step.caps[i : i + 1], ends.get(len(values), inf)
+            if kind == MULTIPLY:
+                values.append(step.multiply(p, values[q], end))
+            else:
+                values.append(step.add(values[p], values[q], 1 if kind == ADD else -1, end))
+        found = [[Fraction(values[v].get(i, 0), step.one) for i in range(self.n + self.m)] for v in self.outputs]
+        need(found == self.stated, "the operations do not compute the recursion that the file states")
+        return None, [[values[v]] for v in self.outputs], [[x] for x in values[self.n + self.m :]], []
+
+
+def whole(a: Any) -> tuple[Any, int]:
+    """A matrix of fractions as one of integers, and their denominator."""
+    den = lcm(*(x.denominator for row in a for x in row))
+    return each(lambda x: int(x * den), a), den
 
 
 class ExactCovariance:
-    """A matrix A below the exact covariance P, and D for which P is below A + D, in units of 2**-bits."""
+    """Matrices A and B below and above the exact covariance, in units of 2**-bits."""
 
-    def __init__(self, model: Kalman) -> None:
-        Phi, H, Q, R, (P0,) = model.stored
-        variances = [c[i][i] for c in (*Q, *R, P0) for i in range(len(c)) if c[i][i]]
-        common = gcd(model.a.unit, *(x for given in (Phi, H, Q, R) for c in given for row in c for x in row))
-        self.n, self.unit = model.n, model.a.unit // common
-        self.bits = bits = 160 + 2 * max(0, *((model.a.unit // x).bit_length() for x in variances))
+    def __init__(self, model: Any) -> None:
+        self.n, self.unit, (P0,) = model.n, model.a.unit, model.stored[4]
+        variances = [c[i][i] for c in (*model.stored[2], *model.stored[3], P0) for i in range(len(c)) if c[i][i]]
+        self.bits = 160 + 2 * max(0, *((self.unit // x).bit_length() for x in variances))
         self.members = list[Any]()
-        for given in map(model.members, range(model.cycle)):
-            Phi, H, Q, R = (each(lambda x: x // common, c) for c in given)
-            scaled = [each(lambda x, p=p: x * self.unit**p << bits, c) for c, p in ((Q, 1), (R, 3))]
-            self.members.append((turned(Phi), Phi, H, turned(H), across(H, turned(Phi)), *scaled))
-        self.low = each(lambda x, y: (x << bits) // model.a.unit - y, P0, diagonal(self.n, self.n))
-        self.width = diagonal(self.n, 2 * self.n)
+        for Phi, H, Q, R in map(model.members, range(model.cycle)):
+            factors = across(ExactArithmetic().inverse(R)[0], turned(H))
+            scaled = [each(lambda x: x * self.unit << self.bits, c) for c in (Q, R)]
+            self.members.append((Phi, H, *scaled, *whole(factors)))
+        self.wide = diagonal(self.n, -self.n), diagonal(self.n, self.n)  # for entries that are rounded down
+        self.ends = [each(lambda x, y: (x << self.bits) // self.unit + y, P0, wide) for wide in self.wide]
+
+    def moved(self, k: int, P: Any, wide: Any) -> Any:
+        """The covariance after step k + 1, rounded."""
+        Phi, H, Q, R, *_ = self.members[k % len(self.members)]
+        V = each(lambda x, q, y: (x + q) // self.unit**2 + y, around(Phi, P), Q, wide)
+        W = across(V, H)
+        inverse, positive = ExactArithmetic().inverse(each(add, across(H, turned(W)), R))
+        need(positive, "an innovation covariance is not definite")
+        T, den = whole(inverse)
+        return each(lambda x, y, z: (x * den - y) // den + z, V, around(W, T), wide)
 
     def step(self, k: int) -> tuple[Any, Any]:
-        """Take step k + 1; return the gain of A, rounded down, and a bound of its distance from that of P."""
-        PhiT, Phi, H, HT, HPhi, Q, R = self.members[k % len(self.members)]
-        n, m, unit, bits = self.n, len(H), self.unit, self.bits
-        V = each(add, around(Phi, self.low), Q)
-        W = across(H, V)
-        inverse, positive = ExactArithmetic().inverse(each(add, across(W, H), R))
-        need(positive, "an innovation covariance is not definite")
-        den = lcm(*(x.denominator for row in inverse for x in row))
-        T, WT = each(lambda x: int(x * den), inverse), turned(W)
-        X = across(WT, T)
-        F = across(each(sub, diagonal(n, den), across(X, HT)), PhiT)
-        seen = around(HPhi, self.width)
-        below, square = den * unit**2, (den * unit) ** 2
-        self.low = each(lambda x, y, z: (x * den - y) // below - z, V, across(X, WT), diagonal(n, n))
-        self.width = each(lambda x, y: x // square + y, around(F, self.width), diagonal(n, 3 * n))
-        T = [up(T[j][j] * unit**4 << 2 * bits, den) for j in range(m)]
-        by = sum(isqrt(up(seen[t][t] * T[t], unit**4)) + 1 for t in range(m))
-        roots = [[isqrt(self.width[i][i] * x) + 1 for x in T] for i in range(n)]
-        return each(lambda x: (x * unit << bits) // den, X), each(lambda x: up(x * by, 1 << bits) + 1, roots)
+        """Take step k + 1; return the gain of A, rounded down, and a bound of its distance from the exact one."""
+        A, B = self.ends = [self.moved(k, *each) for each in zip(self.ends, self.wide, strict=True)]
+        *_, rows, den = self.members[k % len(self.members)]
+        D = each(sub, B, A)
+        seen = [around([row], D)[0][0] for row in rows]
+        far = [[up(isqrt(D[i][i] * x) + 1, den) + 1 for x in seen] for i in range(self.n)]
+        return each(lambda x: x // den, across(A, rows)), far
 
-    def settled(self, k: int, period: int, width: Any) -> Any:
-        """Gains of all steps after the first k, one for each phase, with bounds of their distances."""
+    def gains(self, first: int, period: int, width: Any) -> Iterator[Any]:
+        """Gains of the first steps, and of all later ones, which repeat, with bounds of their distances."""
+        yield from map(self.step, range(first))
         need([*map(len, width)] == [self.n] * self.n, "no interval of the exact covariance")
         width = each(lambda x: int(x * 2**self.bits // 1), width)
-        low = each(lambda x, w: x - w // 2, self.low, width)
-        gains: list[Any] = []
+        low, gains = each(lambda x, w: x - w // 2, self.ends[0], width), list[Any]()
+        high = each(add, low, width)
         for phases in (period, 0):
-            more = each(sub, self.low, low)
-            rest = each(lambda w, x, d: w - x - d, width, more, self.width)
-            need(definite(more) and definite(rest), "the exact covariance was not shown to settle")
-            self.low, self.width = low, width
-            gains += [self.step(k + p) for p in range(phases)]
-        return gains
+            inside = definite(each(sub, self.ends[0], low)) and definite(each(sub, high, self.ends[1]))
+            need(inside, "the exact covariance was not shown to settle")
+            self.ends = [low, high]
+            gains += map(self.step, range(first, first + phases))
+        yield from gains
 
 
 def near(row: Any, known: Any, whole: int, box: Any) -> int:
@@ -475,10 +514,11 @@ def near(row: Any, known: Any, whole: int, box: Any) -> int:
 class ErrorSet:
     """A set that contains an error or a state: segments of the last steps, a box, and an ellipsoid for all before."""
 
-    def __init__(self, sizes: Any, loops: int, message: str, start: Any = ()) -> None:
-        self.sizes, self.loops, self.message, self.n = sizes, loops, message, len(sizes)
-        self.counts, self.x = [1] if start else [], [list(start[i : i + 1]) for i in range(self.n)]
-        self.box, self.M, self.one = [0] * self.n, diagonal(self.n, 0), diagonal(self.n, 1 << loops)
+    def __init__(self, sizes: Any, seen: Any, loops: int, message: str, start: Any = ()) -> None:
+        self.sizes, self.loops, self.message, self.n, self.steps = sizes, loops, message, len(sizes), 0
+        self.limits, self.counts = [x << loops for x in sizes + seen], [1] if start else []
+        self.x = [list(start[i : i + 1]) for i in range(self.n)]
+        self.M, self.box, self.one = diagonal(self.n, 0), [0] * self.n, diagonal(self.n, 1 << loops)
 
     def image(self, row: Any, start: int = 0) -> list[int]:
         """A row, in units of 2**-loops, times each segment."""
@@ -491,9 +531,8 @@ class ErrorSet:
         """The largest size of a row, in units of 2**-loops, times the vector."""
         return sum(map(abs, self.image(row))) + size(row, self.box) + isqrt(max(0, around([row], self.M)[0][0])) + 1
 
-    def entries(self) -> list[int]:
-        """The largest size of each entry."""
-        return [sum(map(abs, x)) + self.box[i] + isqrt(self.M[i][i]) + 1 for i, x in enumerate(self.x)]
+    def through(self, rows: Any, F: Any) -> Any:
+        return each(lambda x: x >> self.loops, across(rows, turned(F)))
 
     def move(self, F: Any) -> None:
         """Take the image of the set, and round its numbers."""
@@ -504,37 +543,35 @@ class ErrorSet:
 
     def add(self, columns: Any, slack: Any, counts: list[int]) -> None:
         """Add a box, and the columns of as many steps as there are counts."""
-        self.counts = self.counts + counts
+        self.counts, self.box = self.counts + counts, list(map(add, self.box, slack))
         self.x = [x + [g[i] for g in columns] for i, x in enumerate(self.x)]
-        self.box = list(map(add, self.box, slack))
 
-    def advance(self, steps: Any, keep: int, last: int) -> None:
-        """Take some steps, after each of which some rows, first those of the states, must be within limits."""
-        new, P, after = ErrorSet(self.sizes, self.loops, self.message), self.one, []
-        for F, columns, slack, rows, limits in steps:
+    def advance(self, steps: Any, keep: int) -> None:
+        """Take some steps; some rows must be within limits before each, and the entries after it."""
+        rows, one, whole, old, before = self.one, self.one, len(steps), copy(self), [*map(self.most, self.one)]
+        P = reduce(lambda rows, step: self.through(step[0], rows), steps, one)
+        self.absorb(keep)
+        self.move(P)
+        after, box = [*map(self.most, one)], [up(x, 1 << self.loops) for x in before]
+        new = ErrorSet(self.sizes, [], self.loops, "")
+        for j, (F, columns, slack, seen) in enumerate(steps, 1):
+            for row, far, limit in zip(seen, self.through(seen, rows), self.limits[self.n :], strict=False):
+                need(old.most(far) + new.most(row) <= limit, f"{self.message} before step {self.steps + j}")
             new.move(F)
             new.add(columns, slack, [len(columns)])
-            P = each(lambda x: x >> self.loops, across(F, turned(P)))
-            rooms = [(limit << self.loops) - new.most(row) for row, limit in zip(rows, limits, strict=True)]
-            after.append((each(lambda x: x >> self.loops, across(rows, turned(P))), rooms))
-        old, count = copy(self), len(steps)
-        self.move(P)
-        box, (before, later) = old.entries(), ([x << self.loops for x in s.entries()] for s in (old, self))
-        for j, (rows, rooms) in enumerate(after, 1):
-            for i, (row, room) in enumerate(zip(rows, rooms, strict=True)):
-                known = [(count - j, self.one[i], before[i]), (j, P[i], later[i])] if i < self.n else []
-                sound = near(row, known, count, box) <= room or old.most(row) <= room
-                need(sound, f"{self.message} after step {last - count + j}")
+            rows = self.through(F, rows)
+            for i, row in enumerate(rows):
+                room, ends = self.limits[i] - new.most(one[i]), [(whole - j, one[i], before[i]), (j, P[i], after[i])]
+                within = near(row, ends, whole, box) <= room or old.most(row) <= room
+                need(within, f"{self.message} after step {self.steps + j}")
+        self.steps += whole
         self.add(turned(new.x), new.box, new.counts)
-        self.absorb(keep)
 
     def absorb(self, keep: int) -> None:
         """Let the ellipsoid contain the box and old segments; the numbers t of (1) are the lengths of all."""
-        segments, self.box = times(diagonal(self.n), self.box, 1), [0] * self.n
-        while len(self.counts) > keep:
-            count = self.counts.pop(0)
-            segments += turned([x[:count] for x in self.x])
-            self.x = [x[count:] for x in self.x]
+        old, self.counts = sum(self.counts[:-keep] if keep else self.counts), self.counts[-keep:] if keep else []
+        segments = [*times(diagonal(self.n), self.box, 1), *turned([x[:old] for x in self.x])]
+        self.x, self.box = [x[old:] for x in self.x], [0] * self.n
         units = [(max(self.sizes) << 60) // max(s, 1) for s in self.sizes]
         sized = ([isqrt(self.M[i][i]) for i in range(self.n)], *segments)
         own, *lengths = (1 + isqrt(sum([x * x for x in map(mul, g, units)])) for g in sized)
@@ -543,30 +580,47 @@ class ErrorSet:
         added = across([list(map(mul, row, shares)) for row in x], x)
         self.M = each(lambda x, y, z: (x * up(total, own) + y >> 40) + z, self.M, added, diagonal(self.n, self.n))
 
+    def later(self, steps: Any, phase: int, back: int) -> Any:
+        """Prove that the vector is within limits after all steps of a phase; bound it, and rows before them."""
+        loops, rows, sums, known, period = self.loops, self.one, [0] * self.n, list[Any](), len(steps)
+        box = [up(self.most(row), 1 << loops) for row in self.one]
+        for lag in range(back):
+            F, columns, slack, seen = steps[(phase - lag) % period]
+            effects = [sum([abs(sum(map(mul, row, g))) for g in columns]) + size(row, slack) for row in rows]
+            sums, rows = [x + y + sum(self.sizes) for x, y in zip(sums, effects, strict=True)], self.through(rows, F)
+            if not lag:
+                rows, sums = rows + seen, sums + [0] * len(seen)
+            if lag % period == phase:
+                known = known or [(row, self.most(row)) for row in rows]
+                for i, (row, x, limit) in enumerate(zip(rows, sums, self.limits, strict=False)):
+                    a, b = (list(map(mul, r, box)) for r in (row, known[i][0]))
+                    if near(row, [(sum(map(mul, a, b)), *known[i])], sum(map(mul, b, b)) or 1, box) > limit - x:
+                        known[i] = row, self.most(row)
+                        need(known[i][1] <= limit - x, f"{self.message} later")
+        found = [x + size(row, self.sizes) for x, row in zip(sums, rows, strict=True)]
+        need(all(map(le, found, self.limits)), f"{self.message}, in phase {phase} of the period")
+        return [up(x, 1 << loops) for x in found]
+
 
 class Proof:
     """The claim of a certificate; sizes are in units of the format, loops in units of 2**-loops."""
 
     def __init__(self, given: Any, scale: int) -> None:
         self.given, self.a, made = given, Arithmetic(given["format"], scale), given["filter"]
-        self.steps, self.period, self.first = given["steps"], given["period"], given["first"]
-        need(
-            self.steps != 0 and min(self.steps or 1, *(given[key] for key in COUNTS)) >= 0,
-            "a number of steps that is none",
-        )
-        self.model: Any = Kalman(self.a, made) if made["kind"] == "kalman" else None
-        self.exact: Any = ExactCovariance(self.model) if self.model else None
-        self.n: int = self.model.n if self.model else made["states"]
-        self.m: int = self.model.m if self.model else made["inputs"]
-        self.x0: Any = self.model.x0 if self.model else [0] * self.n
+        self.steps, self.period = given["steps"], given["period"]
+        self.first = given["first"] if self.steps is None else self.steps
+        counts = [given[key] for key in COUNTS]
+        need(self.steps != 0 and min(self.first, *counts) >= 0, "a number of steps that is none")
+        self.model: Any = (Kalman if made["kind"] == "kalman" else Linear)(self.a, **made)
+        self.n, self.m = self.model.n, self.model.m
+        self.exact: Any = made["kind"] == "kalman" and ExactCovariance(self.model)
         self.limit(*[*given["limits"].values(), *given["derived"].values(), given["bound"]])
         lengths = [[x.bit_length() for x in xs if x] or [0] for xs in (self.b, self.X)]
         self.loops = 64 + max(max(each) - min(each) for each in lengths)
-        self.one, self.caps = diagonal(self.n, 1 << self.loops), dict[int, int]()
-        self.program: Any = None if self.model else self.fixed_program(**made)
+        self.missed = (sum(self.X) >> self.loops) + 1
 
     def limit(self, X: Any, V: Any, Z: Any, least_X: Any, least_V: Any, bound: Any) -> None:
-        """Put the limits and the bound into units, rounded up; `most` is the bound rounded down."""
+        """Put the limits into units, rounded up, and the bound, rounded down."""
         n, m, unit = self.n, self.m, self.a.unit
         given = (X, V, Z, least_X, least_V, bound)
         need(list(map(len, given)) == [n, m, m, n, m, n], "limits or a bound of another filter")
@@ -577,176 +631,83 @@ class Proof:
         least = [y if x is None else min(x, y) for x, y in zip(X + V, least_X + least_V, strict=True)]
         self.derived = least != X + V
         need(not self.derived or None not in Z, "limits that do not follow from others")
-        within = all(abs(x) <= y * unit for x, y in zip(self.x0, least[:n], strict=True))
+        within = all(abs(x) <= y * unit for x, y in zip(self.model.x0, least[:n], strict=True))
         need(within, "the first estimate is beyond its limit")
-        sizes: Any = [[None if x is None else -(-x * unit // 1) for x in xs] for xs in (least[:n], least[n:], Z, bound)]
-        self.X, self.V, self.Z, self.b = sizes
-        self.most = [x * unit // 1 for x in bound]
+        sizes: Any = [[None if x is None else -(-x * unit // 1) for x in xs] for xs in (least[:n], least[n:], Z)]
+        self.X, self.V, self.Z = sizes
+        sound = self.exact or (self.derived and all(map(le, self.Z, self.V)))
+        need(sound, "no limits on the inputs, or too small ones")
+        self.b = [x * unit // 1 for x in bound]
 
-    def fixed_program(self, kind: str, states: int, inputs: int, operations: Any, outputs: Any, **more: Any) -> Any:
-        """The operations of a filter with fixed coefficients, which must compute the recursion that the file states."""
-        need(self.derived and all(map(le, self.Z, self.V)), "no limits on the inputs, or too small ones")
-        c, made, sound = more["coefficients"], list[Any](), len(outputs) == states and min(outputs) >= 0
-        for v, (kind, p, q) in enumerate(operations, states + inputs):
-            if kind not in (MULTIPLY, ADD, SUBTRACT):
-                raise NotImplementedError(f"the operation {kind!r}")
-            sound = sound and type(p) is type(q) is int and 0 <= q < v and 0 <= p < (len(c) if kind == MULTIPLY else v)
-            need(sound, "operations on values that are not known")
-            made.append((kind, self.a.store(c[p]) if kind == MULTIPLY else p, q))
-        rows, one, _ = self.values([[0] * states] * inputs, made, outputs)
-        stated = [x + y for x, y in zip(more["A"], more["B"], strict=True)]
-        found = [[Fraction(x, one) for x in rows[v][: states + inputs]] for v in outputs]
-        need(found == stated, "the operations do not compute the recursion that the file states")
-        self.first, self.period = 0, 1
-        return made, outputs
+    def parts(self, k: int, P: Any, caps: Any) -> tuple[Any, Any]:
+        """The covariance after step k + 1; its loop, its gain, and columns of errors, measurements and the state."""
+        n, m, computed = self.n, self.m, list(map(add, self.X, self.b))
+        first, none = 2 * n + m, [0] * n
+        known = [] if None in self.Z else [computed + self.Z + none, self.b + self.Z + none][: 1 + bool(caps)]
+        step = Step(self.a, self.model.depth, computed, caps, self.b + self.V + self.X, *known)
+        x, v = [[{i: step.one, n + m + i: step.one}] for i in range(n)], [[{n + j: step.one}] for j in range(m)]
+        P, made, seen, Phi = self.model.step(k, P, step, x, v)
+        columns = [[value.get(i, 0) for (value,) in made] for i in range(len(step.sizes[0]))]
+        found = dict[tuple[int, ...], int]()
+        for column, error in zip(columns[first:], step.sizes[0][first:], strict=True):  # equal effects are added
+            key = max(tuple(column), tuple(-x for x in column))
+            found[key] = found.get(key, 0) + error
+        F = each(lambda x: (x << self.loops) // step.one, turned(columns[:n]))
+        seen = [[(row.get(i, 0) << self.loops) // step.one for i in range(n + m, first)] for (row,) in seen]
+        K = each(lambda x: (x << self.exact.bits) // step.one, turned(columns[n : n + m])) if self.exact else []
+        inputs = times(columns[n : n + m], self.Z, step.one) if self.derived else []
+        Phi = each(lambda x: x * step.one // self.a.unit, turned(Phi)) if Phi else columns[:n]
+        both = list(filter(any, times(each(sub, columns[n + m : first], Phi), self.X, step.one)))
+        return P, (F, K, times(found, found.values(), step.one), inputs, both, seen if self.derived else [])
 
-    def values(self, HPhi: Any, operations: Any, outputs: Any) -> tuple[Any, int, list[int]]:
-        """Factors of x and z of each value, and of x for the same function of v and x; their unit; rounding errors."""
-        a, n, m, depth = self.a, self.n, self.m, [2] * (self.n + self.m)
-        for kind, p, q in operations:
-            depth.append(depth[q] + 1 if kind == MULTIPLY else max(depth[p], depth[q]))
-        one = a.unit ** max(depth)  # so that each product is a whole number
-        rows = [x + [0] * m + x for x in diagonal(n, one)]
-        measured = zip(diagonal(m, one), HPhi, strict=True)
-        rows += [[0] * n + z + [x * one // a.unit**2 for x in seen] for z, seen in measured]
-        computed = list(map(add, self.X, self.b))
-        limits = [self.b + self.V + self.X] + ([] if None in self.Z else [computed + self.Z])
-        ends = {v: min(x for x, r in zip(computed, outputs, strict=True) if r == v) for v in outputs}
-        off, none, errors = ([0] * (n + m) for _ in range(3))
-        for v, (kind, p, q) in enumerate(operations, n + m):
-            if kind == MULTIPLY:
-                rows.append([p * x // a.unit for x in rows[q]])
-                off.append(up(abs(p) * off[q], a.unit))
-                none.append(none[q] or p == 0)
-                exact = none[v] or abs(p) in a.exact
-            else:
-                rows.append(list(map(add if kind == ADD else sub, rows[p], rows[q])))
-                off.append(off[p] + off[q])
-                none.append(none[p] and none[q])
-                exact = none[p] or none[q]
-            most = min(up(min([size(rows[v], sizes) for sizes in limits]), one), self.caps.get(v, inf))
-            errors.append(a.error(min(most + off[v], ends.get(v, inf)), bool(exact), kind != MULTIPLY))
-            off[v] += errors[v]
-        return rows, one, errors
-
-    def parts(self, Phi: Any, HPhi: Any, operations: Any, outputs: Any) -> Any:
-        """Loop and gain of a step, and columns of its errors, of its inputs, and of both through the exact filter."""
-        n, start, (rows, one, errors) = self.n, self.n + self.m, self.values(HPhi, operations, outputs)
-        effect, found = [[0] * n for _ in rows], dict[tuple[int, ...], int]()
-        for i, v in enumerate(outputs):
-            effect[v][i] = one
-        for v, (kind, p, q) in reversed(list(enumerate(operations, start))):
-            if errors[v]:  # roundings with the same effect are added
-                column = max(tuple(effect[v]), tuple(-x for x in effect[v]))
-                found[column] = found.get(column, 0) + errors[v]
-            if kind == MULTIPLY:
-                effect[q] = [x + p * y // self.a.unit for x, y in zip(effect[q], effect[v], strict=True)]
-            else:
-                effect[p] = list(map(add, effect[p], effect[v]))
-                effect[q] = list(map(add if kind == ADD else sub, effect[q], effect[v]))
-        F, K, loop = ([rows[v][part] for v in outputs] for part in map(slice, (0, n, start), (n, start, None)))
-        inputs = [] if None in self.Z else times(turned(K), self.Z, one)
-        loop = each(lambda x, y: x - y * one // self.a.unit, loop, Phi) if Phi else diagonal(n, 0)
-        both = list(filter(any, times(turned(loop), self.X, one)))
-        F = each(lambda x: (x << self.loops) // one, F)
-        K = each(lambda x: (x << self.exact.bits) // one, K) if self.exact else []
-        return F, K, times(found, found.values(), one), inputs, both
-
-    def coefficients(self) -> Any:
+    def coefficients(self, caps: Any) -> Any:
         """The parts of each step, without end; the covariance is emulated until it recurs, as claimed."""
         given, model, known = self.given, self.model, list[Any]()
-        while not model:
-            yield self.parts([], [[0] * self.n] * self.m, *self.program)
         begin, end = given["repeat"], given["repeat"] + self.period
         sound = begin <= self.first and self.period > 0 and self.period % model.cycle == 0
         need(sound or self.steps, "the gain cannot repeat after such a period")
         P = kept = model.start
         for k in range(self.steps or end):
-            P, *program = model.step(k, P)
-            kept = P if k + 1 == begin else kept
+            kept = P if k == begin else kept
+            P, parts = self.parts(k, P, caps)
             need(self.steps or k + 1 < end or kept == P, "the computed covariance does not recur as claimed")
-            Phi, H, *_ = model.members(k)
-            known.append(self.parts(Phi, across(H, turned(Phi)), *program))
-            yield known[-1]
-            if k < begin:
-                known.clear()
+            known += [parts] if k >= begin else []
+            yield parts
         yield from cycle(known)
 
-    def seen(self, k: int) -> Any:
-        """H Phi of step k + 1 in units of 2**-loops, and what it may add to the measurements of an innovation."""
-        if not (self.model and self.derived) or k == self.steps:
-            return [], []
-        Phi, H, *_ = self.model.members(k)
-        rows = each(lambda x: (x << self.loops) // self.a.unit**2, across(H, turned(Phi)))
-        return rows, [v - z - 2 * (sum(self.X) >> self.loops) - 2 for v, z in zip(self.V, self.Z, strict=True)]
-
-    def step(self, k: int, parts: Any, gain: Any) -> Any:
-        """The loop of step k + 1, and columns, slack and limits after it, of errors and of the exact filter."""
-        F, K, errors, inputs, both = parts
-        slack = [2 + len(errors) + 2 * self.n + 3 * self.m] * self.n
-        if gain:
-            more = each(sub, K, gain[0])
-            both = both + times(turned(more), self.V, 1 << self.exact.bits)
-            off = [size(row, self.V) + sum(self.V) for row in gain[1]]
-            slack = [x + up(y, 1 << self.exact.bits) for x, y in zip(slack, off, strict=True)]
-        far, near = ([x + 2 * (sum(s) >> self.loops) + 2 for x in slack] for s in (self.b, self.X))
-        rows, most = self.seen(k + 1)
-        return (F, errors + both, far, self.one, self.most), (F, inputs + both, near, self.one + rows, self.X + most)
+    def moves(self, caps: Any = ()) -> Any:
+        """Yield, for each step, loop, columns, slack and rows before it, of the error and of the exact filter."""
+        exact = self.exact
+        gains = exact.gains(self.first, self.period, self.given["width"]) if exact else repeat(None)
+        for (F, K, errors, inputs, both, seen), gain in zip(self.coefficients(caps), gains, strict=False):
+            slack = [2 + len(errors) + 2 * self.n + 3 * self.m] * self.n
+            if gain:
+                both = both + times(turned(each(sub, K, gain[0])), self.V, 1 << exact.bits)
+                off = [size(row, self.V) + sum(self.V) for row in gain[1]]
+                slack = [x + up(y, 1 << exact.bits) for x, y in zip(slack, off, strict=True)]
+            far, near = ([x + 2 * (sum(s) >> self.loops) + 2 for x in slack] for s in (self.b, self.X))
+            yield (F, errors + both, far, []), (F, inputs + both, near, seen)
 
     def run(self) -> None:
         """Take the first steps, and prove that all later ones remain within the limits."""
-        parts, first = self.coefficients(), self.first if self.steps is None else self.steps
-        states, errors = ErrorSet(self.X, self.loops, STATE, self.x0), ErrorSet(self.b, self.loops, ERROR)
-        rows, most = self.seen(0)
-        need(all(states.most(row) <= x << self.loops for row, x in zip(rows, most, strict=True)), STATE)
-        for k in range(0, first, BLOCK):
-            ahead = range(k, min(k + BLOCK, first))
-            steps = [self.step(i, next(parts), self.exact and self.exact.step(i)) for i in ahead]
-            for i, reach in enumerate((errors, states)[: 1 + self.derived]):
-                reach.advance([step[i] for step in steps], self.given["keep"], ahead[-1] + 1)
+        sets = [ErrorSet(self.b, [], self.loops, "the error may exceed its bound")]
+        if self.derived:
+            rooms = [v - z - 2 * self.missed for v, z in zip(self.V, self.Z, strict=True)] if self.exact else []
+            message = "a state or an innovation may exceed its limit"
+            sets.append(ErrorSet(self.X, rooms, self.loops, message, self.model.x0))
+        moves, back = self.moves(), self.given["back"]
+        for k in range(0, self.first, BLOCK):
+            steps = turned(islice(moves, min(BLOCK, self.first - k)))
+            for reach, block in zip(sets, steps, strict=False):
+                reach.advance(block, self.given["keep"])
         if self.steps is None:
-            need(self.given["back"] > 0, "no step back")
-            gains = self.exact.settled(first, self.period, self.given["width"]) if self.exact else [None]
-            steps = [self.step(k, next(parts), gain) for k, gain in enumerate(gains, first)]
-            if self.derived:
-                self.remain(states, [step[1] for step in steps])
-            if not self.model:
-                self.cap([step[1] for step in steps])
-                steps = [self.step(0, next(parts), None)]
-            self.remain(errors, [step[0] for step in steps])
-
-    def remain(self, reach: ErrorSet, steps: Any) -> None:
-        """Prove that a vector remains within limits after the steps of a period, and after all later ones."""
-        for phase, (*_, rows, limits) in enumerate(steps):
-            found = self.later(rows, phase, steps, reach.sizes, reach, limits)
-            need(all(map(le, found, limits)), f"{reach.message}, in phase {phase} of the period")
-
-    def later(self, rows: Any, phase: int, steps: Any, most: Any, reach: Any = None, limits: Any = ()) -> Any:
-        """Bound rows, in units of 2**-loops, times a vector after any step of a phase; `most` bounds earlier ones."""
-        # `reach` is the set before the first of all steps; the first steps need `limits`.
-        loops, sums, known = self.loops, [0] * len(rows), [(row, reach.most(row)) for row in rows] if reach else []
-        box = reach.entries() if reach else []
-        for lag in range(self.given["back"]):
-            F, columns, slack, *_ = steps[(phase - lag) % len(steps)]
-            for g in columns:
-                sums = [x + abs(sum(map(mul, row, g))) for x, row in zip(sums, rows, strict=True)]
-            sums = [x + size(row, slack) + sum(most) for x, row in zip(sums, rows, strict=True)]
-            rows = each(lambda x: x >> loops, across(rows, turned(F)))
-            if reach and lag % len(steps) == phase:
-                for i, (x, row, limit) in enumerate(zip(sums, rows, limits, strict=True)):
-                    room, (other, found) = (limit << loops) - x, known[i]
-                    a, b = ([x * y for x, y in zip(r, box, strict=True)] for r in (row, other))
-                    if near(row, [(sum(map(mul, a, b)), other, found)], sum(map(mul, b, b)) or 1, box) > room:
-                        known[i] = row, reach.most(row)
-                        need(known[i][1] <= room, f"{reach.message} later")
-        return [up(x + size(row, most), 1 << loops) for x, row in zip(sums, rows, strict=True)]
-
-    def cap(self, steps: Any) -> None:
-        """Bound each value of a filter with fixed coefficients by all its inputs."""
-        rows, one, _ = self.values([[0] * self.n] * self.m, *self.program)
-        A, missed = [[(x << self.loops) // one for x in row[: self.n]] for row in rows], (sum(self.X) >> self.loops) + 1
-        for v, (x, row) in enumerate(zip(self.later(A, 0, steps, self.X), rows, strict=True)):
-            self.caps[v] = x + missed + up(size(row, self.b + self.Z), one)
+            need(back > 0, "no step back")
+            errors, states = turned(islice(moves, self.period))
+            caps = [sets[1].later(states, phase, back) for phase in range(self.period)] if self.derived else []
+            if not self.exact:  # limits of states limit all values, and these the roundings
+                errors, _ = turned(islice(self.moves([x + self.missed for x in caps[0][self.n :]]), 1))
+            for phase in range(self.period):
+                sets[0].later(errors, phase, back)
 
 
 def prove(given: Any) -> str:

@@ -553,6 +553,15 @@ def test_a_first_estimate_beyond_its_limit_is_rejected() -> None:
     assert "the first estimate is beyond its limit" in refused(content)
 
 
+def test_innovations_of_correlated_measurements_are_limited() -> None:
+    """The UD form decorrelates them, which makes the first row of H smaller; its limit is that of the measurement."""
+    model = small(H=[[1, 1], [1, "0.5"]], R=[[2, 1], [1, 1]])
+    content = written(model, FloatFormat(2, 11), limits(2, 2, measurement=4), Form.UD)
+    prove(content)
+    content["derived"]["innovation"][0] = factor(content["derived"]["innovation"][0], "0.9")
+    assert "an innovation may exceed its limit" in refused(content)
+
+
 def test_what_has_no_certificate_says_so() -> None:
     slow = guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(10, 2, state=100, innovation=10), most=1000)
     with pytest.raises(ValueError, match="never repeats"):
