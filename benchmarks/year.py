@@ -80,9 +80,9 @@ def measure(steps: int = gravity_probe_b.YEAR) -> list[Timed]:
     binary, decimal = total.values()
     numpy_year = numpy_total * steps / numpy_steps
     return [
-        Timed("base 2, 24 bits, every operation rounded", binary, 12),
+        Timed("base 2, 24 bits, every operation rounded", binary, 6),
         Timed("NumPy, float64, unrounded", numpy_year, None),
-        Timed("base 10, 8 digits, every operation rounded", decimal, 30),
+        Timed("base 10, 8 digits, every operation rounded", decimal, 25),
         Timed(f"base 2, 24 bits, {RECORDS} records at once", many_records(steps), round(6 * binary, 1)),
         Timed("the mission model, base 2, 24 bits", mission_year(steps), None),
     ]
