@@ -277,7 +277,7 @@ def definite(given: Any, strictly: bool = False) -> bool:
     return given == turned(given) and u is not None and not (strictly and any(not u[i][i] for i in range(len(u))))
 
 
-class Step(ExactArithmetic):
+class RoundedStep(ExactArithmetic):
     """The same algorithms with values of a step: their factors, in units of 1 / one, of its inputs and roundings.
 
     Inputs are the error of the last estimate, the innovation, and the state of the exact filter.
@@ -357,7 +357,7 @@ class Kalman:
         """Phi, H, Q and R of step k + 1."""
         return [c[k % len(c)] for c in self.stored[:4]]
 
-    def step(self, k: int, P: Any, step: Step, x: Any, v: Any) -> Any:
+    def step(self, k: int, P: Any, step: RoundedStep, x: Any, v: Any) -> Any:
         """The next covariance, or its factors; the states after step k + 1; its measurements, and Phi."""
         a, (Phi, H, Q, R) = self.a, self.members(k)
         for (value,), row in zip(v, across(H, turned(Phi)), strict=True):  # v, and what was predicted
@@ -380,7 +380,7 @@ class Kalman:
             z = step.sum(z, step.product(H, x), -1)
         return P, step.last(x, step.product(K, z)), v, Phi
 
-    def factor_step(self, k: int, U: Any, step: Step, x: Any, z: Any) -> Any:
+    def factor_step(self, k: int, U: Any, step: RoundedStep, x: Any, z: Any) -> Any:
         """Thornton's prediction, then Bierman's update by one decorrelated measurement after the other."""
         a, n, m, (Phi, H, _, _) = self.a, self.n, self.m, self.members(k)
         UQ, UR, h = self.UQ[k % len(self.UQ)], self.UR[k % len(self.UR)], [list(row) for row in H]
@@ -432,7 +432,7 @@ class Linear:
         self.depth = 1 + len(self.operations)
         self.x0, self.stated = [0] * n, list(map(add, given["A"], given["B"]))
 
-    def step(self, k: int, P: Any, step: Step, x: Any, v: Any) -> Any:
+    def step(self, k: int, P: Any, step: RoundedStep, x: Any, v: Any) -> Any:
         """No covariance; the states after a step; all values but the first, and no exact loop."""
         values, ends = [value for (value,) in x + v], dict[int, int]()
         for output, limit in zip(self.outputs, step.ends, strict=True):
@@ -644,7 +644,7 @@ class Proof:
         n, m, computed = self.n, self.m, list(map(add, self.X, self.b))
         first, none = 2 * n + m, [0] * n
         known = [] if None in self.Z else [computed + self.Z + none, self.b + self.Z + none][: 1 + bool(caps)]
-        step = Step(self.a, self.model.depth, computed, caps, self.b + self.V + self.X, *known)
+        step = RoundedStep(self.a, self.model.depth, computed, caps, self.b + self.V + self.X, *known)
         x, v = [[{i: step.one, n + m + i: step.one}] for i in range(n)], [[{n + j: step.one}] for j in range(m)]
         P, made, seen, Phi = self.model.step(k, P, step, x, v)
         columns = [[value.get(i, 0) for (value,) in made] for i in range(len(step.sizes[0]))]
