@@ -48,7 +48,8 @@ class FloatFormat(Makes[FloatArray]):
         for a format with a range.
     largest : the largest number. By default, all its t digits are b - 1.
     seed : seed of the random numbers for stochastic rounding. Each run of a filter restarts the random numbers from the
-        seed. Operations on arrays draw from one sequence, until :meth:`restart` or a run of a filter restarts it.
+        seed. Operations on arrays draw from one sequence, until :meth:`~gpbnb.arithmetic.making.Makes.restart` or a run
+        of a filter restarts it.
     overflow : what happens to a result that is beyond the largest number after rounding. "raise" raises an
         OverflowError that names the operation and the entry. "saturate" takes the largest number, with the sign of the
         result. "infinity" computes as IEEE 754 does by default, with infinity, NaN and a sign of zero; see the notes.
@@ -307,7 +308,7 @@ class FloatFormat(Makes[FloatArray]):
 
         Raises
         ------
-        TypeError, ValueError, OverflowError : as for :meth:`round`.
+        TypeError, ValueError, OverflowError : as for :meth:`~gpbnb.arithmetic.making.Makes.round`.
 
         References
         ----------
@@ -328,13 +329,13 @@ class FloatFormat(Makes[FloatArray]):
 
         Parameters
         ----------
-        values : a number as in :meth:`round`, nested lists or tuples of them, a NumPy array, or a
-            FloatArray of any format (each entry is then rounded into this one).
+        values : a number as in :meth:`~gpbnb.arithmetic.making.Makes.round`, nested lists or tuples of them, a NumPy
+            array, or a FloatArray of any format (each entry is then rounded into this one).
 
         Raises
         ------
-        TypeError, ValueError, OverflowError : as for :meth:`round`, with the entry in the message; or nested lists of
-            unequal lengths.
+        TypeError, ValueError, OverflowError : as for :meth:`~gpbnb.arithmetic.making.Makes.round`, with the entry in
+            the message; or nested lists of unequal lengths.
         """
         return FloatArray.from_values(values, self)
 

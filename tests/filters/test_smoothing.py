@@ -330,9 +330,7 @@ def test_fixed_point(form, bits):
 def test_a_singular_prediction_is_refused_with_the_way_out():
     certain = LinearModel([[1]], [[1]], [[0]], [[1]], [0], [[0]])
     for form in FORMS:
-        with pytest.raises(
-            ZeroDivisionError, match=r"got a singular .*24 bits; needed pivots .* to the diagonals"
-        ):
+        with pytest.raises(ZeroDivisionError, match=r"got a singular .*24 bits; needed pivots .* to the diagonals"):
             FixedIntervalSmoother(certain, [[1], [2]], form).run(FloatFormat(2, 24))
 
 
