@@ -56,7 +56,7 @@ def negative(x):
 class Definition:
     """What IEEE 754 requires of a format: each result, and the exceptions that it raises.
 
-    Numbers are float64, which have the few digits of sums and products here, so that only quotients are Fractions.
+    Sums and products here have so few digits that float64 holds them; only quotients are Fractions.
     """
 
     def __init__(self, fmt: FloatFormat) -> None:

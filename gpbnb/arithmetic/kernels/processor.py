@@ -250,13 +250,15 @@ def _free(fmt: Any, y: Any, exact_zero: Any) -> Any:
 
 
 def _short(within: Any) -> dict[str, Any]:
+    to_even, dropped = inner(forceinline=True)(_even), inner(forceinline=True)(_dropped_binary)
+
     @inner(forceinline=True)
     def round_alone(fmt: Any, x: Any, exact_zero: Any) -> Any:
         # Fewer operations wait for each other than in `_nearest_even`; the branch keeps loops from being vectorized.
         size = abs(x)
         if (size >= fmt.gradual) & (size >= fmt.least) & (size <= fmt.largest):
-            dropped, u = np.int64(53) - fmt.precision, bits(x)
-            return from_bits((u + ((_ONE << (dropped - 1)) - 1) + ((u >> dropped) & 1)) & -(_ONE << dropped))
+            u = bits(x)
+            return from_bits(to_even(fmt, u, dropped(fmt, u), False, False))
         return within(fmt, _nearest_even(fmt, x), exact_zero)
 
     @inner(forceinline=True)
