@@ -272,7 +272,7 @@ def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000, b
         caps = _caps(given, known, most) if for_ever and given.first == 0 else None
     for _ in range(40):
         found = _disturbances(given, known, b, caps)
-        history, parts, lags = _sums(given, found, b, most, for_ever, steps, budget)
+        history, parts, lags = _sums(given, found, b, most, radius if for_ever else None, steps, budget)
         new = history.max(axis=0)
         if (new <= b).all() or not np.isfinite(new).all():
             break
@@ -359,12 +359,12 @@ def _sums(
     found: Disturbances,
     b: NDArray[np.float64],
     most: int,
-    for_ever: bool,
+    radius: float | None,
     steps: int,
     budget: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """Return bounds after each step, and their parts; the last rows are those of the period."""
-    n, part = given.program.n, _parts_of(given)
+    """Return bounds after each step, and their parts; the last rows are those of the period, if there is a radius."""
+    n, part, for_ever = given.program.n, _parts_of(given), radius is not None
     sizes = columns(found)
     used = (sizes > 0).any(axis=(0, 1))
     if for_ever and not np.isfinite(sizes).all():  # a number may leave the range of the format
@@ -377,7 +377,7 @@ def _sums(
         found.slack,
         part[used],
     )
-    scale, small = _scale(found, _radius(given) if for_ever else math.nan)
+    scale, small = _scale(found, math.nan if radius is None else radius)
     size = units_of_trace(scale)
     window = _window(given, int(used.sum()), given.first if for_ever else steps, budget)
     if not for_ever:

@@ -307,7 +307,8 @@ def _certified(matrices: tuple[Any, ...], terms: int | None) -> NDArray[np.float
     F_off += (n + 4) * 2.0**-53 * np.abs(F)
     G_off += (2 * n + 16) * 2.0**-53 * np.abs(G)
     found = np.zeros((len(starts), G.shape[1]))
-    for j in range(G.shape[1]):
+    _, different, places = np.unique(np.vstack([G, G_off]), axis=1, return_index=True, return_inverse=True)
+    for j in different:
         column, part = np.ascontiguousarray(G[None, :, j : j + 1]), np.array([LOOP])
         arrays = Columns(F[None], F_off[None], column, np.ones((1, 1)), np.ascontiguousarray(G_off[None, :, j]), part)
         sums = certify(arrays, starts, lags, 0, terms is None, End(lags, np.zeros(n), 0.0))
@@ -328,6 +329,7 @@ def _certified(matrices: tuple[Any, ...], terms: int | None) -> NDArray[np.float
         if not (rest[n:] <= known[n:] * (_SHARP / 2)).all():
             return None
         found[:, j] = known + rest
+    found = found[:, different[places.ravel()]]
     found[found > 0] += _UNDERFLOW
     if D is not None:
         found[n:] += [[above(abs(x)) for x in row] for row in exact(D)]

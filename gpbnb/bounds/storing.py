@@ -21,7 +21,8 @@ from gpbnb.bounds.envelope import largest_error, units
 def storing_errors(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the largest error of storing a number of at most each size in a format; infinite beyond its range."""
     table = units(fmt)
-    return np.array([largest_error(table, float(size)) for size in np.ravel(sizes)]).reshape(np.shape(sizes))
+    different, places = np.unique(sizes, return_inverse=True)
+    return np.array([largest_error(table, float(size)) for size in different])[places].reshape(np.shape(sizes))
 
 
 def stored_sizes(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -32,10 +33,11 @@ def stored_sizes(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> 
     """
     upwards = replace(fmt, rounding=Rounding.UP) if fmt.rounding is Rounding.STOCHASTIC else fmt
     found = []
-    for size in np.ravel(sizes):
+    different, places = np.unique(sizes, return_inverse=True)
+    for size in different:
         largest = float(size)
         if np.isfinite(size):
             with contextlib.suppress(OverflowError):
                 largest = max(largest, *(above(abs(upwards.round(sign * float(size)))) for sign in (1, -1)))
         found.append(largest)
-    return np.array(found).reshape(np.shape(sizes))
+    return np.array(found)[places].reshape(np.shape(sizes))
