@@ -20,6 +20,7 @@ from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
+from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text, rounding_named
 from gpbnb.arithmetic.search import Outcome, Search
 from gpbnb.bounds.words import WordGuarantee, bounded_rounding, largest_rounding
@@ -30,7 +31,7 @@ from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.program import innovation_program, matrices
 from gpbnb.filters.run import log_spaced, reference
-from gpbnb.filters.sections import rescaled
+from gpbnb.filters.sections import scaled
 from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable, system_inputs
 from gpbnb.filters.words import (
     WordFormats,
@@ -559,12 +560,17 @@ def _of_system(
 
 def scaled_sections(system: LinearSystem) -> LinearSystem | None:
     """Return a cascade with its sections scaled as by ``scale=True``; None if it is none at rest, or scaled already."""
-    if system.made is None or any(system.x0):
+    made = system.made
+    if made is None or made.cascade is None or any(system.x0):
         return None
-    program = system.made.program
-    inner = program.state_names[:1] == ("w1_1",)  # of the direct form II
-    coefficients = rescaled(program.coefficient_names, system.made.coefficients, inner)
-    return None if coefficients is None else LinearSystem.from_filter(replace(system.made, coefficients=coefficients))
+    try:
+        found = scaled(made.cascade.sections(made.coefficients), made.cascade.form)
+    except ValueError:  # the filter does not decay
+        return None
+    coefficients = exact([each for b, a in found for each in (*b, *a)])
+    if (coefficients == made.coefficients).all():
+        return None
+    return LinearSystem.from_filter(replace(made, coefficients=coefficients))
 
 
 def with_fraction_bits(words: WordFormats, fraction: int) -> WordFormats:
