@@ -67,7 +67,7 @@ def read_files(options: argparse.Namespace) -> CommandInput:
     OSError : a file cannot be read.
     """
     source, own = _filter(options)
-    bases = options.basis or ("emulation", "guarantee" if options.fixed else "bound")
+    bases: Sequence[Basis] = options.basis or ("emulation", "guarantee" if options.fixed else "bound")
     return CommandInput(options, source, own, bases, *_inputs(options, source.model, bases, own))
 
 
