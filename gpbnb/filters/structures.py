@@ -65,9 +65,9 @@ class Cascade(NamedTuple):
     form: str
     lengths: tuple[tuple[int, int], ...]
 
-    def sections(self, coefficients: Sequence[Fraction]) -> list[tuple[list[Fraction], list[Fraction]]]:
+    def sections(self, coefficients: NDArray[Any]) -> list[tuple[list[Fraction], list[Fraction]]]:
         """Return b and a of each section, without the leading 1 of a."""
-        values = iter(coefficients)
+        values = iter(coefficients.tolist())
         return [([*islice(values, above)], [*islice(values, below)]) for above, below in self.lengths]
 
 
@@ -312,11 +312,6 @@ def shortened(values: Sequence[Fraction]) -> list[Fraction]:
 
 
 # -- structures -------------------------------------------------------------------------------------------------------
-
-
-def direct(b: Sequence[Fraction], a: Sequence[Fraction], name: str) -> Structure:
-    """Return a direct form of a filter; for b and a, see :func:`transfer_function`."""
-    return cascade([(b, a)], name)
 
 
 def cascade(sections: Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]], name: str) -> Structure:
