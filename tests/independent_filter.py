@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 Number = tuple[int, int]
 Matrix = list[list[Number]]
@@ -39,6 +39,12 @@ class Arithmetic:
         self.ends_at_subnormal = ends_at_subnormal
         self.limit = base**digits
         self.one = (1, 0)
+
+    @classmethod
+    def of(cls, fmt: Any, ends_at_subnormal: bool = False) -> Arithmetic:
+        """The same digits, rounding and range as a format of the package."""
+        span = fmt.emin, fmt.emax, fmt.subnormal
+        return cls(fmt.base, fmt.precision, fmt.rounding.value, *span, ends_at_subnormal)
 
     # -- rounding -------------------------------------------------------------------------------------------
 
@@ -174,6 +180,18 @@ class Arithmetic:
                 c[k][j] = self.divide(s, a[k][k])
         return c
 
+    def has_positive_pivots(self, given: Matrix) -> bool:
+        """Whether elimination without exchanges meets only positive pivots."""
+        a = [list(row) for row in given]
+        for k in range(len(a)):
+            if a[k][k][0] <= 0:
+                return False
+            for i in range(k + 1, len(a)):
+                factor = self.divide(a[i][k], a[k][k])
+                for j in range(k + 1, len(a)):
+                    a[i][j] = self.subtract(a[i][j], self.multiply(factor, a[k][j]))
+        return True
+
     def factors(self, given: Matrix) -> Matrix | None:
         """U and, on its diagonal, D, of U D U'; None if the matrix is not semidefinite in this arithmetic."""
         a, n = [list(row) for row in given], len(given)
@@ -211,6 +229,12 @@ class Model(NamedTuple):
     R: list[Exact]
     x0: list[Fraction]
     P0: Exact
+
+    @classmethod
+    def of(cls, given: Any) -> Model:
+        """A model of the package in plain lists."""
+        cycles = ([matrix.tolist() for matrix in getattr(given, letter)] for letter in ("Phi", "H", "Q", "R"))
+        return cls(*cycles, given.x0.tolist(), given.P0.tolist())
 
 
 # -- storing ----------------------------------------------------------------------------------------------------------
@@ -291,22 +315,16 @@ class Filter:
             except ZeroDivisionError:
                 raise Refused from None
             for each in self.R:
-                if not self._positive_pivots(each):
+                if not fmt.has_positive_pivots(each):
                     raise Refused
         if form == "ud":
             self.UQ, self.UR = self._factored(Q, self.Q), self._factored(R, self.R)
             (self.U,) = self._factored([P0], [self.P])
 
-    def _positive_pivots(self, given: Matrix) -> bool:
-        a, fmt = [list(row) for row in given], self.fmt
-        for k in range(len(a)):
-            if a[k][k][0] <= 0:
-                return False
-            for i in range(k + 1, len(a)):
-                factor = fmt.divide(a[i][k], a[k][k])
-                for j in range(k + 1, len(a)):
-                    a[i][j] = fmt.subtract(a[i][j], fmt.multiply(factor, a[k][j]))
-        return True
+    @classmethod
+    def of(cls, given: Any, fmt: Arithmetic, form: Any) -> Filter:
+        """The filter of a model and in a form of the package."""
+        return cls(Model.of(given), fmt, form.name.lower().replace("_", " "))
 
     def _factored(self, cycle: list[Exact], stored: list[Matrix]) -> list[Matrix]:
         """Factors of all members; if some are indefinite, all variances as given are raised until none are."""

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
+from gpbnb.report.kalman.exact_step import exact_step
+from gpbnb.wordlength.fixed_point import ScaledFilter
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = (
@@ -51,4 +56,30 @@ def run(fmt, form, given=None, z=None):
     given, z = given or model(), measurements() if z is None else z
     found = Run(given, fmt, form, range(1, len(z) + 1))
     found.take(z)
+    return found
+
+
+def unscaled(made):
+    """A linear filter in its own units."""
+    n, m = made.program.n, made.program.m
+    return ScaledFilter(made, np.zeros(n, np.int64), np.zeros(m, np.int64), np.zeros((0, m)))
+
+
+def exact_steps(given, z):
+    """The steps of the filter in Fractions, with inputs and offsets: an oracle that shares no code with the runs."""
+    x, P, found = given.x0, given.P0, []
+    for k, measured in enumerate(exact(z)):
+        Phi, H, Q, R = (each[k % len(each)] for each in (given.Phi, given.H, given.Q, given.R))
+        c, d = np.array([Fraction(0)] * given.n), np.array([Fraction(0)] * given.m)
+        if given.B is not None:
+            c = c + given.B[k % len(given.B)] @ (given.u if given.u.ndim == 1 else given.u[k])
+        if given.b is not None:
+            c = c + given.b[k % len(given.b)]
+        if given.d is not None:
+            d = given.d[k % len(given.d)]
+        # inputs by hand: predict with Phi x + c through a step from Phi x + c with Phi = 1 and Q = 0
+        ahead, unit = Phi @ x + c, exact(np.eye(given.n, dtype=int))
+        step = exact_step(unit, H, Phi @ P @ Phi.T + Q, R, ahead, 0 * P, measured - d)
+        x, P = step.x, step.P
+        found.append(step)
     return found

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from fractions import Fraction
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
-from typing import Any, Protocol, Self, cast
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,11 @@ from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import check_exit, entering
 from gpbnb.arithmetic.functions import floor_divide, kept, lines, power, remainder
 from gpbnb.arithmetic.kernels.backends import Backend, Components
+from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.text import at_entry, decimal_text, in_columns, place
-from gpbnb.arithmetic.words import Layout, in_words
+from gpbnb.arithmetic.words import in_words
 
 _WIDTH = 120  # characters of a line of text
 _PLAIN = (int, float)  # not bool, which is no number here
@@ -30,57 +30,6 @@ MANY = 100
 
 class NegativeRootError(DomainError):
     """The square root of a negative number."""
-
-
-class NumberFormat(Protocol):
-    """What an array needs of its format, floating or fixed point."""
-
-    # Three properties have the type Any, because pyright accepts no cached property where a protocol types a property.
-
-    @property
-    def base(self) -> int:
-        """The number base."""
-
-    @property
-    def precision(self) -> int:
-        """Digits of the significand, or bits of the word without its sign."""
-
-    @property
-    def rounding(self) -> Rounding:
-        """Applied to every result."""
-
-    @property
-    def kernel(self) -> Any:
-        """The scalar operations, an ExactKernel."""
-
-    @property
-    def unit_roundoff(self) -> Fraction:
-        """Bound of the relative error of one rounding; fixed point has none."""
-
-    @property
-    def backend(self) -> Any:
-        """The Backend that stores the numbers of an array."""
-
-    @property
-    def exact_backend(self) -> Any:
-        """The slow backend, Exact, that can store every number."""
-
-    @property
-    def layout(self) -> Layout:
-        """How a word stores the numbers."""
-
-    @property
-    def algebra(self) -> Mapping[str, Callable[..., Any]]:
-        """What functions of ``np.linalg`` do for arrays of the format."""
-
-    def check_compiled(self) -> None:
-        """Reject a format without compiled loops."""
-
-    def round(self, value: Any) -> Fraction:
-        """Round one number."""
-
-    def array(self, values: Any) -> Any:
-        """Round numbers into an array."""
 
 
 class ComponentArray:

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic import rational
+from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS
-from gpbnb.arithmetic.making import Makes, checked_rounding
+from gpbnb.arithmetic.number_format import NumberFormat, checked_rounding
 from gpbnb.arithmetic.rounding import Limits, Rounding, Rules
 from gpbnb.arithmetic.words import FixedLayout
 
@@ -30,7 +30,7 @@ class FixedArray(FloatArray):
 
 
 @dataclass(frozen=True, init=False)
-class FixedFormat(Makes[FixedArray]):
+class FixedFormat(NumberFormat[FixedArray]):
     r"""Two's complement fixed point: multiples of :math:`2^{-f}` from :math:`-2^i` to :math:`2^i - 2^{-f}`.
 
     Parameters
@@ -60,6 +60,9 @@ class FixedFormat(Makes[FixedArray]):
     overflow: str
     seed: int
 
+    base = 2
+    algebra = linalg.NUMPY
+
     def __init__(
         self,
         integer_bits: int,
@@ -79,6 +82,7 @@ class FixedFormat(Makes[FixedArray]):
             if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
                 raise TypeError(f"{name}: got {value!r} of type {type(value).__name__}; needed an int")
             object.__setattr__(self, name, int(value))
+        object.__setattr__(self, "precision", self.integer_bits + self.fraction_bits)
         object.__setattr__(self, "rounding", checked_rounding(self.rounding))
         if not 1 <= self.precision <= LARGEST_BITS:
             raise ValueError(
@@ -87,16 +91,6 @@ class FixedFormat(Makes[FixedArray]):
             )
         if self.overflow not in _POLICIES:
             raise ValueError(f"overflow: got {self.overflow!r}; needed one of {', '.join(map(repr, _POLICIES))}")
-
-    @property
-    def base(self) -> int:
-        """The number base, 2."""
-        return 2
-
-    @property
-    def precision(self) -> int:
-        """Number of bits in the word, without the sign bit."""
-        return self.integer_bits + self.fraction_bits
 
     @property
     def unit(self) -> Fraction:
@@ -136,33 +130,3 @@ class FixedFormat(Makes[FixedArray]):
     def array(self, values: Any) -> FixedArray:
         """Round numbers into a :class:`FixedArray`; see :meth:`gpbnb.arithmetic.formats.FloatFormat.array`."""
         return FixedArray.from_values(values, self)
-
-
-def scaling(values: Any, bits: int, rounding: Rounding = Rounding.NEAREST, overflow: str = "raise") -> FixedFormat:
-    """Choose the binary point of a word so that no value overflows and no bit is wasted.
-
-    Parameters
-    ----------
-    values : numbers that occur, of any shape, such as the range of a variable in a reference run, with a margin.
-    bits : bits of the word, including its sign.
-    rounding, overflow : as for :class:`FixedFormat`.
-
-    Raises
-    ------
-    ValueError : fewer than two bits, or all values zero.
-    """
-    if bits < 2:
-        raise ValueError(f"bits: got {bits}; needed at least 2, one of them the sign")
-    largest = max(map(abs, rational.exact(values).ravel().tolist()), default=Fraction(0))
-    if not largest:
-        raise ValueError("got values that are all zero; needed at least one nonzero value; omit the variable")
-    integer_bits = largest.numerator.bit_length() - largest.denominator.bit_length()  # or one or two more
-    while True:
-        fmt = FixedFormat(integer_bits, bits - 1 - integer_bits, rounding, overflow)
-        if largest <= fmt.largest:
-            smaller = FixedFormat(integer_bits - 1, bits - integer_bits, rounding, overflow)
-            if largest > smaller.largest:
-                return fmt
-            integer_bits -= 1
-        else:
-            integer_bits += 1

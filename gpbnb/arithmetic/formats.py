@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_fraction, exact_ratio
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, kernel
-from gpbnb.arithmetic.making import Makes, checked_rounding
+from gpbnb.arithmetic.number_format import NumberFormat, checked_rounding
 from gpbnb.arithmetic.rounding import FLOAT_OVERFLOWS, Limits, Rounding, Rules, digits_text
 from gpbnb.arithmetic.words import FloatLayout
 
@@ -29,7 +30,7 @@ LARGEST_EXPONENT = 2**20
 
 
 @dataclass(frozen=True, init=False, repr=False)
-class FloatFormat(Makes[FloatArray]):
+class FloatFormat(NumberFormat[FloatArray]):
     r"""Floating-point numbers :math:`\pm.d_1 d_2 \dots d_t \times b^e`, with any exponent unless a range is given.
 
     Zero is a number of every format. Infinity, NaN and negative zero are numbers of a format with
@@ -48,8 +49,8 @@ class FloatFormat(Makes[FloatArray]):
         for a format with a range.
     largest : the largest number. By default, all its t digits are b - 1.
     seed : seed of the random numbers for stochastic rounding. Each run of a filter restarts the random numbers from the
-        seed. Operations on arrays draw from one sequence, until :meth:`~gpbnb.arithmetic.making.Makes.restart` or a run
-        of a filter restarts it.
+        seed. Operations on arrays draw from one sequence, until
+        :meth:`~gpbnb.arithmetic.number_format.NumberFormat.restart` or a run of a filter restarts it.
     overflow : what happens to a result that is beyond the largest number after rounding. "raise" raises an
         OverflowError that names the operation and the entry. "saturate" takes the largest number, with the sign of the
         result. "infinity" computes as IEEE 754 does by default, with infinity, NaN and a sign of zero; see the notes.
@@ -95,6 +96,8 @@ class FloatFormat(Makes[FloatArray]):
     given_largest: Fraction | None
     seed: int
     overflow: str
+
+    algebra = linalg.NUMPY
 
     def __init__(
         self,
@@ -308,7 +311,7 @@ class FloatFormat(Makes[FloatArray]):
 
         Raises
         ------
-        TypeError, ValueError, OverflowError : as for :meth:`~gpbnb.arithmetic.making.Makes.round`.
+        TypeError, ValueError, OverflowError : as for :meth:`~gpbnb.arithmetic.number_format.NumberFormat.round`.
 
         References
         ----------
@@ -329,13 +332,13 @@ class FloatFormat(Makes[FloatArray]):
 
         Parameters
         ----------
-        values : a number as in :meth:`~gpbnb.arithmetic.making.Makes.round`, nested lists or tuples of them, a NumPy
-            array, or a FloatArray of any format (each entry is then rounded into this one).
+        values : a number as in :meth:`~gpbnb.arithmetic.number_format.NumberFormat.round`, nested lists or tuples of
+            them, a NumPy array, or a FloatArray of any format (each entry is then rounded into this one).
 
         Raises
         ------
-        TypeError, ValueError, OverflowError : as for :meth:`~gpbnb.arithmetic.making.Makes.round`, with the entry in
-            the message; or nested lists of unequal lengths.
+        TypeError, ValueError, OverflowError : as for :meth:`~gpbnb.arithmetic.number_format.NumberFormat.round`, with
+            the entry in the message; or nested lists of unequal lengths.
         """
         return FloatArray.from_values(values, self)
 

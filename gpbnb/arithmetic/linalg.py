@@ -16,10 +16,11 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray, NumberFormat
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.exits import lifted
 from gpbnb.arithmetic.kernels.backends import Looped
 from gpbnb.arithmetic.kernels.selection import check_order
+from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.rounding import Order, Rounding, digit_unit
 
 _MOST_PRODUCTS = 1_000_000  # that pairwise and blocked sums form at once

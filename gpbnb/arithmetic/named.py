@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from gpbnb.arithmetic.array import NumberFormat
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 
 
@@ -79,7 +79,7 @@ NAMED = {
 }
 
 
-def digits(fmt: NumberFormat | FixedFormat) -> str:
+def digits(fmt: NumberFormat) -> str:
     """Name the precision of a format, as in "4 decimal digits" or "24 bits"."""
     return digits_text(fmt.precision, fmt.base)
 
@@ -100,7 +100,7 @@ def rounding_text(rounding: Rounding) -> str:
     return _ROUNDINGS[rounding]
 
 
-def arithmetic(fmt: NumberFormat | FixedFormat) -> str:
+def arithmetic(fmt: NumberFormat) -> str:
     """Name digits, rounding and range of a format, as in "24 bits, ties to even, exponents -126 to 127"."""
     rounding = "" if fmt.rounding is Rounding.NEAREST else f", {rounding_text(fmt.rounding)}"
     fraction = getattr(fmt, "fraction_bits", None)

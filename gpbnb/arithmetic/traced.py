@@ -208,7 +208,7 @@ class TracedFormat:
     def made(self, places: Places) -> TracedArray:
         """Return an array of places."""
         made = object.__new__(TracedArray)
-        made._format, made.backend, made.components = self, self._recording, (places,)
+        made._format, made.backend, made.components = cast(Any, self), self._recording, (places,)
         return made
 
     def array(self, values: Any) -> TracedArray:

@@ -50,6 +50,7 @@ _UP = 1 + 2.0**-50
 _SUMS = 1 + 1e-10
 """Factor that exceeds the effect of float64 roundings on sums and products of matrices with entries of one sign."""
 _BITS = 160
+_TRIALS = 60  # sets
 _SLOWEST, _SMALL = 0.9999, 1e-5
 """Closed loops with a larger spectral radius are not tried. Powers are computed until they are about this small."""
 
@@ -180,16 +181,13 @@ class _Phase:
     after: Any
 
 
-def enclose(
-    stored: LinearModel, run: Run, fmt: FloatFormat | FixedFormat, form: Form, trials: int = 60
-) -> Enclosure | None:
+def enclose(stored: LinearModel, run: Run, fmt: FloatFormat | FixedFormat, form: Form) -> Enclosure | None:
     """Find a step from which the computed covariance stays in a set for ever, and enclose its gains.
 
     Parameters
     ----------
     stored : the model, rounded to the format.
     run : a run of the filter with every step as a checkpoint.
-    trials : number of sets to try.
 
     Returns
     -------
@@ -203,14 +201,14 @@ def enclose(
         return None
     before, ctx.prec = ctx.prec, _BITS
     try:
-        return _enclose(stored, run, float(fmt.unit_roundoff) * _UP, form, start, trials)
+        return _enclose(stored, run, float(fmt.unit_roundoff) * _UP, form, start)
     except ZeroDivisionError:  # the set contains a covariance whose innovation has no variance
         return None
     finally:
         ctx.prec = before
 
 
-def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int, trials: int) -> Enclosure | None:
+def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int) -> Enclosure | None:
     cycle = stored.cycle
     phases = _phases(stored, start)
     powers = _powers(phases)
@@ -223,7 +221,7 @@ def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int,
     begun = [_largest([M @ first @ M.T for M in each.products]) for each in powers]
     B = [2 * each for each in begun]
     given = [[_enclosed(each, unit) for each in phase.given] for phase in phases]
-    for _ in range(trials):
+    for _ in range(_TRIALS):
         found = [_disturbed(form, phase, each, b, unit) for phase, each, b in zip(phases, given, B, strict=True)]
         W = [each.covariance + moved[j] for j, each in enumerate(found)]
         new = []

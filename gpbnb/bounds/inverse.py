@@ -30,11 +30,12 @@ import flint
 import numpy as np
 
 from gpbnb.arithmetic import linalg, search
-from gpbnb.arithmetic.array import FloatArray, NumberFormat
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounds import above, column_sum, gamma, gamma_probabilistic
 from gpbnb.arithmetic.conversion import exact_fraction
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.linalg import LU
+from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
 from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text
 
@@ -67,7 +68,7 @@ def wilkinson(factors: LU, x: FloatArray) -> float:
     norm = float(column_sum(abs(x.to_float())))
     largest = float(np.max(abs(factors.lower.to_float()))) * float(np.max(abs(factors.upper.to_float())))
     g = _count(n, x.format) * n * n * largest * norm
-    return _solved(norm * g, g, n)
+    return _solved(norm * g, g, x)
 
 
 def higham(factors: LU, x: FloatArray) -> float:
@@ -136,14 +137,15 @@ def _from_factors(factors: LU, x: FloatArray, weight: float) -> float:
     rows = np.empty_like(product)
     rows[factors.permutation] = product
     g = weight * (rows @ sizes)
-    return _solved(float(column_sum(sizes @ g)), float(column_sum(g)), len(x))
+    return _solved(float(column_sum(sizes @ g)), float(column_sum(g)), x)
 
 
-def _solved(first: float, ratio: float, n: int) -> float:
+def _solved(first: float, ratio: float, x: FloatArray) -> float:
     """Return first / (1 - ratio), rounded up; no number here has passed through more than 8n roundings of float64."""
-    slack = 1 + 16 * n * 2.0**-53
+    slack = 1 + 16 * len(x) * 2.0**-53
     if not ratio * slack < 1:
-        raise ValueError(f"‖G‖ must be below 1 to prove a bound; got {ratio:.3g}. Use more digits.")
+        more = digit_unit(x.format.base)
+        raise ValueError(f"‖G‖ must be below 1 to prove a bound; got {ratio:.3g}. Use more {more}.")
     return first * slack / (1 - ratio * slack) * slack
 
 

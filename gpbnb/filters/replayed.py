@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -50,10 +51,52 @@ _CODES = {
 }
 _KINDS = (Binary, Hexadecimal, Decimal, ShortDecimal, DoubleDouble, LimitedDecimal, Hardware32, Hardware64)
 
-# Seconds that a process replays in one kind of arithmetic before it compiles the loops, or loads compiled loops.
-_limits = [3.0, 0.1]
-_spent: dict[Any, float] = {}  # seconds
-_compiled: dict[Any, bool] = {}  # whether the loops of a kind of arithmetic need only be loaded
+
+class ReplayBudget:
+    """The time that a process may replay in each kind of arithmetic, before it compiles the loops, or loads them.
+
+    Parameters
+    ----------
+    before_compiling, before_loading : seconds, in arithmetic whose loops must be compiled, and only be loaded.
+    """
+
+    def __init__(self, before_compiling: float = 3.0, before_loading: float = 0.1) -> None:
+        self._limits = {False: before_compiling, True: before_loading}
+        self._compiled = dict[Any, bool]()
+        self._spent = dict[Any, float]()
+        self._closed = 0  # blocks that take every step in the compiled loops
+        self._lock = threading.Lock()
+
+    def allows(self, kind: Any, seconds: float, ready: Callable[[], bool]) -> bool:
+        """Whether so many seconds are left, which are then spent; once they are not, none is left.
+
+        Parameters
+        ----------
+        ready : whether the loops of this kind are compiled already; asked once.
+        """
+        if self._closed:
+            return False
+        if kind not in self._compiled:
+            self._compiled[kind] = ready()
+        with self._lock:
+            spent = self._spent.get(kind, 0.0) + seconds
+            enough = spent <= self._limits[self._compiled[kind]]
+            self._spent[kind] = spent if enough else math.inf
+        return enough
+
+    @contextlib.contextmanager
+    def closed(self) -> Iterator[None]:
+        """Allow no replay within a ``with`` block, in any thread; time that is left is kept."""
+        with self._lock:
+            self._closed += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._closed -= 1
+
+
+BUDGET = ReplayBudget()
 
 
 class _Listed(NamedTuple):
@@ -93,13 +136,7 @@ def replay_pays(
         return False
     if x.shape[1] != 1 or model.increment.shape[0] or size > LONGEST:
         return False
-    if kind not in _compiled:
-        _compiled[kind] = ready()
-    spent = _spent.get(kind, 0.0) + len(z) * (_PER_STEP + size * _PER_OPERATION)
-    limit = _limits[_compiled[kind]]
-    if limit >= 0:
-        _spent[kind] = spent if spent <= limit else math.inf
-    return spent <= limit
+    return BUDGET.allows(kind, len(z) * (_PER_STEP + size * _PER_OPERATION), ready)
 
 
 def advance_by_replay(
@@ -156,14 +193,9 @@ def advance_by_replay(
     return True
 
 
-@contextlib.contextmanager
-def only_compiled() -> Iterator[None]:
+def only_compiled() -> contextlib.AbstractContextManager[None]:
     """Take every step in the compiled loops within a ``with`` block."""
-    before, _limits[:] = _limits.copy(), (-1.0, -1.0)
-    try:
-        yield
-    finally:
-        _limits[:] = before
+    return BUDGET.closed()
 
 
 def _kind(tag: Any) -> Any:

@@ -7,7 +7,6 @@ silently: pairing and order are arguments.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -121,7 +120,7 @@ def ordered(sections: list[Coefficients], order: Any) -> list[Coefficients]:
     return [sections[i] for i in at]
 
 
-def scaled(sections: Sequence[Coefficients], inner: bool = False) -> list[Coefficients]:
+def scaled(sections: Sequence[Coefficients], form: str) -> list[Coefficients]:
     """Multiply sections by powers of two, so that numbers between them stay within 1 for inputs within 1.
 
     The peak gain from the input to the output of each section but the last is then at most 1 and more than 1/2. The
@@ -129,7 +128,8 @@ def scaled(sections: Sequence[Coefficients], inner: bool = False) -> list[Coeffi
 
     Parameters
     ----------
-    inner : whether the gain to the delayed values of the next section counts as well, as the direct form II needs.
+    form : the direct form of the sections; in the direct form II, the gain to the delayed values of the next section
+        counts as well.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def scaled(sections: Sequence[Coefficients], inner: bool = False) -> list[Coeffi
     for i, (b, a) in enumerate(sections[:-1]):
         response = _filtered(response, b, a)
         reached = [response]
-        if inner:
+        if form == "direct form II":
             reached.append(_filtered(response, [Fraction(1)], sections[i + 1][1]))
         largest = max(float(np.abs(each).sum()) for each in reached)
         power = math.ceil(math.log2(largest)) if largest else 0
@@ -149,28 +149,6 @@ def scaled(sections: Sequence[Coefficients], inner: bool = False) -> list[Coeffi
         moved = power
     b, a = sections[-1]
     return [*found, ([each * Fraction(2) ** moved for each in b], [*a])]
-
-
-def rescaled(names: Sequence[str], coefficients: NDArray[Any], inner: bool) -> NDArray[Any] | None:
-    """Return the coefficients of a cascade after :func:`scaled`; None if they are no cascade's, or stay the same.
-
-    Parameters
-    ----------
-    names : names of the coefficients, as of :func:`gpbnb.filters.structures.cascade`: b0_1, b1_1, …, a1_1, …, b0_2, ….
-    inner : as of :func:`scaled`.
-    """
-    sections = dict[str, Coefficients]()
-    for name, value in zip(names, coefficients.tolist(), strict=False):
-        if not (of := re.fullmatch(r"([ab])\d+_(\d+)", name)):
-            return None
-        b, a = sections.setdefault(of[2], ([], []))
-        (b if of[1] == "b" else a).append(value)
-    try:
-        found = scaled([*sections.values()], inner)
-    except (ValueError, IndexError):  # the filter does not decay, or has no sections
-        return None
-    made = exact([each for b, a in found for each in (*b, *a)])
-    return None if (made == coefficients).all() else made
 
 
 def _length(sections: Sequence[Coefficients]) -> int:

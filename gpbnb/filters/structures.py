@@ -34,6 +34,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,6 +53,24 @@ LONGEST = 512
 """Bits of numerator and denominator together up to which a computed coefficient is kept as it is."""
 
 
+class Cascade(NamedTuple):
+    """How the coefficients of a cascade belong to its sections.
+
+    Parameters
+    ----------
+    form : the direct form of the sections.
+    lengths : for each section, the numbers of its coefficients b and of its coefficients a.
+    """
+
+    form: str
+    lengths: tuple[tuple[int, int], ...]
+
+    def sections(self, coefficients: NDArray[Any]) -> list[tuple[list[Fraction], list[Fraction]]]:
+        """Return b and a of each section, without the leading 1 of a."""
+        values = iter(coefficients.tolist())
+        return [([*islice(values, above)], [*islice(values, below)]) for above, below in self.lengths]
+
+
 class Structure(NamedTuple):
     """One step of a filter in a structure.
 
@@ -59,10 +78,12 @@ class Structure(NamedTuple):
     ----------
     program : operations of the step; the outputs follow the states.
     coefficients : (c,), the exact design values; they are rounded when a format stores them.
+    cascade : the sections of a cascade; None for another structure.
     """
 
     program: Program
     coefficients: NDArray[Any]
+    cascade: Cascade | None = None
 
 
 class Section(NamedTuple):
@@ -293,11 +314,6 @@ def shortened(values: Sequence[Fraction]) -> list[Fraction]:
 # -- structures -------------------------------------------------------------------------------------------------------
 
 
-def direct(b: Sequence[Fraction], a: Sequence[Fraction], name: str) -> Structure:
-    """Return a direct form of a filter; for b and a, see :func:`transfer_function`."""
-    return cascade([(b, a)], name)
-
-
 def cascade(sections: Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]], name: str) -> Structure:
     """Return sections in a row, each in the direct form with this name; the output of one is the input of the next."""
     form = DIRECT[name]
@@ -318,7 +334,8 @@ def cascade(sections: Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]], n
         states += [each + end for each in own]
         at, first = at + len(own), first + len(numbers)
     program = build.finish([*moved, value], len(coefficients), 1, [*states, "y"], labels)
-    return Structure(program, exact(coefficients))
+    lengths = tuple((len(b), len(a)) for b, a in padded)
+    return Structure(program, exact(coefficients), Cascade(name, lengths) if len(padded) > 1 else None)
 
 
 def lattice(b: Sequence[Fraction], a: Sequence[Fraction]) -> Structure:

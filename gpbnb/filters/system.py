@@ -33,6 +33,7 @@ from gpbnb.filters.structures import (
     CASCADES,
     DIRECT,
     SUMS,
+    Cascade,
     Controller,
     Structure,
     balanced,
@@ -66,6 +67,7 @@ class LinearFilter:
     program : operations of a step.
     coefficients : (c,), the exact design values; they are rounded when a format stores them.
     name : name in tables.
+    cascade : its sections, if it is a cascade.
 
     Raises
     ------
@@ -76,6 +78,7 @@ class LinearFilter:
     program: Program
     coefficients: NDArray[Any]
     name: str = "a linear filter"
+    cascade: Cascade | None = None
 
     def __post_init__(self) -> None:
         checked_name(self.name)
@@ -157,7 +160,7 @@ def controller(leak: Any, Ki: Any, Kp: Any, Kd: Any, name: str = "a PID controll
 
 
 def _named(made: Structure, name: str) -> LinearFilter:
-    return LinearFilter(*made, name)
+    return LinearFilter(made.program, made.coefficients, name, made.cascade)
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -375,7 +378,7 @@ class LinearSystem:
             return cls.from_coefficients(b, a, found, name=name)
         sections = repaired(sections, pairing, order)
         if scale:
-            sections = scaled(sections, inner=form == "direct form II")
+            sections = scaled(sections, form)
         return cls.from_filter(_named(cascade(sections, form), f"cascade of {form}" if name is None else name))
 
     @classmethod

@@ -218,14 +218,13 @@ class IntegerRun(NamedTuple):
         return np.stack([high * unit, low * unit], axis=-1)
 
 
-def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats, x0: Any = None) -> IntegerRun:
+def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats) -> IntegerRun:
     """Run a filter on integers.
 
     Parameters
     ----------
-    given : the filter; a system starts from its own x0.
+    given : the filter, which starts from zeros; a system starts from its own x0.
     u : (steps, m), inputs; each is rounded into the format of the data.
-    x0 : (n,), the first state of a filter, with its outputs; by default zeros.
 
     Raises
     ------
@@ -236,7 +235,7 @@ def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats, x0
         start = np.concatenate([given.x0, exact([0] * given.p)])
         u, given = system_inputs(given, u), given.as_filter()
     else:
-        start = exact([0] * given.program.n if x0 is None else x0)
+        start = exact([0] * given.program.n)
     made = integer_program(given, words)
     data = words.data
     return IntegerRun(run_integers(made, integers_of(u, data), integers_of(start[None], data)[0]), data.unit)

@@ -17,10 +17,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         given = read(arguments)
         # These imports take a second, and help and refusals need none of them.
-        from gpbnb.wordlength.running import answer, certificate, write, write_code_of
+        from gpbnb.wordlength.running import answer, certificate, read_files, write, write_code_of
 
-        report = answer(given, command, lambda text: print(text, file=sys.stderr, flush=True))
-        proof = certificate(given, report) if given.certificate else ""
+        asked = read_files(given)
+        report = answer(asked, command, lambda text: print(text, file=sys.stderr, flush=True))
+        proof = certificate(asked, report) if given.certificate else ""
     except (ValueError, OSError, ArithmeticError, ImportError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2
@@ -36,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             replace_file(given.certificate, proof.encode())
         option = f"--code {given.code}"
         if given.code and report.met:
-            print("code:", *write_code_of(given, report.structure))
+            print("code:", *write_code_of(asked, report.structure))
         elif given.code:
             print(f"{program}: no code, since no format meets the tolerance", file=sys.stderr)
     except (ValueError, ArithmeticError) as error:

@@ -20,6 +20,7 @@ from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
+from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text, rounding_named
 from gpbnb.arithmetic.search import Outcome, Search
 from gpbnb.bounds.words import WordGuarantee, bounded_rounding, largest_rounding
@@ -30,7 +31,7 @@ from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.program import innovation_program, matrices
 from gpbnb.filters.run import log_spaced, reference
-from gpbnb.filters.sections import rescaled
+from gpbnb.filters.sections import scaled
 from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable, system_inputs
 from gpbnb.filters.words import (
     WordFormats,
@@ -42,7 +43,7 @@ from gpbnb.filters.words import (
 )
 from gpbnb.wordlength.precision import checked_question, recorded_strategy
 from gpbnb.wordlength.recursion import Recursion, recursion_strategy
-from gpbnb.wordlength.requirement import Strategy, checked_tolerance, largest_ratio
+from gpbnb.wordlength.requirement import Strategy, WordlengthAnswer, checked_tolerance, largest_ratio
 from gpbnb.wordlength.system import weak_evidence
 
 Basis = Literal["emulation", "guarantee"]
@@ -73,30 +74,32 @@ class ScaledFilter:
 
 
 @dataclass(frozen=True)
-class FixedAnswer:
+class FixedAnswer(WordlengthAnswer):
     """The smallest number of fraction bits that meets a tolerance.
 
     Parameters
     ----------
-    fmt : the format; None if no format tried meets the tolerance.
-    tried : fraction bits, and largest error or bound / tolerance, infinite if a number overflows.
-    why : why the next smaller format was rejected.
-    words : the formats of data, coefficients and sums; None for a function or a Kalman filter, or if there is no
-        answer.
     steps : number of steps for which a guarantee holds, if the system never forgets its errors; None if it holds for
         ever.
-    warnings : as of a :class:`gpbnb.wordlength.requirement.Requirement`.
+    tried : fraction bits, and largest error or bound / tolerance.
+    words : the formats of data, coefficients and sums; None for a function or a Kalman filter, or if there is no
+        answer.
     advice : what scaling the sections of a cascade would save; empty if it saves nothing.
     """
 
     fmt: FixedFormat | MaybeNone
-    basis: Basis
-    tried: tuple[tuple[int, float], ...]
-    why: str
     words: WordFormats | None = None
-    steps: int | None = None
-    warnings: tuple[str, ...] = ()
     advice: str = ""
+
+    @property
+    def digits(self) -> int | None:
+        """Fraction bits of the format; None without a format."""
+        return None if self.fmt is None else self.fmt.fraction_bits
+
+    @property
+    def stored(self) -> WordFormats | None:
+        """The formats in which the answer stores a filter."""
+        return self.words
 
     def __str__(self) -> str:
         end = "".join(f"; {note}" for note in (self.advice, *self.warnings) if note)
@@ -144,12 +147,6 @@ def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilt
     return ScaledFilter(made, state, seen, gain.astype(np.float64))
 
 
-def unscaled(made: LinearFilter) -> ScaledFilter:
-    """Return a linear filter in its own units."""
-    n, m = made.program.n, made.program.m
-    return ScaledFilter(made, np.zeros(n, np.int64), np.zeros(m, np.int64), np.zeros((0, m)))
-
-
 def integer_bits(given: ScaledFilter, z: Any) -> int:
     """Return the number of integer bits that all intermediate values of a run need, as advice for scaling."""
     scaled = np.asarray(z, dtype=np.float64) / 2.0 ** given.measurement.astype(float)
@@ -184,24 +181,18 @@ def emulated(
     return errors * 2.0 ** given.state.astype(float)
 
 
-def guaranteed(
-    given: ScaledFilter, fmt: FixedFormat, coefficient_bits: int = COEFFICIENT_BITS, wide: bool = False
+def bound_per_unit(
+    given: ScaledFilter, coefficient_bits: int = COEFFICIENT_BITS, wide: bool = False
 ) -> NDArray[np.float64]:
-    """Bound the error of each state, (n,), in the units of the model, for ever and for all measurements.
+    """Bound the error of each state, (n,), in the units of the model, for ever, if no rounding errs by more than one.
 
-    The bound holds as long as nothing overflows. For the parameters, see :func:`emulated`.
+    The bound is proportional to the largest error of a rounding. It holds for all measurements, as long as nothing
+    overflows. For the parameters, see :func:`emulated`.
 
     Raises
     ------
     ValueError : the filter is not stable.
     """
-    return bound_per_unit(given, coefficient_bits, wide) * (largest_rounding(fmt.rounding) * float(fmt.unit))
-
-
-def bound_per_unit(
-    given: ScaledFilter, coefficient_bits: int = COEFFICIENT_BITS, wide: bool = False
-) -> NDArray[np.float64]:
-    """Return the bound of :func:`guaranteed` for rounding errors of at most one; the bound is proportional to them."""
     ones = FixedFormat(1, 0, Rounding.DOWN)
     made = integer_program(given.filter, _words(given.filter, ones, coefficient_bits, wide))
     return np.asarray(bounded_rounding(made) * 2.0 ** given.state.astype(float))
@@ -284,7 +275,7 @@ def required_fraction_bits(
     found = Search(strategy.error, strategy.like, (), largest=largest, least=strategy.least)
     ratios = dict(found.tried)
     if cause := strategy.cause():
-        return FixedAnswer(None, basis, (), cause)
+        return FixedAnswer(None, basis, None, (), cause)
 
     def rejection(bits: int) -> str:
         refused = found.reasons[bits]
@@ -295,12 +286,12 @@ def required_fraction_bits(
         blame = strategy.blame(largest)
         why = blame or f"{rejection(largest)}; {largest} fraction bits are the most tried"
         advice = "" if blame else strategy.advice(None)
-        return FixedAnswer(None, basis, found.tried, why, None, strategy.steps, advice=advice)
+        return FixedAnswer(None, basis, strategy.steps, found.tried, why, advice=advice)
     bits = found.fmt.fraction_bits
     why = rejection(bits - 1 if bits > strategy.least else min(bits + 1, largest))
-    words = strategy.words(found.fmt)
+    words, warnings = strategy.words(found.fmt), strategy.warnings()
     fmt = found.fmt if words is None else words.data
-    return FixedAnswer(fmt, basis, found.tried, why, words, strategy.steps, strategy.warnings(), strategy.advice(fmt))
+    return FixedAnswer(fmt, basis, strategy.steps, found.tried, why, warnings, words, strategy.advice(fmt))
 
 
 def words_error(
@@ -559,12 +550,17 @@ def _of_system(
 
 def scaled_sections(system: LinearSystem) -> LinearSystem | None:
     """Return a cascade with its sections scaled as by ``scale=True``; None if it is none at rest, or scaled already."""
-    if system.made is None or any(system.x0):
+    made = system.made
+    if made is None or made.cascade is None or any(system.x0):
         return None
-    program = system.made.program
-    inner = program.state_names[:1] == ("w1_1",)  # of the direct form II
-    coefficients = rescaled(program.coefficient_names, system.made.coefficients, inner)
-    return None if coefficients is None else LinearSystem.from_filter(replace(system.made, coefficients=coefficients))
+    try:
+        found = scaled(made.cascade.sections(made.coefficients), made.cascade.form)
+    except ValueError:  # the filter does not decay
+        return None
+    coefficients = exact([each for b, a in found for each in (*b, *a)])
+    if (coefficients == made.coefficients).all():
+        return None
+    return LinearSystem.from_filter(replace(made, coefficients=coefficients))
 
 
 def with_fraction_bits(words: WordFormats, fraction: int) -> WordFormats:

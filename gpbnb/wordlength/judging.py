@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, cast
+from dataclasses import dataclass
+from typing import Any, cast
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -20,6 +21,7 @@ from gpbnb.wordlength.requirement import (
     Basis,
     LastingBound,
     Strategy,
+    WordlengthAnswer,
     checked_tolerance,
     evidence,
     without_evidence,
@@ -27,24 +29,23 @@ from gpbnb.wordlength.requirement import (
 from gpbnb.wordlength.system import EmulatedSystem, system_strategy
 
 
-class Judgement(NamedTuple):
+@dataclass(frozen=True)
+class Judgement(WordlengthAnswer):
     """Whether a format meets a tolerance.
 
     Parameters
     ----------
-    ratio : largest error or bound / tolerance; infinite if there is none.
-    why : why it is infinite.
     ends : whether a guarantee holds for the steps only, because there is none for ever.
-    warnings : as of a :class:`gpbnb.wordlength.requirement.Requirement`.
     """
 
     fmt: FloatFormat | FixedFormat
-    basis: Basis
     steps: int
-    ratio: float
-    why: str
     ends: bool = False
-    warnings: tuple[str, ...] = ()
+
+    @property
+    def ratio(self) -> float:
+        """Largest error or bound / tolerance; infinite if there is none."""
+        return self.tried[0][1]
 
     @property
     def met(self) -> bool:
@@ -80,7 +81,7 @@ def judge(
     asked = Asked(steps, basis, kind, None, False)
     if isinstance(model, LinearModel) and basis in ("emulation", "bound"):
         (found,) = survey_formats(model, z, tolerance, [kind], form_named(form), basis)
-        return Judgement(fmt, basis, steps, *found)
+        return Judgement(fmt, basis, steps, ((fmt.precision, found.ratio),), found.why)
     strategy: Strategy
     if isinstance(model, LinearSystem):
         strategy = system_strategy(model, asked, tolerance, z, within)
@@ -96,4 +97,4 @@ def judge(
         ended = later.error(kind)
         found, ends = (found, ends) if math.isinf(ended.ratio) else (ended, True)
     warnings = strategy.warnings() if isinstance(strategy, EmulatedSystem) else ()
-    return Judgement(fmt, basis, steps, *found, ends, warnings)
+    return Judgement(fmt, basis, steps, ((fmt.precision, found.ratio),), found.why, warnings, ends)

@@ -30,12 +30,12 @@ from gpbnb.wordlength.blocks import (
     required_block_precisions,
     required_word_formats,
 )
-from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, FixedAnswer, required_fraction_bits
+from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.judging import Judgement, judge
+from gpbnb.wordlength.judging import judge
 from gpbnb.wordlength.precision import largest_errors, required_precision
 from gpbnb.wordlength.ranges import binary_ranges
-from gpbnb.wordlength.requirement import Basis, Requirement
+from gpbnb.wordlength.requirement import Basis, WordlengthAnswer
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms that a report compares; the requested form comes first."""
@@ -218,7 +218,7 @@ class Question:
             )
         return self.z
 
-    def answer(self, part: _Part, z: Any, progress: bool = False) -> Requirement | Judgement | FixedAnswer:
+    def answer(self, part: _Part, z: Any, progress: bool = False) -> WordlengthAnswer:
         """Answer one of the single questions, by a search or by judging the one format."""
         if self.fixed and isinstance(part.model, LinearSystem):
             basis = cast(FixedBasis, part.basis)
@@ -290,7 +290,7 @@ def study(
     OverflowError : for a reason given there.
     """
     parts, z = asked.parts(), asked.measured()
-    found: list[tuple[_Part, Requirement | Judgement | FixedAnswer]] = []
+    found: list[tuple[_Part, WordlengthAnswer]] = []
     for part in parts:
         tell(f"{part.label} …")
         answer = asked.answer(part, z, progress)
@@ -301,7 +301,7 @@ def study(
     first, main = _fewest(found) if asked.choose else found[0]
     if (blocks := asked.blocks(z, first.structure)) is not None:
         tell(f"blocks: {blocks}")
-    met = _met(main)
+    met = main.met
     stored = _stored(asked.structures.get(first.structure), main) if met else ""
     if stored:
         tell(f"{first.structure}: {stored}")
@@ -313,7 +313,7 @@ def study(
     return Report(
         name=model.name,
         kind="Kalman filter" if is_filter else "linear system",
-        digits=_digits(main) if met else None,
+        digits=main.digits if met else None,
         text=f"{first.structure}: {main}" if len(asked.structures) > 1 else str(main),
         base=asked.base if fmt is None else fmt.base,
         rounding=str(asked.rounding) if fmt is None else fmt.rounding.value,
@@ -340,9 +340,9 @@ def study(
     )
 
 
-def _stored(system: LinearSystem | None, answer: Requirement | Judgement | FixedAnswer) -> str:
+def _stored(system: LinearSystem | None, answer: WordlengthAnswer) -> str:
     """Return in words what storing the coefficients does to a linear system at an answer; empty for another model."""
-    fmt = answer.words if isinstance(answer, FixedAnswer) else answer.fmt
+    fmt = answer.stored
     if system is None or fmt is None or not system.as_filter().program.is_linear:
         return ""
     try:
@@ -351,28 +351,21 @@ def _stored(system: LinearSystem | None, answer: Requirement | Judgement | Fixed
         return ""
 
 
-def _met(answer: Requirement | Judgement | FixedAnswer) -> bool:
-    return answer.met if isinstance(answer, Judgement) else answer.fmt is not None
-
-
 def _fewest(
-    found: Sequence[tuple[_Part, Requirement | Judgement | FixedAnswer]],
-) -> tuple[_Part, Requirement | Judgement | FixedAnswer]:
+    found: Sequence[tuple[_Part, WordlengthAnswer]],
+) -> tuple[_Part, WordlengthAnswer]:
     """Return the answer with the fewest digits on the first basis, in fixed point with the shortest word.
 
     Among equals, it is the one with the smallest error; the first of all if none is met.
     """
     of_basis = [(part, each) for part, each in found if part.basis == found[0][0].basis]
-    met = [(part, each) for part, each in of_basis if _met(each)]
+    met = [(part, each) for part, each in of_basis if each.met]
 
-    def cost(pair: tuple[_Part, Requirement | Judgement | FixedAnswer]) -> tuple[float, ...]:
+    def cost(pair: tuple[_Part, WordlengthAnswer]) -> tuple[float, ...]:
         answer = pair[1]
-        if isinstance(answer, Judgement):
-            return (answer.ratio,)
-        digits = _digits(answer)
-        if answer.fmt is None or digits is None:
+        if answer.fmt is None or answer.digits is None:
             return ()
-        return answer.fmt.precision, dict(answer.tried)[digits]
+        return answer.fmt.precision, dict(answer.tried)[answer.digits]
 
     return min(met or of_basis[:1], key=cost)
 
@@ -422,20 +415,9 @@ def _finite(number: float) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _digits(answer: Requirement | Judgement | FixedAnswer) -> int | None:
-    """Return digits, or in fixed point fraction bits."""
-    if isinstance(answer, FixedAnswer):
-        return None if answer.fmt is None else answer.fmt.fraction_bits
-    return None if answer.fmt is None else answer.fmt.precision
-
-
-def _plain(label: str, answer: Requirement | Judgement | FixedAnswer) -> Answer:
-    if isinstance(answer, Judgement):
-        digits = answer.fmt.precision
-        ratio = ((digits, _finite(answer.ratio)),)
-        return Answer(label, answer.basis, digits if answer.met else None, str(answer), ratio)
+def _plain(label: str, answer: WordlengthAnswer) -> Answer:
     tried = tuple((digits, _finite(ratio)) for digits, ratio in answer.tried)
-    return Answer(label, answer.basis, _digits(answer), str(answer), tried)
+    return Answer(label, answer.basis, answer.digits if answer.met else None, str(answer), tried)
 
 
 # -- the page -------------------------------------------------------------------------------------------------

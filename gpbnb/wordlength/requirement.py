@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.conversion import MaybeNone
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.arithmetic.search import Outcome, Search
 from gpbnb.filters.array_forms import AnyForm
+from gpbnb.filters.words import WordFormats
 
 ANY_BINARY = FloatFormat(2, 2)
 """A binary format; its precision does not matter."""
@@ -28,16 +30,56 @@ Basis = Literal["emulation", "bound", "guarantee", "probable"]
 
 
 @dataclass(frozen=True)
-class Requirement:
+class WordlengthAnswer(ABC):
+    """The smallest format that meets a tolerance, or whether one does, with the basis of this answer.
+
+    Parameters
+    ----------
+    fmt : the format; None if no format that was tried meets the tolerance.
+    basis : "emulation", for the observed errors with these measurements; or "bound", for the largest possible errors.
+    steps : steps of the filter.
+    tried : digits, and largest error or bound / tolerance over states and steps; infinite if the run stopped, a number
+        overflowed, a variance was no longer positive, or no bound exists.
+    why : the reason why an error is infinite, or why the next smaller format was rejected.
+    warnings : reasons why an observed answer may not hold for other inputs; see
+        :func:`gpbnb.wordlength.system.weak_evidence`.
+    """
+
+    fmt: FloatFormat | FixedFormat | MaybeNone
+    basis: Basis
+    steps: int | None
+    tried: tuple[tuple[int, float], ...]
+    why: str = ""
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def met(self) -> bool:
+        """Whether the format meets the tolerance."""
+        return self.fmt is not None
+
+    @property
+    def digits(self) -> int | None:
+        """Digits of the format, as `tried` counts them; None without a format."""
+        return None if self.fmt is None else self.fmt.precision
+
+    @property
+    def stored(self) -> FloatFormat | FixedFormat | WordFormats | None:
+        """The format or formats in which the answer stores a filter."""
+        return self.fmt
+
+    @abstractmethod
+    def __str__(self) -> str:
+        """Say the answer in words."""
+
+
+@dataclass(frozen=True)
+class Requirement(WordlengthAnswer):
     """The smallest precision that meets a tolerance, and the basis of this answer.
 
     Parameters
     ----------
     fmt : None if no precision up to the limit of the search meets the tolerance.
-    basis : "emulation", for the observed errors with these measurements; or "bound", for the largest possible errors.
-    steps : steps of the filter.
-    tried : precision, and largest error / tolerance over states and steps; infinite if the run stopped, a
-        variance was no longer positive, or no bound exists.
+    basis, steps, tried, warnings : as of a :class:`WordlengthAnswer`.
     why : the reason why an error is infinite, for the largest precision at which it is infinite; empty if all errors
         are finite. The answer shows this reason if it prevented a smaller answer.
     form : form of the filter.
@@ -52,16 +94,11 @@ class Requirement:
     processors : the largest error / tolerance of a run in binary32, and in binary64 if binary32 has too few bits or
         misses the tolerance. Empty if no run was made: in another base, with directed rounding or a given range, and
         for bounds, which hold for ties to even, too.
-    warnings : reasons why an observed answer may not hold for other inputs; see
-        :func:`gpbnb.wordlength.system.weak_evidence`.
     base : base of the formats tried.
     """
 
     fmt: FloatFormat | MaybeNone
-    basis: Basis
     steps: int
-    tried: tuple[tuple[int, float], ...]
-    why: str = ""
     form: AnyForm | None = None
     irregular: tuple[int, ...] = ()
     advice: str = ""
@@ -71,13 +108,12 @@ class Requirement:
     ends: bool = False
     untraced: str = ""
     processors: tuple[tuple[str, float], ...] = ()
-    warnings: tuple[str, ...] = ()
     base: int = 2
 
     @property
     def precision(self) -> int | MaybeNone:
         """Digits of the answer, or None."""
-        return None if self.fmt is None else self.fmt.precision
+        return self.digits
 
     def __str__(self) -> str:
         notes, base = [*self.repairs], self.base if self.fmt is None else self.fmt.base
@@ -239,30 +275,30 @@ class Asked(NamedTuple):
         cause: str = "",
         ends: bool = False,
         untraced: str = "",
+        warnings: tuple[str, ...] = (),
     ) -> Requirement:
         """Return the result of a search as the answer."""
         if found.undecided and not advice:
             reason = found.reasons[found.undecided[-1]]
             undecided = digits_text(listed(found.undecided), self.like.base)
             advice = f"the proof does not cover {undecided}, in which no bound was found: {reason}"
-        tried, irregular, limit = found.tried, found.irregular, found.limit
-        processors = self._run_on_processors(found) if self.basis == "emulation" else ()
         return Requirement(
             found.fmt,
             self.basis,
             self.steps,
-            tried,
+            found.tried,
             found.why,
+            warnings,
             form,
-            irregular,
+            found.irregular,
             advice,
             repairs,
-            limit,
+            found.limit,
             cause,
             ends,
             untraced,
-            processors,
-            base=self.like.base,
+            self._run_on_processors(found) if self.basis == "emulation" else (),
+            self.like.base,
         )
 
     def _run_on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,42 @@ from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, part_label,
 from gpbnb.wordlength.requirement import Basis
 
 
-def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) -> Report:
-    """Answer the question of a command line that :func:`gpbnb.wordlength.options.read` has read.
+class CommandInput(NamedTuple):
+    """What a command line asks about, with the files that it names as they were read.
+
+    Parameters
+    ----------
+    options : the options, as :func:`gpbnb.wordlength.options.read` returns them.
+    source : the filter; with a constant gain, it is a linear system.
+    own : the model in its file.
+    bases : what answers may be based on.
+    z : measurements or inputs; None if a model simulates them.
+    origin : where they come from.
+    """
+
+    options: argparse.Namespace
+    source: FilterSource
+    own: LinearModel | LinearSystem
+    bases: Sequence[Basis]
+    z: Any
+    origin: str
+
+
+def read_files(options: argparse.Namespace) -> CommandInput:
+    """Read the files of a command line.
+
+    Raises
+    ------
+    ValueError, ArithmeticError : a file or an option does not fit the others.
+    OSError : a file cannot be read.
+    """
+    source, own = _filter(options)
+    bases: Sequence[Basis] = options.basis or ("emulation", "guarantee" if options.fixed else "bound")
+    return CommandInput(options, source, own, bases, *_inputs(options, source.model, bases, own))
+
+
+def answer(asked: CommandInput, command: str, tell: Callable[[str], Any]) -> Report:
+    """Answer the question of a command line.
 
     Parameters
     ----------
@@ -48,32 +82,29 @@ def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) 
     Raises
     ------
     ValueError, ArithmeticError : for a reason given in :func:`gpbnb.wordlength.report.study`.
-    OSError : a file cannot be read.
     """
-    read, own = _filter(given)
-    model, bases = read.model, _bases(given)
-    z, source = _inputs(given, model, bases, own)
-    asked = Question(
-        model,
+    given, source = asked.options, asked.source
+    question = Question(
+        source.model,
         given.tolerance,
-        z,
+        asked.z,
         given.steps,
         given.base or 2,
         given.rounding or "nearest",
         _form(given),
-        bases,
-        None if given.fixed else _limits(given, model, bases),
+        asked.bases,
+        None if given.fixed else _limits(asked, source.model),
         given.emin,
         given.emax,
         _format(given),
-        read.structures,
+        source.structures,
         given.mixed,
         given.fixed,
         given.coefficients or COEFFICIENT_BITS,
-        read.compares_all,
-        read.lacking if len(read.structures) > 1 else {},
+        source.compares_all,
+        source.lacking if len(source.structures) > 1 else {},
     )
-    return study(asked, source, command, tell)
+    return study(question, asked.origin, command, tell)
 
 
 def _filter(given: argparse.Namespace) -> tuple[FilterSource, LinearModel | LinearSystem]:
@@ -99,11 +130,6 @@ def _form(given: argparse.Namespace) -> str:
 
 def _no_form(given: argparse.Namespace) -> ValueError:
     return ValueError(f"got --form {given.form} for a linear system; needed none: only a Kalman filter has forms")
-
-
-def _bases(given: argparse.Namespace) -> Sequence[Basis]:
-    """Return the bases of a command line, or those that suit its numbers."""
-    return given.basis or ("emulation", "guarantee" if given.fixed else "bound")
 
 
 def _inputs(
@@ -173,13 +199,14 @@ def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: Linear
         )
 
 
-def certificate(given: argparse.Namespace, report: Report) -> str:
+def certificate(asked: CommandInput, report: Report) -> str:
     """Return the certificate of the first guarantee in a report; that of a linear system bounds its roundings only.
 
     Raises
     ------
     ValueError : no precision has a guarantee, or the format is fixed point.
     """
+    given, source = asked.options, asked.source
     guaranteed = [each for each in report.answers if each.basis == "guarantee"]
     own = part_label(report.structure, "guarantee")
     digits = next(each.digits for each in guaranteed if not report.structure or each.label == own)
@@ -192,8 +219,7 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
         )
     if fmt is None:
         fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
-    read, _ = _filter(given)
-    chosen = read.structures.get(report.structure, read.model)
+    chosen = source.structures.get(report.structure, source.model)
     if isinstance(chosen, LinearModel):
         within = limits(chosen.n, chosen.m, **_sizes(given))
         form = form_named(_form(given))
@@ -202,7 +228,7 @@ def certificate(given: argparse.Namespace, report: Report) -> str:
     return from_schedule(made, limits(made.program.n, made.program.m, **_sizes(given)), report.steps).certificate()
 
 
-def write_code_of(given: argparse.Namespace, structure: str = "") -> tuple[Path, ...]:
+def write_code_of(asked: CommandInput, structure: str = "") -> tuple[Path, ...]:
     """Write the filter of a command line as C, into the folder of its option ``--code``.
 
     The format is the one that is judged, or the answer in fixed point, or else the first of binary32 and binary64 that
@@ -214,27 +240,25 @@ def write_code_of(given: argparse.Namespace, structure: str = "") -> tuple[Path,
         :func:`gpbnb.wordlength.code.write_code`.
     OSError : a file cannot be written.
     """
-    read, own = _filter(given)
-    model: LinearModel | LinearSystem = read.structures.get(structure, read.model)
-    z, _ = _inputs(given, model, bases := _bases(given), own)
+    given = asked.options
+    model = asked.source.structures.get(structure, asked.source.model)
     if given.fixed and isinstance(model, LinearSystem):
-        words, largest = _words_within_tolerance(given, model, bases, z)
-        return _written(given, model, own, z, words, largest, structure or None)
-    within = _limits(given, model, bases)
-    fmt = _format(given) or _type_within_tolerance(given, model, bases, within, z)
-    return _written(given, model, own, z, fmt, within, structure or None)
+        words, largest = _words_within_tolerance(asked, model)
+        return _written(asked, model, words, largest, structure or None)
+    within = _limits(asked, model)
+    fmt = _format(given) or _type_within_tolerance(asked, model, within)
+    return _written(asked, model, fmt, within, structure or None)
 
 
 def _written(
-    given: argparse.Namespace,
+    asked: CommandInput,
     model: LinearModel | LinearSystem,
-    own: LinearModel | LinearSystem,
-    z: Any,
     fmt: AnyFormat,
     within: FilterLimits | None,
     structure: str | None,
 ) -> tuple[Path, ...]:
     """Write the code of a filter; vectors of a Kalman filter are its first measurements, if none of them is missing."""
+    given, own, z = asked.options, asked.own, asked.z
     if not isinstance(own, LinearModel):
         return write_code(model, fmt, None, given.code, within=within, structure=structure)
     if z is None:
@@ -243,31 +267,27 @@ def _written(
     return write_code(own, fmt, given.form, given.code, inputs=vectors, within=within)
 
 
-def _words_within_tolerance(
-    given: argparse.Namespace, system: LinearSystem, bases: Sequence[Basis], z: Any
-) -> tuple[WordFormats, FilterLimits]:
+def _words_within_tolerance(asked: CommandInput, system: LinearSystem) -> tuple[WordFormats, FilterLimits]:
     """Return the formats that a search in fixed point finds on the first basis, and the largest inputs as limits."""
-    asked = (system, z, given.tolerance, cast(FixedBasis, bases[0]), given.rounding or "nearest")
+    given, basis = asked.options, cast(FixedBasis, asked.bases[0])
+    question = (system, asked.z, given.tolerance, basis, given.rounding or "nearest")
     bits = given.coefficients or COEFFICIENT_BITS
-    words = (required_word_formats(*asked) if given.mixed else required_fraction_bits(*asked, bits)).words
+    words = (required_word_formats(*question) if given.mixed else required_fraction_bits(*question, bits)).words
     if words is None:
         raise ValueError(f"got --code {given.code}, and no format meets the tolerance; needed a larger tolerance")
-    return words, limits(system.n, system.m, measurement=np.abs(z).max(axis=0))
+    return words, limits(system.n, system.m, measurement=np.abs(asked.z).max(axis=0))
 
 
 def _type_within_tolerance(
-    given: argparse.Namespace,
-    model: LinearModel | LinearSystem,
-    bases: Sequence[Basis],
-    within: FilterLimits | None,
-    z: Any,
+    asked: CommandInput, model: LinearModel | LinearSystem, within: FilterLimits | None
 ) -> FloatFormat:
     """Return binary32 if it meets the tolerance of a command line, else binary64."""
+    given, z = asked.options, asked.z
     steps = given.steps or (DEFAULT_STEPS if z is None else len(z))
     if z is None and isinstance(model, LinearModel):
         z = simulated_measurements(model, steps)
     for fmt in (BINARY32, BINARY64):
-        if judge(model, fmt, steps, given.tolerance, _form(given), bases[0], z, within).met:
+        if judge(model, fmt, steps, given.tolerance, _form(given), asked.bases[0], z, within).met:
             return fmt
     raise ValueError(
         f"got --code {given.code}, and neither binary32 nor binary64 meets the tolerance; needed a larger tolerance, "
@@ -310,16 +330,14 @@ def _sizes(given: argparse.Namespace) -> dict[str, Any]:
     return {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
 
 
-def _limits(
-    given: argparse.Namespace, model: LinearModel | LinearSystem, bases: Sequence[Basis]
-) -> FilterLimits | None:
+def _limits(asked: CommandInput, model: LinearModel | LinearSystem) -> FilterLimits | None:
     """Return the limits that the bases need; None if they need none."""
-    asked = [each for each in bases if each in ("guarantee", "probable")]
-    if not asked:
+    bounds = [each for each in asked.bases if each in ("guarantee", "probable")]
+    if not bounds:
         return None
-    of_system, sizes = isinstance(model, LinearSystem), _sizes(given)
+    of_system, sizes = isinstance(model, LinearSystem), _sizes(asked.options)
     needed = "--measurement" if of_system else "--state and --innovation, or --measurement"
     if not sizes or (of_system and set(sizes) != {"measurement"}):
         options = ", ".join(f"--{each}" for each in sizes)
-        raise ValueError(f"got --basis {asked[0]} with {options or 'no limits'}; needed {needed}")
+        raise ValueError(f"got --basis {bounds[0]} with {options or 'no limits'}; needed {needed}")
     return limits(model.n, model.m, **sizes)

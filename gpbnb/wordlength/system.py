@@ -65,7 +65,7 @@ def required_system_precision(
     if not cause:
         advice = "" if found.fmt is not None else _too_many_digits(system, found, asked.like.base)
         warnings = strategy.warnings() if found.fmt is not None and isinstance(strategy, EmulatedSystem) else ()
-        return replace(asked.answer(found, advice=advice, ends=ends), warnings=warnings)
+        return asked.answer(found, advice=advice, ends=ends, warnings=warnings)
     if asked.basis == "probable":
         return asked.answer(found, cause=f"{cause}, {_FOR_SOME_STEPS}")
     grow = "grow with every step, whatever the precision" if asked.basis == "emulation" else "add up with every step"

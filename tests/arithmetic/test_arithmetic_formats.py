@@ -19,7 +19,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gpbnb.arithmetic.conversion import exact_fraction, exact_ratio
-from gpbnb.arithmetic.fixed import FixedFormat, scaling
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
@@ -58,7 +58,6 @@ def test_a_rounding_is_accepted_by_its_name(name: str) -> None:
         (FloatFormat(2, 8, name), FloatFormat(2, 8, rounding)),
         (FixedFormat(2, 8, name), FixedFormat(2, 8, rounding)),
         (replace(FloatFormat(2, 8), rounding=name), FloatFormat(2, 8, rounding)),
-        (scaling([3], 8, name), scaling([3], 8, rounding)),
     ):
         assert named == same
         assert named.rounding is rounding

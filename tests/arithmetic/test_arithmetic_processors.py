@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from plain_structures import floating
 
 from gpbnb.arithmetic import linalg, named
-from gpbnb.arithmetic.fixed import FixedFormat, scaling
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs
 from gpbnb.arithmetic.rounding import Rounding
@@ -46,31 +47,8 @@ def up(mode: Rounding, negative: Any, odd: Any, inexact: Any, half: Any) -> Any:
 
 def expected(x: Fraction, fmt: FloatFormat) -> Fraction | None:
     """The number of the format for an exact result; None if it overflows."""
-    if x == 0:
-        return x
-
-    def scaled(k: int) -> tuple[int, int]:
-        """Numerator and denominator of abs(x) / base**k."""
-        p, q = abs(x.numerator), x.denominator
-        return (p, q * fmt.base**k) if k > 0 else (p * fmt.base**-k, q)
-
-    power = int((x.numerator.bit_length() - x.denominator.bit_length()) / math.log2(fmt.base))
-    while operator.ge(*scaled(power + 1)):
-        power += 1
-    while operator.lt(*scaled(power)):
-        power -= 1
-    if fmt.emin is not None and fmt.subnormal:
-        power = max(power, fmt.emin)
-    p, q = scaled(power - fmt.precision + 1)
-    m, rest = divmod(p, q)
-    m += bool(up(fmt.rounding, np.bool_(x < 0), np.bool_(m % 2), rest > 0, 2 * rest - q))
-    y = (m if x > 0 else -m) * Fraction(fmt.base) ** (power - fmt.precision + 1)
-    limits = fmt.limits
-    if limits is None:
-        return y
-    if abs(y) > limits.largest:
-        return None
-    return Fraction(0) if not fmt.subnormal and abs(y) < Fraction(fmt.base) ** limits.emin else y
+    y = floating(fmt.base, fmt.precision, fmt.rounding.value, fmt.emin, fmt.subnormal)(x)
+    return None if fmt.limits is not None and abs(y) > fmt.limits.largest else y
 
 
 TINY = [
@@ -555,19 +533,6 @@ class TestFixed:
             assert (-fmt.array(-1)).to_fractions() == result
         with pytest.raises(OverflowError, match="negation"):
             -FixedFormat(0, 3).array(-1)
-
-    def test_scaling_wastes_no_bit(self) -> None:
-        for values, bits in (([0.3, -0.7], 16), ([1000, -2], 16), ([1], 8), (["0.99999"], 8), ([3e-5], 16)):
-            fmt = scaling(values, bits)
-            largest = max(abs(Fraction(value)) for value in values)
-            assert 1 + fmt.integer_bits + fmt.fraction_bits == bits
-            assert fmt.largest >= largest
-            assert FixedFormat(fmt.integer_bits - 1, fmt.fraction_bits + 1).largest < largest
-
-    def test_scaling_needs_a_sign_and_a_bit(self) -> None:
-        assert scaling([0.3], 2) == FixedFormat(0, 1)
-        with pytest.raises(ValueError, match="bits: got 1; needed at least 2"):
-            scaling([0.3], 1)
 
     def test_linear_algebra(self) -> None:
         q = FixedFormat(3, 12)

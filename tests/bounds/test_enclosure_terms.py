@@ -182,7 +182,7 @@ def test_the_set_that_is_never_left(monkeypatch: pytest.MonkeyPatch) -> None:
     run = SimpleNamespace(C=[None, array(start)], G=[array(0), array(F(7, 4))])
     run.exactly = lambda x: np.vectorize(F, otypes=[object])(np.asarray(x))
     stored: Any = SimpleNamespace(cycle=1)
-    found = enclosure._enclose(stored, run, 0.0, Form.INNOVATION, 2, 60)
+    found = enclosure._enclose(stored, run, 0.0, Form.INNOVATION, 2)
     begun = sums * max(x * abs(start - center) * x for x in products)
     W = disturbed + abs(after - center)
 
@@ -225,7 +225,7 @@ def test_each_phase_of_the_set_takes_up_what_the_phases_before_it_add(monkeypatc
     run = SimpleNamespace(C=[None, None, array(start)], G=[None, array(F(7, 4)), array(F(3))])
     run.exactly = lambda x: np.vectorize(F, otypes=[object])(np.asarray(x))
     stored: Any = SimpleNamespace(cycle=2)
-    found = enclosure._enclose(stored, run, 0.0, Form.INNOVATION, 3, 60)
+    found = enclosure._enclose(stored, run, 0.0, Form.INNOVATION, 3)
     begun = abs(start - centers[0])
     # A step from phase 0 leads to the center of phase 1, and a step from phase 1 to that of phase 0.
     w0, w1 = 5 + abs(F(578) - 576), 11 + abs(F(643) - 640)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from exact_terms import same
 from flint import ctx
+from plain_structures import floating
 from scipy import signal
 
 from gpbnb import FloatFormat, LinearSystem, limits, required_precision
@@ -170,24 +171,11 @@ def test_gains_of_a_difference_are_those_of_two_plain_loops(digits: int) -> None
     assert reached <= found <= reached * 1.001
 
 
-def rounded(x: F, digits: int) -> F:
-    """Round to a number of bits, ties away from zero."""
-    if not x:
-        return x
-    p, q = abs(x.numerator), x.denominator
-    exponent = p.bit_length() - q.bit_length()
-    if p << max(-exponent, 0) < q << max(exponent, 0):
-        exponent -= 1
-    shift = digits - 1 - exponent
-    p, q = (p << shift, q) if shift >= 0 else (p, q << -shift)
-    found = F((2 * p + q) // (2 * q)) / F(2) ** shift
-    return found if x > 0 else -found
-
-
 def attacked(sections: Any, digits: int, steps: int) -> float:
     """The largest error of a section's output where each input of twelve pushes the last error furthest."""
+    r = floating(2, digits, "nearest")
     b0, b1, b2, _, a1, a2 = (F(float(c)) for c in sections[0])
-    B0, B1, B2, A1, A2 = (rounded(c, digits) for c in (b0, b1, b2, a1, a2))
+    B0, B1, B2, A1, A2 = (r(c) for c in (b0, b1, b2, a1, a2))
     c0, c1, c2, d1, d2 = (int(c * ONE) for c in (b0, b1, b2, a1, a2))
     move = np.array([[-float(A1), 1.0], [-float(A2), 0.0]])
     rows = [np.array([1.0, 0.0])]
@@ -200,11 +188,11 @@ def attacked(sections: Any, digits: int, steps: int) -> float:
         row, found = rows[steps - 1 - k], []
         sign = 1 if row @ [float(b1 - a1 * b0), float(b2 - a2 * b0)] >= 0 else -1
         for i in range(12):
-            u = rounded(sign * (1 - i * F(1, 2**6) - i * F(1, 2**19)), digits)
-            y = rounded(rounded(B0 * u, digits) + s1, digits)
-            into = rounded(rounded(B1 * u, digits) + s2, digits)
-            t1 = rounded(into - rounded(A1 * y, digits), digits)
-            t2 = rounded(rounded(B2 * u, digits) - rounded(A2 * y, digits), digits)
+            u = r(sign * (1 - i * F(1, 2**6) - i * F(1, 2**19)))
+            y = r(r(B0 * u) + s1)
+            into = r(r(B1 * u) + s2)
+            t1 = r(into - r(A1 * y))
+            t2 = r(r(B2 * u) - r(A2 * y))
             v = int(u * ONE)
             z = (c0 * v >> 300) + x1
             z1, z2 = (c1 * v - d1 * z >> 300) + x2, c2 * v - d2 * z >> 300

@@ -55,15 +55,6 @@ def test_quotients_and_sines_are_compared_without_simplifying(monkeypatch):
     assert Step("sines", (1 - sp.cos(2 * X)) / sp.sin(X), 2 * sp.sin(X)).holds
 
 
-def test_some_steps_of_a_derivation_are_asked_alone():
-    mixed = Derivation((HOLD[0], FAIL[0], HOLD[1]))
-    assert mixed.holds_at(0, 2)
-    assert not mixed.holds_at(0, 1)
-    assert not mixed.holds
-    with pytest.raises(IndexError):
-        mixed.holds_at(3)
-
-
 def test_a_derivation_shows_each_step():
     derivation = Derivation((HOLD[0], FAIL[0]))
     lines = repr(derivation).splitlines()

@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from plain_nonlinear import eye, inverse, transposed
 
 from gpbnb import BINARY32, BINARY64, FixedFormat, FloatFormat, Form, LinearModel, emulate
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.run import Run, Sums
 from tests.plain_structures import floating
 
-ZERO, ONE = Fraction(0), Fraction(1)
+ZERO = Fraction(0)
 
 
 class Rounds(NamedTuple):
@@ -45,29 +46,6 @@ class Rounds(NamedTuple):
         return [[self.store(a + sign * b) for a, b in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
 
 
-def transposed(A):
-    return [list(row) for row in zip(*A, strict=True)]
-
-
-def inverse(r, A):
-    """Inverse by elimination without exchanges, each operation rounded."""
-    m = len(A)
-    A = [row[:] for row in A]
-    C = [[ONE if i == j else ZERO for j in range(m)] for i in range(m)]
-    for k in range(m):
-        for i in range(k + 1, m):
-            f = r(A[i][k] / A[k][k])
-            A[i] = [*A[i][: k + 1], *(r(A[i][j] - r(f * A[k][j])) for j in range(k + 1, m))]
-            C[i] = [r(C[i][j] - r(f * C[k][j])) for j in range(m)]
-    for j in range(m):
-        for k in range(m - 1, -1, -1):
-            s = C[k][j]
-            for i in range(k + 1, m):
-                s = r(s - r(A[k][i] * C[i][j]))
-            C[k][j] = r(s / A[k][k])
-    return C
-
-
 class Filter:
     """A filter in a form, with roundings by block; `model` rounds the model."""
 
@@ -89,7 +67,6 @@ class Filter:
             self.step_ud(z)
             return
         p, s, g, x = (self.blocks[name] for name in ("covariance", "innovation", "gain", "state"))
-        eye = [[Fraction(i == j) for j in range(len(self.Phi))] for i in range(len(self.Phi))]
         V = transposed(
             p.plus(
                 p.product(p.take(self.Phi), transposed(p.product(p.take(self.Phi), self.P))),
@@ -101,7 +78,7 @@ class Filter:
         K = g.product(g.take(PHt), g.take(inverse(s.store, S)))
 
         def remaining(K):
-            return p.plus(eye, p.product(p.take(K), p.take(self.H)), -1)
+            return p.plus(eye(len(self.Phi)), p.product(p.take(K), p.take(self.H)), -1)
 
         W = remaining(K)
         if self.form is Form.JOSEPH:

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from small_filter import FORMATS, FORMATS_OF_ALL_FORMS, STEPS, measurements, model, run
+from small_filter import FORMATS, FORMATS_OF_ALL_FORMS, STEPS, exact_steps, measurements, model, run
 
 from gpbnb import BFLOAT16, FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -24,28 +24,16 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.filters.simulation import BLOCK, Simulation
-from gpbnb.report.kalman import exact_step
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 
 # -- the reference --------------------------------------------------------------------------------
 
 
-def exactly(given, z):
-    """Exact estimates, gains and covariances of each step."""
-    x, P, found = given.x0, given.P0, []
-    for k in range(len(z)):
-        Phi, H, Q, R = (each[k % len(each)] for each in (given.Phi, given.H, given.Q, given.R))
-        step = exact_step.exact_step(Phi, H, Q, R, x, P, z[k])
-        x, P = step.x, step.P
-        found.append(step)
-    return found
-
-
 def test_the_reference_is_the_exact_filter_to_thirty_digits():
     given, z = model(), measurements()
     checkpoints = reference(given, z, range(1, STEPS + 1))
-    for k, step in enumerate(exactly(given, z)):
+    for k, step in enumerate(exact_steps(given, z)):
         for found, true in ((checkpoints.x[k], step.x), (checkpoints.K[k], step.gain), (checkpoints.P[k], step.P)):
             # A hundred operations a step, each within 2**-102, on numbers that nothing here magnifies a hundredfold.
             assert np.abs(found - true).max() < Fraction(10**4 * (k + 1), 2**102) * np.abs(true).max()
@@ -56,7 +44,7 @@ def test_all_forms_are_one_filter(form):
     """In double-double each is the exact filter; in many digits, each comes near."""
     given, z = model(), measurements()
     checkpoints = reference(given, z, (STEPS,), form)
-    step = exactly(given, z)[-1]
+    step = exact_steps(given, z)[-1]
     for found, true in ((checkpoints.x[0], step.x), (checkpoints.P[0], step.P)):
         assert np.abs(found - true).max() < Fraction(1, 2**85)
     if form is not Form.HUNG_SECOND_GAIN:  # whose own gain is P H' R^-1 as well, but by another rounding
@@ -82,11 +70,11 @@ def test_a_reference_of_the_model_as_given_adds_the_errors_of_storing_it():
     alone = emulate(given, z, fmt, Form.INNOVATION, (STEPS,))
     stored = np.array([[fmt.round(float(v)) for v in row] for row in z], dtype=object)
     both = emulate(given, z, fmt, Form.INNOVATION, (STEPS,), reference(given, z, (STEPS,)))
-    step = exactly(given.rounded(fmt), stored)[-1]
+    step = exact_steps(given.rounded(fmt), stored)[-1]
     assert alone.state[0] == pytest.approx(
         (run(fmt, Form.INNOVATION).checkpoints().x[-1] - step.x).astype(float), rel=1e-12
     )
-    step = exactly(given, z)[-1]
+    step = exact_steps(given, z)[-1]
     assert both.state[0] == pytest.approx(
         (run(fmt, Form.INNOVATION).checkpoints().x[-1] - step.x).astype(float), rel=1e-12
     )
@@ -315,7 +303,7 @@ def test_no_error_exceeds_the_bound_beside_the_run(fmt, form):
     stored = np.array([[fmt.round(float(v)) for v in row] for row in z], dtype=object)
     checkpoints = run(fmt, form).checkpoints()
     worst = 0.0
-    for k, step in enumerate(exactly(given.rounded(fmt), stored)):
+    for k, step in enumerate(exact_steps(given.rounded(fmt), stored)):
         P = (checkpoints.P[k] + checkpoints.P[k].T) / 2
         for error, bound in (
             (checkpoints.x[k] - step.x, found.state[k]),
@@ -338,7 +326,7 @@ def test_the_bound_of_the_reference_holds():
     run.take(z[:7])
     run.take(z[7:])
     checkpoints = run.checkpoints()
-    for k, step in enumerate(exactly(given, z)):
+    for k, step in enumerate(exact_steps(given, z)):
         for error, bound in (
             (checkpoints.x[k] - step.x, run.bounds[0][k]),
             (checkpoints.P[k] - step.P, run.bounds[2][k]),

@@ -6,9 +6,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from small_filter import exact_steps
 
 from gpbnb import BINARY64, FloatFormat, LinearModel, Rounding, required_precision
-from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.array_run import ArrayRun
@@ -17,7 +17,6 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel as Model
 from gpbnb.filters.run import Run, Sums, reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
-from gpbnb.report.kalman.exact_step import exact_step
 from gpbnb.wordlength.precision import survey
 
 FORMS = (*Form, *ArrayForm)
@@ -49,32 +48,12 @@ def drawn(seed=0, n=3, m=2, inputs=True, cycle=2):
     )
 
 
-def exactly(model, z):
-    """The filter in Fractions, step by step: an oracle that shares no code with the runs."""
-    x, P, found = model.x0, model.P0, []
-    for k, measured in enumerate(exact(z)):
-        Phi, H, Q, R = (getattr(model, letter)[k % len(getattr(model, letter))] for letter in ("Phi", "H", "Q", "R"))
-        c, d = np.array([Fraction(0)] * model.n), np.array([Fraction(0)] * model.m)
-        if model.B is not None:
-            c = c + model.B[k % len(model.B)] @ model.u[k]
-        if model.b is not None:
-            c = c + model.b[k % len(model.b)]
-        if model.d is not None:
-            d = model.d[k % len(model.d)]
-        # inputs by hand: predict with Phi x + c through a step from Phi x + c with Phi = 1 and Q = 0
-        ahead, unit = Phi @ x + c, exact(np.eye(model.n, dtype=int))
-        step = exact_step(unit, H, Phi @ P @ Phi.T + Q, R, ahead, 0 * P, measured - d)
-        x, P = step.x, step.P
-        found.append(x)
-    return np.array(found)
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_the_reference_with_inputs_is_the_exact_filter(seed):
     model = drawn(seed)
     z = simulated_measurements(model, 6, seed)
     found = reference(model, z, range(1, 7)).x
-    true = exactly(model, z)
+    true = np.array([step.x for step in exact_steps(model, z)])
     # double-double: 2**-102 an operation, some hundred operations a step
     assert np.abs((found - true).astype(float)).max() < 2.0**-85 * np.abs(true.astype(float)).max()
 

@@ -6,14 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from small_filter import exact_steps
 
-from gpbnb.arithmetic.rational import exact
 from gpbnb.filters import reference as precise_reference
 from gpbnb.filters import run as filter_run
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, reference, reference_states
-from gpbnb.report.kalman.exact_step import exact_step
 
 EYE = np.eye(2, dtype=int)
 Z = np.array([[1.5, 3.0], [-0.25, -0.5], [2.0, 4.0], [0.75, 1.5], [1.0, 2.0]])
@@ -43,16 +42,8 @@ def test_results_agree_in_104_bits_of_the_largest_of_each_entry(share, agree):
     assert precise_reference._agree(some, other) is agree
 
 
-def exactly(model, z):
-    """The filter in Fractions; with inputs, as the exact step of a filter without them."""
-    x, P, states = model.x0, model.P0, []
-    for k, measured in enumerate(exact(z)):
-        state, offset = model.known(k)
-        shifted = measured - offset - model.H[0] @ state
-        step = exact_step(model.Phi[0], model.H[0], model.Q[0], model.R[0], x, P, shifted)
-        x, P = step.x + state, step.P
-        states.append(x)
-    return states, step
+def states(model, z):
+    return [step.x for step in exact_steps(model, z)]
 
 
 def distance(states, expected):
@@ -63,7 +54,7 @@ def distance(states, expected):
 @pytest.mark.parametrize("R", ["1e-20", "1e-30", "1e-60"])
 def test_a_precise_sensor_has_the_exact_reference(R):
     model = sensor(R)
-    expected, last = exactly(model, Z)
+    expected, last = states(model, Z), exact_steps(model, Z)[-1]
     assert distance(reference_states(model, Z), expected) < 1e-30
     checkpoints = reference(model, Z, (2, 5))
     assert float(max(np.abs(checkpoints.x - np.array([expected[1], expected[4]])).ravel())) < 1e-30
@@ -74,12 +65,12 @@ def test_a_precise_sensor_has_the_exact_reference(R):
 def test_double_double_alone_is_wrong_there():
     model = sensor("1e-30")
     run = Run(model, None, Form.INNOVATION, ())
-    assert distance(run.states(Z), exactly(model, Z)[0][: run.steps]) > 1e-3
+    assert distance(run.states(Z), states(model, Z)[: run.steps]) > 1e-3
 
 
 def test_inputs_and_offsets_are_known_to_it():
     model = sensor("1e-40", B=[["0.5"], [1]], u=[[1], [2], [-1], [0], [3]], b=["0.1", 0], d=["0.25", "0.5"])
-    assert distance(reference_states(model, Z), exactly(model, Z)[0]) < 1e-30
+    assert distance(reference_states(model, Z), states(model, Z)) < 1e-30
 
 
 def test_an_estimate_that_is_zero_at_first_has_a_reference():
@@ -88,7 +79,7 @@ def test_an_estimate_that_is_zero_at_first_has_a_reference():
     z = np.concatenate([np.zeros((1, 2)), Z])
     found = reference_states(still, z)
     assert not found[0].any()
-    assert distance(found, exactly(still, z)[0]) < 1e-30
+    assert distance(found, states(still, z)) < 1e-30
 
 
 def test_only_such_models_need_it(monkeypatch):
@@ -96,7 +87,7 @@ def test_only_such_models_need_it(monkeypatch):
         raise AssertionError("the reference was computed again")
 
     monkeypatch.setattr("gpbnb.filters.run.precise_steps", never)
-    expected = exactly(sensor("1e-6"), Z)[0]
+    expected = states(sensor("1e-6"), Z)
     assert distance(reference_states(sensor("1e-6"), Z), expected) < 1e-18
     with pytest.raises(AssertionError, match="computed again"):
         reference(sensor("1e-30"), Z, (3,))

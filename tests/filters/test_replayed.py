@@ -11,7 +11,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters import replayed
 from gpbnb.filters.forms import Form
-from gpbnb.filters.replayed import only_compiled
+from gpbnb.filters.replayed import ReplayBudget, only_compiled
 from gpbnb.filters.run import Run, Sums
 
 OTHERS = (
@@ -28,8 +28,7 @@ HUNG = (Form.HUNG, Form.HUNG_SECOND_GAIN)
 @pytest.fixture(autouse=True)
 def afresh(monkeypatch):
     """Nothing has been replayed yet."""
-    monkeypatch.setattr(replayed, "_spent", {})
-    monkeypatch.setattr(replayed, "_compiled", {})
+    monkeypatch.setattr(replayed, "BUDGET", ReplayBudget())
 
 
 @pytest.fixture
@@ -145,9 +144,25 @@ def test_other_arithmetic_runs_in_the_compiled_loops(options, replays):
 
 
 def test_many_steps_run_in_the_compiled_loops_and_so_do_all_later_ones(replays, monkeypatch):
-    monkeypatch.setattr(replayed, "_limits", [1e-3, 1e-3])
+    monkeypatch.setattr(replayed, "BUDGET", ReplayBudget(1e-3, 1e-3))
     fmt = FloatFormat(2, 11)
     for steps, replayed_steps in ((6, 6), (200, 6), (6, 6)):
         run = Run(model(), fmt, "innovation", ())
         run.take(measurements(steps))
         assert (run.steps, len(replays)) == (steps, replayed_steps)
+
+
+def test_blocks_of_several_threads_overlap_and_the_time_that_was_left_is_kept():
+    budget = ReplayBudget(before_compiling=1.0)
+
+    def allowed(seconds):
+        return budget.allows("kind", seconds, lambda: False)
+
+    assert allowed(0.5)
+    first, second = budget.closed(), budget.closed()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)  # not the one that was entered last
+    assert not allowed(0.1)
+    second.__exit__(None, None, None)
+    assert [allowed(seconds) for seconds in (0.4, 0.4, 0.0)] == [True, False, False]

@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from independent_filter import Arithmetic, ExactFilter, Filter, Model, Refused
+from independent_filter import Arithmetic, ExactFilter, Filter, Refused
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
@@ -22,30 +22,16 @@ from gpbnb.report.guarantees.random_filters import DETERMINISTIC, KINDS, LIMITED
 from gpbnb.sweeps.command import run
 
 
-def arithmetic(fmt, **changed):
-    return Arithmetic(fmt.base, fmt.precision, fmt.rounding.value, fmt.emin, fmt.emax, fmt.subnormal, **changed)
-
-
-def own(model):
-    """The model in plain lists."""
-    cycles = ([matrix.tolist() for matrix in getattr(model, letter)] for letter in ("Phi", "H", "Q", "R"))
-    return Model(*cycles, model.x0.tolist(), model.P0.tolist())
-
-
-def form_of(drawn):
-    return drawn.form.name.lower().replace("_", " ")
-
-
 def compared(drawn, steps, rng):
     """Run a filter without the package and with it, compare all numbers by ==, and return how the run ends."""
     fmt = drawn.fmt
     z = rng.standard_normal((steps, drawn.model.m)) * 10.0 ** rng.uniform(-2, 3)
     # In base 10, the package's loops end where the result of an operation would be subnormal.
-    mine = arithmetic(fmt, ends_at_subnormal=fmt.base == 10 and fmt.emin is not None and fmt.subnormal)
+    mine = Arithmetic.of(fmt, ends_at_subnormal=fmt.base == 10 and fmt.emin is not None and fmt.subnormal)
     measured = [[Fraction(each) for each in row] for row in z.tolist()]
 
     def stored():
-        return Filter(own(drawn.model), mine, form_of(drawn)), [[mine.store(each) for each in row] for row in measured]
+        return Filter.of(drawn.model, mine, drawn.form), [[mine.store(each) for each in row] for row in measured]
 
     try:
         run = Run(drawn.model, fmt, drawn.form, range(1, steps + 1))
@@ -165,7 +151,7 @@ def test_errors_are_those_of_filters_without_the_package(seed):
     compared_steps = 0
     for _, z in filters.inputs(drawn, found, np.random.default_rng(seed)):
         off, _ = filters.errors(drawn, z)
-        rounded = Filter(own(drawn.model), arithmetic(drawn.fmt), form_of(drawn))
+        rounded = Filter.of(drawn.model, Arithmetic.of(drawn.fmt), drawn.form)
         true = ExactFilter(rounded.model())
         for k, row in enumerate(z[:25].tolist()):
             measured = [rounded.fmt.value(rounded.fmt.store(Fraction(each))) for each in row]
@@ -244,7 +230,7 @@ def test_the_worst_error_is_that_of_all_sequences():
     assert z == [Fraction(k, 8) for k in (-8, -7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6, 7, 8)]
     largest = [0.0] * 3
     for sequence in product(z, repeat=3):
-        rounded = Filter(own(model), arithmetic(fmt), "innovation")
+        rounded = Filter.of(model, Arithmetic.of(fmt), Form.INNOVATION)
         true = ExactFilter(rounded.model())
         for k, each in enumerate(sequence):
             largest[k] = max(largest[k], abs(float(rounded.step([each])[0] - true.step([each])[0])))
@@ -257,7 +243,7 @@ def test_the_worst_error_is_that_of_all_sequences():
 def test_the_worst_error_is_reached_and_within_the_bound(seed):
     given = scalar.draw(seed)
     found = scalar.worst_error(given)
-    rounded = Filter(own(given.model), arithmetic(given.fmt), form_of(given))
+    rounded = Filter.of(given.model, Arithmetic.of(given.fmt), given.form)
     true = ExactFilter(rounded.model())
     for each in found.z.tolist():
         error = rounded.step([Fraction(each)])[0] - true.step([Fraction(each)])[0]

@@ -160,13 +160,6 @@ class TestReadings:
         assert given.values[0] != stored.values[0]
         assert given.values[1:] == stored.values[1:]
 
-    def test_pairs_share_wordlength_and_norm(self):
-        found = example.pairs()
-        assert len(found) == 4 * 10
-        for bound, error in found:
-            assert (bound.wordlength, bound.norm, bound.relative) == (error.wordlength, error.norm, error.relative)
-            assert error.detail.startswith("elimination")
-
 
 class TestSearch:
     @pytest.mark.parametrize("column", ["bound", "error"])

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from small_filter import unscaled
 from tabulated import by_header
 
 from gpbnb.arithmetic.fixed import FixedFormat
@@ -71,7 +72,7 @@ def test_formats_show_their_limits() -> None:
 
 
 def test_fixed_point_bounds_stand_beside_what_was_observed() -> None:
-    given = fixed_point.unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
+    given = unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
     z = np.random.default_rng(2).uniform(-1, 1, (60, 1))
     ways = [("nearest", 12, {"rounding": Rounding.NEAREST}), ("floor", 12, {"rounding": Rounding.DOWN})]
     table = processor_tables.fixed_point({"section": (given, z)}, ways)
@@ -87,7 +88,7 @@ def test_fixed_point_bounds_stand_beside_what_was_observed() -> None:
 
 
 def test_a_wide_sum_has_a_bound_of_its_own() -> None:
-    given = fixed_point.unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
+    given = unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
     z = np.random.default_rng(2).uniform(-8, 8, (60, 1))
     options = {"rounding": Rounding.NEAREST, "wide": True}
     table = processor_tables.fixed_point({"section": (given, z)}, [("wide", 16, options)], state=1)

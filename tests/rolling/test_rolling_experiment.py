@@ -174,7 +174,7 @@ def test_the_stored_survey_agrees_with_theory():
     assert np.max(abs(z)) < 3.5
     # What rolling buys, from simulation alone.
     gain = study.standard_error()[0] / study.standard_error()[-1]
-    expected = theory.rolling_gain(77.5) * (8 / 9) ** 0.5
+    expected = theory.drift_error_unrolled(1.0) / theory.drift_error_rolled(1.0, 77.5) * (8 / 9) ** 0.5
     assert gain == pytest.approx(expected, rel=4 * 2**0.5 * study.uncertainty())
 
 

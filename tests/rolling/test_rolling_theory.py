@@ -174,9 +174,6 @@ def test_with_rolling_the_closed_form_is_reached_after_many_turns(period, sample
     closed = theory.drift_error_rolled(LEVEL, period, samples * 10.0, 10.0)
     # Slow noise leaks into the fit as log(n) over the number of turns.
     assert exact == pytest.approx(closed, rel=math.log(samples) / (samples * 10 / period))
-    assert theory.drift_error_unrolled(1.0) / theory.drift_error_rolled(1.0, period) == pytest.approx(
-        theory.rolling_gain(period)
-    )
 
 
 def test_phases_of_roll():

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_filter import unscaled
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.words import largest_rounding
 from gpbnb.filters.simulation import Simulation
 from gpbnb.filters.system import biquad, controller, state_space
 from gpbnb.wordlength import examples, fixed_point
@@ -24,6 +26,11 @@ def tracked() -> tuple[ScaledFilter, np.ndarray[Any, Any]]:
     model = examples.tracker()
     z = Simulation(model, (5.0, 1.0), 0, resolution=2.0**-12).measurements(300)
     return fixed_point.constant_gain(model, z), z
+
+
+def guaranteed(given: ScaledFilter, fmt: FixedFormat, wide: bool = False) -> np.ndarray[Any, Any]:
+    """The bound of each state's error in a format."""
+    return fixed_point.bound_per_unit(given, wide=wide) * largest_rounding(fmt.rounding) * float(fmt.unit)
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -49,7 +56,7 @@ def test_every_step_is_that_of_the_fixed_point_kernel(mode: Rounding) -> None:
 
 def test_a_long_accumulator_rounds_each_sum_once() -> None:
     """A section whose two products are rounded together instead of one by one."""
-    given = fixed_point.unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
+    given = unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
     z = np.random.default_rng(1).uniform(-1, 1, (50, 1))
     fmt = FixedFormat(2, 8)
     coefficients = fixed_point.stored_coefficients(given.filter, 15)
@@ -70,7 +77,7 @@ def test_a_long_accumulator_rounds_each_sum_once() -> None:
 def test_the_guarantee_holds_and_is_not_far_off(mode: Rounding, wide: bool) -> None:
     given, z = tracked()
     fmt = FixedFormat(fixed_point.integer_bits(given, z), 14, mode)
-    bound = fixed_point.guaranteed(given, fmt, wide=wide)
+    bound = guaranteed(given, fmt, wide=wide)
     worst = np.abs(fixed_point.emulated(given, z, fmt, wide=wide)).max(axis=0)
     assert (worst <= bound).all()
     assert (worst > bound / 40).all()
@@ -78,16 +85,16 @@ def test_the_guarantee_holds_and_is_not_far_off(mode: Rounding, wide: bool) -> N
 
 def test_the_bound_of_one_state_is_its_geometric_series() -> None:
     """s <- s / 2 + z: one product a step, half a unit each, halved from step to step."""
-    given = fixed_point.unscaled(controller("0.5", "1", "0", "0"))
+    given = unscaled(controller("0.5", "1", "0", "0"))
     fmt = FixedFormat(2, 10)
-    bound = fixed_point.guaranteed(given, fmt)
+    bound = guaranteed(given, fmt)
     assert bound[0] == pytest.approx(float(fmt.unit) / 2 / (1 - 0.5), rel=1e-9)
-    chopped = fixed_point.guaranteed(given, FixedFormat(2, 10, Rounding.CHOP))
+    chopped = guaranteed(given, FixedFormat(2, 10, Rounding.CHOP))
     assert np.allclose(chopped, 2 * bound)
 
 
 def test_an_integrator_has_no_bound_for_ever() -> None:
-    given = fixed_point.unscaled(controller("1", "0.01", "0", "0"))
+    given = unscaled(controller("1", "0.01", "0", "0"))
     answer = fixed_point.required_fraction_bits(given, np.ones((20, 1)), 0.1, "guarantee")
     assert answer.fmt is None
     assert "the filter as given is not stable" in answer.why
@@ -127,7 +134,7 @@ def test_a_tolerance_that_no_format_meets_has_no_answer() -> None:
 )
 def test_overflow_is_in_a_product_or_in_a_sum(b: str, z: list[float], place: str) -> None:
     """x = 0.9 x + b z, with numbers below four."""
-    given = fixed_point.unscaled(state_space([["0.9"]], [[b]]))
+    given = unscaled(state_space([["0.9"]], [[b]]))
     with pytest.raises(OverflowError, match=f"overflow in {place}, at step 2"):
         fixed_point.emulated(given, np.array(z).reshape(-1, 1), FixedFormat(2, 8))
 
@@ -188,20 +195,20 @@ NEAR = biquad("0.3", 0, 0, "-1.9999988", "0.9999998")
 )
 def test_without_a_guarantee_the_answer_names_the_cause(made, bits, message):  # type: ignore[no-untyped-def]
     z = np.full((20, 1), 0.1)
-    answer = fixed_point.required_fraction_bits(fixed_point.unscaled(made), z, 1e-3, "guarantee", coefficient_bits=bits)
+    answer = fixed_point.required_fraction_bits(unscaled(made), z, 1e-3, "guarantee", coefficient_bits=bits)
     assert answer.fmt is None
     assert str(answer).startswith(f"no format, by guarantee: {message}")
 
 
 def test_an_accumulator_without_rounding_errors_needs_no_stability() -> None:
-    made = fixed_point.unscaled(state_space([[1]], [[1]]))
+    made = unscaled(state_space([[1]], [[1]]))
     answer = fixed_point.required_fraction_bits(made, np.ones((20, 1)), 1e-3, "guarantee")
     assert answer.fmt is not None
     assert dict(answer.tried)[answer.fmt.fraction_bits] == 0
 
 
 def test_without_an_answer_the_most_that_was_tried_is_named() -> None:
-    made = fixed_point.unscaled(biquad("0.3", 0, 0, "-1.6", "0.64"))
+    made = unscaled(biquad("0.3", 0, 0, "-1.6", "0.64"))
     z = np.random.default_rng(0).uniform(-1, 1, (20, 1))
     answer = fixed_point.required_fraction_bits(made, z, 1e-300)
     assert answer.fmt is None

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from independent_filter import Arithmetic, transposed
 
 from gpbnb import BINARY32, FloatFormat, emulate
 from gpbnb.filters.blocks import BlockFormats
@@ -21,79 +22,6 @@ COLLAPSE = 1791
 """The step that the book names."""
 
 # -- the height channel, in integers ------------------------------------------------------------------------------
-
-
-class Digits:
-    """Numbers m 2**e in some bits, ties away from zero; nothing is taken from the package."""
-
-    def __init__(self, bits):
-        self.bits = bits
-
-    def rounded(self, m, e):
-        lost = abs(m).bit_length() - self.bits
-        if lost <= 0:
-            return m, e
-        size = (abs(m) + (1 << (lost - 1))) >> lost
-        return (size if m > 0 else -size), e + lost
-
-    def of(self, number):
-        m, denominator = float(number).as_integer_ratio()
-        return self.rounded(m, 1 - denominator.bit_length())
-
-    def add(self, a, b, sign=1):
-        if not a[0] or not b[0]:
-            return a if not b[0] else (sign * b[0], b[1])
-        e = min(a[1], b[1])
-        return self.rounded((a[0] << (a[1] - e)) + sign * (b[0] << (b[1] - e)), e)
-
-    def times(self, a, b):
-        return self.rounded(a[0] * b[0], a[1] + b[1])
-
-    def over(self, a, b):
-        shift = 2 * self.bits + 4
-        quotient, rest = divmod(abs(a[0]) << shift, abs(b[0]))
-        sign = 1 if (a[0] < 0) == (b[0] < 0) else -1
-        return self.rounded(sign * (2 * quotient + bool(rest)), a[1] - b[1] - shift - 1)
-
-    def product(self, A, B):
-        columns = list(zip(*B, strict=True))
-        return [[self.row(row, column) for column in columns] for row in A]
-
-    def row(self, row, column):
-        """A sum from left to right; terms of zero change nothing."""
-        total = (0, 0)
-        for a, b in zip(row, column, strict=True):
-            if a[0] and b[0]:
-                total = self.add(total, self.times(a, b))
-        return total
-
-    def sum(self, A, B, sign=1):
-        return [[self.add(a, b, sign) for a, b in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
-
-    def inverse(self, A):
-        """Elimination without exchanges; pivots last."""
-        n, A, C = len(A), [row[:] for row in A], eye(len(A))
-        for k in range(n):
-            for i in range(k + 1, n):
-                f = self.over(A[i][k], A[k][k])
-                A[i] = [
-                    self.add(a, self.times(f, b), -1) if j > k else a
-                    for j, (a, b) in enumerate(zip(A[i], A[k], strict=True))
-                ]
-                C[i] = [self.add(c, self.times(f, d), -1) for c, d in zip(C[i], C[k], strict=True)]
-        for k in range(n - 1, -1, -1):
-            for i in range(k + 1, n):
-                C[k] = [self.add(c, self.times(A[k][i], d), -1) for c, d in zip(C[k], C[i], strict=True)]
-            C[k] = [self.over(c, A[k][k]) for c in C[k]]
-        return C, [A[k][k] for k in range(n)]
-
-
-def eye(n):
-    return [[(int(i == j), 0) for j in range(n)] for i in range(n)]
-
-
-def transposed(A):
-    return [list(row) for row in zip(*A, strict=True)]
 
 
 def outer(deviations):
@@ -118,20 +46,20 @@ def channel():
     return Phi, Q, P0, np.diag([0.09, 4])
 
 
-def covariances(bits, steps):
+def covariances(fmt, steps):
     """Yield the covariance after each step, and whether its variances and all pivots are positive."""
-    digits = Digits(bits)
-    Phi, Q, P, R = ([[digits.of(a) for a in row] for row in each.tolist()] for each in channel())
-    H = [[(int(j == i + 4), 0) for j in range(7)] for i in range(2)]
+    Phi, Q, P, R = (fmt.stored([list(map(Fraction, row)) for row in each.tolist()]) for each in channel())
+    H = fmt.unit(7)[4:6]
     for k in range(steps):
-        P = digits.sum(digits.product(digits.product(Phi, P), transposed(Phi)), Q)
-        pivots = []
+        P = fmt.sum(fmt.product(fmt.product(Phi, P), transposed(Phi)), Q)
+        sound = True
         if k % 5 == 0:
-            VH = digits.product(P, transposed(H))
-            inverse, pivots = digits.inverse(digits.sum(digits.product(H, VH), R))
-            K = digits.product(VH, inverse)
-            P = digits.product(digits.sum(eye(7), digits.product(K, H), -1), P)
-        yield P, all(m > 0 for m, _ in [*(P[i][i] for i in range(7)), *pivots])
+            VH = fmt.product(P, transposed(H))
+            S = fmt.sum(fmt.product(H, VH), R)
+            sound = fmt.has_positive_pivots(S)
+            K = fmt.product(VH, fmt.inverse(S))
+            P = fmt.product(fmt.difference(fmt.unit(7), fmt.product(K, H)), P)
+        yield P, sound and all(P[i][i][0] > 0 for i in range(7))
 
 
 @pytest.mark.parametrize(("bits", "collapse"), [(24, COLLAPSE), (53, None)])
@@ -141,10 +69,10 @@ def test_the_collapse_is_that_of_plain_integers(bits, collapse):
     run.take(np.zeros((steps, 2)))
     assert run.indefinite == collapse
     P = dict(zip((1, 700, 1790, 1791), run.checkpoints().P.tolist(), strict=True))
-    lost = None
-    for step, (plain, positive) in enumerate(covariances(bits, 1791), start=1):
+    lost, fmt = None, Arithmetic(2, bits)
+    for step, (plain, positive) in enumerate(covariances(fmt, 1791), start=1):
         if step in P:
-            assert P[step] == [[Fraction(m) * Fraction(2) ** e for m, e in row] for row in plain]
+            assert P[step] == fmt.values(plain)
         lost = lost or (None if positive else step)
     assert lost == collapse
 
@@ -153,7 +81,7 @@ def test_a_curve_of_variances_ends_where_the_run_does():
     curve, lost = study.variances(examples.height_channel(), FloatFormat(2, 24), 4, 1800)
     assert lost == COLLAPSE
     assert [k for k, _ in curve] == list(range(18, 1801, 18))
-    plain = {k: P[4][4] for k, (P, _) in enumerate(covariances(24, 180), start=1)}
+    plain = {k: P[4][4] for k, (P, _) in enumerate(covariances(Arithmetic(2, 24), 180), start=1)}
     assert [value for k, value in curve[:10]] == [math.ldexp(*plain[k]) for k, _ in curve[:10]]
     blocks = BlockFormats.uniform(FloatFormat(2, 24)).with_block("covariance", FloatFormat(2, 53))
     assert study.variances(examples.height_channel(), blocks, 4, 1800)[1] is None

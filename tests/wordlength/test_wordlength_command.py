@@ -23,7 +23,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength import running as command
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.models import read_measurements, read_model
+from gpbnb.wordlength.models import read_filter, read_measurements, read_model
 from gpbnb.wordlength.precision import required_precision
 from gpbnb.wordlength.report import Answer, Report, study
 
@@ -205,8 +205,9 @@ def test_a_certificate_that_cannot_be_written_is_refused(files, tmp_path, capsys
     assert "which are one file" in capsys.readouterr().err
 
 
-def test_a_digital_filter_comes_with_a_certificate(tmp_path, capsys):
-    model, path = tmp_path / "system.toml", tmp_path / "certificate.json"
+def test_a_digital_filter_comes_with_a_certificate_and_code_of_the_file_as_it_was_read(tmp_path, capsys, monkeypatch):
+    model, path, reads = tmp_path / "system.toml", tmp_path / "certificate.json", []
+    monkeypatch.setattr(command, "read_filter", lambda *given: reads.append(given) or read_filter(*given))
     model.write_text('b = [0.1, 0.2, 0.1]\na = [1, -0.5, 0.3]\nstructure = "direct form I"\n', encoding="utf-8")
     given = [
         str(model),
@@ -218,8 +219,11 @@ def test_a_digital_filter_comes_with_a_certificate(tmp_path, capsys):
         "2",
         "--certificate",
         str(path),
+        "--code",
+        str(tmp_path / "code"),
     ]
     assert main(given) == 0
+    assert len(reads) == 1
     content = json.loads(path.read_text(encoding="utf-8"))
     assert "fixed coefficients" in prove(content)
     assert content["limits"]["measurement"] == ["2"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,7 +21,9 @@ from gpbnb import (
     required_precision,
 )
 from gpbnb.arithmetic.search import Outcome
-from gpbnb.filters.structures import DIRECT
+from gpbnb.filters.sections import scaled
+from gpbnb.filters.structures import DIRECT, cascade, sections_of
+from gpbnb.filters.system import LinearFilter
 from gpbnb.filters.words import run_words
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.fixed_point import scaled_sections
@@ -118,6 +121,17 @@ def test_the_sections_of_a_cascade_are_scaled_as_its_design_scales_them(form):
     assert scaled_sections(LinearSystem.from_sections(sos, "lattice")) is None
     moving = LinearSystem.from_filter(given.made, x0=np.ones(given.n))
     assert scaled_sections(moving) is None
+
+
+def test_a_first_section_without_states_does_not_hide_the_form_of_the_others():
+    sections = [([Fraction(1)], []), *sections_of(signal.ellip(6, 1, 60, 0.1, output="sos"))]
+    found = {}
+    for form in DIRECT:
+        made, want = (cascade(each, form) for each in (sections, scaled(sections, form)))
+        system = LinearSystem.from_filter(LinearFilter(made.program, made.coefficients, cascade=made.cascade))
+        found[form] = scaled_sections(system).made.coefficients.tolist()
+        assert found[form] == want.coefficients.tolist()
+    assert found["direct form II"] != found["direct form II transposed"]
 
 
 def test_a_tolerance_below_the_last_bit_still_blames_the_fraction_bits():

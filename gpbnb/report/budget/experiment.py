@@ -46,8 +46,9 @@ def draw(budget: Budget, trials: int, rng: np.random.Generator) -> Draws:
     return Draws(budget, total)
 
 
-def turning_mean(cycles: float, samples: int = 20000) -> float:
+def turning_mean(cycles: float) -> float:
     """Return the length of the mean of a unit vector that rotates through `cycles`, sampled at midpoints."""
+    samples = 20_000
     angle = 2 * np.pi * cycles * (np.arange(samples) + 0.5) / samples
     return float(np.hypot(np.cos(angle).mean(), np.sin(angle).mean()))
 

@@ -336,17 +336,6 @@ def parse(text: str, name: str = "the text") -> ReadBudget:
     return ReadBudget(Budget(tuple(sources.values())), tuple(refused))
 
 
-def write(budget: Budget, path: str | Path) -> None:
-    """Write a budget to a new CSV file, from which :func:`read` recovers the same budget.
-
-    Raises
-    ------
-    FileExistsError : the file exists; overwriting it would lose its rejected rows.
-    """
-    with Path(path).open("x", encoding="utf-8", newline="") as file:
-        file.write(to_csv(budget.sources))
-
-
 def to_csv(sources: Sequence[Source]) -> str:
     """Format sources as CSV with the columns `HEADER`; a factor of 1 is left empty.
 

@@ -83,10 +83,6 @@ class Derivation:
         """Whether every step holds."""
         return all(step.holds for step in self.steps)
 
-    def holds_at(self, *places: int) -> bool:
-        """Whether the steps at the given places, counted from 0, hold."""
-        return all(self.steps[place].holds for place in places)
-
     def __repr__(self) -> str:
         return "\n".join(f"{_mark(step)} {step}" for step in self.steps)
 

@@ -213,11 +213,12 @@ def misalignment_cases(size: float) -> dict[str, Misalignments]:
     return {"no angle": none} | single | pairs | changing | both
 
 
-def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float], phases: int = 32) -> Floats:
+def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float]) -> Floats:
     """Simulate the error of φ in a mean over one roll, the length of (Δφ2, Δφ3), for one angle of several `sizes`.
 
     All angles are in radians; `drift` holds the true φ2 and φ3.
     """
+    phases = 32
     turns = 2 * math.pi * np.arange(phases) / phases
     errors = []
     for size in np.atleast_1d(np.asarray(sizes, dtype=float)):

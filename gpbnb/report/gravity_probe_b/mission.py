@@ -349,20 +349,19 @@ class RollPhase(NamedTuple):
     deviation: float
 
 
-def roll_phase_after(blocks: int, record: int = 0) -> RollPhase:
+def roll_phase_after(blocks: int) -> RollPhase:
     """Run the mission model in float64 with deviation states, and return its knowledge of the roll phase.
 
     Parameters
     ----------
-    blocks : number of blocks of 4096 steps.
-    record : number of the record.
+    blocks : number of blocks of 4096 steps, of the first record.
     """
     mission = Mission(deviations=True)
     run = Run(mission.model(2), REFERENCE, Form.INNOVATION, ())
     truth = np.array(mission.start)
     for block in range(blocks):
         H = mission.matrices(block, 2)
-        z, truth = mission.measurements(record, block, truth, H, BLOCK)
+        z, truth = mission.measurements(0, block, truth, H, BLOCK)
         run.use_measurement_matrices(H)
         run.carry(z[:, :, np.newaxis], 1)
     state = [name for name, _ in STATES].index("roll-phase offset δ")

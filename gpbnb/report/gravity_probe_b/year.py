@@ -334,8 +334,6 @@ def _name(case: YearCase) -> tuple[str, ...]:
     return case.model, str(case.base), str(case.precision), case.rounding.value, case.form.name.lower()
 
 
-HEADER = ("model", "base", "precision", "rounding", "form", "step", *_COLUMNS)
-
 _KEY_COLUMNS = (
     Column("model", "text", choices=MODELS),
     Column("base", "integer", 2, 16),

@@ -263,22 +263,6 @@ def error_readings() -> tuple[PrintedColumn, ...]:
     return tuple(result)
 
 
-def pairs(
-    norm: str = "column sum", relative: bool = False, source: str = "its own digits"
-) -> list[tuple[PrintedColumn, PrintedColumn]]:
-    """Pair each reading of the bound with the error of elimination in the same wordlength."""
-    errors = {
-        (one.wordlength, one.norm, one.relative): one
-        for one in error_readings()
-        if one.detail == "elimination, against the matrix as given"
-    }
-    return [
-        (one, errors[one.wordlength, norm, relative])
-        for one in bound_readings()
-        if (one.norm, one.relative) == (norm, relative) and one.detail.endswith(source)
-    ]
-
-
 @dataclass(frozen=True)
 class Agreements:
     """Result of a search among readings: agreements in all digits, and the number expected by chance.

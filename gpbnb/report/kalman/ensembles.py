@@ -287,9 +287,6 @@ def lines(seed: int, outcomes: Sequence[TrialOutcome]) -> list[tuple[str, ...]]:
     ]
 
 
-HEADER = ("seed", *Summary._fields)
-
-
 def _column(name: str, kind: type) -> Column:
     if kind is str:
         return Column(name, "text")

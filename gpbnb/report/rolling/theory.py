@@ -288,11 +288,6 @@ def drift_error_rolled(level: float, period: float, duration: float = YEAR, inte
     return math.sqrt(6 * float(flicker_density(level, 1 / period, interval)) / duration**3) * YEAR
 
 
-def rolling_gain(period: float, duration: float = YEAR) -> float:
-    r"""Factor by which rolling reduces the standard error of a drift, :math:`\sqrt{3T/(2T_r)}`."""
-    return math.sqrt(1.5 * duration / period)
-
-
 def roll_phase(index: Any, period: float, interval: float = INTERVAL) -> NDArray[np.float64]:
     """Roll angle, in [0, 2π), at samples counted from 0; `period` and `interval` in s."""
     if not (0 < period < math.inf and 0 < interval < math.inf):

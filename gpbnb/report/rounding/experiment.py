@@ -15,9 +15,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray, NumberFormat
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounded import BoundedError
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.rational import column_sum_norm, integers
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import theory

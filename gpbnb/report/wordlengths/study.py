@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -11,10 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic import search
-from gpbnb.arithmetic.algebra import Algebra
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
 from gpbnb.arithmetic.rounding import Rounding
@@ -23,7 +21,6 @@ from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.contraction import companion_bound
 from gpbnb.filters.emulation import compare_runs
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import StepModel, kalman_step
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.report.gravity_probe_b.year import Year
@@ -222,53 +219,6 @@ def companion_run(
     history = compare_runs(run, companion.checkpoints())
     bound = companion_bound(history.state, companion.bounds.state[: len(history.steps)])
     return np.abs(history.state).max(axis=0), bound.max(axis=0)
-
-
-def native(
-    model: LinearModel, z: NDArray[Any], dtype: type[np.floating[Any]], progress: bool = False
-) -> NDArray[np.float64]:
-    """Run the innovation form in a NumPy type, with the limited range of a processor.
-
-    Operations and their order are those of the emulation. Here results are rounded to nearest, ties to even. Small
-    numbers become subnormal or zero, and large numbers infinite. Products and sums are rounded one by one, not fused.
-
-    Parameters
-    ----------
-    model, z : as for :func:`gpbnb.wordlength.precision.survey`; each entry is converted to float64, then to the type.
-    dtype : numpy.float16, numpy.float32 or numpy.float64.
-    progress : show a progress bar that counts steps.
-
-    Returns
-    -------
-    x : (steps, n), the estimate after each step; not finite if the range is too small.
-    """
-    if not (isinstance(dtype, type) and issubclass(dtype, np.floating)):
-        raise TypeError(f"got dtype {dtype!r}; needed numpy.float16, numpy.float32 or numpy.float64")
-    model.refuse_inputs("NumPy's own types")
-    with np.errstate(all="ignore"):
-        given = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
-        return innovation_form(given, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)
-
-
-def innovation_form(given: Mapping[str, NDArray[Any]], z: NDArray[Any], progress: bool = False) -> NDArray[Any]:
-    """Run the innovation form in the number type of the arrays; see :func:`native`.
-
-    Parameters
-    ----------
-    given : Phi, H, Q, R with a leading axis, x0 and P0, as from :meth:`gpbnb.filters.model.LinearModel.to_float`.
-    z : (steps, m).
-
-    Returns
-    -------
-    x : (steps, n), the estimate after each step.
-    """
-    x, P, estimates = given["x0"][:, np.newaxis], given["P0"], np.empty((len(z), len(given["x0"])), z.dtype)
-    algebra = Algebra(lambda n: np.eye(n, dtype=P.dtype))
-    for k, measured in enumerate(tqdm(z, desc="native", unit="step", disable=not progress)):
-        model = StepModel(*(given[letter][k % len(given[letter])] for letter in ("Phi", "H", "Q", "R")))
-        x, _, P = kalman_step(algebra, Form.INNOVATION, model, x, P, measured[:, np.newaxis])
-        estimates[k] = x[:, 0]
-    return estimates
 
 
 class InversePrecision(NamedTuple):

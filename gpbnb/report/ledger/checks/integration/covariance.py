@@ -188,8 +188,8 @@ def _from_any(case: Case) -> Names:
     return _in_time(case, _ANY)
 
 
-def _from_steady(case: Case, times: int = 1) -> Names:
-    return _in_time(case, (times * case.steady, sp.S.Zero, sp.S.Zero))
+def _from_steady(case: Case) -> Names:
+    return _in_time(case, (case.steady, sp.S.Zero, sp.S.Zero))
 
 
 @CHECKS.add(*eq("19"))

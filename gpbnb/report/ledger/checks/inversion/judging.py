@@ -57,14 +57,12 @@ def corrected(printed: Statement, form: str) -> Statement:
     return replace(printed, form=form)
 
 
-def slip(
-    printed: Statement, environments: Iterable[Names], meant: str, recomputed: str, note: str, sharp: bool = True
-) -> Finding:
+def slip(printed: Statement, environments: Iterable[Names], meant: str, recomputed: str, note: str) -> Finding:
     """Judge a statement that fails: it has a misprint if the intended form holds, otherwise it is wrong."""
     environments = tuple(environments)
     return compare(
         holds(printed, environments),
         recomputed,
-        Verdict.MISPRINT if holds(corrected(printed, meant), environments, sharp) else Verdict.WRONG,
+        Verdict.MISPRINT if holds(corrected(printed, meant), environments) else Verdict.WRONG,
         otherwise_note=note,
     )

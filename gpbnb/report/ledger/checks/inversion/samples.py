@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
@@ -63,7 +62,7 @@ def samples() -> tuple[Sample, ...]:
     return tuple(found)
 
 
-def of_example(norm: Callable[[Matrix], Any] = column_sum_norm) -> tuple[Sample, float]:
+def of_example() -> tuple[Sample, float]:
     """Return the example of 11.4 in four digits, and the norm of its error."""
     sample = samples()[0]
-    return sample, float(norm(sample.error))
+    return sample, float(column_sum_norm(sample.error))

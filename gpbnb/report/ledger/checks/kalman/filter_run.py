@@ -12,7 +12,6 @@ import sympy as sp
 from gpbnb.report.ledger.statements import Statement
 
 STATES, MEASUREMENTS, STEPS = 3, 2, 5
-_LETTERS = ("Phi", "H", "Q", "R", "z", "x", "P", "prior", "K", "F", "u")
 
 
 @cache

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.report.ledger.html import chapter
 from gpbnb.report.ledger.registry import Checks
 
 CHECKS = Checks()
 
-CHAPTER = chapter("kalman")
 FOUR = FloatFormat(10, 4)

@@ -29,7 +29,6 @@ from gpbnb.report.rolling import derivation, experiment, theory
 from gpbnb.report.rolling.theory import DRIFTS, LEVEL, PERIOD, PERIOD_FLOWN
 
 Names = dict[str, Any]
-LOST = "the scan has lost the picture and keeps only its caption"
 
 
 # -- cases ----------------------------------------------------------------------------------------

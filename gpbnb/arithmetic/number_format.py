@@ -1,4 +1,4 @@
-"""What floating-point and fixed-point formats share: how they compute, and what they make besides ``fmt.array``."""
+"""What formats share: how they compute, and what they make besides ``fmt.array``."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from gpbnb.arithmetic import linalg
-from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import ExactKernel, kernel
@@ -21,7 +19,7 @@ from gpbnb.arithmetic.rounding import Order, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.text import at_entry
 from gpbnb.arithmetic.words import Layout, words
 
-Made = TypeVar("Made", bound=FloatArray)
+Made = TypeVar("Made")
 
 
 def checked_rounding(rounding: Any) -> Rounding:
@@ -34,8 +32,15 @@ def checked_rounding(rounding: Any) -> Rounding:
     return rounding_named(rounding)
 
 
-class Makes(ABC, Generic[Made]):
-    """A number format that makes arrays of one class."""
+class NumberFormat(ABC, Generic[Made]):
+    """A number format, floating or fixed point, that makes arrays of one class."""
+
+    #: The number base.
+    base: int
+    #: Digits of the significand, or bits of the word without its sign.
+    precision: int
+    #: Applied to every result.
+    rounding: Rounding
 
     @property
     @abstractmethod
@@ -48,9 +53,19 @@ class Makes(ABC, Generic[Made]):
         """How a word stores a number of this format."""
 
     @property
+    @abstractmethod
     def algebra(self) -> Mapping[str, Callable[..., Any]]:
         """What functions of ``np.linalg`` do for arrays of the format; elimination pivots, as LAPACK does."""
-        return linalg.NUMPY
+
+    @property
+    def unit_roundoff(self) -> Fraction:
+        """Bound of the relative error of one rounding.
+
+        Raises
+        ------
+        AttributeError : fixed point, whose relative errors have no bound.
+        """
+        raise AttributeError(f"got {self}, whose relative errors have no bound; needed floating point")
 
     @abstractmethod
     def array(self, values: Any) -> Made:
