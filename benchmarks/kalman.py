@@ -1,4 +1,4 @@
-"""One step of a Kalman filter, n = 10, m = 2, each of its seven thousand operations rounded."""
+"""One step of a Kalman filter, n = 10, m = 2, each of its seven thousand operations rounded; and whole emulations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import decimal
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -23,6 +23,11 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.matrices import difference, matrix_sum
 from gpbnb.arithmetic.kernels.scalar import divide, load, matmul, multiply, negative, store, subtract
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.nonlinear_run import opened
+from gpbnb.filters.replayed import only_compiled
 
 N, M = 10, 2
 STEPS = 20  # in one call of the compiled loop
@@ -106,15 +111,15 @@ def plain_step(model: Any, x0: Any, P0: Any) -> tuple[Any, Any]:
     return x, product(difference(identity, product(K, H)), V)
 
 
-def model() -> tuple[Any, ...]:
+def model(n: int = N) -> tuple[Any, ...]:
     """A stable model with no zeros in it, and where to start."""
     rng = np.random.default_rng(10)
-    Phi = 0.9 * np.eye(N) + 0.03 * rng.standard_normal((N, N))
-    H = rng.standard_normal((M, N))
-    A = rng.standard_normal((N, N))
-    Q, R = 0.01 * np.eye(N) + 1e-3, np.array([[1.0, 0.1], [0.1, 1.0]])
-    parts = (Phi, Phi.T, Q, H, H.T, R, rng.standard_normal((M, 1)), np.eye(N))
-    return parts, rng.standard_normal((N, 1)), A @ A.T / N + np.eye(N)
+    Phi = 0.9 * np.eye(n) + 0.3 / n * rng.standard_normal((n, n))
+    H = rng.standard_normal((M, n))
+    A = rng.standard_normal((n, n))
+    Q, R = 0.01 * np.eye(n) + 1e-3, np.array([[1.0, 0.1], [0.1, 1.0]])
+    parts = (Phi, Phi.T, Q, H, H.T, R, rng.standard_normal((M, 1)), np.eye(n))
+    return parts, rng.standard_normal((n, 1)), A @ A.T / n + np.eye(n)
 
 
 def compiled(fmt: FloatFormat) -> tuple[Callable[[int], Any], Any]:
@@ -208,4 +213,26 @@ def measure() -> list[Row]:
         times = medians({"gpbnb": partial(run, STEPS), "empty": partial(run, 0), "decimal": with_decimal}, 100)
         step = {"gpbnb": (times["gpbnb"] - times["empty"]) / STEPS, "decimal": times["decimal"]}
         table += rows(f"Kalman step, {precision} decimal digits", step, "gpbnb", {"decimal": least})
-    return table + measure_binary32()
+    return table + measure_binary32() + measure_emulation()
+
+
+def measure_emulation() -> list[Row]:
+    """``emulate``, whose reference and errors may take twice the time of its run, beside the run alone."""
+    table: list[Row] = []
+    for n, steps, turns in ((10, 1000, 20), (100, 100, 5)):
+        (Phi, _, Q, H, _, R, *_), x0, P0 = model(n)
+        given = LinearModel(Phi=Phi, H=H, Q=Q, R=R, x0=x0[:, 0], P0=(P0 + P0.T) / 2)
+        z = np.random.default_rng(n).standard_normal((steps, M))
+        runs = iter([opened(given, named.BINARY32, Form.INNOVATION) for _ in range(turns + 1)])
+
+        def alone(runs: Iterator[Any] = runs, z: Any = z) -> None:
+            next(runs).take(z)
+
+        with only_compiled():
+            works: dict[str, Callable[[], object]] = {
+                "gpbnb": partial(emulate, given, z, named.BINARY32),
+                "its run": alone,
+            }
+            times = medians(works, turns)
+        table += rows(f"emulate {steps} steps, n = {n}, binary32", times, "gpbnb", {"its run": 1 / 3})
+    return table

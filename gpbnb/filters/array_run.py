@@ -26,6 +26,7 @@ from gpbnb.filters import array_steps
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_steps import ONE_FORMAT, BlockStorage
 from gpbnb.filters.bounded_steps import CarriedBound, Taken
+from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import (
@@ -40,7 +41,6 @@ from gpbnb.filters.kalman_step import (
 )
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import double_doubles_of, opening
-from gpbnb.filters.run import Checkpoints
 
 ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
 FACTORED = (Form.UD, *ROOTS)

@@ -14,12 +14,13 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_checkpoints, opened
-from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums, log_spaced, reference
+from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, log_spaced, reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,42 +60,33 @@ class History:
     @property
     def gain_norm(self) -> NDArray[np.float64]:
         """Relative error of the gain, (c,), by largest column sums, norm (22)."""
-        return relative(self.gain, self.reference.K)
+        return relative(self.gain, self.reference.to_float("K"))
 
     @property
     def covariance_norm(self) -> NDArray[np.float64]:
         """Relative error of the covariance, (c,), by largest column sums, norm (22)."""
-        return relative(self.covariance, self.reference.P)
+        return relative(self.covariance, self.reference.to_float("P"))
 
     @property
     def least_eigenvalue(self) -> NDArray[np.float64]:
         """Least eigenvalue of the symmetric part of the computed covariance, (c,), in units of the true variances."""
-        true = self.reference.P[: len(self.steps)].astype(np.float64)
+        true = self.reference.to_float("P")[: len(self.steps)]
         computed = true + self.covariance
         scale = np.sqrt(np.diagonal(true, axis1=1, axis2=2))
         scaled = computed / scale[:, :, np.newaxis] / scale[:, np.newaxis, :]
         return np.asarray(np.linalg.eigvalsh((scaled + np.swapaxes(scaled, 1, 2)) / 2)[:, 0], dtype=np.float64)
 
 
-def relative(error: NDArray[np.float64], true: NDArray[Any]) -> NDArray[np.float64]:
+def relative(error: NDArray[np.float64], true: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return norms (22) of errors over norms of the true matrices, (c,)."""
-    size = np.abs(true[: len(error)].astype(np.float64)).sum(axis=1).max(axis=1)
+    size = np.abs(true[: len(error)]).sum(axis=1).max(axis=1)
     return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
 
 
 def compare_runs(run: Run | ArrayRun | NonlinearRun, true: Checkpoints) -> History:
     """Subtract the reference from the checkpoints of a run, at the same steps."""
     checkpoints = run.checkpoints()
-    c = len(checkpoints.steps)
-    if checkpoints.steps != true.steps[:c]:
-        raise ValueError(
-            f"got checkpoint steps {checkpoints.steps} for the runs and {true.steps} for the "
-            "reference; needed equal steps"
-        )
-    x, K, P = (
-        (each - other[:c]).astype(np.float64)
-        for each, other in ((checkpoints.x, true.x), (checkpoints.K, true.K), (checkpoints.P, true.P))
-    )
+    x, K, P = checkpoints.minus(true)
     blocks = run.block_formats if isinstance(run, Run) else None
     fmt, steps = blocks or cast(FloatFormat | BlockFormats, run.fmt), np.array(checkpoints.steps, dtype=np.int64)
     repairs = tuple(str(each) for each in run.repairs)

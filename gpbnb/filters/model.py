@@ -430,11 +430,7 @@ class LinearModel:
         ------
         ValueError : a stored covariance is indefinite, and :meth:`definite_in` could not repair it.
         """
-        sound = self.definite_in(fmt)
-        stored = {letter: array.to_fractions() for letter, array in stored_arrays(sound, fmt).items()}
-        for letter, strictly in _COVARIANCES.items():
-            _check_cycle(letter, stored[letter], strictly)
-        return sound._changed(**stored, name=f"{self.name}, in {format_text(fmt)}", repair=None)
+        return _rounded(self, fmt) if fmt.rounding is Rounding.STOCHASTIC else _rounded_once(self, fmt)
 
     def arrays(self, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
         """Return the model as a dict of arrays, by letter, with each entry rounded into the format.
@@ -556,6 +552,17 @@ def _floats(model: LinearModel) -> dict[str, NDArray[np.float64]]:
                 f"got {letter} with an entry beyond the range of float64; needed entries below 1.8e308; scale the model"
             ) from None
     return found
+
+
+def _rounded(model: LinearModel, fmt: FloatFormat | FixedFormat) -> LinearModel:
+    sound = model.definite_in(fmt)
+    stored = {letter: array.to_fractions() for letter, array in stored_arrays(sound, fmt).items()}
+    for letter, strictly in _COVARIANCES.items():
+        _check_cycle(letter, stored[letter], strictly)
+    return sound._changed(**stored, name=f"{model.name}, in {format_text(fmt)}", repair=None)
+
+
+_rounded_once = lru_cache(maxsize=8)(_rounded)
 
 
 @lru_cache(maxsize=16)

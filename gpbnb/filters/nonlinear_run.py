@@ -27,12 +27,13 @@ from gpbnb.filters.array_run import (
 )
 from gpbnb.filters.array_steps import BlockStorage, observe_ud, observed, root_of_factors
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
+from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.factors import combined_gain, upper_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import corrected_by, measured_in, predicted_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.reference import Step, agreed
-from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums, reference_states
+from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
 from gpbnb.filters.unscented import UnscentedModel, unscented_step
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
@@ -22,6 +19,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
+from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
 from gpbnb.filters.forms import Form
@@ -400,18 +398,16 @@ class Run:
 
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Convert results of the compiled loops to exact Fractions."""
-        if self.fmt is None:
-            high, low = (part.astype(object) for part in (packed[..., 0], packed[..., 1]))
-            return np.asarray(np.frompyfunc(_exact_sum, 2, 1)(high, low), dtype=object)
-        return np.asarray(FloatArray.from_packed(packed, self.fmt).to_fractions(), dtype=object)
+        return Packed(packed, self.fmt).exactly()
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""
         count = int(self.notes[NEXT_CHECKPOINT])
-        x, K, P = (self.exactly(each[:count]) for each in (self.X, self.G, self.C))
+        steps = [int(step) for step in self.checkpoint_steps[:count]]
+        x, K, P = (Packed(each[:count].copy(), self.fmt) for each in (self.X[:, :, 0], self.G, self.C))
         if self.form is Form.UD:
-            K, P = self._from_factors(K, P)
-        return Checkpoints(tuple(int(step) for step in self.checkpoint_steps[:count]), x[..., 0], K, P)
+            return Checkpoints(steps, x, *self._from_factors(K.exactly(), P.exactly()))
+        return Checkpoints(steps, x, K, P)
 
     def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return gains and covariances from factors and from the gains of one measurement after the other."""
@@ -428,15 +424,9 @@ def _ascending(checkpoint_steps: Sequence[int]) -> NDArray[np.int64]:
     steps = np.array(checkpoint_steps).reshape(-1)
     if steps.size and steps.dtype.kind not in "iu":
         raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed whole numbers")
-    if np.any(np.diff(steps.astype(np.int64), prepend=0) <= 0):
+    if steps.size and (steps[0] <= 0 or np.any(steps[1:] <= steps[:-1])):
         raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more")
     return steps.astype(np.int64)
-
-
-def _exact_sum(high: float, low: float) -> Fraction:
-    # Both denominators are powers of two: faster than the sum of two Fractions.
-    (n, d), (p, q) = high.as_integer_ratio(), low.as_integer_ratio()
-    return Fraction(n * (q // d) + p, q) if q > d else Fraction(n + p * (d // q), d)
 
 
 def widened(packed: NDArray[Any]) -> NDArray[np.float64]:
@@ -448,16 +438,6 @@ def widened(packed: NDArray[Any]) -> NDArray[np.float64]:
     wide = np.empty(packed.shape)
     widen(Decimal(1, True), packed, wide)  # of any precision
     return wide
-
-
-@dataclass(frozen=True, eq=False)
-class Checkpoints:
-    """Exact values after some steps, object arrays of Fractions: x (c, n), K (c, n, m), P (c, n, n)."""
-
-    steps: tuple[int, ...]
-    x: NDArray[Any]
-    K: NDArray[Any]
-    P: NDArray[Any]
 
 
 def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
@@ -491,12 +471,12 @@ def reference(
     ArithmeticError : the model is degenerate, or more digits are necessary for too many steps.
     """
     run = Run(model.without_inputs(), None, form, checkpoint_steps)
+    start = run.P.copy()
     if model.has_inputs:
         _take_with_inputs(run, model, z)
     else:
         run.take(z)
     if run.form is not Form.UD:
-        start = Run(model.without_inputs(), None, run.form, ()).P
         count = int(run.notes[NEXT_CHECKPOINT])
         at = np.array([0, *run.checkpoint_steps[:count]])
         if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C[:count]])):

@@ -10,7 +10,8 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.arithmetic.kernels.matrices import product
+from gpbnb.arithmetic.kernels.matrices import product, product_by_sparse
+from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, zero
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32, BINARY64
 from gpbnb.filters.emulation import emulate
@@ -137,33 +138,46 @@ def inverse(fmt, S):
 
 
 @compiled
-def three_products(fmt, a, b, c, d, e):
+def every_product(fmt, a, b, c, d, e, f):
     product(fmt, a, b, c)
     product_with_units(fmt, a, b, d)
     product_by_columns(fmt, a, b, e)
+    product_by_sparse(fmt, a, b, f)
 
 
 @compiled
-def by_dots(fmt, a, b, c):
-    for j in range(b.shape[1]):
-        product(fmt, a, b[:, j : j + 1], c[:, j : j + 1])
+def by_scalars(fmt, a, b, c):
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            s = zero(fmt)
+            for k in range(a.shape[1]):
+                s = add(fmt, s, multiply(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j))))
+            store(fmt, c, (i, j), s)
 
 
-@pytest.mark.parametrize("shape", [(8, 9, 8), (9, 3, 11), (12, 12, 12), (7, 8, 9)])
-def test_wide_products_in_double_double(shape):
-    """Those of high and low parts taken apart are those of one column at a time."""
-    n, m, p = shape
-    rng = np.random.default_rng(shape)
-    a, b = (rng.standard_normal((*s, 2)) * [1.0, 2.0**-55] for s in ((n, m), (m, p)))
-    a[rng.random((n, m)) < 0.3] = 0
-    a[rng.random((n, m)) < 0.2] = (1.0, 0.0)
-    found, expected = [np.empty((n, p, 2)) for _ in range(3)], np.empty((n, p, 2))
-    three_products(DoubleDouble(), a, b, *found)
-    by_dots(DoubleDouble(), a, b, expected)
-    for each in found:
-        assert np.array_equal(each, expected)
+@pytest.mark.parametrize("scale", [0, -190, 190, 300, -500])
+def test_products_in_double_double(scale):
+    """Those of high and low parts taken apart are those of scalar operations, to the sign of zeros."""
+    rng = np.random.default_rng(abs(scale))
+    for n, m, p in [(8, 9, 8), (9, 3, 11), (12, 12, 12), (7, 8, 9), (4, 8, 1), (10, 10, 1), (2, 20, 2), (17, 1, 5)]:
+        a, b = (rng.standard_normal((*s, 2)) * [1.0, 2.0**-55] for s in ((n, m), (m, p)))
+        a[rng.random((n, m)) < 0.3] = 0
+        a[rng.random((n, m)) < 0.2] = (1.0, 0.0)
+        b[rng.random((m, p)) < 0.2, 1] = 0
+        a *= 2.0**scale
+        b *= 2.0 ** (scale // 2)
+        found, expected = [np.empty((n, p, 2)) for _ in range(4)], np.empty((n, p, 2))
+        every_product(DoubleDouble(), a, b, *found)
+        by_scalars(DoubleDouble(), a, b, expected)
+        for each in found:
+            assert each.tobytes() == expected.tobytes(), (n, m, p)
+
+
+@pytest.mark.parametrize("exponents", [(400, 700), (-500, -400), (-349, -800)])
+def test_products_in_double_double_beyond_its_range(exponents):
+    a, b = (np.full((6, 6, 2), [2.0**exponent, 0.0]) for exponent in exponents)
     with pytest.raises(OverflowError):
-        three_products(DoubleDouble(), a * 2.0**800, b * 2.0**800, *found)
+        every_product(DoubleDouble(), a, b, *(np.empty((6, 6, 2)) for _ in range(4)))
 
 
 @pytest.mark.parametrize("precision", [3, 8, 15, 16, 18])

@@ -9,8 +9,9 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, max_norm, row_sum_norm
+from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.run import Checkpoints, reference
+from gpbnb.filters.run import reference
 from gpbnb.report.kalman import exact_step, printed, report_bounds
 
 TWO = LinearModel(

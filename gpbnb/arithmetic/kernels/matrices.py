@@ -13,6 +13,7 @@ from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.bits import bits, from_bits
 from gpbnb.arithmetic.kernels.compiling import borrowing, inner
+from gpbnb.arithmetic.kernels.planes import product_in_planes
 from gpbnb.arithmetic.kernels.scalar import (
     add,
     can_be_freed,
@@ -35,7 +36,6 @@ from gpbnb.arithmetic.kernels.tags import (
     LEAST,
     LIMIT,
     Blocked,
-    DoubleDouble,
     Hexadecimal,
     Limited,
     Mixed,
@@ -46,7 +46,6 @@ from gpbnb.arithmetic.kernels.tags import (
 _INLINE = {"forceinline": True, "no_cfunc_wrapper": True, "_nrt": False}
 _MAKES_ARRAYS = {"no_cfunc_wrapper": True, "_nrt": True}
 _MOST = np.int64(2**63 - 1)
-WIDE = 8  # rows and columns, from which on high and low parts are taken apart
 MANY = 2000  # multiplications in a product, from which on a look at the range of its entries pays
 
 
@@ -194,47 +193,6 @@ def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return in_order
 
 
-@borrowing
-def _add_multiple(fmt: Any, factor: Any, high: Any, low: Any, sum_high: Any, sum_low: Any) -> None:
-    """Add a multiple of one row to another; all four arrays are contiguous, so that the loop is vectorized."""
-    for j in range(high.shape[0]):
-        s = add(fmt, (sum_high[j], sum_low[j]), multiply(fmt, factor, (high[j], low[j])))
-        sum_high[j] = s[0]
-        sum_low[j] = s[1]
-
-
-def product_in_planes(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    """c = a b for pairs of float64 in wide matrices, with high and low parts apart; returns whether it did that."""
-    raise TypeError("got a call of product_in_planes from Python; needed one from a function compiled by numba")
-
-
-@overload(product_in_planes, strict=False, jit_options=_MAKES_ARRAYS)
-def _product_in_planes(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    def of_pairs(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-        p = b.shape[1]
-        if p < WIDE or a.shape[0] < WIDE:
-            return False
-        high, low = np.empty((b.shape[0], p)), np.empty((b.shape[0], p))
-        for k in range(b.shape[0]):
-            for j in range(p):
-                high[k, j], low[k, j] = load(fmt, b, (k, j))
-        sums = np.empty((2, p))
-        for i in range(a.shape[0]):
-            sums[:] = 0.0
-            for k in range(a.shape[1]):
-                factor = load(fmt, a, (i, k))
-                if not is_zero(fmt, factor):
-                    _add_multiple(fmt, factor, high[k], low[k], sums[0], sums[1])
-            for j in range(p):
-                put(fmt, c, (i, j), (sums[0, j], sums[1, j]))
-        check(fmt, c)
-        return True
-
-    if getattr(fmt, "instance_class", None) is DoubleDouble:
-        return of_pairs
-    return lambda fmt, a, b, c: False
-
-
 @borrowing(forceinline=True)
 def _add_products(fmt: Any, a: Any, b: Any, c: Any) -> None:
     for i in range(a.shape[0]):
@@ -270,7 +228,7 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
 @borrowing
 def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """Like :func:`product`, with the same digits, but summed over the nonzero entries of b."""
-    if product_in_order(fmt, a, b, c):
+    if product_in_order(fmt, a, b, c) or product_in_planes(fmt, a, b, c):
         return
     for j in range(b.shape[1]):
         fresh = True

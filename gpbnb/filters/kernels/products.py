@@ -13,7 +13,8 @@ from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.bits import ADDING_MULTIPLES, bits
 from gpbnb.arithmetic.kernels.compiling import borrowing
-from gpbnb.arithmetic.kernels.matrices import MANY, product_in_order, product_in_planes, stays_within
+from gpbnb.arithmetic.kernels.matrices import MANY, product_in_order, stays_within
+from gpbnb.arithmetic.kernels.planes import product_in_planes
 from gpbnb.arithmetic.kernels.scalar import (
     add,
     check,

@@ -30,11 +30,12 @@ from gpbnb import sweeps
 from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.emulation import History, compare_runs, emulate, relative
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.run import Checkpoints, Run, log_spaced, reference
+from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.filters.simulation import BLOCK, Simulation
 from gpbnb.report.gravity_probe_b.model import SEED, TRUTH, YEAR, gravity_probe_b, gravity_probe_b_year
 from gpbnb.sweeps import Column, Sweep, as_computed
@@ -322,7 +323,7 @@ def bound_rows(case: YearCase, directory: Path, steps: int) -> list[tuple[str, .
     if not run.bounded:
         return []
     states, gains, covariances = (each[: len(true.steps)] for each in run.bounds)
-    norms = [relative(gains, true.K), relative(covariances, true.P)]
+    norms = [relative(gains, true.to_float("K")), relative(covariances, true.to_float("P"))]
     numbers = np.column_stack([states[:, :4], states.max(axis=1), *norms])
     return [
         (*_name(case), str(step), *(f"{number * (1 + 1e-5):.6g}" for number in line))

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.run import Checkpoints
 from gpbnb.report.kalman import report_bounds
 
 
