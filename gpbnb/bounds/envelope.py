@@ -42,7 +42,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.doubledouble import two_sum
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.program import MULTIPLY, effects, functionals
+from gpbnb.filters.program import MULTIPLY, effects, extents, functionals
 
 _U = 2.0**-53
 _UP = 1 + 2.0**-40
@@ -184,6 +184,8 @@ class _Values(NamedTuple):
     none: NDArray[np.bool_]
     drift: NDArray[np.float64]
     largest: NDArray[np.float64]
+    #: (values, 2), see :func:`gpbnb.filters.program.extents`.
+    reach: NDArray[np.int64]
 
 
 @compiled
@@ -211,7 +213,8 @@ def disturbances(program: Any, given: Any, units: Any, limits: Any, b: Any, caps
     loop, gain = np.zeros((steps, n, n)), np.zeros((steps, n, m))
     count = first + o_count
     rows, sizes = np.empty((count, first, 2)), np.empty((count, first))
-    values = _Values(rows, sizes, np.empty(count), np.empty(count, np.bool_), np.empty(count), np.empty(count))
+    none, reach = np.empty(count, np.bool_), extents(program.operations, first)
+    values = _Values(rows, sizes, np.empty(count), none, np.empty(count), np.empty(count), reach)
     effect, effect_sizes = np.empty((count, n)), np.empty((count, n))
     plain = np.empty(given.coefficients.shape[1])
     for k in range(steps):
@@ -262,7 +265,10 @@ def _size(v: int, HPhi: Any, limits: Any, b: Any, cap: float, values: Any) -> fl
     m, n = HPhi.shape[0], HPhi.shape[1]
     rows, sizes = values.rows, values.sizes
     seen, known, carried = 0.0, 0.0, 0.0
-    for j in range(n):
+    begin, end = values.reach[v, 0], values.reach[v, 1]
+    if end > n:  # it depends on measurements, and through them on all states
+        begin, end = 0, n
+    for j in range(begin, end):
         r, tiny = rows[v, j, 0], (m + 8) * _U * sizes[v, j]
         by_innovation = r
         for i in range(m):
@@ -438,13 +444,13 @@ def effect(given: Any, at: int, c: Any, each: Any) -> None:
     each[:] = 0.0
     for j in range(n):
         each[ROUNDING] += abs(c[j]) * given.slack[at, j]
+    sums = np.zeros(g_count)
+    for j in range(n):  # sums of all columns side by side
+        for g in range(g_count):
+            sums[g] += c[j] * given.G[at, j, g]
     for g in range(g_count):
-        if given.limits[at, g] != 0.0:
-            s = 0.0
-            for j in range(n):
-                s += c[j] * given.G[at, j, g]
-            if s != 0.0:
-                each[given.part[g]] += abs(s) * given.limits[at, g]
+        if given.limits[at, g] != 0.0 and sums[g] != 0.0:
+            each[given.part[g]] += abs(sums[g]) * given.limits[at, g]
 
 
 @compiled
@@ -501,7 +507,11 @@ def certify(given: Any, starts: Any, k: int, first: int, steady: bool, end: Any)
             following[:] = 0.0
             rate[:] = 0.0
             for j in range(n):
-                if c[j] != 0.0:
+                if c[j] != 0.0 and counts[j] == n:
+                    for r in range(n):
+                        following[r] += c[j] * given.F[at, j, r]
+                        rate[r] += abs(c[j]) * given.spread[at, j, r]
+                elif c[j] != 0.0:
                     for e in range(counts[j]):
                         r = into[j, e]
                         following[r] += c[j] * given.F[at, j, r]

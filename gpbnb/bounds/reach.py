@@ -81,10 +81,11 @@ def forward(
     segments, kind, ellipsoids = reach
     window, columns = segments.shape[0], segments.shape[1]
     bounds, parts, moved = np.zeros((steps, n)), np.zeros((steps, n, 4)), np.empty(n)
-    last = before.copy()
+    last, reached = before.copy(), np.empty((3, n))
     for k in range(steps):
         number = done + k
         loop, slot, dropped = F[k], number % window, 0.0
+        turned = np.ascontiguousarray(loop.T)  # so that the entries of a product are computed side by side
         if number >= window:
             take_in(segments[slot : slot + 1], kind, ellipsoids, size)
             for p in range(3):
@@ -92,15 +93,16 @@ def forward(
         for w in range(min(number, window)):
             if w != slot:
                 for c in range(columns):
+                    moved[:] = 0.0
+                    for j in range(n):
+                        s = segments[w, c, j]
+                        for i in range(n):
+                            moved[i] += turned[j, i] * s
                     for i in range(n):
-                        s = 0.0
-                        for j in range(n):
-                            s += loop[i, j] * segments[w, c, j]
-                        moved[i] = s
+                        s = moved[i]
                         if s != 0.0 and abs(s) <= _TINY:
-                            moved[i], dropped = 0.0, 1e-240
-                    for i in range(n):
-                        segments[w, c, i] = moved[i]
+                            s, dropped = 0.0, 1e-240
+                        segments[w, c, i] = s
         for i in range(n):
             own = slack[k, i] + dropped
             for j in range(n):
@@ -111,13 +113,15 @@ def forward(
                 own += 2 * _U * abs(segments[slot, g, i])
             segments[slot, g_count:, i] = 0.0
             segments[slot, g_count + i, i] = own * _UP
+        reached[:] = 0.0
+        for w in range(min(number + 1, window)):
+            for c in range(columns):
+                for i in range(n):
+                    reached[kind[c], i] += abs(segments[w, c, i])
         for i in range(n):
-            for w in range(min(number + 1, window)):
-                for c in range(columns):
-                    parts[k, i, kind[c]] += abs(segments[w, c, i])
             total = 0.0
             for p in range(3):
-                parts[k, i, p] += math.sqrt(ellipsoids[p, i, i])
+                parts[k, i, p] = reached[p, i] + math.sqrt(ellipsoids[p, i, i])
                 total += parts[k, i, p]
             bounds[k, i] = total * (1 + (window * columns + 64) * 4 * _U)
         last[:] = bounds[k]
@@ -167,17 +171,19 @@ def _length(segment: Any, size: Any) -> float:
 def _move_ellipsoid(loop: Any, M: Any) -> None:
     """Replace M by an upper bound of F M F^T."""
     n = M.shape[0]
-    half, reached = np.zeros((n, n)), np.zeros(n)
+    half, reached, turned, row = np.zeros((n, n)), np.zeros(n), np.ascontiguousarray(loop.T), np.empty(n)
     for i in range(n):
         for r in range(n):
             reached[i] += abs(loop[i, r]) * math.sqrt(M[r, r])
             for j in range(n):
                 half[i, j] += loop[i, r] * M[r, j]
     for i in range(n):
+        row[:] = 0.0
+        for r in range(n):
+            for j in range(i + 1):
+                row[j] += half[i, r] * turned[r, j]
         for j in range(i + 1):
-            s = 0.0
-            for r in range(n):
-                s += half[i, r] * loop[j, r]
+            s = row[j]
             if i == j:
                 s = max(s, 0.0) + n * (n + 4) * 8 * _U * reached[i] * reached[i]
             M[i, j] = s

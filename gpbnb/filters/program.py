@@ -401,28 +401,52 @@ def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes
     rows : (n + m + o, n + m, 2), to be filled, double-double; relative to `sizes`, errors are below 2**-90.
     sizes : (n + m + o, n + m), to be filled: the result with all signs made positive.
     """
-    exactly = DoubleDouble()
-    rows[:first] = 0.0
-    sizes[:first] = 0.0
+    exactly, reach = DoubleDouble(), extents(operations, first)
+    rows[:] = 0.0
+    sizes[:] = 0.0
     for i in range(first):
         rows[i, i, 0] = 1.0
         sizes[i, i] = 1.0
     for o in range(operations.shape[0]):
         code, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
-        for j in range(first):
-            right = (rows[b, j, 0], rows[b, j, 1])
-            if code == MULTIPLY:
-                c = (coefficients[a, 0], coefficients[a, 1])
+        v = first + o
+        if code == MULTIPLY:
+            c = (coefficients[a, 0], coefficients[a, 1])
+            for j in range(reach[b, 0], reach[b, 1]):
+                right = (rows[b, j, 0], rows[b, j, 1])
                 s = doubledouble.multiply(exactly, c, right) if c[0] != 0.0 and right[0] != 0.0 else (0.0, 0.0)
-                size = abs(c[0]) * sizes[b, j]
-            else:
-                left = (rows[a, j, 0], rows[a, j, 1])
-                if code == SUBTRACT:
-                    right = (-right[0], -right[1])
-                s = doubledouble.add(exactly, left, right)
-                size = sizes[a, j] + sizes[b, j]
-            rows[first + o, j, 0], rows[first + o, j, 1] = s[0], s[1]
-            sizes[first + o, j] = size
+                rows[v, j, 0], rows[v, j, 1] = s[0], s[1]
+                sizes[v, j] = abs(c[0]) * sizes[b, j]
+            continue
+        for j in range(reach[a, 0], reach[a, 1]):
+            rows[v, j, 0], rows[v, j, 1] = rows[a, j, 0], rows[a, j, 1]
+            sizes[v, j] = sizes[a, j]
+        for j in range(reach[b, 0], reach[b, 1]):
+            right = (rows[b, j, 0], rows[b, j, 1])
+            if code == SUBTRACT:
+                right = (-right[0], -right[1])
+            s = doubledouble.add(exactly, (rows[v, j, 0], rows[v, j, 1]), right)
+            rows[v, j, 0], rows[v, j, 1] = s[0], s[1]
+            sizes[v, j] += sizes[b, j]
+
+
+@compiled
+def extents(operations: Any, first: int) -> Any:
+    """Return the range of states and measurements, begin and end, outside of which each value does not depend on any.
+
+    A sum of products with the states, from left to right, depends on the first states only. Bounds that know this take
+    half the time.
+    """
+    found = np.empty((first + operations.shape[0], 2), np.int64)
+    for i in range(first):
+        found[i, 0], found[i, 1] = i, i + 1
+    for o in range(operations.shape[0]):
+        code, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
+        begin, end = found[b, 0], found[b, 1]
+        if code != MULTIPLY:
+            begin, end = min(begin, found[a, 0]), max(end, found[a, 1])
+        found[first + o, 0], found[first + o, 1] = begin, end
+    return found
 
 
 @compiled
@@ -443,15 +467,17 @@ def effects(operations: Any, outputs: Any, coefficients: Any, first: int, G: Any
         sizes[outputs[i], i] += 1.0
     for o in range(operations.shape[0] - 1, -1, -1):
         code, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
+        v = first + o
+        if code == MULTIPLY:
+            c = coefficients[a]
+            for i in range(n):
+                G[b, i] += c * G[v, i]
+                sizes[b, i] += abs(c) * sizes[v, i]
+            continue
+        sign = 1.0 if code == ADD else -1.0
         for i in range(n):
-            g, size = G[first + o, i], sizes[first + o, i]
-            if size == 0.0:
-                continue
-            if code == MULTIPLY:
-                G[b, i] += coefficients[a] * g
-                sizes[b, i] += abs(coefficients[a]) * size
-            else:
-                G[a, i] += g
-                G[b, i] += g if code == ADD else -g
-                sizes[a, i] += size
-                sizes[b, i] += size
+            G[a, i] += G[v, i]
+            sizes[a, i] += sizes[v, i]
+        for i in range(n):
+            G[b, i] += sign * G[v, i]
+            sizes[b, i] += sizes[v, i]
