@@ -8,7 +8,7 @@ from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,8 @@ from gpbnb.filters.named import checked_name, checked_names, range_text, sized
 LARGEST_EXPONENT = 450
 """Largest size of an exponent of two in a model for compiled loops of a format with any exponent."""
 
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 Entries: TypeAlias = "Numbers | Callable[[int], Numbers]"
 """What a matrix of a model may be given as, numbers or a function of the step."""
@@ -468,6 +470,11 @@ class LinearModel:
         return {letter: entries.copy() for letter, entries in _floats(self).items()}
 
 
+def remembered(function: F) -> F:
+    """Keep the last results of a function of a model, and perhaps of a format; models are told apart by identity."""
+    return cast(F, lru_cache(maxsize=16)(function))
+
+
 def stored_arrays(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
     """Return :meth:`LinearModel.arrays`, rounded once for each format; their formats are equal to `fmt`.
 
@@ -477,7 +484,7 @@ def stored_arrays(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[st
     return model.arrays(fmt) if fmt.rounding is Rounding.STOCHASTIC else _arrays_once(model, fmt)
 
 
-@lru_cache(maxsize=8)
+@remembered
 def _arrays_once(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
     return model.arrays(replace(fmt))  # a format of its own, for which no search refuses conversions
 
@@ -541,7 +548,7 @@ def _mirrored(matrices: NDArray[Any]) -> NDArray[Any]:
     return np.where(above, matrices, np.swapaxes(matrices, -1, -2))
 
 
-@lru_cache(maxsize=16)
+@remembered
 def _floats(model: LinearModel) -> dict[str, NDArray[np.float64]]:
     found = {}
     for letter in _LETTERS:
@@ -562,10 +569,10 @@ def _rounded(model: LinearModel, fmt: FloatFormat | FixedFormat) -> LinearModel:
     return sound._changed(**stored, name=f"{model.name}, in {format_text(fmt)}", repair=None)
 
 
-_rounded_once = lru_cache(maxsize=8)(_rounded)
+_rounded_once = remembered(_rounded)
 
 
-@lru_cache(maxsize=16)
+@remembered
 def _definite_in(model: LinearModel, fmt: FloatFormat | FixedFormat) -> LinearModel:
     try:
         rounded = {letter: stored_arrays(model, fmt)[letter].to_fractions() for letter in _COVARIANCES}

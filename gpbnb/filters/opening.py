@@ -17,7 +17,6 @@ forms, see :mod:`gpbnb.filters.covariance`.
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +34,7 @@ from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, 
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.records import pairs_as_double_doubles
 from gpbnb.filters.kernels.step import StepArrays, factor_each, invert_each
-from gpbnb.filters.model import LinearModel, stored_arrays
+from gpbnb.filters.model import LinearModel, remembered, stored_arrays
 
 
 class Opening(NamedTuple):
@@ -203,7 +202,7 @@ def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
 
 
-@lru_cache(maxsize=8)
+@remembered
 def _double_doubles(model: LinearModel) -> list[NDArray[np.float64]]:
     return [double_doubles(getattr(model, letter)) for letter in _LETTERS]
 

@@ -5,7 +5,7 @@
 
 from gpbnb.sweeps.numbers import plain_integer, plain_number
 from gpbnb.sweeps.record import read_record, write_record
-from gpbnb.sweeps.sweep import Difference, Sweep, as_computed, machine
+from gpbnb.sweeps.sweep import Difference, Sweep, machine
 from gpbnb.sweeps.table import Column, DamagedFileError, StoredTable, read, write
 
 __all__ = [
@@ -14,7 +14,6 @@ __all__ = [
     "Difference",
     "StoredTable",
     "Sweep",
-    "as_computed",
     "machine",
     "plain_integer",
     "plain_number",

@@ -38,6 +38,10 @@ class Difference(NamedTuple):
     computed: Record
 
 
+def _as_computed(cell: Any, result: Sequence[Any]) -> list[Record]:
+    return [tuple(row) for row in result]  # lists, if they were saved
+
+
 def _no_faults(file: Path) -> list[str]:
     return []
 
@@ -55,9 +59,9 @@ class Sweep(Generic[C]):
     cells : all cells, in the order of the table.
     compute : picklable function that returns the result of a cell, made of lists, dictionaries, texts and numbers. Its
         second argument is a directory in which a long cell may save its progress, or None.
-    rows : function that turns the result of a cell into rows.
     command : command that recomputes the sweep.
     seed : seed of all random numbers.
+    rows : function that turns the result of a cell into rows; by default the result is these rows.
     version : a number that changes when results change, so that cells saved by an older version are not used.
     summary : function that makes further rows from the results of all cells.
     sample : function that recomputes rows of a cell as a check, by default all of them; it receives a random
@@ -73,9 +77,9 @@ class Sweep(Generic[C]):
     key: int
     cells: Callable[[], Sequence[C]]
     compute: Callable[[C, Path | None], Any]
-    rows: Callable[[C, Any], list[Record]]
     command: str
     seed: int
+    rows: Callable[[C, Any], list[Record]] = _as_computed
     version: str = "1"
     summary: Callable[[Sequence[tuple[C, Any]]], list[Record]] | None = None
     sample: Callable[[C, np.random.Generator], list[Record]] | None = None
@@ -284,11 +288,6 @@ class Sweep(Generic[C]):
                     pending[executor.submit(_some, self.compute, chunks[number], directory)] = number
                 else:
                     yield chunks[number], results
-
-
-def as_computed(cell: Any, result: Sequence[Any]) -> list[Record]:
-    """Return rows as computed; a saved result has lists in place of tuples."""
-    return [tuple(row) for row in result]
 
 
 def cell_key(cell: Any) -> Record:

@@ -19,11 +19,11 @@ from gpbnb.wordlength.precision import Guaranteed, Probable, survey_formats
 from gpbnb.wordlength.requirement import (
     Asked,
     Basis,
-    LastingBound,
     Strategy,
     WordlengthAnswer,
     checked_tolerance,
     evidence,
+    for_ever_or_over,
     without_evidence,
 )
 from gpbnb.wordlength.system import EmulatedSystem, system_strategy
@@ -92,9 +92,8 @@ def judge(
         tolerances = checked_tolerance(tolerance, model.n, "states", basis)
         limited = Guaranteed if basis == "guarantee" else Probable
         strategy = limited(model, compiled_form(form), within, tolerances)
-    found, ends = strategy.error(kind), isinstance(strategy, LastingBound) and strategy.steps is not None
-    if isinstance(strategy, LastingBound) and math.isinf(found.ratio) and (later := strategy.over(steps)) is not None:
-        ended = later.error(kind)
-        found, ends = (found, ends) if math.isinf(ended.ratio) else (ended, True)
+    found, ends = for_ever_or_over(
+        steps, strategy, lambda each: each.error(kind), lambda outcome: not math.isinf(outcome.ratio)
+    )
     warnings = strategy.warnings() if isinstance(strategy, EmulatedSystem) else ()
     return Judgement(fmt, basis, steps, ((fmt.precision, found.ratio),), found.why, warnings, ends)

@@ -52,6 +52,7 @@ from gpbnb.wordlength.requirement import (
     for_ever_or_over,
     format_like,
     largest_ratio,
+    some_bound,
 )
 from gpbnb.wordlength.system import required_system_precision
 
@@ -200,7 +201,7 @@ def _for_ever(
     kind = Guaranteed if basis == "guarantee" else Probable
     strategy = kind(model, form, within, tolerances)
     with asked.search(checks=()) as search:
-        found, ends = for_ever_or_over(asked.steps, strategy, search)
+        found, ends = for_ever_or_over(asked.steps, strategy, search, some_bound)
     cause = ""
     if found.fmt is None and not ends and model.cycle == 1:
         cause = unobserved(model.Phi[0], model.H[0], model.state_names)

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol, get_args
+from typing import Any, Literal, NamedTuple, Protocol, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ from gpbnb.filters.words import WordFormats
 
 ANY_BINARY = FloatFormat(2, 2)
 """A binary format; its precision does not matter."""
+
+Found = TypeVar("Found")
 
 Basis = Literal["emulation", "bound", "guarantee", "probable"]
 
@@ -218,26 +220,31 @@ class LastingBound(ABC):
 
 
 def for_ever_or_over(
-    steps: int, strategy: Strategy, search: Callable[[Strategy], Search[FloatFormat]]
-) -> tuple[Search[FloatFormat], bool]:
-    """Search with a strategy; if no precision has a bound for ever, search for one over some steps.
+    steps: int, strategy: Strategy, ask: Callable[[Strategy], Found], has_bound: Callable[[Found], bool]
+) -> tuple[Found, bool]:
+    """Ask a strategy for a bound for ever and, if it has none, for one over some steps.
+
+    Parameters
+    ----------
+    ask : returns what a strategy finds, such as the result of a search.
+    has_bound : whether anything that was found is bounded.
 
     Returns
     -------
-    found : the result of the search.
+    found : what was found.
     ends : whether it holds only for the steps.
     """
-    found, ends = search(strategy), isinstance(strategy, LastingBound) and strategy.steps is not None
-    if isinstance(strategy, LastingBound) and _has_no_bound(found) and (later := strategy.over(steps)) is not None:
-        ended = search(later)
-        if not _has_no_bound(ended):
+    found, ends = ask(strategy), isinstance(strategy, LastingBound) and strategy.steps is not None
+    if isinstance(strategy, LastingBound) and not has_bound(found) and (later := strategy.over(steps)) is not None:
+        ended = ask(later)
+        if has_bound(ended):
             return ended, True
     return found, ends
 
 
-def _has_no_bound(found: Search[FloatFormat]) -> bool:
-    """Whether no precision that was tried has a finite error."""
-    return all(math.isinf(ratio) for _, ratio in found.tried)
+def some_bound(found: Search[FloatFormat]) -> bool:
+    """Whether a precision that was tried has a finite error."""
+    return not all(math.isinf(ratio) for _, ratio in found.tried)
 
 
 class Asked(NamedTuple):

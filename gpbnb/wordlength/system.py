@@ -32,6 +32,7 @@ from gpbnb.wordlength.requirement import (
     checked_tolerance,
     for_ever_or_over,
     largest_ratio,
+    some_bound,
 )
 
 
@@ -59,7 +60,7 @@ def required_system_precision(
     """
     strategy = system_strategy(system, asked, tolerance, u, within)
     with asked.search(CHECKED[asked.like.base], bounds=asked.basis != "emulation") as search:
-        found, ends = for_ever_or_over(asked.steps, strategy, search)
+        found, ends = for_ever_or_over(asked.steps, strategy, search, some_bound)
     limited = not system.as_filter().program.is_linear
     cause = "" if found.fmt is not None or limited else system.unstable()
     if not cause:

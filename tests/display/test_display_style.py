@@ -11,12 +11,6 @@ from matplotlib.text import Text
 from gpbnb.report.display import style
 
 
-@pytest.fixture(autouse=True)
-def _close():
-    yield
-    plt.close("all")
-
-
 @pytest.mark.parametrize("columns", [1, 2, 3])
 def test_panels_side_by_side_in_the_width_of_the_page(columns):
     fig, axes = style.figure(columns, height=4.2)

@@ -16,12 +16,6 @@ from gpbnb.report.display.vector import DECIMALS, MOST_MARKERS, element, svg
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-@pytest.fixture(autouse=True)
-def _close():
-    yield
-    plt.close("all")
-
-
 def drawn(points=50):
     fig, (ax,) = style.figure()
     x = np.linspace(1, 3, points)

@@ -22,12 +22,6 @@ CELLS = [
 ]
 
 
-@pytest.fixture(autouse=True)
-def _close():
-    yield
-    plt.close("all")
-
-
 def test_there_are_figures():
     assert len(CELLS) >= 48
 

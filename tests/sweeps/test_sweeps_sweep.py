@@ -57,7 +57,7 @@ def total(results):
 
 @pytest.fixture
 def sweep(tmp_path):
-    return Sweep("tests/normal", tmp_path / "normal.csv", COLUMNS, 3, lambda: CELLS, compute, rows, "make it", 7)
+    return Sweep("tests/normal", tmp_path / "normal.csv", COLUMNS, 3, lambda: CELLS, compute, "make it", 7, rows)
 
 
 EXPECTED = [(cell, compute(cell, None)) for cell in CELLS]

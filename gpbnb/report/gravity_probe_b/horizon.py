@@ -34,7 +34,7 @@ from gpbnb.report.display.tables import Table
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS
 from gpbnb.report.gravity_probe_b.year import model as year_model
-from gpbnb.sweeps import Column, Sweep, as_computed, read_record, write_record
+from gpbnb.sweeps import Column, Sweep, read_record, write_record
 
 FILE = Path(__file__).with_name("horizon.csv")
 COLUMNS = (
@@ -318,7 +318,7 @@ def year_of_bounds(precision: int, directory: Path | None = None, steps: int = Y
 
 def first_cycle(precision: int, rng: np.random.Generator) -> list[tuple[str, ...]]:
     """Return the rows after the first cycle of the model."""
-    return as_computed(precision, year_of_bounds(precision, steps=year_model(MODELS[0], 2).cycle))
+    return [tuple(row) for row in year_of_bounds(precision, steps=year_model(MODELS[0], 2).cycle)]
 
 
 SWEEP: Sweep[int] = Sweep(
@@ -328,7 +328,6 @@ SWEEP: Sweep[int] = Sweep(
     key=3,
     cells=lambda: (53,),
     compute=year_of_bounds,
-    rows=as_computed,
     command="python -m gpbnb.report.stored recompute gravity_probe_b/horizon",
     seed=0,
     sample=first_cycle,

@@ -38,7 +38,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.filters.simulation import BLOCK, Simulation
 from gpbnb.report.gravity_probe_b.model import SEED, TRUTH, YEAR, gravity_probe_b, gravity_probe_b_year
-from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.sweeps import Column, Sweep
 
 #: Format in which the model is stored, by base; every format of this base in :data:`CASES` contains it.
 STORED = {2: FloatFormat(2, 14), 10: FloatFormat(10, 4)}
@@ -539,7 +539,6 @@ SWEEP = YearSweep(
     key=6,
     cells=lambda: CASES,
     compute=first_steps,
-    rows=as_computed,
     command=_COMMAND,
     seed=SEED,
     sample=sample_of_year,

@@ -19,7 +19,7 @@ from gpbnb.bounds.guarantee import Guarantee, guarantee, limits
 from gpbnb.filters.forms import Form
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.table import CASES, FORMAT, case_guarantee
-from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.sweeps import Column, Sweep
 from gpbnb.wordlength.examples import cyclic, tracker
 from gpbnb.wordlength.precision import required_precision
 
@@ -121,7 +121,6 @@ SWEEP: Sweep[str] = Sweep(
     key=1,
     cells=lambda: tuple(guarantees()),
     compute=_computed,
-    rows=as_computed,
     command="python -m gpbnb.report.stored recompute guarantees/certificates",
     seed=0,
     same=_same,

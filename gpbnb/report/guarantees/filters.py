@@ -32,7 +32,7 @@ from gpbnb.report.guarantees.random_filters import (
     draw,
     innovations,
 )
-from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.sweeps import Column, Sweep
 
 FILE = Path(__file__).with_name("filters.csv")
 FILTERS = 3_000
@@ -329,7 +329,6 @@ SWEEP: Sweep[int] = Sweep(
     key=1,
     cells=lambda: range(FILTERS),
     compute=_computed,
-    rows=as_computed,
     command="python -m gpbnb.report.stored recompute guarantees/filters",
     seed=0,
     faults=_wrong,

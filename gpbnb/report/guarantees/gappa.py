@@ -24,7 +24,7 @@ from gpbnb.bounds.guarantee import Guarantee, disturbances_of
 from gpbnb.filters.program import ADD, MULTIPLY
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.guarantees.table import FORMAT, case_guarantee, case_named
-from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.sweeps import Column, Sweep
 
 FILE = Path(__file__).with_name("gappa.csv")
 FILTERS = ("tracker, 0 m from its origin", "PX4, landing target", "dynamax, tracking")
@@ -126,7 +126,6 @@ SWEEP: Sweep[str] = Sweep(
     key=2,
     cells=lambda: FILTERS,
     compute=_computed,
-    rows=as_computed,
     command="python -m gpbnb.report.stored recompute guarantees/gappa",
     seed=0,
     sample=_sample,

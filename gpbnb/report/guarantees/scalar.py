@@ -28,7 +28,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.random_filters import DETERMINISTIC
-from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.sweeps import Column, Sweep
 
 FILE = Path(__file__).with_name("scalar.csv")
 FILTERS = 500
@@ -288,7 +288,6 @@ SWEEP: Sweep[int] = Sweep(
     key=1,
     cells=lambda: range(FILTERS),
     compute=_computed,
-    rows=as_computed,
     command="python -m gpbnb.report.stored recompute guarantees/scalar",
     seed=0,
     faults=_above,

@@ -13,7 +13,7 @@ from gpbnb.bounds.adversary import responses, run_against
 from gpbnb.bounds.guarantee import closed_loops, from_schedule, limits
 from gpbnb.bounds.linear import filter_schedule
 from gpbnb.filters.system import state_space
-from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.sweeps import Column, Sweep
 
 FILE = Path(__file__).with_name("survey.csv")
 ROWS = 2_000
@@ -92,7 +92,6 @@ SWEEP: Sweep[int] = Sweep(
     key=1,
     cells=lambda: range(ROWS),
     compute=_computed,
-    rows=as_computed,
     command="python -m gpbnb.report.stored recompute guarantees/survey",
     seed=19,
 )

@@ -22,7 +22,7 @@ from gpbnb.bounds.bounded_run import BoundedHistory, emulate_with_bound
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.kalman import report_bounds
-from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.sweeps import Column, Sweep
 
 #: The kinds of random models; see :func:`random_model`.
 KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
@@ -309,7 +309,6 @@ SWEEP: Sweep[int] = Sweep(
     key=3,
     cells=lambda: range(REPEATS),
     compute=trials_of_seed,
-    rows=as_computed,
     command="python -m gpbnb.report.stored recompute kalman/ensembles",
     seed=0,
 )

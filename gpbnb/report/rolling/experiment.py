@@ -36,7 +36,7 @@ from gpbnb.report.rolling.spectra import (
     welch,
 )
 from gpbnb.report.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
-from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.sweeps import Column, Sweep
 
 __all__ = [
     "HANN",
@@ -235,7 +235,6 @@ SWEEP: Sweep[int] = Sweep(
     key=1,
     cells=lambda: (SURVEY_GYROS,),
     compute=survey_of,
-    rows=as_computed,
     command="python -m gpbnb.report.stored recompute rolling/drift_rates",
     seed=1984,
     sample=first_gyros,
