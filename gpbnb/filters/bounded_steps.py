@@ -22,7 +22,7 @@ from gpbnb.filters.contraction import (
 )
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel
-from gpbnb.filters.kernels.bounded import residuals, symmetric_parts, whole_gain
+from gpbnb.filters.kernels.bounded import represented, residuals, symmetric_parts, whole_gain
 from gpbnb.filters.kernels.step import NEXT_CHECKPOINT, advance
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed, opening, step_arrays
@@ -104,7 +104,7 @@ class CarriedBound:
         """
         try:
             covariances = np.empty_like(taken.P)
-            symmetric_parts(int(self.form), taken.P, covariances)
+            (represented if self.form == Form.UD else symmetric_parts)(taken.P, covariances)
             done = self._take(first, taken, covariances)
         except (OverflowError, ZeroDivisionError):
             done = 0
@@ -133,8 +133,10 @@ class CarriedBound:
         while at < len(self.checkpoint_steps) and self.checkpoint_steps[at] <= first + steps:
             i = int(self.checkpoint_steps[at]) - first - 1
             k, bound = first + i, bounds[i]
-            used = np.empty_like(taken.gains[i])
-            whole_gain(int(self.form), taken.gains[i], exact.H[k % len(exact.H)], taken.UR[k % len(taken.UR)], used)
+            used = taken.gains[i]
+            if self.form == Form.UD:
+                used = np.empty_like(used)
+                whole_gain(taken.gains[i], exact.H[k % len(exact.H)], taken.UR[k % len(taken.UR)], used)
             self.saved.state[at] = state_error_bound(bound)
             self.saved.gain[at] = gain_error_bound(bound, K[i], used[..., 0], off.gain[i])
             self.saved.covariance[at] = covariance_error_bound(bound)
