@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.doubledouble import two_sum
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.program import MULTIPLY, effects, extents, functionals
@@ -109,7 +109,7 @@ def largest_error(units: Any, size: float) -> float:
     return np.inf if at >= len(units.powers) else units.errors[at]
 
 
-@compiled
+@inner
 def _is_power(units: Any, high: float, low: float) -> bool:
     if high == 0.0:
         return True
@@ -237,17 +237,17 @@ def disturbances(program: Any, given: Any, units: Any, limits: Any, b: Any, caps
             lim[k, g_count + j] = limits.state[j]
         for r in range(m):
             lim[k, g_count + n + r] = limits.innovation[r]
-        slack[k] *= _UP
+        for i in range(n):
+            slack[k, i] *= _UP
     return Disturbances(F, spread, G, lim, slack, K, loop, gain)
 
 
-@compiled
+@inner
 def _operands(HPhi: Any, limits: Any, b: Any, values: Any) -> None:
     """Note the largest states and measurements of a step, which have no rounding errors of their own."""
     m, n = HPhi.shape[0], HPhi.shape[1]
-    values.off[: n + m] = 0.0
-    values.none[: n + m] = False
-    values.drift[: n + m] = 0.0
+    for v in range(n + m):
+        values.off[v], values.none[v], values.drift[v] = 0.0, False, 0.0
     largest = values.largest
     for j in range(n):
         largest[j] = (limits.state[j] + b[j]) * _UP
@@ -259,7 +259,7 @@ def _operands(HPhi: Any, limits: Any, b: Any, values: Any) -> None:
         largest[n + i] = min(limits.measurement[i], largest[n + i] * _UP)
 
 
-@compiled
+@inner
 def _size(v: int, HPhi: Any, limits: Any, b: Any, cap: float, values: Any) -> float:
     """Return the largest size of a value's function, by state and measurement, or by state and innovation."""
     m, n = HPhi.shape[0], HPhi.shape[1]
@@ -287,7 +287,7 @@ def _size(v: int, HPhi: Any, limits: Any, b: Any, cap: float, values: Any) -> fl
     return min(min(seen, known), cap) + carried
 
 
-@compiled
+@inner
 def _results(
     program: Any, given: Any, k: int, units: Any, limits: Any, b: Any, caps: Any, values: Any, lim: Any
 ) -> None:
@@ -327,7 +327,7 @@ def _results(
         lim[program.groups[o]] += h
 
 
-@compiled
+@inner
 def _differences(outputs: Any, given: Any, k: int, limits: Any, values: Any, into: Any) -> None:
     """Note closed loop and gain of step k + 1, and their differences from those of the exact filter."""
     n, m = into.K.shape
@@ -359,7 +359,7 @@ def _differences(outputs: Any, given: Any, k: int, limits: Any, values: Any, int
                 into.slack[i] += ((n + 4) * _U * abs(s[0]) + 2.0**-86 * size + given.dK[k, i, r]) * V[r]
 
 
-@compiled
+@inner
 def _minus(a: Any, b: Any) -> Any:
     s, e = two_sum(a[0], -b[0])
     e += a[1] - b[1]
@@ -367,7 +367,7 @@ def _minus(a: Any, b: Any) -> Any:
     return high, e - (high - s)
 
 
-@compiled
+@inner
 def _plus_product(s: Any, a: Any, b: Any) -> Any:
     p = a[0] * b[0]
     high, low = _two_product(a[0], b[0], p)
@@ -378,7 +378,7 @@ def _plus_product(s: Any, a: Any, b: Any) -> Any:
     return total, e - (total - t)
 
 
-@compiled
+@inner
 def _two_product(a: float, b: float, p: float) -> Any:
     c = 134217729.0 * a
     a1 = c - (c - a)
@@ -437,11 +437,12 @@ class Certificate(NamedTuple):
     lags: int
 
 
-@compiled
+@inner
 def effect(given: Any, at: int, c: Any, each: Any) -> None:
     """Set `each`, (4,), to the effect of the disturbances of a step on the product c e, part by part."""
     n, g_count = given.F.shape[1], given.G.shape[2]
-    each[:] = 0.0
+    for p in range(4):
+        each[p] = 0.0
     for j in range(n):
         each[ROUNDING] += abs(c[j]) * given.slack[at, j]
     sums = np.zeros(g_count)
@@ -453,7 +454,7 @@ def effect(given: Any, at: int, c: Any, each: Any) -> None:
             each[given.part[g]] += abs(sums[g]) * given.limits[at, g]
 
 
-@compiled
+@inner
 def _entries(given: Any) -> Any:
     """Return where the rows of the closed loops have entries in any step, (n, n), and how many, (n,)."""
     n = given.F.shape[1]
@@ -504,8 +505,8 @@ def certify(given: Any, starts: Any, k: int, first: int, steady: bool, end: Any)
             effect(given, at, c, each)  # a sum of its own: no term takes part in more than n + g + lags additions
             for p in range(4):
                 sums[i, p] += each[p]
-            following[:] = 0.0
-            rate[:] = 0.0
+            for j in range(n):
+                following[j] = rate[j] = 0.0
             for j in range(n):
                 if c[j] != 0.0 and counts[j] == n:
                     for r in range(n):
@@ -521,8 +522,8 @@ def certify(given: Any, starts: Any, k: int, first: int, steady: bool, end: Any)
                 residual[i, r] += rate[r]
             lags = max(lags, lag + 1)
             if not steady and k - lag - 1 <= 0:
-                begun[i] = np.abs(c)
-                c[:] = 0.0
+                for r in range(n):
+                    begun[i, r], c[r] = abs(c[r]), 0.0
         for r in range(n):
             residual[i, r] *= 1 + (lags + n + g_count + 64) * 4 * _U
             tail[i, r] = abs(c[r])

@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.bounds.envelope import ROUNDING, START, effect
 
 _U = 2.0**-53
@@ -111,7 +111,8 @@ def forward(
                 limit = limits[k, g]
                 segments[slot, g, i] = G[k, i, g] * limit if limit != 0.0 and G[k, i, g] != 0.0 else 0.0
                 own += 2 * _U * abs(segments[slot, g, i])
-            segments[slot, g_count:, i] = 0.0
+            for j in range(n):
+                segments[slot, g_count + j, i] = 0.0
             segments[slot, g_count + i, i] = own * _UP
         reached[:] = 0.0
         for w in range(min(number + 1, window)):
@@ -124,7 +125,8 @@ def forward(
                 parts[k, i, p] = reached[p, i] + math.sqrt(ellipsoids[p, i, i])
                 total += parts[k, i, p]
             bounds[k, i] = total * (1 + (window * columns + 64) * 4 * _U)
-        last[:] = bounds[k]
+        for i in range(n):
+            last[i] = bounds[k, i]
     return bounds, parts
 
 
@@ -147,7 +149,7 @@ def take_in(segments: Any, kind: Any, ellipsoids: Any, size: Any) -> None:
             continue
         total *= _UP
         if own > 0.0:
-            M *= total / own
+            _scale(M, total / own)
         for w in range(segments.shape[0]):
             for c in range(segments.shape[1]):
                 length = _length(segments[w, c], size) if kind[c] == p else 0.0
@@ -159,7 +161,14 @@ def take_in(segments: Any, kind: Any, ellipsoids: Any, size: Any) -> None:
             M[i, i] *= 1 + n * (segments.shape[0] * segments.shape[1] + 16) * 4 * _U
 
 
-@compiled
+@inner
+def _scale(M: Any, factor: float) -> None:
+    for i in range(M.shape[0]):
+        for j in range(M.shape[1]):
+            M[i, j] *= factor
+
+
+@inner
 def _length(segment: Any, size: Any) -> float:
     s = 0.0
     for i in range(size.shape[0]):
@@ -167,7 +176,7 @@ def _length(segment: Any, size: Any) -> float:
     return math.sqrt(s)
 
 
-@compiled
+@inner
 def _move_ellipsoid(loop: Any, M: Any) -> None:
     """Replace M by an upper bound of F M F^T."""
     n = M.shape[0]
@@ -249,14 +258,16 @@ def onward(given: Any, first: int, lags: int, reach: Any, size: Any, b: Any) -> 
     c, c_next, anchor, difference = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for phase in range(1, min(period, lags) + 1):
         for i in range(n):
-            c[:] = 0.0
-            c[i] = 1.0
-            sums[:] = 0.0
+            for j in range(n):
+                c[j] = 1.0 if i == j else 0.0
+            for p in range(4):
+                sums[p] = 0.0
             residual, largest, asked = 0.0, 0.0, False
             for lag in range(1, lags + 1):
                 at = first + (phase - lag) % period
                 effect(given, at, c, each)  # sums of their own: no term takes part in more additions than allowed
-                c_next[:] = 0.0
+                for j in range(n):
+                    c_next[j] = 0.0
                 for j in range(n):
                     if c[j] != 0.0:
                         for r in range(n):
@@ -265,14 +276,17 @@ def onward(given: Any, first: int, lags: int, reach: Any, size: Any, b: Any) -> 
                 residual += each[START]
                 for p in range(3):
                     sums[p] += each[p]
-                c[:] = c_next
+                for j in range(n):
+                    c[j] = c_next[j]
                 if (lag - phase) % period == 0:
                     for j in range(n):
                         difference[j] = c[j] - anchor[j]
                     between = width(whole[0], difference) if asked else np.inf
                     if not between <= 1e-3 * largest:
-                        anchor[:] = c
-                        value[:] = 0.0
+                        for j in range(n):
+                            anchor[j] = c[j]
+                        for p in range(4):
+                            value[p] = 0.0
                         support(reach, c, value)
                         between, asked = 0.0, True
                     total = residual + between
@@ -286,7 +300,7 @@ def onward(given: Any, first: int, lags: int, reach: Any, size: Any, b: Any) -> 
     return bounds, parts
 
 
-@compiled
+@inner
 def _join(M: Any, other: Any, size: Any) -> None:
     """Add an ellipsoid to another."""
     n = M.shape[0]
@@ -299,7 +313,8 @@ def _join(M: Any, other: Any, size: Any) -> None:
         return
     total = (mine + its) * _UP
     if mine > 0.0:
-        M *= total / mine
-    M += other * (total / its)
+        _scale(M, total / mine)
     for i in range(n):
+        for j in range(n):
+            M[i, j] += other[i, j] * (total / its)
         M[i, i] *= 1 + n * 32 * _U

@@ -14,7 +14,7 @@ from gpbnb.filters.contraction import (
     Contraction,
     Repeated,
     contraction_start,
-    contraction_step,
+    contraction_steps,
     covariance_error_bound,
     evaluation_errors,
     gain_error_bound,
@@ -22,7 +22,7 @@ from gpbnb.filters.contraction import (
 )
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel
-from gpbnb.filters.kernels.bounded import residuals, symmetric_parts, whole_gain
+from gpbnb.filters.kernels.bounded import represented, residuals, symmetric_parts, whole_gain
 from gpbnb.filters.kernels.step import NEXT_CHECKPOINT, advance
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed, opening, step_arrays
@@ -104,7 +104,7 @@ class CarriedBound:
         """
         try:
             covariances = np.empty_like(taken.P)
-            symmetric_parts(int(self.form), taken.P, covariances)
+            (represented if self.form == Form.UD else symmetric_parts)(taken.P, covariances)
             done = self._take(first, taken, covariances)
         except (OverflowError, ZeroDivisionError):
             done = 0
@@ -125,17 +125,22 @@ class CarriedBound:
             diagonal = np.diagonal(size, axis1=1, axis2=2)
             size = np.sqrt(np.abs(diagonal[:, :, np.newaxis] * diagonal[:, np.newaxis, :])) * (1 + 2.0**-50)
         at = int(np.searchsorted(self.checkpoint_steps, first, side="right"))
-        for i, k in enumerate(range(first, first + steps)):
-            model = StepModel(*(each[k % len(each)] for each in self._plain))
-            off = evaluation_errors(model, before[i], size[i], measured[i], K[i], S[i], _UNIT)
-            self.now = contraction_step(self.now, model, Repeated(K[i], S[i], y[i], q[i], T[i]), off)
-            if at < len(self.checkpoint_steps) and self.checkpoint_steps[at] == k + 1:
-                used = np.empty_like(taken.gains[i])
-                whole_gain(int(self.form), taken.gains[i], exact.H[k % len(exact.H)], taken.UR[k % len(taken.UR)], used)
-                self.saved.state[at] = state_error_bound(self.now)
-                self.saved.gain[at] = gain_error_bound(self.now, K[i], np.ascontiguousarray(used[..., 0]), off.gain)
-                self.saved.covariance[at] = covariance_error_bound(self.now)
-                at += 1
+        every = np.arange(first, first + steps)
+        model = StepModel(*(each[every % len(each)] for each in self._plain))
+        off = evaluation_errors(model, before[:steps], size[:steps], measured[:steps], K, S, _UNIT)
+        bounds = contraction_steps(self.now, model, Repeated(K, S, y, q, T), off)
+        self.now = bounds[-1] if bounds else self.now
+        while at < len(self.checkpoint_steps) and self.checkpoint_steps[at] <= first + steps:
+            i = int(self.checkpoint_steps[at]) - first - 1
+            k, bound = first + i, bounds[i]
+            used = taken.gains[i]
+            if self.form == Form.UD:
+                used = np.empty_like(used)
+                whole_gain(taken.gains[i], exact.H[k % len(exact.H)], taken.UR[k % len(taken.UR)], used)
+            self.saved.state[at] = state_error_bound(bound)
+            self.saved.gain[at] = gain_error_bound(bound, K[i], used[..., 0], off.gain[i])
+            self.saved.covariance[at] = covariance_error_bound(bound)
+            at += 1
         return steps
 
 

@@ -22,18 +22,23 @@ derivation ``contraction`` of the report on Kalman filters proves it. In the nor
 expand, so errors are added but not amplified. The norm has no units; an entry of the error is at most
 :math:`\|v\|_k` of these standard deviations.
 
-The functions are compiled, take and return float64, and include their own roundings in the bound.
+The functions take and return float64, and include their own roundings in the bound. Each sum of products is added up
+from left to right. All that does not depend on the step before is computed for many steps at once, along a first axis.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import borrowing, compiled
+from gpbnb.filters.kalman_step import StepModel
+
+Array = NDArray[np.float64]
 
 _U = 2.0**-53
 
@@ -81,31 +86,27 @@ class EvaluationErrors(NamedTuple):
     innovation: NDArray[np.float64]
 
 
-@compiled
-def contraction_start(P: Any, de: Any, dE: Any) -> Any:
+@np.errstate(all="ignore")
+def contraction_start(P: Array, de: Array, dE: Array) -> Contraction:
     """Start the bound at the initial state and covariance.
 
     Parameters
     ----------
     P : (n, n), initial covariance, which defines the weights.
     de, dE : (n,) and (n, n), componentwise bounds on the errors of the initial state and covariance; zero if exact.
-
-    Returns
-    -------
-    bound : Contraction.
     """
-    L = _weights((P + P.T) / 2)
+    L = np.empty(P.shape)
+    _weights(np.ascontiguousarray((P + P.T) / 2), L)
     Y, delta = _inverse(L)
-    eta = _norm(_times(np.abs(Y), de.reshape(-1, 1))) / (1 - delta)
-    zeta = _norm(_times(_times(np.abs(Y), dE), np.abs(Y).T)) / (1 - delta) ** 2
-    up = 1 + _many(len(P), 0)
+    aY, up = np.abs(Y), 1 + _many(len(P), 0)
+    eta = float(_norm(_times(aY, de[:, np.newaxis])) / (1 - delta))
+    zeta = float(_norm(_times(_times(aY, dE), aY.T)) / (1 - delta) ** 2)
     if not (delta < 1 and eta < np.inf and zeta < np.inf):
         eta, zeta = np.inf, np.inf
     return Contraction(L, eta * up, zeta * up, 1.0, np.zeros(1))
 
 
-@compiled
-def contraction_step(before: Any, model: Any, repeated: Any, off: Any) -> Any:
+def contraction_step(before: Contraction, model: StepModel, repeated: Repeated, off: EvaluationErrors) -> Contraction:
     r"""Propagate the bound through one step.
 
     .. math:: \zeta_k = \|T_k\|_k + \frac{\alpha^2\zeta}{1-g\zeta}, \qquad
@@ -116,60 +117,103 @@ def contraction_step(before: Any, model: Any, repeated: Any, off: Any) -> Any:
 
     Parameters
     ----------
-    before : Contraction, the bound after the previous step.
-    model : StepModel of this step, nearest float64.
-    repeated : Repeated, the exact step from the program's values, and its residuals.
-    off : EvaluationErrors of the repeated step, from :func:`evaluation_errors`.
-
-    Returns
-    -------
-    bound : Contraction.
+    before : the bound after the previous step.
+    model : this step's, nearest float64.
+    repeated : the exact step from the program's values, and its residuals.
+    off : errors of the repeated step, from :func:`evaluation_errors`.
     """
-    Phi, H, Q, R = model
-    K, S, innovation, q, T = repeated
-    dq, dT, dK, dinnovation = off
-    n, m = K.shape
-    L, zeta = before.L, before.zeta
-    many = _many(n, m)
-    HPhi = _times(H, Phi)
-    A = Phi - _times(K, HPhi)
-    aK, aH, aPhi, aL = np.abs(K), np.abs(H), np.abs(Phi), np.abs(L)
-    AL = _times(A, L)
-    C = np.eye(n) - _times(K, H)
-    W = _times(AL, AL.T) + _times(_times(C, Q), C.T) + _times(_times(K, R), K.T)
-    new = _weights((W + W.T) / 2)
+    of_one = StepModel(*_as_one(model)), Repeated(*_as_one(repeated)), EvaluationErrors(*_as_one(off))
+    return contraction_steps(before, *of_one)[0]
+
+
+def _as_one(arrays: Iterable[Array]) -> list[Array]:
+    return [each[np.newaxis] for each in arrays]
+
+
+@np.errstate(all="ignore")
+def contraction_steps(
+    before: Contraction, model: StepModel, repeated: Repeated, off: EvaluationErrors
+) -> list[Contraction]:
+    """Propagate the bound through some steps as :func:`contraction_step` does, and return the bound after each.
+
+    Parameters
+    ----------
+    model, repeated, off : as for one step, each array with a first axis for the steps.
+    """
+    K, q, T = repeated.K, repeated.q, repeated.T
+    many = _many(*K.shape[-2:])
+    up = 1 + many  # roundings of a few norms and sums
+    A, weights = _closed_loops(model, K, before.L)
+    L, new = weights[:-1], weights[1:]
     Y, delta = _inverse(new)
-    aY = np.abs(Y)
-    # Bounds the errors of A, AL and YAL: their roundings, and the error of K.
-    spread = _times(aPhi + _times(aK, _times(aH, aPhi)), aL) * many + _times(dK, _times(aH, _times(aPhi, aL)))
-    alpha = (_norm2(_times(Y, AL)) + _norm(_times(aY, spread))) / (1 - delta)
-
-    inverse, dinverse = _inverse_general(S)
-    HL, aHL = _times(HPhi, L), _times(aH, _times(aPhi, aL))
-    N, dN = _times(HL.T, inverse), _times(aHL.T, dinverse + many * np.abs(inverse))  # L'N, N = Phi' H' S^-1
-    g = _norm(_times(N, HL)) + _norm(_times(dN, aHL)) + many * _norm(_times(np.abs(N), aHL))
-    nu, dnu = innovation.reshape(-1, 1), dinnovation.reshape(-1, 1) + many * np.abs(innovation).reshape(-1, 1)
-    y = _norm(_times(N, nu)) + _norm(_times(dN, np.abs(nu) + dnu)) + _norm(_times(np.abs(N), dnu))
-
-    q1, dq1 = q.reshape(-1, 1), (dq + many * np.abs(q)).reshape(-1, 1)
-    size_q = (_norm(_times(Y, q1)) + _norm(_times(aY, dq1))) / (1 - delta)
-    size_T = (_norm(_times(_times(Y, T), Y.T)) + _norm(_times(_times(aY, dT + many * np.abs(T)), aY.T))) / (
-        1 - delta
-    ) ** 2
-    up = 1 + many  # roundings of these few norms and sums
-    known = 1 - g * zeta * up
-    columns = np.zeros(m)
-    if not (delta < 1 and known > 0 and alpha < np.inf and size_T < np.inf and size_q < np.inf and y < np.inf):
-        return Contraction(new, np.inf, np.inf, alpha, columns + np.inf)
-    for j in range(m):
-        columns[j] = (_norm(N[:, j : j + 1]) + _norm(dN[:, j : j + 1])) * alpha * zeta / known * up
-    eta = (size_q + alpha * (before.eta + y * zeta) / known) * up
-    return Contraction(new, eta, (size_T + alpha * alpha * zeta / known) * up, alpha, columns)
+    known = delta < 1
+    aY, within = np.abs(Y), 1 - delta
+    alpha = _closed_norm(model, repeated, off, (A, L, Y)) / within
+    N, dN, g, y = _through_gain(model, repeated, off, L)
+    columns = np.sqrt(_sums(N * N, axis=-2)) + np.sqrt(_sums(dN * dN, axis=-2))
+    dq = (off.q + many * np.abs(q))[..., np.newaxis]
+    size_q = (_norm(_times(Y, q[..., np.newaxis])) + _norm(_times(aY, dq))) / within
+    dT = off.T + many * np.abs(T)
+    size_T = _norm(_times(_times(Y, T), _turned(Y))) + _norm(_times(_times(aY, dT), _turned(aY)))
+    size_T /= within**2
+    known &= (alpha < np.inf) & (size_T < np.inf) & (size_q < np.inf) & (y < np.inf)
+    bounds, eta, zeta = [], before.eta, before.zeta
+    sizes = (each.tolist() for each in (known, alpha, g, y, size_q, size_T))
+    for k, (is_known, a, gain, by_covariance, state, covariance) in enumerate(zip(*sizes, strict=True)):
+        rest = 1 - gain * zeta * up
+        if is_known and rest > 0:
+            column = columns[k] * a * zeta / rest * up
+            eta = (state + a * (eta + by_covariance * zeta) / rest) * up
+            zeta = (covariance + a * a * zeta / rest) * up
+        else:
+            column, eta, zeta = np.full(K.shape[-1], np.inf), np.inf, np.inf
+        bounds.append(Contraction(new[k], eta, zeta, a, column))
+    return bounds
 
 
-@compiled
-def evaluation_errors(model: Any, x: Any, P: Any, z: Any, K: Any, S: Any, unit: float) -> Any:
-    r"""Bound the errors of the evaluation of one step, componentwise.
+def _closed_loops(model: StepModel, K: Array, L: Array) -> tuple[Array, Array]:
+    """Return the closed loop of each step, and weights before the first and after each step, by Joseph's form."""
+    n = len(L)
+    C, weights = np.eye(n) - _times(K, model.H), np.empty((len(K) + 1, n, n))
+    A = model.Phi - _times(K, _times(model.H, model.Phi))
+    weights[0] = L
+    by_noise = _times(_times(C, model.Q), _turned(C)), _times(_times(K, model.R), _turned(K))
+    _propagate_weights(A, *by_noise, weights)
+    return A, weights
+
+
+def _closed_norm(
+    model: StepModel, repeated: Repeated, off: EvaluationErrors, loops: tuple[Array, Array, Array]
+) -> Array:
+    """Bound the norms of YAL, where A has rounding errors and the error of K."""
+    A, L, Y = loops
+    many = _many(*repeated.K.shape[-2:])
+    aPhi, aH, aL = np.abs(model.Phi), np.abs(model.H), np.abs(L)
+    spread = _times(aPhi + _times(np.abs(repeated.K), _times(aH, aPhi)), aL) * many
+    spread += _times(off.gain, _times(aH, _times(aPhi, aL)))
+    return _norm2(_times(Y, _times(A, L))) + _norm(_times(np.abs(Y), spread))
+
+
+def _through_gain(model: StepModel, repeated: Repeated, off: EvaluationErrors, L: Array) -> tuple[Array, ...]:
+    """Return L'N with N = Phi' H' S^-1 and a bound of its error, and bounds of the norms of L'GL and L'y."""
+    many = _many(*repeated.K.shape[-2:])
+    HL = _times(_times(model.H, model.Phi), L)
+    aHL = _times(np.abs(model.H), _times(np.abs(model.Phi), np.abs(L)))
+    inverse, dinverse = _inverse_general(repeated.S)
+    N, dN = _times(_turned(HL), inverse), _times(_turned(aHL), dinverse + many * np.abs(inverse))
+    aN = np.abs(N)
+    g = _norm(_times(N, HL)) + _norm(_times(dN, aHL)) + many * _norm(_times(aN, aHL))
+    nu = repeated.innovation[..., np.newaxis]
+    dnu = off.innovation[..., np.newaxis] + many * np.abs(nu)
+    y = _norm(_times(N, nu)) + _norm(_times(dN, np.abs(nu) + dnu)) + _norm(_times(aN, dnu))
+    return N, dN, g, y
+
+
+@np.errstate(all="ignore")
+def evaluation_errors(
+    model: StepModel, x: Array, P: Array, z: Array, K: Array, S: Array, unit: float
+) -> EvaluationErrors:
+    r"""Bound the errors of the evaluation of one step, or of each of some steps, componentwise.
 
     The step is :math:`x = \Phi x + K(z - H(\Phi x))`, :math:`P_p = \Phi P\Phi^T + Q`, :math:`S = HP_pH^T + R`,
     :math:`K = P_pH^TS^{-1}`, and P by :math:`(I-KH)P_p` or Joseph's form, made symmetric by averaging its two halves.
@@ -178,66 +222,57 @@ def evaluation_errors(model: Any, x: Any, P: Any, z: Any, K: Any, S: Any, unit: 
 
     Parameters
     ----------
-    model : StepModel. x (n,), P (n, n) : state and covariance before the step. z (m,) : measurement.
+    model : the step's. x (n,), P (n, n) : state and covariance before the step. z (m,) : measurement.
     K (n, m), S (m, m) : gain and innovation covariance of this step.
     unit : unit roundoff of one operation of the evaluation, 2**-102 for :mod:`gpbnb.arithmetic.kernels.doubledouble`.
-
-    Returns
-    -------
-    off : EvaluationErrors.
     """
-    Phi, H, Q, R = model
-    n, m = K.shape
+    n, m = K.shape[-2:]
     many = (16 * (n + m) + 64) * unit * (1 + _many(n, m))
-    aPhi, aH, aK = np.abs(Phi), np.abs(H), np.abs(K)
-    predicted = _times(_times(aPhi, np.maximum(np.abs(P), np.abs(P.T))), aPhi.T) + np.abs(Q)
-    PH = _times(predicted, aH.T)
-    sizes = _times(aH, PH) + np.abs(R)
-    pivots = np.empty((m, m))
-    for i in range(m):
-        for j in range(m):
-            pivots[i, j] = math.sqrt(sizes[i, i] * sizes[j, j])
+    aPhi, aH, aQ, aR = map(np.abs, model)
+    aK = np.abs(K)
+    predicted = _times(_times(aPhi, np.maximum(np.abs(P), np.abs(_turned(P)))), _turned(aPhi)) + aQ
+    PH = _times(predicted, _turned(aH))
+    sizes = _times(aH, PH) + aR
+    diagonal = np.diagonal(sizes, axis1=-2, axis2=-1)
+    pivots = np.sqrt(diagonal[..., :, np.newaxis] * diagonal[..., np.newaxis, :])
     inverse, dinverse = _inverse_general(S)
     aS = np.abs(inverse) + dinverse
     dK = many * _times(PH + m * _times(_times(PH, aS), pivots), aS)
     left = np.eye(n) + _times(aK, aH)
-    dT = many * (_times(_times(left, predicted), left.T) + _times(_times(aK, np.abs(R)), aK.T))
-    dT += 2 * _times(_times(dK, PH.T), left.T) + 2 * _times(left, _times(PH, dK.T))
-    ahead = _times(aPhi, np.abs(x).reshape(-1, 1))
-    seen = np.abs(z).reshape(-1, 1) + _times(aH, ahead)
+    dT = many * (_times(_times(left, predicted), _turned(left)) + _times(_times(aK, aR), _turned(aK)))
+    dT += 2 * _times(_times(dK, _turned(PH)), _turned(left)) + 2 * _times(left, _times(PH, _turned(dK)))
+    ahead = _times(aPhi, np.abs(x)[..., np.newaxis])
+    seen = np.abs(z)[..., np.newaxis] + _times(aH, ahead)
     dq = many * (ahead + _times(aK, seen)) + _times(dK, seen)
-    return EvaluationErrors(dq[:, 0], dT, dK, many * seen[:, 0])
+    return EvaluationErrors(dq[..., 0], dT, dK, many * seen[..., 0])
 
 
-@compiled
-def state_error_bound(bound: Any) -> Any:
+def state_error_bound(bound: Contraction) -> Array:
     r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,)."""
-    rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
-    return rows * bound.eta
+    return _rows(bound.L) * (1 + _many(len(bound.L), 0)) * bound.eta
 
 
-@compiled
-def covariance_error_bound(bound: Any) -> Any:
+def covariance_error_bound(bound: Contraction) -> Array:
     r"""Bound each entry of the error of the covariance, :math:`\zeta\sqrt{(LL^T)_{ii}(LL^T)_{jj}}`; (n, n)."""
-    rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
+    rows = _rows(bound.L) * (1 + _many(len(bound.L), 0))
     return bound.zeta * np.outer(rows, rows)
 
 
-@compiled
-def gain_error_bound(bound: Any, K: Any, used: Any, dK: Any) -> Any:
+@np.errstate(all="ignore")
+def gain_error_bound(bound: Contraction, K: Array, used: Array, dK: Array) -> Array:
     r"""Bound each entry of the error of the gain that the program used in the step that led to `bound`; (n, m).
 
     .. math:: \hat K_k - K_k = (\hat K_k - K^\circ_k) + F_k E_{k-1} \Phi^T H^T S^{\circ-1}
 
     Parameters
     ----------
-    bound : Contraction after the step.
+    bound : the bound after the step.
     K, dK : as in :func:`contraction_step`.
     used : (n, m), the program's gain.
     """
     up = 1 + _many(K.shape[0], K.shape[1])
-    rows = np.sqrt((bound.L * bound.L).sum(axis=1))
-    return (np.abs(used - K) + dK + _U * (np.abs(used) + np.abs(K)) + np.outer(rows, bound.gain)) * up
+    off = np.abs(used - K) + dK + _U * (np.abs(used) + np.abs(K)) + np.outer(_rows(bound.L), bound.gain)
+    return off * up
 
 
 def companion_bound(difference: Any, bound: Any) -> NDArray[np.float64]:
@@ -253,64 +288,90 @@ def companion_bound(difference: Any, bound: Any) -> NDArray[np.float64]:
     return (np.abs(difference) + np.asarray(bound)) * (1 + 4 * _U)
 
 
-@compiled
 def _many(n: int, m: int) -> float:
     """Bound on the error of one step's float64 computations, relative to the sums of magnitudes."""
     return (16 * (n + m) + 64) * _U
 
 
-@compiled
-def _times(A: Any, B: Any) -> Any:
-    rows, inner, columns = A.shape[0], A.shape[1], B.shape[1]
-    product = np.zeros((rows, columns))
-    for i in range(rows):
-        for k in range(inner):
-            a = A[i, k]
-            if a != 0.0:
-                for j in range(columns):
-                    product[i, j] += a * B[k, j]
+def _turned(A: Array) -> Array:
+    return np.swapaxes(A, -2, -1)
+
+
+def _sums(A: Array, axis: int = -1) -> Any:
+    """Sums from left to right."""
+    return np.cumsum(A, axis=axis).take(-1, axis=axis)
+
+
+def _norm(A: Array) -> Array:
+    return np.sqrt(_sums(np.square(A).reshape(*A.shape[:-2], -1)))
+
+
+def _norm2(X: Array) -> Array:
+    """Upper bounds on the largest singular values."""
+    norms = np.empty(X.shape[:-2])
+    _bound_norms2(_times(_turned(X), X).reshape(-1, *X.shape[-1:] * 2), norms.reshape(-1))
+    return norms
+
+
+def _rows(L: Array) -> Array:
+    return np.sqrt(_sums(L * L))
+
+
+def _times(A: Array, B: Array) -> Array:
+    """Products of matrices, or of each pair of matrices; zeros of A are skipped, so that none meets an infinity."""
+    product = np.zeros((*A.shape[:-1], B.shape[-1]))
+    _add_products(
+        *(np.require(each, requirements=["C", "W"]).reshape(-1, *each.shape[-2:]) for each in (A, B, product))
+    )
     return product
 
 
 @compiled
-def _norm(A: Any) -> float:
-    total = 0.0
-    for i in range(A.shape[0]):
-        for j in range(A.shape[1]):
-            total += A[i, j] * A[i, j]
-    return math.sqrt(total)
+def _add_products(A: Any, B: Any, product: Any) -> None:
+    for step in range(A.shape[0]):
+        for i in range(A.shape[1]):
+            for k in range(A.shape[2]):
+                a = A[step, i, k]
+                if a != 0.0:
+                    for j in range(B.shape[2]):
+                        product[step, i, j] += a * B[step, k, j]
 
 
 @compiled
-def _norm2(X: Any) -> float:
-    """Upper bound on the largest singular value: bisection finds a mu for which elimination shows mu - X'X positive.
+def _bound_norms2(B: Any, norms: Any) -> None:
+    """Bound the largest singular values of matrices X by B = X'X.
 
-    If elimination succeeds, all eigenvalues of a matrix with trace t are above -2 (n + 2) u t (Rump 2006).
+    Bisection finds a mu for which elimination shows mu - B positive. If elimination succeeds, all eigenvalues of a
+    matrix with trace t are above -2 (n + 2) u t (Rump 2006).
     """
-    n = X.shape[1]
-    B = _times(X.T, X)
-    trace = 0.0
-    for i in range(n):
-        trace += B[i, i]
-    if not trace < np.inf:
-        return np.inf
-    low, high = trace / n * 0.999, trace
-    while high - low > max(1e-3 * abs(1 - high), 1e-11) * low + 1e-300:  # only its distance from 1 matters
-        middle = low + (high - low) / 2
-        if not low < middle < high:
-            break
-        if _is_positive(middle, B):
-            high = middle
-        else:
-            low = middle
-    return math.sqrt(high * (1 + 4 * n * (n + 2) * _U) + 4 * (n + 2) * _U * trace) * (1 + 4 * _U)
+    n = B.shape[1]
+    M = np.empty((n, n))
+    for step in range(B.shape[0]):
+        trace = 0.0
+        for i in range(n):
+            trace += B[step, i, i]
+        if not trace < np.inf:
+            norms[step] = np.inf
+            continue
+        low, high = trace / n * 0.999, trace
+        while high - low > max(1e-3 * abs(1 - high), 1e-11) * low + 1e-300:  # only its distance from 1 matters
+            middle = low + (high - low) / 2
+            if not low < middle < high:
+                break
+            if _is_positive(middle, B[step], M):
+                high = middle
+            else:
+                low = middle
+        above = high * (1 + 4 * n * (n + 2) * _U) + 4 * (n + 2) * _U * trace
+        norms[step] = math.sqrt(above) * (1 + 4 * _U)
 
 
-@compiled
-def _is_positive(mu: float, B: Any) -> bool:
-    n = len(B)
-    M = -B
+@borrowing
+def _is_positive(mu: float, B: Any, M: Any) -> bool:
+    n = B.shape[0]
     for i in range(n):
+        for j in range(n):
+            M[i, j] = -B[i, j]
         M[i, i] += mu
     for k in range(n):
         if not M[k, k] > 0:
@@ -323,10 +384,38 @@ def _is_positive(mu: float, B: Any) -> bool:
 
 
 @compiled
-def _weights(W: Any) -> Any:
-    """A nonsingular lower factor of about W; any such factor is valid, so lost pivots are replaced by small ones."""
-    n = len(W)
-    L = np.zeros((n, n))
+def _propagate_weights(A: Any, by_noise: Any, by_measurement: Any, weights: Any) -> None:
+    """Set the weights after each step: those before it, through the closed loop, and two covariances added."""
+    n = A.shape[1]
+    AL, W = np.empty((n, n)), np.empty((n, n))
+    for step in range(A.shape[0]):
+        AL[:] = 0.0
+        for i in range(n):
+            for k in range(n):
+                if A[step, i, k] != 0.0:
+                    for j in range(k + 1):
+                        AL[i, j] += A[step, i, k] * weights[step, k, j]
+        W[:] = 0.0
+        for i in range(n):
+            for j in range(n):
+                for k in range(n):
+                    if AL[i, k] != 0.0:
+                        W[i, j] += AL[i, k] * AL[j, k]
+                W[i, j] = W[i, j] + by_noise[step, i, j] + by_measurement[step, i, j]
+        for i in range(n):
+            for j in range(i):
+                W[i, j] = W[j, i] = (W[i, j] + W[j, i]) / 2
+        _weights(W, weights[step + 1])
+
+
+@compiled
+def _weights(W: Any, L: Any) -> None:
+    """Set L to a nonsingular lower factor of about W.
+
+    Any such factor is valid, so lost pivots are replaced by small ones.
+    """
+    n = W.shape[0]
+    L[:] = 0.0
     for j in range(n):
         pivot = W[j, j]
         for k in range(j):
@@ -340,56 +429,47 @@ def _weights(W: Any) -> Any:
             for k in range(j):
                 entry -= L[i, k] * L[j, k]
             L[i, j] = entry / L[j, j]
-    return L
 
 
-@compiled
-def _inverse(L: Any) -> Any:
+@np.errstate(all="ignore")
+def _inverse(L: Array) -> tuple[Array, Array]:
     """Approximate inverse Y of a lower triangular L, and a bound on the Frobenius norm of YL - I."""
-    n = len(L)
-    Y = np.zeros((n, n))
-    for j in range(n):
-        Y[j, j] = 1 / L[j, j]
-        for i in range(j + 1, n):
-            entry = 0.0
-            for k in range(j, i):
-                entry -= L[i, k] * Y[k, j]
-            Y[i, j] = entry / L[i, i]
+    n = L.shape[-1]
+    Y = np.zeros(L.shape)
+    for i in range(n):
+        for k in range(i):
+            Y[..., i, :i] -= L[..., i, k, np.newaxis] * Y[..., k, :i]
+        Y[..., i, i] = 1.0
+        Y[..., i, : i + 1] /= L[..., i, i, np.newaxis]
     return Y, _norm(_times(Y, L) - np.eye(n)) + _many(n, 0) * _norm(_times(np.abs(Y), np.abs(L)))
 
 
-@compiled
-def _inverse_general(S: Any) -> Any:
+@np.errstate(all="ignore")
+def _inverse_general(S: Array) -> tuple[Array, Array]:
     """Inverse of S by elimination with pivoting, and a componentwise bound on its error, infinite if S is singular."""
-    m = len(S)
-    M, Y = S.copy(), np.eye(m)
+    m = S.shape[-1]
+    M = np.array(S).reshape(-1, m, m)
+    Y, every, singular = np.tile(np.eye(m), (len(M), 1, 1)), np.arange(len(M)), np.zeros(len(M), dtype=bool)
     for k in range(m):
-        p = k
-        for i in range(k + 1, m):
-            if abs(M[i, k]) > abs(M[p, k]):
-                p = i
-        if not abs(M[p, k]) > 0:
-            return np.eye(m), np.full((m, m), np.inf)
-        for j in range(m):
-            M[k, j], M[p, j] = M[p, j], M[k, j]
-            Y[k, j], Y[p, j] = Y[p, j], Y[k, j]
-        pivot = M[k, k]
-        for j in range(m):
-            M[k, j] /= pivot
-            Y[k, j] /= pivot
+        p = k + np.abs(M[:, k:, k]).argmax(axis=1)
+        for rows in (M, Y):
+            rows[every, k], rows[every, p] = rows[every, p], rows[every, k]
+        pivot = M[:, k, k].copy()
+        singular |= ~(np.abs(pivot) > 0)
+        for rows in (M, Y):
+            rows[:, k] /= pivot[:, np.newaxis]
         for i in range(m):
-            factor = M[i, k]
-            if i != k and factor != 0.0:
-                for j in range(m):
-                    M[i, j] -= factor * M[k, j]
-                    Y[i, j] -= factor * Y[k, j]
+            if i != k:
+                factor = M[:, i, k, np.newaxis].copy()
+                M[:, i] -= factor * M[:, k]
+                Y[:, i] -= factor * Y[:, k]
+    Y[singular] = np.eye(m)
     # S^-1 - Y = -E (I + E)^-1 Y with E = YS - I. With e the largest row sum of |E|, each entry is at most e / (1 - e)
     # times the sum of its column of |Y|.
+    Y = Y.reshape(S.shape)
     aY = np.abs(Y)
     E = np.abs(_times(Y, S) - np.eye(m)) + _many(m, m) * _times(aY, np.abs(S))
-    largest = 0.0
-    for i in range(m):
-        largest = max(largest, E[i].sum())
-    if not largest < 0.5:
-        return Y, np.full((m, m), np.inf)
-    return Y, 2 * _times(np.full((m, m), largest), aY)
+    largest = _sums(E).max(axis=-1)
+    error = 2 * _times(np.broadcast_to(largest[..., np.newaxis, np.newaxis], S.shape), aY)
+    error[singular.reshape(S.shape[:-2]) | ~(largest < 0.5)] = np.inf
+    return Y, error

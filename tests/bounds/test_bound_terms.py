@@ -476,7 +476,7 @@ def test_factors_of_the_first_covariance_may_be_off(monkeypatch: pytest.MonkeyPa
 def test_each_step_has_the_errors_of_its_evaluation(form: Form, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of the repeated step, in units of double-double; the bound and the gain's bound contain them."""
     errors, steps, used = [], [], []
-    for name, seen in (("evaluation_errors", errors), ("contraction_step", steps), ("gain_error_bound", used)):
+    for name, seen in (("evaluation_errors", errors), ("contraction_steps", steps), ("gain_error_bound", used)):
         function = getattr(bounded_steps, name)
 
         def noted(*given: Any, function: Any = function, seen: list[Any] = seen) -> Any:
@@ -491,20 +491,20 @@ def test_each_step_has_the_errors_of_its_evaluation(form: Form, monkeypatch: pyt
     run.take(z)
     model = correlated().rounded(FMT)
     before = [fractions(model.x0), *run.exactly(run.X)[:2, :, 0]]
-    assert all(F(errors[0][0][2][i, i]) >= first[i, i] for i in range(2))
-    assert len(errors) == len(steps) == len(used) == 3
-    for k, ((given, (dq, dT, dK, dy)), (taken, _), (asked, _)) in enumerate(zip(errors, steps, used, strict=True)):
-        same(taken[2].innovation, fractions(z[k]) - model.H[0] @ model.Phi[0] @ before[k], 1e-15)
-        assert given[6] == 2.0**-100
-        size = given[2]
+    [(given, off)], [(taken, _)] = errors, steps
+    assert all(F(given[2][0, i, i]) >= first[i, i] for i in range(2))
+    assert given[6] == 2.0**-100
+    assert taken[3] is off
+    assert all((each > 0).all() for each in off)
+    assert len(used) == 3
+    for k, (asked, _) in enumerate(used):
+        same(taken[2].innovation[k], fractions(z[k]) - model.H[0] @ model.Phi[0] @ before[k], 1e-15)
+        size = given[2][k]
         # Cancellation inside a product of factors goes by the standard deviations.
         root = np.sqrt(size[0, 0] * size[1, 1])
         assert (np.abs(size[0, 1]) > root * (1 - 1e-15)) == (form is Form.UD)
         assert np.abs(size[0, 1]) < root * (1 + 1e-15)
-        for found, exactly in zip(taken[3], (dq, dT, dK, dy), strict=True):
-            assert np.array_equal(found, exactly)
-            assert (found > 0).all()
-        assert asked[3] is dK
+        assert np.array_equal(asked[3], off.gain[k])
 
 
 @compiled

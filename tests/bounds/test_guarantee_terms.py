@@ -134,6 +134,12 @@ PAIRS = [
 
 
 @pytest.fixture
+def certifying(monkeypatch):
+    for name in ("effect", "_entries"):
+        monkeypatch.setattr(envelope, name, plain(getattr(envelope, name)))
+
+
+@pytest.fixture
 def exactly(monkeypatch):
     for name in ("two_sum", "_two_product"):
         monkeypatch.setattr(envelope, name, plain(getattr(envelope, name)))
@@ -569,7 +575,7 @@ def certificate(starts, k, first, steady, most):
     ("k", "first", "steady", "most"),
     [(1, 1, True, 5), (2, 1, True, 4), (3, 0, True, 7), (6, 1, False, 9), (5, 1, False, 3)],
 )
-def test_certificate(monkeypatch, k: int, first: int, steady: bool, most: int) -> None:
+def test_certificate(certifying, monkeypatch, k: int, first: int, steady: bool, most: int) -> None:
     monkeypatch.setattr(envelope, "_U", float(UNIT))
     starts = np.array([[1.0, 0.0], [0.5, -2.0]])
     found = plain(envelope.certify)(PERIODIC, starts, k, first, steady, End(most, np.ones(2), 0.0))
@@ -583,7 +589,7 @@ def test_certificate(monkeypatch, k: int, first: int, steady: bool, most: int) -
     assert (found.start.any(), found.tail.any()) == ((True, False) if not steady and most > k else (False, True))
 
 
-def test_a_certificate_has_the_lags_of_its_longest_row() -> None:
+def test_a_certificate_has_the_lags_of_its_longest_row(certifying) -> None:
     """The second state forgets everything at once, and its row ends first."""
     loop, none = np.array([[[0.5, 0.0], [0.0, 0.0]]]), np.zeros((1, 2, 2))
     given = (loop, none, np.ones((1, 2, 1)), np.ones((1, 1)), np.zeros((1, 2)), np.zeros(1, np.int64))
@@ -601,7 +607,7 @@ def half_units(steps: int, columns: int) -> tuple[np.ndarray, ...]:
     return loops, none, np.ones((steps, 1, columns)), np.full((steps, columns), 2.0**-53), slack
 
 
-def test_a_certificate_allows_for_each_addition() -> None:
+def test_a_certificate_allows_for_each_addition(certifying) -> None:
     """Added one by one to 1, half units are lost to rounding; the allowance must exceed all of them."""
     assert 1.0 + 2.0**-53 == 1.0
     steps, columns = 50, 64
@@ -611,7 +617,7 @@ def test_a_certificate_allows_for_each_addition() -> None:
     assert F(float(found.sums.sum())) >= 1 + steps * columns * F(1, 2**53)
 
 
-def test_a_certificate_ends_once_its_rows_are_small() -> None:
+def test_a_certificate_ends_once_its_rows_are_small(certifying) -> None:
     """Half of it each step, in units of 4: below 0.3 after the fourth, whose disturbance is not in the sum any more."""
     loop, none = np.array([[[0.5]]]), np.zeros((1, 1))
     given = (loop, none[None], np.ones((1, 1, 1)), np.ones((1, 1)), none, np.zeros(1, np.int64))
@@ -621,7 +627,7 @@ def test_a_certificate_ends_once_its_rows_are_small() -> None:
     assert found.sums[0, 0] == pytest.approx(1.875, rel=1e-13)
 
 
-def test_peaks(monkeypatch) -> None:
+def test_peaks(certifying, monkeypatch) -> None:
     """State and innovation before the first step, in the first steps, and in a period."""
     monkeypatch.setattr(envelope, "_U", 0.0)
     monkeypatch.setattr(envelope, "_UP", float(UP))
@@ -650,7 +656,7 @@ STEPS = [(1, False, 1), (2, False, 2), (3, False, 1), (4, False, 2), (1, True, 2
 
 
 @pytest.mark.parametrize("largest", range(6))
-def test_the_peak_of_each_step_counts(monkeypatch, largest: int) -> None:
+def test_the_peak_of_each_step_counts(certifying, monkeypatch, largest: int) -> None:
     """Certificates of 1 but for one step, whose terms are all seen."""
     monkeypatch.setattr(envelope, "_UP", float(UP))
     HPhi = np.array([[[0.5, -2.0]], [[1.0, 0.25]], [[-0.75, 1.5]]])

@@ -14,9 +14,13 @@ from gpbnb.bounds.reach import Reach
 
 
 @pytest.fixture
-def sets(monkeypatch):
-    for name in ("take_in", "_length", "_move_ellipsoid", "support", "width", "_join"):
+def as_python(monkeypatch):
+    for name in ("take_in", "_length", "_move_ellipsoid", "support", "width", "_join", "_scale", "effect"):
         monkeypatch.setattr(reach, name, plain(getattr(reach, name)))
+
+
+@pytest.fixture
+def sets(as_python, monkeypatch):
     monkeypatch.setattr(reach, "_U", float(UNIT))
     monkeypatch.setattr(reach, "_UP", float(UP))
     return reach
@@ -137,7 +141,7 @@ def test_a_pass_forward(sets) -> None:
         last = F(float(bounds[k, 0]))
 
 
-def test_dropped_components_are_made_up_for() -> None:
+def test_dropped_components_are_made_up_for(as_python) -> None:
     """A segment that halves falls below what is kept; without the slack of 1e-240, the bound would forget it."""
     one, tiny = np.ones((2, 1, 1)), 1.5e-250
     given = one / 2, 0 * one, one, np.full((2, 1), tiny), np.zeros((2, 1))
@@ -180,7 +184,7 @@ def test_steps_after_the_gain_has_settled(sets, loop: float) -> None:
     assert bool(carried) is (loop > 0.5)
 
 
-def test_steps_in_a_period_allow_for_each_addition() -> None:
+def test_steps_in_a_period_allow_for_each_addition(as_python) -> None:
     """As of a certificate: 1 in the last step, and half units of 1 from each column, lost if added to it one by one."""
     steps, columns, half = 50, 64, 2.0**-53
     slack, part = np.zeros((steps, 1)), np.full(columns, envelope.ROUNDING)

@@ -16,10 +16,8 @@ from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import copy, product
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, one, put, subtract, zero
 from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
-from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.step import decorrelate
 
-_UD = int(Form.UD)
 _POWERS = np.array([10.0**k for k in range(23)])  # exact
 
 
@@ -61,37 +59,40 @@ def widen(fmt: Any, packed: Any, wide: Any) -> None:
 
 
 @compiled
-def symmetric_parts(form: int, given: Any, covariances: Any) -> None:
-    """Symmetric parts of covariances, (k, n, n, 2); in the UD form, the covariances that the factors represent."""
-    exactly, n = DoubleDouble(), given.shape[1]
-    U, UD = np.empty((n, n, 2)), np.empty((n, n, 2))
-    half = (0.5, 0.0)
+def symmetric_parts(given: Any, covariances: Any) -> None:
+    """Symmetric parts of covariances, (k, n, n, 2)."""
+    exactly, half = DoubleDouble(), (0.5, 0.0)
     for k in range(given.shape[0]):
-        a, c = given[k], covariances[k]
-        if form == _UD:
-            for i in range(n):
-                for j in range(n):
-                    d = load(exactly, a, (j, j))
-                    u = load(exactly, a, (i, j)) if i < j else one(exactly) if i == j else zero(exactly)
-                    put(exactly, U, (j, i), u)
-                    put(exactly, UD, (i, j), multiply(exactly, u, d))
-            product(exactly, UD, U, c)
-        else:
-            for i in range(n):
-                for j in range(i + 1):
-                    x = multiply(exactly, add(exactly, load(exactly, a, (i, j)), load(exactly, a, (j, i))), half)
-                    put(exactly, c, (i, j), x)
-                    put(exactly, c, (j, i), x)
+        for i in range(given.shape[1]):
+            for j in range(i + 1):
+                total = add(exactly, load(exactly, given, (k, i, j)), load(exactly, given, (k, j, i)))
+                x = multiply(exactly, total, half)
+                put(exactly, covariances, (k, i, j), x)
+                put(exactly, covariances, (k, j, i), x)
 
 
 @compiled
-def whole_gain(form: int, K: Any, H: Any, UR: Any, c: Any) -> None:
-    """c = the gain of a step; in the UD form, combined from the gains of its single measurements."""
+def represented(factors: Any, covariances: Any) -> None:
+    """Covariances (k, n, n, 2) that factors represent, of which each matrix has D on its diagonal and U above."""
+    exactly, n = DoubleDouble(), factors.shape[1]
+    U, UD = np.empty((n, n, 2)), np.empty((n, n, 2))
+    for k in range(factors.shape[0]):
+        a = factors[k]
+        for i in range(n):
+            for j in range(n):
+                d = load(exactly, a, (j, j))
+                u = load(exactly, a, (i, j)) if i < j else one(exactly) if i == j else zero(exactly)
+                put(exactly, U, (j, i), u)
+                put(exactly, UD, (i, j), multiply(exactly, u, d))
+        product(exactly, UD, U, covariances[k])
+
+
+@compiled
+def whole_gain(K: Any, H: Any, UR: Any, c: Any) -> None:
+    """c = the gain of a step in the UD form, combined from the gains of its single measurements."""
     n, m = K.shape[0], K.shape[1]
     exactly = DoubleDouble()
     copy(exactly, K, c)
-    if form != _UD:
-        return
     HD = np.empty_like(H)
     decorrelate(exactly, UR, H, HD)
     for i in range(m):
