@@ -122,7 +122,7 @@ class Enclosed:
         return self._rounded(ratio, error)
 
 
-def _enclosed(values: NDArray[Any], unit: float, spread: NDArray[np.float64] | None = None) -> NDArray[Any]:
+def enclosed_numbers(values: NDArray[Any], unit: float, spread: NDArray[np.float64] | None = None) -> NDArray[Any]:
     """Return numbers as :class:`Enclosed` balls with radius zero or with the radii in `spread`."""
     out = np.empty(values.shape, dtype=object)
     for at in np.ndindex(values.shape):
@@ -220,7 +220,7 @@ def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int)
     # E_0 is the error before phase 0; before phase j it has been multiplied by every power of that phase.
     begun = [_largest([M @ first @ M.T for M in each.products]) for each in powers]
     B = [2 * each for each in begun]
-    given = [[_enclosed(each, unit) for each in phase.given] for phase in phases]
+    given = [[enclosed_numbers(each, unit) for each in phase.given] for phase in phases]
     for _ in range(_TRIALS):
         found = [_disturbed(form, phase, each, b, unit) for phase, each, b in zip(phases, given, B, strict=True)]
         W = [each.covariance + moved[j] for j, each in enumerate(found)]
@@ -262,8 +262,8 @@ class _Disturbed(NamedTuple):
 def _disturbed(form: Form, phase: _Phase, given: list[NDArray[Any]], B: NDArray[np.float64], unit: float) -> _Disturbed:
     """Bound w and the gain of a step from any covariance within B of the center."""
     Phi, H, Q, R = given
-    algebra, n = Algebra(lambda size: _enclosed(np.eye(size), unit)), len(B)
-    V, error_V = _restarted(predicted(algebra, Phi, _enclosed(phase.center, unit, B), Q))
+    algebra, n = Algebra(lambda size: enclosed_numbers(np.eye(size), unit)), len(B)
+    V, error_V = _restarted(predicted(algebra, Phi, enclosed_numbers(phase.center, unit, B), Q))
     computed = gain(algebra, H, R, V).K
     K, error_K = _restarted(computed)
     result = updated(algebra, form, StepModel(Phi, H, Q, R), V, K)

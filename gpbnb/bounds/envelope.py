@@ -266,9 +266,17 @@ def _size(v: int, HPhi: Any, limits: Any, b: Any, cap: float, values: Any) -> fl
     rows, sizes = values.rows, values.sizes
     seen, known, carried = 0.0, 0.0, 0.0
     begin, end = values.reach[v, 0], values.reach[v, 1]
-    if end > n:  # it depends on measurements, and through them on all states
-        begin, end = 0, n
-    for j in range(begin, end):
+    if end <= n:  # without measurements, innovations add nothing
+        for j in range(begin, end):
+            r, tiny = rows[v, j, 0], (m + 8) * _U * sizes[v, j]
+            size = abs(r) + 2.0**-90 * sizes[v, j]
+            if r != 0.0:
+                seen += size * limits.state[j]
+            if r != 0.0 or tiny != 0.0:
+                known += (abs(r) + tiny) * limits.state[j]
+            carried += size * b[j]
+        return min(min(seen, known), cap) + carried
+    for j in range(n):
         r, tiny = rows[v, j, 0], (m + 8) * _U * sizes[v, j]
         by_innovation = r
         for i in range(m):

@@ -25,14 +25,21 @@ from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sp
 from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.enclosure import enclose
+from gpbnb.bounds.enclosure import Enclosure, enclose
+from gpbnb.bounds.gain_limits import FORMS, StepNumbers, limits_of_gains
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.opening import widened_array
 from gpbnb.filters.program import Program, innovation_program, loop_program, sequential_program
-from gpbnb.filters.run import Run
+from gpbnb.filters.run import Run, widened
 from gpbnb.filters.system import LinearFilter
+
+MOST, WORK = 20_000, 1e8
+"""Largest number of steps to emulate unless more are asked for, and of steps times the cube of the number of states."""
+
+ENTRY_BY_ENTRY = 16
+"""Largest number of states whose covariances are enclosed entry by entry, see :mod:`gpbnb.bounds.enclosure`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +136,11 @@ def check_deterministic(fmt: FloatFormat | FixedFormat) -> None:
 
 
 def schedule(
-    model: LinearModel, fmt: FloatFormat | FixedFormat, form: Form | str, most: int = 20_000, horizon: int | None = None
+    model: LinearModel,
+    fmt: FloatFormat | FixedFormat,
+    form: Form | str,
+    most: int | None = None,
+    horizon: int | None = None,
 ) -> Schedule:
     """Find the coefficients of a Kalman filter until its computed covariance repeats and the exact gain has settled.
 
@@ -137,7 +148,8 @@ def schedule(
     ----------
     model, fmt, form : as for a run of the filter. The exact filter uses model and measurements as the format stores
         them.
-    most : largest number of steps to try. A model with `steps` is continued with the cycles of its matrices.
+    most : largest number of steps to try, 20,000 by default, and fewer for more than 17 states, whose covariances
+        seldom repeat. A model with `steps` is continued with the cycles of its matrices.
     horizon : number of steps to return if the gain does not settle; by default all that were tried.
 
     Raises
@@ -149,7 +161,9 @@ def schedule(
     check_deterministic(fmt)
     stored, nothing = model.rounded(fmt), np.array([Fraction(0)] * model.n, dtype=object)
     x0, stored = stored.x0, replace(stored, x0=nothing, steps=None)
-    run, repeat, period = _emulated(replace(model, x0=nothing, steps=None), fmt, form, most)
+    tried = int(np.clip(WORK / model.n**3, 256, MOST)) if most is None else most
+    most = MOST if most is None else most
+    run, repeat, period = _emulated(replace(model, x0=nothing, steps=None), fmt, form, tried)
     bad = run.stopped or run.indefinite
     if run.stopped:
         why = f"the computed covariance became singular, or left the range of the backend, at step {run.stopped}"
@@ -162,7 +176,7 @@ def schedule(
     end = max(bad - bool(run.stopped), 0) if bad else run.steps if repeat is None or period is None else repeat + period
     if end == 0:
         raise ValueError(f"got {model.name} in {format_text(fmt)}; needed a first step that can be computed: {why}")
-    enclosure = enclose(stored, run, fmt, form) if repeat is None and not bad else None
+    enclosure = _enclosed(stored, run, fmt, form) if repeat is None and not bad else None
     if enclosure is not None:
         repeat, period, why = enclosure.start - stored.cycle, stored.cycle, ""
     if repeat is None or period is None or why:
@@ -197,6 +211,37 @@ def schedule(
         program, fmt, coefficients, packed, Phi, HPhi, K, dK, x0, first, settled, repeat, period, why, enclosed, wide,
         model, form,
     )  # fmt: skip
+
+
+def _enclosed(stored: LinearModel, run: Run, fmt: FloatFormat | FixedFormat, form: Form) -> Enclosure | None:
+    """Enclose gains that do not repeat: entry by entry for few states, and by a norm for many."""
+    if stored.n <= ENTRY_BY_ENTRY:
+        return enclose(stored, run, fmt, form)
+    if form not in FORMS or stored.cycle > 1 or not isinstance(fmt, FloatFormat) or fmt.limits is not None:
+        return None
+    P, K = (widened(each[: run.steps]).sum(axis=-1) for each in (run.C, run.G))
+    if form is Form.UD:
+        P = np.array([U @ U.T for U in map(_root, P)])
+    return limits_of_gains(form, step_numbers(run), P, K, float(fmt.unit_roundoff) * (1 + 2.0**-50))
+
+
+def step_numbers(run: Run) -> StepNumbers:
+    """Return the first step's matrices of a run, as its form uses them."""
+    n, m, each = run.model.n, run.model.m, run.matrices
+    given = each.Phi, each.H, each.Q, each.R
+    Phi, H, Q, R = (widened(each[:1]).sum(axis=-1)[0] for each in given)
+    if run.form is not Form.UD:
+        return StepNumbers(Phi, Q, np.zeros((n, n)), [(H, R)])
+    row = widened_array(packed_coefficients(run, np.zeros(1, dtype=np.int64))[1]).sum(axis=-1)[0]
+    D = row[n * n + m * m : n * n + m * m + m * n].reshape(m, 1, n)
+    variances = widened(run.UR[:1]).sum(axis=-1)[0].diagonal()
+    root = _root(widened(run.UQ[:1]).sum(axis=-1)[0])
+    return StepNumbers(Phi, root @ root.T, root, [(D[i], variances[i].reshape(1, 1)) for i in range(m)])
+
+
+def _root(U: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the root of a covariance from its factors, whose diagonal holds variances."""
+    return np.asarray((np.triu(U, 1) + np.eye(len(U))) * np.sqrt(np.maximum(U.diagonal(), 0.0)))
 
 
 def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int64]:

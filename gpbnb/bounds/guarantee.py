@@ -29,7 +29,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ from gpbnb.bounds.envelope import (
     peaks,
     units,
 )
-from gpbnb.bounds.gains import Schedule, schedule
+from gpbnb.bounds.gains import MOST, Schedule, schedule
 from gpbnb.bounds.reach import forward, nothing, onward, units_of_trace
 from gpbnb.bounds.storing import stored_sizes
 from gpbnb.filters.forms import Form
@@ -66,6 +66,9 @@ from gpbnb.filters.program import functionals
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "older errors")
 """Names of the parts of a bound, in the order in which a guarantee lists them."""
+
+_AT_ONCE = 64
+"""Number of steps whose columns are multiplied at a time."""
 
 BUDGET = 3e8
 """Approximate number of multiplications for the steps before the gain settles, a few seconds."""
@@ -205,7 +208,7 @@ def guarantee(
     fmt: FloatFormat | FixedFormat,
     within: FilterLimits,
     form: Form | str = Form.INNOVATION,
-    most: int = 20_000,
+    most: int | None = None,
     horizon: int = 1_000,
     budget: float = BUDGET,
 ) -> Guarantee:
@@ -220,7 +223,8 @@ def guarantee(
         the same stored model and measurements. If the model has a number of `steps`, the bound holds for these steps.
     within : limits on the exact filter, from :func:`limits`; limits on the measurements apply to the values before they
         are stored.
-    most : the largest number of steps to emulate while the gain settles.
+    most : the largest number of steps to emulate while the gain settles, 20,000 by default, and fewer for more than 17
+        states.
     horizon : the number of steps that the bound covers if no bound holds for ever.
     budget : approximate number of multiplications to spend on the steps before the gain settles. For a filter that
         settles slowly, a larger budget gives a smaller bound.
@@ -241,7 +245,7 @@ def guarantee(
     model.refuse_inputs("a guarantee")
     check_limits(within, model.n, model.m)
     if model.steps is not None:
-        most, horizon = min(most, model.steps), min(horizon, model.steps)
+        most, horizon = min(MOST if most is None else most, model.steps), min(horizon, model.steps)
     found = from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
     if model.steps is not None and found.steps in (None, model.steps):
         found = replace(found, steps=model.steps, why=f"{model.name} describes no more")
@@ -292,12 +296,18 @@ def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000, b
 
 
 def _disturbances(
-    given: Schedule, within: FilterLimits, b: NDArray[np.float64], caps: NDArray[np.float64] | None = None
+    given: Schedule,
+    within: FilterLimits,
+    b: NDArray[np.float64],
+    caps: NDArray[np.float64] | None = None,
+    rows: slice = slice(None),
 ) -> Disturbances:
+    """Compute closed loops and disturbances of some steps."""
     program = given.program
     if caps is None:
         caps = np.full(len(program.operations), math.inf)
-    numbers = Steps(given.coefficients, given.offsets, given.Phi, given.HPhi, given.exact, given.dK)
+    all_steps = (given.coefficients, given.offsets, given.Phi, given.HPhi, given.exact, given.dK)
+    numbers = Steps(*(each[rows] for each in all_steps))
     return Disturbances(*disturbances(program.compiled, numbers, units(given.fmt), within, b, caps))
 
 
@@ -327,7 +337,8 @@ def _radius(given: Schedule) -> float:
     """Estimate the spectral radius of the closed loop over a period, as a factor per step; proofs do not use it."""
     if not given.settled:
         return math.nan
-    F = closed_loops(given)[given.first :]
+    ones, late = FilterLimits(*(np.ones(k) for k in (given.program.n, given.program.m, given.program.m))), given.first
+    F = _disturbances(given, ones, np.zeros(given.program.n), rows=slice(late, None)).F
     whole = np.eye(given.program.n)
     for each in F:
         whole = each @ whole
@@ -345,10 +356,29 @@ def _window(given: Schedule, columns: int, steps: int, budget: float) -> int:
     return int(np.clip(budget / (max(steps, 1) * (columns + n) * n * n), 8, max(steps, 1)))
 
 
-def _scale(found: Disturbances, radius: float) -> tuple[NDArray[np.float64], float]:
+class _Effects(NamedTuple):
+    """What the columns of some steps do to the states."""
+
+    #: (g,), which columns have an effect in any step, and whether all effects are finite.
+    used: NDArray[np.bool_]
+    finite: bool
+    #: (n,), largest effect of all disturbances of a step on each state.
+    size: NDArray[np.float64]
+
+
+def _effects(found: Disturbances) -> _Effects:
+    used, size, finite = np.zeros(found.G.shape[2], dtype=np.bool_), np.zeros(found.G.shape[1]), True
+    for k in range(0, len(found.G), _AT_ONCE):
+        some = slice(k, k + _AT_ONCE)
+        sizes = columns(found._replace(G=found.G[some], limits=found.limits[some]))
+        used |= (sizes > 0).any(axis=(0, 1))
+        finite = finite and bool(np.isfinite(sizes).all())
+        size = np.maximum(size, (sizes.sum(axis=2) + found.slack[some]).max(axis=0))
+    return _Effects(used, finite, size)
+
+
+def _scale(size: NDArray[np.float64], radius: float) -> tuple[NDArray[np.float64], float]:
     """Return the largest contribution of a lag, and a negligible one; the proof does not use them."""
-    each = columns(found).sum(axis=2) + found.slack
-    size = each.max(axis=0)
     grown = size / (1 - radius) if radius < 1 else size
     positive = size[size > 0]
     return grown, 1e-7 * float(positive.min()) if len(positive) else 0.0
@@ -365,9 +395,8 @@ def _sums(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
     """Return bounds after each step, and their parts; the last rows are those of the period, if there is a radius."""
     n, part, for_ever = given.program.n, _parts_of(given), radius is not None
-    sizes = columns(found)
-    used = (sizes > 0).any(axis=(0, 1))
-    if for_ever and not np.isfinite(sizes).all():  # a number may leave the range of the format
+    used, finite, size = _effects(found)
+    if for_ever and not finite:  # a number may leave the range of the format
         return np.full((1, n), math.inf), np.full((1, n, 4), math.inf), most
     arrays = Columns(
         found.F,
@@ -377,7 +406,7 @@ def _sums(
         found.slack,
         part[used],
     )
-    scale, small = _scale(found, math.nan if radius is None else radius)
+    scale, small = _scale(size, math.nan if radius is None else radius)
     size = units_of_trace(scale)
     window = _window(given, int(used.sum()), given.first if for_ever else steps, budget)
     if not for_ever:

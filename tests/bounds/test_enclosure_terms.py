@@ -99,7 +99,7 @@ def phase() -> enclosure._Phase:
 
 
 def given(unit: float) -> list[np.ndarray]:
-    return [enclosure._enclosed(np.array([[x]], dtype=object), unit) for x in (PHI, H, Q, R)]
+    return [enclosure.enclosed_numbers(np.array([[x]], dtype=object), unit) for x in (PHI, H, Q, R)]
 
 
 def chain(form: Form) -> dict[str, F]:
@@ -378,7 +378,7 @@ def bits():
 
 def test_balls_have_the_radii_of_the_set_and_of_errors(bits: None) -> None:
     spread = np.array([[0.25, 0.0]])
-    found = enclosure._enclosed(np.array([[F(3), F(1, 3)]], dtype=object), 0.5, spread)
+    found = enclosure.enclosed_numbers(np.array([[F(3), F(1, 3)]], dtype=object), 0.5, spread)
     same(found[0, 0].exactly.rad(), 0.25, 1e-8)
     assert found[0, 1].exactly.rad() < 1e-40
     found[0, 1].error = 0.125
@@ -507,7 +507,7 @@ def test_a_set_that_is_not_symmetric_holds_what_a_step_adds(
         return restarted(values)
 
     monkeypatch.setattr(enclosure, "_restarted", with_errors)
-    model = [enclosure._enclosed(each, 0.0) for each in (Phi, H, Q, R)]
+    model = [enclosure.enclosed_numbers(each, 0.0) for each in (Phi, H, Q, R)]
     found = enclosure._disturbed(form, step, model, B, 0.0)
     rng, tightest = np.random.default_rng(seed), 0.0
     for _ in range(20):

@@ -1,0 +1,148 @@
+"""Limits of the gains of many states: roundings of a step, gains of runs, and fifty states with a guarantee."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.gain_limits import FORMS, StepNumbers, chain, contracted, limits_of_gains, parts_of_a_step
+from gpbnb.bounds.gains import step_numbers
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.factors import covariance_of_factors
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run, reference_states
+from gpbnb.report.kalman.exact_step import exact_step
+from gpbnb.wordlength.examples import cyclic
+
+FORMATS = [FloatFormat(2, 16), FloatFormat(2, 24, Rounding.CHOP), FloatFormat(10, 6)]
+
+
+def coupled() -> LinearModel:
+    """Four states and two measurements; factors of Q and R are exact, so that a step has no other errors."""
+    above = ["0.9", "0.25", "0", "0"], ["-0.25", "0.875", "0.125", "0.5"]
+    return LinearModel(
+        Phi=exact([*above, ["0", "0", "0.75", "1"], ["0.5", "0", "0", "-0.5"]]),
+        H=exact([["1", "0", "0.5", "0"], ["0", "-1", "0.25", "2"]]),
+        Q=exact(np.diag([2, 1, 4, 1])) / 4,
+        R=exact(np.diag([1, 2])),
+        x0=exact(["0"] * 4),
+        P0=exact(3 * np.eye(4, dtype=int)),
+    )
+
+
+def settled(form: Form, fmt: FloatFormat, model: LinearModel, steps: int) -> tuple[LinearModel, Run]:
+    stored = model.rounded(fmt)
+    run = Run(stored, fmt, form, range(1, steps + 1))
+    run.take(np.zeros((steps, model.m)))
+    return stored, run
+
+
+def covariances(run: Run) -> np.ndarray:
+    P = run.exactly(run.C)
+    return np.array([covariance_of_factors(U) for U in P]) if run.form is Form.UD else P
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+@pytest.mark.parametrize("form", FORMS)
+def test_no_step_is_rounded_by_more_than_its_bounds(form: Form, fmt: FloatFormat) -> None:
+    """From covariances of a run to the exact step from them; the bounds are not much larger than what is seen."""
+    stored, run = settled(form, fmt, coupled(), 300)
+    P, K = covariances(run), run.exactly(run.G)
+    given, unit = step_numbers(run), float(fmt.unit_roundoff) * (1 + 2.0**-50)
+    found = limits_of_gains(form, given, P.astype(np.float64), K.astype(np.float64), unit)
+    assert found is not None
+    step = chain(given, found.center[0])
+    assert step is not None
+    # The set that is found contains all covariances of the run.
+    s = np.sqrt((step.weights**2).sum(axis=1))
+    parts = parts_of_a_step(form, step, float((found.covariance[0] / np.outer(s, s)).max()), unit)
+    assert parts is not None
+    allowed = parts.covariance[-1]
+    later = np.eye(4)
+    for T, u in zip(parts.covariance[-2::-1], step.updates[::-1], strict=True):
+        later = later @ u.C
+        allowed = allowed + np.abs(later) @ T @ np.abs(later.T)
+    largest = 0.0
+    matrices = [each[0] for each in (stored.Phi, stored.H, stored.Q, stored.R)]
+    for k in range(100, 299):
+        before = (P[k] + P[k].T) / 2
+        if (before != P[k]).any():
+            continue  # the oracle takes symmetric covariances
+        true = exact_step(*matrices, stored.x0, before, exact(["0", "0"]))
+        ratio = np.abs((P[k + 1] - true.P).astype(float)) / (allowed + 3 * parts.second * np.abs(step.center))
+        largest = max(largest, float(ratio.max()))
+    assert largest <= 1
+    assert largest == 0 or largest > 1e-3
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+@pytest.mark.parametrize("form", FORMS)
+def test_no_gain_leaves_its_limits(form: Form, fmt: FloatFormat) -> None:
+    for model in (coupled(), cyclic(20, 2, 1, 0.7)):
+        _, run = settled(form, fmt, model, 600)
+        P, K = covariances(run).astype(np.float64), run.exactly(run.G).astype(np.float64)
+        unit = float(fmt.unit_roundoff) * (1 + 2.0**-50)
+        found = limits_of_gains(form, step_numbers(run), P[:200], K[:200], unit)
+        if model.n == 20 and fmt.precision < 20:
+            continue  # too few digits for a set of this form
+        assert found is not None
+        for k in range(found.start, 600):
+            assert (np.abs(K[k] - K[found.start - 1]) <= found.gain[0]).all()
+            assert (np.abs(P[k] - found.center[0]) <= found.covariance[0]).all()
+        assert found.gain.max() < 5000 * unit * np.abs(K).max()
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_fifty_states_have_a_guarantee_for_ever(form: Form) -> None:
+    """No run with random, steady or adversarial measurements leaves the bound; few steps are enough."""
+    given, fmt, n = cyclic(50, 2, 1, 0.5), FloatFormat(2, 24), 50
+    within = limits(n, 2, state=100, innovation=10)
+    found = guarantee(given, fmt, within, form)
+    assert found.for_ever
+    assert found.schedule.enclosed is not None
+    assert found.schedule.steps < 100
+    stored, rng, steps = given.rounded(fmt), np.random.default_rng(5), 120
+    K = found.schedule.exact[-1, :, :, 0]
+    F = (np.eye(n) - K @ stored.H[0].astype(float)) @ stored.Phi[0].astype(float)
+    worst = 0.0
+    for aim in (None, 0, int(found.bound.argmax())):
+        # the sign of each innovation by its effect on one state at the end, or random
+        course = rng.choice([-1.0, 1.0], (steps, 2))
+        row = np.eye(n)[0 if aim is None else aim]
+        for k in range(steps - 1, -1, -1):
+            if aim is not None:
+                course[k] = np.sign(row @ K)
+            row = row @ F
+        x, z = np.zeros(n), np.zeros((steps, 2))
+        for k in range(steps):  # measurements of an exact filter with these innovations
+            ahead = stored.Phi[0].astype(float) @ x
+            z[k] = stored.H[0].astype(float) @ ahead + 9.9 * course[k]
+            x = ahead + K @ (9.9 * course[k])
+            assert np.abs(x).max() < 99
+        measured, run = fmt.array(z), Run(stored, fmt, form, range(1, steps + 1))
+        run.take(measured)
+        true = reference_states(stored, measured.to_fractions()).sum(axis=-1)
+        errors = np.abs(run.exactly(run.X)[..., 0].astype(float) - true)
+        rows = found.history[np.minimum(np.arange(steps), len(found.history) - 1)]
+        assert (errors <= rows * (1 + 1e-9)).all()
+        worst = max(worst, float((errors / found.bound).max()))
+    assert 1e-4 < worst <= 1
+
+
+def test_where_no_set_is_found() -> None:
+    """A covariance that does not settle, a set larger than what contracts, and a precision that is too low."""
+    one = np.eye(1)
+    given = StepNumbers(2 * one, one, one, [(0 * one, one)])
+    K = np.zeros((2, 1, 1))
+    assert limits_of_gains(Form.UD, given, np.ones((2, 1, 1)), K, 2.0**-24) is None
+    given = StepNumbers(one / 2, one, one, [(one, one)])
+    step = chain(given, one * 0.532)
+    assert step is not None
+    for form in FORMS:
+        assert contracted(form, step, one * 0, 2.0**-24) is not None
+        assert contracted(form, step, one * 0, 2.0**-3) is None
+        assert contracted(form, step, one, 2.0**-24) is None
