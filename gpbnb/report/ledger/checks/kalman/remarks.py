@@ -42,9 +42,8 @@ def refined() -> tuple[int, int, float]:
                 here, true = exact_step.exact_step(*run), exact_step.exact_step(*truth)
                 x, _, P = smallest.rounded_step(fmt, run, second)
                 P = (P + P.T) / 2
-                given = [as_float(each) for each in (run.x, run.P, z)]
-                K, S = as_float(here.gain), as_float(here.innovation_covariance)
-                off = contraction.evaluation_errors(model, *given, K, S, 2.0**-102)
+                before, K, S = as_float(run.P), as_float(here.gain), as_float(here.innovation_covariance)
+                off = contraction.evaluation_errors(model, as_float(run.x), before, as_float(z), K, S, 2.0**-102)
                 residuals = as_float(here.innovation), as_float(x - here.x), as_float(P - here.P)
                 bound = contraction.contraction_step(bound, model, contraction.Repeated(K, S, *residuals), off)
                 run, truth = run._replace(x=x, P=P), truth._replace(x=true.x, P=true.P)
