@@ -244,7 +244,7 @@ def _described(rules: Rules) -> str:
 
 
 def run_tag(rules: Rules, fused: bool, order: Order = "left", block: int = 32) -> tags.Tag:
-    """Return the tag for a separate compiled loop; see :meth:`gpbnb.arithmetic.making.Makes.run_tag`."""
+    """Return the tag for a separate compiled loop; see :meth:`gpbnb.arithmetic.number_format.NumberFormat.run_tag`."""
     check_order(order, fused, block)
     plain = compiled_tag(rules)
     if not fused and order == "left":
