@@ -381,7 +381,9 @@ class Parts(NamedTuple):
 
 
 def parts_of_a_step(form: Form, step: Chain, xi: float, unit: float) -> Parts | None:
-    """Bound the roundings of a step from every covariance within ξ; None if ξ is too large."""
+    """Bound the roundings of a step from every covariance within ξ; None if ξ is too large, or less than they add."""
+    if not xi < _LARGEST:
+        return None
     ud, wide = form is Form.UD, xi + 1e-8
     predict, update = (predicted_factors, single_update) if ud else (predicted_covariance, joint_update)
     aPhi = np.abs(step.Phi)
