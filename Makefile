@@ -100,11 +100,12 @@ exactness: .venv/made-for ## billions of operations compared with independent ar
 	$(PY) -m benchmarks.code
 
 # pychop has no wheel.
-bench: .venv/made-for ## timings against peers, side by side, and the short formats against gfloat
+bench: .venv/made-for ## timings against peers, side by side, the short formats against gfloat, and guarantees
 	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r benchmarks/environment.txt
 	$(PY) -m benchmarks
 	$(PY) -m benchmarks.year
 	$(PY) -m benchmarks.formats
+	$(PY) -m benchmarks.guarantee
 
 # yattag, which cosmic-ray uses, has no wheel.
 mutants: .venv/made-for ## seed faults and list those that no test catches; FILES="gpbnb/report/budget/theory.py" or SINCE=HEAD~3 picks files, OPTIONS=--measure finds the tests of each line first

@@ -55,6 +55,8 @@ _TINY = 1e-13
 """Exceeds the relative error of a sum of at most 400 products in float64."""
 _FLOAT = 1e-11
 """Exceeds the relative errors of the centers of a step, compared with sums of magnitudes."""
+_MARGIN = 1 + 1e-6
+"""Exceeds the effect of float64 roundings on norms, and of weights that are not exact roots of their centers."""
 _LARGEST = 0.2
 """Larger sets are not tried."""
 _SMALL, _LAGS, _TRIALS = 1e-7, 5_000, 40
@@ -163,7 +165,7 @@ def chain(given: StepNumbers, P: Array) -> Chain | None:
     for H, R in measured:
         before = (before + before.T) / 2
         S = H @ before @ H.T + R
-        inverse = np.linalg.inv(S)
+        inverse = np.asarray(np.linalg.inv(S), dtype=np.float64)
         if not _norm(inverse @ S - np.eye(len(S))) <= _TINY * len(S):
             return None
         K = before @ H.T @ inverse
@@ -379,13 +381,15 @@ class Parts(NamedTuple):
 
 
 def parts_of_a_step(form: Form, step: Chain, xi: float, unit: float) -> Parts | None:
-    """Bound the roundings of a step from every covariance within ξ; None if ξ is too large."""
+    """Bound the roundings of a step from every covariance within ξ; None if ξ is too large, or less than they add."""
+    if not xi < _LARGEST:
+        return None
     ud, wide = form is Form.UD, xi + 1e-8
     predict, update = (predicted_factors, single_update) if ud else (predicted_covariance, joint_update)
     aPhi = np.abs(step.Phi)
     covariance = [predict(step, wide, unit) + _FLOAT * (aPhi @ np.abs(step.center) @ aPhi.T + np.abs(step.Q))]
     gains, before, second = list[Array](), list[float](), 0.0
-    norm = wide + _whitened(step.updates[0].L, covariance[0])
+    norm = (wide + _whitened(step.updates[0].L, covariance[0])) * _MARGIN
     for u in step.updates:
         if not norm <= min(2 * wide, _LARGEST):
             return None
@@ -396,15 +400,17 @@ def parts_of_a_step(form: Form, step: Chain, xi: float, unit: float) -> Parts | 
         gains.append(found.gain + _FLOAT * whole @ np.abs(u.before) @ np.abs(u.N))
         grown = norm * norm / (1 - norm)
         second += grown
-        norm += grown + _whitened(u.after, covariance[-1])
+        norm = (norm + grown + _whitened(u.after, covariance[-1])) * _MARGIN
+        if not norm <= 2 * before[-1]:  # near enough to the factor after the update
+            return None
     covariance[-1] = covariance[-1] + np.abs(step.center - (step.updates[-1].after @ step.updates[-1].after.T))
-    return Parts(covariance, gains, before, second * (1 + 1e-6))
+    return Parts(covariance, gains, before, second * _MARGIN)
 
 
 def _whitened(L: Array, T: Array) -> float:
     """Bound the norm of all matrices whose entries are within T."""
     Y = np.abs(np.linalg.inv(L))
-    return _norm(Y @ T @ Y.T) * (1 + 1e-6)
+    return _norm(Y @ T @ Y.T) * _MARGIN
 
 
 def _largest_singular(X: Array) -> float:
@@ -417,7 +423,7 @@ def _largest_singular(X: Array) -> float:
         B = B / size
         whole *= size**root
         B, root = B @ B, root / 2
-    return whole * float(np.sqrt((B * B).sum())) ** root * (1 + 1e-6)
+    return whole * float(np.sqrt((B * B).sum())) ** root * _MARGIN
 
 
 class _Sums(NamedTuple):
@@ -482,8 +488,8 @@ def _sums(step: Chain, start: Array, parts: Parts, xi: float) -> _Sums | None:
     norm += max(first * first * _whitened(L, np.abs(start)), last * last * xi)
     for j in range(len(gains)):
         tail = xi * np.outer(a_ahead[j] @ np.abs(M) @ s, (s @ np.abs(M).T @ a_back[j]))
-        gains[j] = (gains[j] + np.maximum(begun[j], tail)) * (1 + 1e-6)
-    return _Sums(norm * (1 + 1e-6), gains)
+        gains[j] = (gains[j] + np.maximum(begun[j], tail)) * _MARGIN
+    return _Sums(norm * _MARGIN, gains)
 
 
 def _limits(step: Chain, parts: Parts, sums: _Sums) -> list[Array]:
@@ -498,7 +504,7 @@ def _limits(step: Chain, parts: Parts, sums: _Sums) -> list[Array]:
                 C, N = C @ np.abs(step.updates[i - 1].C), np.abs(step.updates[i - 1].C.T) @ N
         second = xi * xi / (1 - xi) + (parts.second if j else 0.0)
         total = total + second * np.outer(_rows(u.C @ u.L), _rows(u.N.T @ u.L))
-        found.append(total * (1 + 1e-6))
+        found.append(total * _MARGIN)
     return found
 
 
@@ -520,7 +526,7 @@ def contracted(form: Form, step: Chain, start: Array, unit: float) -> Contracted
     start : (n, n), bound of the distance of the first covariance from the center.
     unit : largest relative error of an operation.
     """
-    xi = 2 * _whitened(step.weights, start)
+    xi = max(2 * _whitened(step.weights, start), unit)
     for _ in range(_TRIALS):
         parts = parts_of_a_step(form, step, xi, unit)
         if parts is None:  # the set is smaller than what one step adds, or too large

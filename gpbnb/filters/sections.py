@@ -70,10 +70,12 @@ def sections_from_zeros(z: Any, p: Any, k: Any, pairing: str = "nearest", order:
 
     Raises
     ------
-    ValueError : a complex number without its conjugate, NaN or infinity; an unknown pairing or order.
+    ValueError : no pole; a complex number without its conjugate, NaN or infinity; an unknown pairing or order.
     """
     gain = exact([k])[0]
     zeros, poles = (_factors_from_roots(given, name) for name, given in (("zeros", z), ("poles", p)))
+    if not poles and not zeros:
+        raise ValueError("got no zeros and no poles; needed at least one pole: a gain alone is no filter")
     spare = len(np.ravel(p)) - len(np.ravel(z))  # in powers of 1/z, poles beyond the zeros are delays
     if spare < 0:
         raise ValueError(f"got {len(np.ravel(z))} zeros and {len(np.ravel(p))} poles; needed at least as many poles")

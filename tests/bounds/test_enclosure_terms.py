@@ -434,6 +434,22 @@ def test_products_of_closed_loops_have_their_roundings(bits: None) -> None:
         assert products[-1].max() < enclosure._SMALL
 
 
+def test_closed_loops_of_a_cascade_are_stable_if_their_sections_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twelve sections with poles of size 0.98: eigenvalues of the whole matrix in float64 are larger than one."""
+    turn = 0.98 * np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    loop = np.kron(np.eye(12), turn) + np.kron(np.eye(12, k=-1), np.ones((2, 2)))
+    assert np.abs(np.linalg.eigvals(loop)).max() > 1
+    none = np.zeros((24, 24))
+    as_balls = arb_mat([[arb(float(x)) for x in row] for row in loop])
+    monkeypatch.setattr(enclosure, "_SMALL", 0.5)
+    found = enclosure._powers([enclosure._Phase((), none, as_balls, none, none, none, none)])
+    assert found is not None
+    assert len(found[0].products) == int(np.ceil(np.log(0.5) / np.log(0.98))) + 9
+    section = np.abs(np.linalg.matrix_power(turn, 3))
+    assert found[0].products[3][:2, :2] == pytest.approx(section, rel=1e-12)
+    assert enclosure._powers([enclosure._Phase((), none, as_balls * arb(1.03), none, none, none, none)]) is None
+
+
 @pytest.mark.parametrize(("error", "radius"), [(F(1, 2), F(0)), (F(1, 2**10), F(1, 8))])
 def test_the_gain_s_error_in_joseph_s_form(error: F, radius: F, monkeypatch: pytest.MonkeyPatch, bits: None) -> None:
     """By S times the square of a large error, and by the asymmetry of V times a small one."""

@@ -140,7 +140,7 @@ def test_where_no_set_is_found() -> None:
     K = np.zeros((2, 1, 1))
     assert limits_of_gains(Form.UD, given, np.ones((2, 1, 1)), K, 2.0**-24) is None
     given = StepNumbers(one / 2, one, one, [(one, one)])
-    step = chain(given, one * 0.532)
+    step = chain(given, one * (np.sqrt(65) - 7) / 2)  # where P² + 7 P = 4
     assert step is not None
     for form in FORMS:
         assert contracted(form, step, one * 0, 2.0**-24) is not None
