@@ -127,7 +127,7 @@ class Update:
     after: Array
 
 
-class Rounded(NamedTuple):
+class UpdateRoundings(NamedTuple):
     """Roundings of an update: of the covariance and of the gain, entry by entry."""
 
     covariance: Array
@@ -222,7 +222,7 @@ def predicted_covariance(step: Chain, xi: float, unit: float) -> Array:
     return np.asarray((first @ np.abs(step.Phi.T) + second + unit * V) * _MORE)
 
 
-def joint_update(u: Update, xi: float, unit: float) -> Rounded:
+def joint_update(u: Update, xi: float, unit: float) -> UpdateRoundings:
     """Bound the roundings of an update by all measurements at once, in the innovation form."""
     s, t = _rows(u.L), _rows(u.H @ u.L)
     H, V = known(u.H), Sized(u.before, xi * np.outer(s, s))
@@ -242,7 +242,7 @@ def joint_update(u: Update, xi: float, unit: float) -> Rounded:
     of_C = of_KH + unit * C.size
     rounded = of_C @ V.size + product_error(C._replace(off=C.off + unit * C.size), V, unit)
     HV = np.abs(u.H @ u.before) + xi * np.outer(t, s)
-    return Rounded(np.asarray((rounded + of_K @ HV) * _MORE), of_K)
+    return UpdateRoundings(np.asarray((rounded + of_K @ HV) * _MORE), of_K)
 
 
 def _inverse(S: Sized, unit: float) -> tuple[Array, Array]:
@@ -333,7 +333,7 @@ def _squares(L: Array, near: Array) -> Array:
     return np.asarray(np.abs(L) @ np.abs(L).T + np.outer(s, near) + np.outer(near, s) + np.outer(near, near))
 
 
-def single_update(u: Update, xi: float, unit: float) -> Rounded:
+def single_update(u: Update, xi: float, unit: float) -> UpdateRoundings:
     """Bound the roundings of Bierman's update by one measurement."""
     n, r = len(u.before), float(u.R[0, 0])
     gamma, more = _near_factor(xi), 1 + 16 * (n + 4) * n * unit
@@ -361,7 +361,7 @@ def single_update(u: Update, xi: float, unit: float) -> Rounded:
     Lf, Lv, vf = L.size @ of_v, np.abs(u.L @ center) + off, 2 * float(v @ of_v) / a
     P += more * (2 * np.outer(Lf, Lv) / a + np.outer(Lf, Lf) / a + np.outer(Lv, Lv) * vf / a)
     of_K = more * ((of_b[:, -1] + partial[:, -1] * (n + 6) * unit + Lf) / a + Lv / a * vf)
-    return Rounded(np.asarray((P + P.T) / 2 * _MORE), np.asarray(of_K * _MORE)[:, None])
+    return UpdateRoundings(np.asarray((P + P.T) / 2 * _MORE), np.asarray(of_K * _MORE)[:, None])
 
 
 FORMS = (Form.INNOVATION, Form.UD)
