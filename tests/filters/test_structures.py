@@ -110,6 +110,32 @@ def test_responses_are_those_of_scipy(structure):
         assert found == pytest.approx(signal.lfilter(b, a, impulse[:, 0]), rel=1e-9, abs=1e-9)
 
 
+def test_a_filter_of_zeros_and_poles_is_that_of_scipy_or_refused():
+    """Also with fewer zeros than poles, which are delays; a zero or a pole at 0 counts as one."""
+    impulse = np.zeros((60, 1))
+    impulse[0] = 1
+    for z, p, k in (
+        signal.cheby1(5, 1, 0.2, output="zpk"),
+        signal.ellip(4, 1, 40, [0.2, 0.5], "band", output="zpk"),
+        ([0.5], [0.25, 0.5 + 0.5j, 0.5 - 0.5j], 2.0),
+        ([], [0.9], 0.1),
+        ([0.0, 0.3], [0.0, 0.0], 1.0),
+    ):
+        for structure in ("cascade", "direct form II transposed"):
+            found = LinearSystem.from_zeros(z, p, k, structure).outputs(impulse)[:, 0, 0]
+            b, a = signal.zpk2tf(z, p, k)
+            b = np.concatenate([np.zeros(len(a) - len(b)), b])  # in powers of 1/z
+            # the accuracy of lfilter itself, as above
+            assert found == pytest.approx(signal.lfilter(b, a, impulse[:, 0]), rel=1e-9, abs=1e-9)
+    for given, message in (
+        (([], [], 2), "got no zeros and no poles; needed at least one pole"),
+        (([0.5], [], 2), "got 1 zeros and 0 poles; needed at least as many poles"),
+        (([], [0.5 + 0.5j], 2), "conjugate"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            LinearSystem.from_zeros(*given)
+
+
 def test_reflections_of_a_filter_of_second_order():
     """For 1 + a1/z + a2/z²: k2 = a2, k1 = a1 / (1 + a2); for the taps, b less what the higher ones add."""
     k, v = reflections([Fraction(1), Fraction(2), Fraction(3)], [Fraction(1), Fraction(1, 2), Fraction(1, 4)])
