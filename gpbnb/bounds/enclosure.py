@@ -214,9 +214,9 @@ def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int)
     powers = _powers(phases)
     if powers is None:
         return None
-    moved = [_abs(phase.after - _matrix(phases[(j + 1) % cycle].center)) for j, phase in enumerate(phases)]
+    moved = [_abs(phase.after - matrix_of(phases[(j + 1) % cycle].center)) for j, phase in enumerate(phases)]
     P = _to_matrix(run.exactly(run.C[start - 1]))
-    first = _abs(P - _matrix(phases[0].center))
+    first = _abs(P - matrix_of(phases[0].center))
     # E_0 is the error before phase 0; before phase j it has been multiplied by every power of that phase.
     begun = [_largest([M @ first @ M.T for M in each.products]) for each in powers]
     B = [2 * each for each in begun]
@@ -311,7 +311,7 @@ def _phases(stored: LinearModel, start: int) -> list[_Phase]:
         center = (P + P.T) / 2
         given = tuple(each[j % len(each)] for each in (stored.Phi, stored.H, stored.Q, stored.R))
         Phi, H, Q, R = (_to_matrix(each) for each in given)
-        V = Phi * _matrix(center) * Phi.transpose() + Q
+        V = Phi * matrix_of(center) * Phi.transpose() + Q
         HS = H.transpose() * (H * V * H.transpose() + R).inv()
         K, C = V * HS, identity - V * HS * H
         G = _abs(Phi.transpose() * HS * H * Phi)
@@ -344,10 +344,10 @@ def _powers(phases: list[_Phase]) -> list[_Powers] | None:
         M = np.eye(n)
         each = _Powers([M], [])
         for lag in range(lags):
-            exactly = _matrix(M) * phases[(j - 1 - lag) % cycle].loop
+            exactly = matrix_of(M) * phases[(j - 1 - lag) % cycle].loop
             M = _middle(exactly)
             each.products.append(np.abs(M))
-            each.residuals.append(_abs(exactly - _matrix(M)))
+            each.residuals.append(_abs(exactly - matrix_of(M)))
         found.append(each)
     return found
 
@@ -369,7 +369,8 @@ def _to_matrix(values: NDArray[Any]) -> Any:
     return arb_mat([[_ball(a) for a in row] for row in values])
 
 
-def _matrix(values: NDArray[np.float64]) -> Any:
+def matrix_of(values: NDArray[np.float64]) -> Any:
+    """Return a matrix of balls with radius 0."""
     return arb_mat([[arb(float(a)) for a in row] for row in values])
 
 

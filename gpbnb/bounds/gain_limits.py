@@ -38,13 +38,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from flint import ctx
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.algebra import inverse_in_order
-from gpbnb.bounds.enclosure import Enclosure, enclosed_numbers
+from gpbnb.bounds.enclosure import Enclosure, enclosed_numbers, matrix_of
 from gpbnb.filters.forms import Form
 
 Array = NDArray[np.float64]
@@ -59,6 +60,9 @@ _MARGIN = 1 + 1e-6
 """Exceeds the effect of float64 roundings on norms, and of weights that are not exact roots of their centers."""
 _LARGEST = 0.2
 """Larger sets are not tried."""
+_BITS = 256
+"""Bits of the balls in which the centers of a step are computed."""
+_MOST_STATES = 400
 _SMALL, _LAGS, _TRIALS = 1e-7, 5_000, 40
 """Powers of the closed loop are computed until they are about this small, unless there are too many."""
 
@@ -105,7 +109,7 @@ def product(x: Sized, y: Sized, error: Array) -> Sized:
 
 @dataclass(frozen=True, eq=False)
 class Update:
-    """One update of the covariance from its center, in float64; errors of these numbers are negligible.
+    """One update of the covariance from its center; each number is next to the exact one, see :func:`chain`.
 
     Parameters
     ----------
@@ -125,6 +129,11 @@ class Update:
     C: Array
     L: Array
     after: Array
+
+    @property
+    def terms(self) -> Array:
+        """Magnitudes of the terms of C, (n, n), however much of them cancels."""
+        return np.asarray(np.eye(len(self.C)) + np.abs(self.before) @ np.abs(self.N) @ np.abs(self.H))
 
 
 class UpdateRoundings(NamedTuple):
@@ -159,25 +168,58 @@ class StepNumbers(NamedTuple):
 
 
 def chain(given: StepNumbers, P: Array) -> Chain | None:
-    """Follow a step from a covariance; None if one of its covariances is nearly singular."""
-    Phi, Q, root, measured = given
-    before, updates = Phi @ P @ Phi.T + Q, []
-    for H, R in measured:
-        before = (before + before.T) / 2
-        S = H @ before @ H.T + R
-        inverse = np.asarray(np.linalg.inv(S), dtype=np.float64)
-        if not _norm(inverse @ S - np.eye(len(S))) <= _TINY * len(S):
+    """Follow a step from a covariance; None if one of its covariances is nearly singular, or has too many states."""
+    if len(P) > _MOST_STATES:
+        return None
+    bits, ctx.prec = ctx.prec, _BITS
+    try:
+        return _chain(given, P)
+    except ZeroDivisionError:  # an innovation covariance may be singular
+        return None
+    finally:
+        ctx.prec = bits
+
+
+def _chain(given: StepNumbers, P: Array) -> Chain | None:
+    """Compute in balls, so that each float64 is next to the exact number, whatever cancels."""
+    Phi, identity = matrix_of(given.Phi), matrix_of(np.eye(len(P)))
+    V, updates = Phi * matrix_of(P) * Phi.transpose() + matrix_of(given.Q), []
+    for H, R in given.measured:
+        of_H, of_R = matrix_of(H), matrix_of(R)
+        V = (V + V.transpose()) / 2
+        S = of_H * V * of_H.transpose() + of_R
+        inverse = S.inv()
+        N = of_H.transpose() * inverse
+        K = V * N
+        C = identity - K * of_H
+        then = C * V * C.transpose() + K * of_R * K.transpose()
+        found = [_nearest(each) for each in (V, S, inverse, K, N, C, then)]
+        if not _sharp(H, *zip(*found, strict=True)):
             return None
-        K = before @ H.T @ inverse
-        C = np.eye(len(P)) - K @ H
-        after = C @ before @ C.T + K @ R @ K.T
-        L, then = _upper_factor(before), _upper_factor(after)
-        if L is None or then is None:
+        before, near_S, near_inverse, near_K, near_N, near_C, end = (near for near, _ in found)
+        L, after = _upper_factor(before), _upper_factor(end)
+        if L is None or after is None:
             return None
-        updates.append(Update(H, R, before, S, inverse, K, H.T @ inverse, C, L, then))
-        before = after
+        updates.append(Update(H, R, before, near_S, near_inverse, near_K, near_N, near_C, L, after))
+        V = then
     weights = _upper_factor(P)
-    return None if weights is None else Chain(Phi, Q, P, weights, tuple(updates), root)
+    return None if weights is None else Chain(given.Phi, given.Q, P, weights, tuple(updates), given.root)
+
+
+def _nearest(X: Any) -> tuple[Array, Array]:
+    """Return the midpoints of balls as float64, and their radii."""
+    near = [[float(x.mid()) for x in row] for row in X.tolist()]
+    off = [[float(x.rad()) for x in row] for row in X.tolist()]
+    return np.array(near), np.array(off)
+
+
+def _sharp(H: Array, numbers: Sequence[Array], radii: Sequence[Array]) -> bool:
+    """Whether the balls of an update are far smaller than a float64 of the magnitudes that lead to them."""
+    V, S, inverse, _, N, _, after = map(np.abs, numbers)
+    of_V, of_S, of_inverse, of_after = (np.sqrt(np.outer(X.diagonal(), X.diagonal())) for X in (V, S, inverse, after))
+    aH, of_K = np.abs(H), V @ N
+    sizes = of_V, of_S, of_inverse, of_K, aH.T @ inverse, np.eye(len(V)) + of_K @ aH, of_after
+    return all((off <= 2.0**-60 * size).all() for off, size in zip(radii, sizes, strict=True))
 
 
 def _upper_factor(P: Array) -> Array | None:
@@ -382,20 +424,24 @@ class Parts(NamedTuple):
 
 def parts_of_a_step(form: Form, step: Chain, xi: float, unit: float) -> Parts | None:
     """Bound the roundings of a step from every covariance within ξ; None if ξ is too large, or less than they add."""
-    if not xi < _LARGEST:
+    if not xi < _LARGEST or not unit * len(step.center) < 0.1:
         return None
     ud, wide = form is Form.UD, xi + 1e-8
     predict, update = (predicted_factors, single_update) if ud else (predicted_covariance, joint_update)
     aPhi = np.abs(step.Phi)
-    covariance = [predict(step, wide, unit) + _FLOAT * (aPhi @ np.abs(step.center) @ aPhi.T + np.abs(step.Q))]
+    aQ = np.abs(step.Q) + np.abs(step.root) @ np.abs(step.root.T)
+    covariance = [predict(step, wide, unit) + _FLOAT * (aPhi @ np.abs(step.center) @ aPhi.T + aQ)]
     gains, before, second = list[Array](), list[float](), 0.0
     norm = (wide + _whitened(step.updates[0].L, covariance[0])) * _MARGIN
     for u in step.updates:
         if not norm <= min(2 * wide, _LARGEST):
             return None
         before.append(norm)
-        found = update(u, norm, unit)
-        whole = np.eye(len(u.C)) + np.abs(u.K) @ np.abs(u.H)
+        try:
+            found = update(u, norm, unit)
+        except ZeroDivisionError:  # a pivot of an innovation covariance within the set may be zero
+            return None
+        whole = u.terms
         covariance.append(found.covariance + _FLOAT * (whole @ np.abs(u.before) @ whole.T))
         gains.append(found.gain + _FLOAT * whole @ np.abs(u.before) @ np.abs(u.N))
         grown = norm * norm / (1 - norm)
@@ -403,8 +449,10 @@ def parts_of_a_step(form: Form, step: Chain, xi: float, unit: float) -> Parts | 
         norm = (norm + grown + _whitened(u.after, covariance[-1])) * _MARGIN
         if not norm <= 2 * before[-1]:  # near enough to the factor after the update
             return None
-    covariance[-1] = covariance[-1] + np.abs(step.center - (step.updates[-1].after @ step.updates[-1].after.T))
-    return Parts(covariance, gains, before, second * _MARGIN)
+    after = step.updates[-1].after
+    change = np.abs(step.center - after @ after.T)
+    covariance[-1] = covariance[-1] + change
+    return Parts(covariance, gains, before, second * (1 + _whitened(step.weights, change)) * _MARGIN)
 
 
 def _whitened(L: Array, T: Array) -> float:
@@ -437,7 +485,7 @@ def _sums(step: Chain, start: Array, parts: Parts, xi: float) -> _Sums | None:
     """Sum the effects of all earlier steps on the norm of the covariance's error, and on its part of each gain."""
     n, L = len(step.center), step.weights
     Y, s = np.linalg.inv(L), _rows(L)
-    whole = [np.eye(n) + np.abs(u.K) @ np.abs(u.H) for u in step.updates]
+    whole = [u.terms for u in step.updates]
     later, size = [np.eye(n)], [np.eye(n)]  # the updates after each part, the last part first
     for u, each in zip(step.updates[::-1], whole[::-1], strict=True):
         later.append(later[-1] @ u.C)
@@ -497,15 +545,21 @@ def _limits(step: Chain, parts: Parts, sums: _Sums) -> list[Array]:
     found = []
     for j, u in enumerate(step.updates):
         total, xi = sums.gains[j] + parts.gain[j], parts.before[j]
-        C, N = np.abs(u.C) + _TINY * (np.eye(len(u.C)) + np.abs(u.K) @ np.abs(u.H)), np.abs(u.N)
+        C, N = _size_of(u), np.abs(u.N)
         for i in range(j, -1, -1):  # the roundings of this step before the update
             total = total + C @ parts.covariance[i] @ N
             if i:
-                C, N = C @ np.abs(step.updates[i - 1].C), np.abs(step.updates[i - 1].C.T) @ N
+                size = _size_of(step.updates[i - 1])
+                C, N = C @ size, size.T @ N
         second = xi * xi / (1 - xi) + (parts.second if j else 0.0)
         total = total + second * np.outer(_rows(u.C @ u.L), _rows(u.N.T @ u.L))
         found.append(total * _MARGIN)
     return found
+
+
+def _size_of(u: Update) -> Array:
+    """Return the magnitudes of C, with its roundings."""
+    return np.asarray(np.abs(u.C) + _TINY * u.terms)
 
 
 class Contracted(NamedTuple):
@@ -565,7 +619,8 @@ def limits_of_gains(form: Form, given: StepNumbers, P: Array, K: Array, unit: fl
     Y, off = np.linalg.inv(step.weights), P - center
     far = np.array([_norm(Y @ each @ Y.T) for each in off])
     start = int(np.argmax(far <= 2 * far[-1])) + 1
-    found = contracted(form, step, np.abs(off[start - 1]) + _FLOAT * np.abs(center), unit)
+    s = _rows(step.weights)
+    found = contracted(form, step, np.abs(off[start - 1]) + _FLOAT * np.outer(s, s), unit)
     if found is None:
         return None
     columns = [u.K for u in step.updates], found.gains
@@ -584,7 +639,8 @@ def _settled(given: StepNumbers, P: Array, most: int = 5_000) -> Array | None:
             step = C @ step @ C.T + K @ R @ K.T
         if not np.abs(step).max() < 1e100:
             return None
-        change, P = np.abs(step - P).max(), (step + step.T) / 2
-        if change <= 1e-14 * np.abs(P).max():
+        change, P = np.abs(step - P), (step + step.T) / 2
+        s = np.sqrt(P.diagonal())
+        if (change <= 1e-13 * np.outer(s, s)).all():
             return np.asarray(P)
     return None

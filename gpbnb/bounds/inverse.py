@@ -68,7 +68,7 @@ def wilkinson(factors: LU, x: FloatArray) -> float:
     norm = float(column_sum(abs(x.to_float())))
     largest = float(np.max(abs(factors.lower.to_float()))) * float(np.max(abs(factors.upper.to_float())))
     g = _count(n, x.format) * n * n * largest * norm
-    return _solved(norm * g, g, x)
+    return _solved(norm * g, g, n, x.format.base)
 
 
 def higham(factors: LU, x: FloatArray) -> float:
@@ -137,15 +137,14 @@ def _from_factors(factors: LU, x: FloatArray, weight: float) -> float:
     rows = np.empty_like(product)
     rows[factors.permutation] = product
     g = weight * (rows @ sizes)
-    return _solved(float(column_sum(sizes @ g)), float(column_sum(g)), x)
+    return _solved(float(column_sum(sizes @ g)), float(column_sum(g)), len(x), x.format.base)
 
 
-def _solved(first: float, ratio: float, x: FloatArray) -> float:
+def _solved(first: float, ratio: float, n: int, base: int) -> float:
     """Return first / (1 - ratio), rounded up; no number here has passed through more than 8n roundings of float64."""
-    slack = 1 + 16 * len(x) * 2.0**-53
+    slack = 1 + 16 * n * 2.0**-53
     if not ratio * slack < 1:
-        more = digit_unit(x.format.base)
-        raise ValueError(f"‖G‖ must be below 1 to prove a bound; got {ratio:.3g}. Use more {more}.")
+        raise ValueError(f"‖G‖ must be below 1 to prove a bound; got {ratio:.3g}. Use more {digit_unit(base)}.")
     return first * slack / (1 - ratio * slack) * slack
 
 

@@ -80,7 +80,7 @@ def test_a_column_counts_whatever_its_sign(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(bound, "certify", certify)
     monkeypatch.setattr(bound, "_radius", lambda _: 0.5)
     monkeypatch.setattr(bound, "_parts_of", lambda _: np.array([ROUNDING, GAIN, LOOP, GAIN]))
-    bound._sums(one_state(2), disturbances(2, G=G, limits=limit), np.zeros(1), 50, True, 10, 1e6)
+    bound._sums(one_state(2), disturbances(2, G=G, limits=limit), np.zeros(1), 50, 0.5, 10, 1e6)
     given = seen[0][0]
     assert np.array_equal(given.G, G[:, :, [0, 2]])
     assert np.array_equal(given.limits, limit[:, [0, 2]])
@@ -97,7 +97,7 @@ def test_rows_allow_for_the_sums_of_all_states(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(bound, "_radius", lambda _: 0.5)
     monkeypatch.setattr(bound, "_parts_of", lambda _: np.zeros(2, dtype=np.int64))
     given = disturbances(1, slack=np.zeros((1, n)))
-    history, _, _ = bound._sums(schedule, given, np.full(n, 2.0), 50, True, 10, 1e6)
+    history, _, _ = bound._sums(schedule, given, np.full(n, 2.0), 50, 0.5, 10, 1e6)
     assert (1 + F(1, 2**53)) ** (n + 7) < F(history[0, 0]) < 1 + F(2 * n, 2**53)
     assert (history == history[0, 0]).all()
 
@@ -116,7 +116,7 @@ def test_the_first_steps_count_among_the_earlier_ones(monkeypatch: pytest.Monkey
     monkeypatch.setattr(bound, "onward", onward)
     monkeypatch.setattr(bound, "_radius", lambda _: 0.5)
     monkeypatch.setattr(bound, "_parts_of", lambda _: np.zeros(2, dtype=np.int64))
-    history, _, _ = bound._sums(one_state(2, first=1), disturbances(2), np.array([8.0]), 50, True, 10, 1e6)
+    history, _, _ = bound._sums(one_state(2, first=1), disturbances(2), np.array([8.0]), 50, 0.5, 10, 1e6)
     assert known == [9.0, float(raised)]
     exactly = (sum(sums) + (residual + tail) * F(known[-1])) * (1 + F(1, 2**48))
     assert exactly < raised
@@ -140,7 +140,7 @@ def test_what_one_state_needs_takes_nothing_from_another(monkeypatch: pytest.Mon
     )
     monkeypatch.setattr(bound, "_radius", lambda _: 0.5)
     monkeypatch.setattr(bound, "_parts_of", lambda _: np.zeros(2, dtype=np.int64))
-    history, _, _ = bound._sums(given, found, np.zeros(2), 50, True, 10, 1e6)
+    history, _, _ = bound._sums(given, found, np.zeros(2), 50, 0.5, 10, 1e6)
     assert history[:2].tolist() == [[9, 1], [2, 20]]
     same(history[2], [F(13, 4), F(29, 4)], 1e-14)
     assert known[-1].tolist() == [9, 20 * (1 + 2.0**-30)]
@@ -157,7 +157,7 @@ def test_a_filter_that_is_not_stable_repeats_its_period_all_the_same(monkeypatch
 
     monkeypatch.setattr(bound, "forward", forward)
     monkeypatch.setattr(bound, "_parts_of", lambda _: np.zeros(2, dtype=np.int64))
-    history, _, lags = bound._sums(one_state(3, first=1), disturbances(3, slack=slack), np.zeros(1), 7, False, 7, 1e6)
+    history, _, lags = bound._sums(one_state(3, first=1), disturbances(3, slack=slack), np.zeros(1), 7, None, 7, 1e6)
     assert list(seen[0]) == [1, 2, 4, 2, 4, 2, 4]
     assert np.isinf(history).all()
     assert lags == 7

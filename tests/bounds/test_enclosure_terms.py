@@ -321,14 +321,14 @@ def test_sums_of_a_period(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     monkeypatch.setattr(bound, "certify", lambda *_: certificate)
     monkeypatch.setattr(bound, "_parts_of", lambda _: np.zeros(4, dtype=np.int64))
-    history, parts, lags = bound._sums(schedule, found, np.array([8.0]), 50, True, 10, 1e6)
+    history, parts, lags = bound._sums(schedule, found, np.array([8.0]), 50, 0.5, 10, 1e6)
     carried = (residual + tail) * 8
     same(parts[0, 0, 3], carried, 1e-16)
     exactly = (sum(sums) + carried) * (1 + F(1, 2**48))
     assert abs(F(float(history[0, 0])) / exactly - 1) < F(1, 2**51)
     assert lags == 9
     # A bound that does not bound itself is raised until it does.
-    raised, _, _ = bound._sums(schedule, found, np.array([1.0]), 50, True, 10, 1e6)
+    raised, _, _ = bound._sums(schedule, found, np.array([1.0]), 50, 0.5, 10, 1e6)
     limit = sum(sums) / (1 - residual - tail)
     assert limit < F(float(raised[0, 0])) < limit * (1 + F(1, 2**30))
 
