@@ -171,13 +171,11 @@ def chain(given: StepNumbers, P: Array) -> Chain | None:
     """Follow a step from a covariance; None if one of its covariances is nearly singular, or has too many states."""
     if len(P) > _MOST_STATES:
         return None
-    bits, ctx.prec = ctx.prec, _BITS
     try:
-        return _chain(given, P)
+        with ctx.workprec(_BITS):
+            return _chain(given, P)
     except ZeroDivisionError:  # an innovation covariance may be singular
         return None
-    finally:
-        ctx.prec = bits
 
 
 def _chain(given: StepNumbers, P: Array) -> Chain | None:

@@ -39,7 +39,7 @@ MOST, WORK = 20_000, 1e8
 """Largest number of steps to emulate unless more are asked for, and of steps times the cube of the number of states."""
 
 ENTRY_BY_ENTRY = 16
-"""Largest number of states whose covariances are enclosed entry by entry, see :mod:`gpbnb.bounds.enclosure`."""
+"""Largest number of states whose covariances are enclosed entry by entry where the norm of `gain_limits` applies."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,11 +214,10 @@ def schedule(
 
 
 def _enclosed(stored: LinearModel, run: Run, fmt: FloatFormat | FixedFormat, form: Form) -> Enclosure | None:
-    """Enclose gains that do not repeat: entry by entry for few states, and by a norm for many."""
-    if stored.n <= ENTRY_BY_ENTRY:
+    """Enclose gains that do not repeat: by a norm if there are many states and it applies, else entry by entry."""
+    by_norm = stored.n > ENTRY_BY_ENTRY and form in FORMS and stored.cycle == 1
+    if not by_norm or not isinstance(fmt, FloatFormat) or fmt.limits is not None:
         return enclose(stored, run, fmt, form)
-    if form not in FORMS or stored.cycle > 1 or not isinstance(fmt, FloatFormat) or fmt.limits is not None:
-        return None
     P, K = (widened(each[: run.steps]).sum(axis=-1) for each in (run.C, run.G))
     if form is Form.UD:
         P = np.array([U @ U.T for U in map(_root, P)])

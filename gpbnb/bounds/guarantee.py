@@ -327,18 +327,17 @@ def closed_loops(given: Schedule) -> NDArray[np.float64]:
     return unit_disturbances(given).F
 
 
-def unit_disturbances(given: Schedule) -> Disturbances:
-    """Return closed loops and disturbances of the steps of a schedule, for limits of one."""
+def unit_disturbances(given: Schedule, rows: slice = slice(None)) -> Disturbances:
+    """Return closed loops and disturbances of some steps of a schedule, for limits of one."""
     ones = FilterLimits(np.ones(given.program.n), np.ones(given.program.m), np.ones(given.program.m))
-    return _disturbances(given, ones, np.zeros(given.program.n))
+    return _disturbances(given, ones, np.zeros(given.program.n), None, rows)
 
 
 def _radius(given: Schedule) -> float:
     """Estimate the spectral radius of the closed loop over a period, as a factor per step; proofs do not use it."""
     if not given.settled:
         return math.nan
-    ones, late = FilterLimits(*(np.ones(k) for k in (given.program.n, given.program.m, given.program.m))), given.first
-    F = _disturbances(given, ones, np.zeros(given.program.n), rows=slice(late, None)).F
+    F = unit_disturbances(given, slice(given.first, None)).F
     whole = np.eye(given.program.n)
     for each in F:
         whole = each @ whole
@@ -359,10 +358,11 @@ def _window(given: Schedule, columns: int, steps: int, budget: float) -> int:
 class _Effects(NamedTuple):
     """What the columns of some steps do to the states."""
 
-    #: (g,), which columns have an effect in any step, and whether all effects are finite.
+    #: (g,), which columns change a state in any step.
     used: NDArray[np.bool_]
+    #: whether every change is finite.
     finite: bool
-    #: (n,), largest effect of all disturbances of a step on each state.
+    #: (n,), the largest change of each state in a step.
     size: NDArray[np.float64]
 
 
