@@ -312,3 +312,16 @@ def test_the_longest_numbers_are_read_exactly():
     assert exact_fraction("1e" + "0" * 60 + "1") == 10
     largest = FloatFormat(2, 4, emin=-6, emax=8, largest="448").largest
     assert (type(largest), largest) == (Fraction, 448)
+
+
+def test_random_numbers_come_from_one_sequence_however_many_formats_are_in_use():
+    first = FloatFormat(2, 12, "stochastic")
+    kept = first.backend
+    for seed in range(1, 400):
+        other = FloatFormat(2, 12, "stochastic", seed=seed)
+        assert other.backend is not kept
+        assert other.kernel is not kept.kernel
+    second = FloatFormat(2, 12, "stochastic")
+    assert second.backend is kept
+    assert second.kernel is kept.kernel
+    assert second.exact_backend.kernel is kept.kernel

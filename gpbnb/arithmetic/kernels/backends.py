@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel
+from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel, one_per_format
 from gpbnb.arithmetic.kernels.selection import fusing_tag, tag_of, wide_tag
 from gpbnb.arithmetic.kernels.tags import (
     FARTHEST,
@@ -613,14 +613,14 @@ class TwoWords(Looped):
         return x.reshape(shape)
 
 
-@lru_cache(maxsize=256)
+@one_per_format
 def exact(rules: Rules) -> Exact:
     """Return the backend that holds every number of a format."""
     special = rules.limits is not None and rules.limits.overflow in SPECIAL
     return Special(rules) if special else Exact(rules)
 
 
-@lru_cache(maxsize=256)
+@one_per_format
 def backend(rules: Rules) -> Backend:
     """Return the fastest backend for a format."""
     tag = tag_of(rules)

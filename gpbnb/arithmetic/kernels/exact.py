@@ -8,11 +8,13 @@ their last digits are zeros. Every function computes the exact result and rounds
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, wraps
 from math import isqrt, log2, log10
-from typing import Any, cast
+from typing import Any, TypeVar, cast
+from weakref import WeakValueDictionary
 
 from gpbnb.arithmetic.flags import signal
 from gpbnb.arithmetic.rounding import DRAW_BITS, Limits, Rounding, Rules
@@ -23,6 +25,7 @@ SPECIAL = ("infinity", "NaN")
 """What formats with infinity and NaN, or with NaN alone, give beyond their range."""
 
 ZERO: Pair = (0, 0)
+Made = TypeVar("Made")
 LARGEST_BITS = 10_000_000  # longer integers would take minutes or exhaust the memory
 _LARGEST_POWER_OF_TEN = int(LARGEST_BITS / log2(10))
 _MASK = 2**64 - 1
@@ -527,8 +530,25 @@ def _chopping(rules: Rules) -> ExactKernel:
     return ExactKernel(rules._replace(limits=None, rounding=Rounding.CHOP))
 
 
-@lru_cache(maxsize=256)
+def one_per_format(make: Callable[[Rules], Made]) -> Callable[[Rules], Made]:
+    """Make an object of a format once, and again only if nobody uses it any more.
+
+    A second one beside it would draw the random numbers of stochastic rounding from a sequence of its own.
+    """
+    alive: WeakValueDictionary[Rules, Made] = WeakValueDictionary()
+
+    @lru_cache(maxsize=256)
+    @wraps(make)
+    def made(rules: Rules) -> Made:
+        if (known := alive.get(rules)) is None:
+            alive[rules] = known = make(rules)
+        return known
+
+    return made
+
+
+@one_per_format
 def kernel(rules: Rules) -> ExactKernel:
-    """Return the kernel of a format; each is made only once."""
+    """Return the kernel of a format."""
     special = rules.limits is not None and rules.limits.overflow in SPECIAL
     return SpecialKernel(rules) if special else ExactKernel(rules)
