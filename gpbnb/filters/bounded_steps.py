@@ -13,6 +13,7 @@ from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.filters.contraction import (
     Contraction,
     Repeated,
+    at_step,
     contraction_start,
     contraction_steps,
     covariance_error_bound,
@@ -124,23 +125,24 @@ class CarriedBound:
         if self.form == Form.UD:
             diagonal = np.diagonal(size, axis1=1, axis2=2)
             size = np.sqrt(np.abs(diagonal[:, :, np.newaxis] * diagonal[:, np.newaxis, :])) * (1 + 2.0**-50)
-        at = int(np.searchsorted(self.checkpoint_steps, first, side="right"))
         every = np.arange(first, first + steps)
         model = StepModel(*(each[every % len(each)] for each in self._plain))
         off = evaluation_errors(model, before[:steps], size[:steps], measured[:steps], K, S, _UNIT)
         bounds = contraction_steps(self.now, model, Repeated(K, S, y, q, T), off)
-        self.now = bounds[-1] if bounds else self.now
-        while at < len(self.checkpoint_steps) and self.checkpoint_steps[at] <= first + steps:
-            i = int(self.checkpoint_steps[at]) - first - 1
-            k, bound = first + i, bounds[i]
-            used = taken.gains[i]
-            if self.form == Form.UD:
-                used = np.empty_like(used)
-                whole_gain(taken.gains[i], exact.H[k % len(exact.H)], taken.UR[k % len(taken.UR)], used)
-            self.saved.state[at] = state_error_bound(bound)
-            self.saved.gain[at] = gain_error_bound(bound, K[i], used[..., 0], off.gain[i])
-            self.saved.covariance[at] = covariance_error_bound(bound)
-            at += 1
+        if not steps:
+            return 0
+        self.now = at_step(bounds, -1)
+        at, last = np.searchsorted(self.checkpoint_steps, (first, first + steps), side="right")
+        i = self.checkpoint_steps[at:last] - first - 1
+        some, used = Contraction(*(each[i] for each in bounds)), taken.gains[i]
+        if self.form == Form.UD:
+            used = np.empty_like(used)
+            for j, k in enumerate(i):
+                of_step = exact.H[(first + k) % len(exact.H)], taken.UR[(first + k) % len(taken.UR)]
+                whole_gain(taken.gains[k], *of_step, used[j])
+        self.saved.state[at:last] = state_error_bound(some)
+        self.saved.gain[at:last] = gain_error_bound(some, K[i], used[..., 0], off.gain[i])
+        self.saved.covariance[at:last] = covariance_error_bound(some)
         return steps
 
 

@@ -52,11 +52,11 @@ class Contraction(NamedTuple):
     #: (n, n), the weights, lower triangular.
     L: NDArray[np.float64]
     #: bounds the error of the state, in standard deviations.
-    eta: float
+    eta: Any
     #: bounds the relative error of the covariance.
-    zeta: float
+    zeta: Any
     #: bounds the norm of :math:`A_k`, at most about 1.
-    alpha: float
+    alpha: Any
     #: (m,), bounds the effect of the covariance error on each column of the gain.
     gain: NDArray[np.float64]
 
@@ -123,7 +123,12 @@ def contraction_step(before: Contraction, model: StepModel, repeated: Repeated, 
     off : errors of the repeated step, from :func:`evaluation_errors`.
     """
     of_one = StepModel(*_as_one(model)), Repeated(*_as_one(repeated)), EvaluationErrors(*_as_one(off))
-    return contraction_steps(before, *of_one)[0]
+    return at_step(contraction_steps(before, *of_one), 0)
+
+
+def at_step(bounds: Contraction, k: int) -> Contraction:
+    """Return the bound after step k, counted from 0, of the bounds after some steps."""
+    return Contraction(bounds.L[k], float(bounds.eta[k]), float(bounds.zeta[k]), float(bounds.alpha[k]), bounds.gain[k])
 
 
 def _as_one(arrays: Iterable[Array]) -> list[Array]:
@@ -131,10 +136,12 @@ def _as_one(arrays: Iterable[Array]) -> list[Array]:
 
 
 @np.errstate(all="ignore")
-def contraction_steps(
-    before: Contraction, model: StepModel, repeated: Repeated, off: EvaluationErrors
-) -> list[Contraction]:
+def contraction_steps(before: Contraction, model: StepModel, repeated: Repeated, off: EvaluationErrors) -> Contraction:
     """Propagate the bound through some steps as :func:`contraction_step` does, and return the bound after each.
+
+    Returns
+    -------
+    bounds : those after each step, each quantity with a first axis for the steps; see :func:`at_step`.
 
     Parameters
     ----------
@@ -157,18 +164,22 @@ def contraction_steps(
     size_T = _norm(_times(_times(Y, T), _turned(Y))) + _norm(_times(_times(aY, dT), _turned(aY)))
     size_T /= within**2
     known &= (alpha < np.inf) & (size_T < np.inf) & (size_q < np.inf) & (y < np.inf)
-    bounds, eta, zeta = [], before.eta, before.zeta
+    etas, zetas, rests = [before.eta], [before.zeta], []
     sizes = (each.tolist() for each in (known, alpha, g, y, size_q, size_T))
-    for k, (is_known, a, gain, by_covariance, state, covariance) in enumerate(zip(*sizes, strict=True)):
+    for is_known, a, gain, by_covariance, state, covariance in zip(*sizes, strict=True):
+        eta, zeta = etas[-1], zetas[-1]
         rest = 1 - gain * zeta * up
         if is_known and rest > 0:
-            column = columns[k] * a * zeta / rest * up
             eta = (state + a * (eta + by_covariance * zeta) / rest) * up
             zeta = (covariance + a * a * zeta / rest) * up
         else:
-            column, eta, zeta = np.full(K.shape[-1], np.inf), np.inf, np.inf
-        bounds.append(Contraction(new[k], eta, zeta, a, column))
-    return bounds
+            rest, eta, zeta = 0.0, np.inf, np.inf
+        etas.append(eta)
+        zetas.append(zeta)
+        rests.append(rest)
+    rest = np.array(rests)[:, np.newaxis]
+    by_gain = columns * alpha[:, np.newaxis] * np.array(zetas[:-1])[:, np.newaxis] / rest * up
+    return Contraction(new, np.array(etas[1:]), np.array(zetas[1:]), alpha, np.where(rest > 0, by_gain, np.inf))
 
 
 def _closed_loops(model: StepModel, K: Array, L: Array) -> tuple[Array, Array]:
@@ -248,14 +259,19 @@ def evaluation_errors(
 
 
 def state_error_bound(bound: Contraction) -> Array:
-    r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,)."""
-    return _rows(bound.L) * (1 + _many(len(bound.L), 0)) * bound.eta
+    r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,).
+
+    This and the next two functions take the bound after one step or after each of some steps, with a first axis for
+    these.
+    """
+    rows = _standard_deviations(bound)
+    return rows * np.asarray(bound.eta)[..., np.newaxis]
 
 
 def covariance_error_bound(bound: Contraction) -> Array:
     r"""Bound each entry of the error of the covariance, :math:`\zeta\sqrt{(LL^T)_{ii}(LL^T)_{jj}}`; (n, n)."""
-    rows = _rows(bound.L) * (1 + _many(len(bound.L), 0))
-    return bound.zeta * np.outer(rows, rows)
+    rows = _standard_deviations(bound)
+    return np.asarray(bound.zeta)[..., np.newaxis, np.newaxis] * _outer(rows, rows)
 
 
 @np.errstate(all="ignore")
@@ -270,8 +286,8 @@ def gain_error_bound(bound: Contraction, K: Array, used: Array, dK: Array) -> Ar
     K, dK : as in :func:`contraction_step`.
     used : (n, m), the program's gain.
     """
-    up = 1 + _many(K.shape[0], K.shape[1])
-    off = np.abs(used - K) + dK + _U * (np.abs(used) + np.abs(K)) + np.outer(_rows(bound.L), bound.gain)
+    up = 1 + _many(*K.shape[-2:])
+    off = np.abs(used - K) + dK + _U * (np.abs(used) + np.abs(K)) + _outer(_rows(bound.L), bound.gain)
     return off * up
 
 
@@ -291,6 +307,14 @@ def companion_bound(difference: Any, bound: Any) -> NDArray[np.float64]:
 def _many(n: int, m: int) -> float:
     """Bound on the error of one step's float64 computations, relative to the sums of magnitudes."""
     return (16 * (n + m) + 64) * _U
+
+
+def _standard_deviations(bound: Contraction) -> Array:
+    return _rows(bound.L) * (1 + _many(bound.L.shape[-1], 0))
+
+
+def _outer(a: Array, b: Array) -> Array:
+    return a[..., :, np.newaxis] * b[..., np.newaxis, :]
 
 
 def _turned(A: Array) -> Array:
