@@ -1,6 +1,6 @@
 """A few steps of a Kalman filter without compiling its loops: the operations of one step are listed, and replayed.
 
-Compiling :func:`gpbnb.filters.kernels.step.advance` for another arithmetic takes as long as many thousand steps.
+Compiling the loops of :mod:`gpbnb.filters.kernels.step` for another arithmetic takes as long as many thousand steps.
 :func:`gpbnb.arithmetic.kernels.replay.replay` compiles in a tenth of this time, for filters of all sizes and forms, and
 takes the same operations. All digits are the same.
 """
@@ -35,7 +35,18 @@ from gpbnb.arithmetic.kernels.tags import (
 )
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, StepArrays
-from gpbnb.filters.program import ADD, CONSTANT, DIVIDE, DIVISOR, MULTIPLY, NOT_NEGATIVE, POSITIVE, PRODUCT, SUBTRACT
+from gpbnb.filters.program import (
+    ADD,
+    CHOOSE,
+    CONSTANT,
+    DIVIDE,
+    DIVISOR,
+    MULTIPLY,
+    NOT_NEGATIVE,
+    POSITIVE,
+    PRODUCT,
+    SUBTRACT,
+)
 from gpbnb.filters.tracing import traced_step
 
 LONGEST = 20_000
@@ -49,6 +60,7 @@ _CODES = {
     PRODUCT: codes.MULTIPLY,
     DIVIDE: codes.DIVIDE,
 }
+_UNEQUAL = 0b101  # less or greater
 _KINDS = (Binary, Hexadecimal, Decimal, ShortDecimal, DoubleDouble, LimitedDecimal, Hardware32, Hardware64)
 
 
@@ -100,7 +112,7 @@ BUDGET = ReplayBudget()
 
 
 class _Listed(NamedTuple):
-    """The operations of a step, and the places of its numbers: the first are x (n), P (n, n) and z (m)."""
+    """The operations of a step, and the places of its numbers: the first are x (n), entries of P or U, and z (m)."""
 
     #: (o, 5), as :func:`replay` takes them.
     instructions: NDArray[np.intc]
@@ -108,6 +120,10 @@ class _Listed(NamedTuple):
     first: int
     coefficients: int
     size: int
+    #: number of truth values.
+    truths: int
+    #: which entries of P or U, row by row, a step takes.
+    taken: NDArray[np.int64]
     #: places of the results.
     x: NDArray[np.int64]
     K: NDArray[np.int64]
@@ -136,7 +152,8 @@ def replay_pays(
         return False
     if x.shape[1] != 1 or model.increment.shape[0] or size > LONGEST:
         return False
-    return BUDGET.allows(kind, len(z) * (_PER_STEP + size * _PER_OPERATION), ready)
+    loops = kind, form is Form.UD
+    return BUDGET.allows(loops, len(z) * (_PER_STEP + size * _PER_OPERATION), ready)
 
 
 def advance_by_replay(
@@ -151,9 +168,14 @@ def advance_by_replay(
     kept: tuple[NDArray[Any], ...],
     notes: NDArray[np.int64],
 ) -> bool:
-    """Take steps as :func:`gpbnb.filters.kernels.step.advance` does, and return True; or take none.
+    """Take steps as :func:`gpbnb.filters.kernels.step.advance` or ``advance_ud`` does, and return True; or take none.
 
-    It takes none if a number has no result in the arithmetic, so that the loops report where.
+    It takes none if a number has no result in the arithmetic, so that the loops report where; and in the UD form if a
+    variance is not positive, which matters to the loops only where they use it.
+
+    Parameters
+    ----------
+    model : in the UD form, Q and R are their factors. P then holds those of the covariance.
     """
     n, m = x.shape[0], z.shape[1]
     listed = _listed(n, m, form, isinstance(tag, DoubleDouble))
@@ -161,14 +183,14 @@ def advance_by_replay(
     x0, P0, innovation = repeated
     checkpoint_steps, X, G, C = kept
     state, covariance, after = x[:, 0].copy(), P.reshape(n * n, *pair).copy(), notes.copy()
-    values, truths = np.zeros((listed.size, *pair), x.dtype), np.zeros(2, np.uint8)
+    values, truths = np.zeros((listed.size, *pair), x.dtype), np.zeros(max(listed.truths, 2), np.uint8)
     values[-1] = model.identity[0, 0]
     for k in range(len(z)):
         if len(x0):
             state, covariance = x0[k, :, 0], P0[k].reshape(n * n, *pair)
         given = [each[(first + k) % len(each)] for each in (model.Phi, model.H, model.Q, model.R)]
         parts = [matrix.reshape(-1, *pair) for matrix in given]
-        values[: listed.first] = np.concatenate([state, covariance, z[k, :, 0]])
+        values[: listed.first] = np.concatenate([state, covariance[listed.taken], z[k, :, 0]])
         values[listed.coefficients : -2] = np.concatenate(parts)
         try:
             if replay(tag, listed.instructions, 0, end, values, truths) < end:
@@ -179,6 +201,8 @@ def advance_by_replay(
         if np.any(signs[listed.divisors] == 0):
             return False
         indefinite = np.any(signs[listed.positive] <= 0) or np.any(signs[listed.not_negative] < 0)
+        if indefinite and form is Form.UD:
+            return False
         state, covariance = values[listed.x], values[listed.P]
         after[DONE] = first + k + 1
         if indefinite and not after[INDEFINITE]:
@@ -217,17 +241,23 @@ def _listed(n: int, m: int, form: Form, pairs: bool) -> _Listed:
     step = traced_step(n, m, form)
     trace = step.trace
     x, K, P, S = (
-        np.reshape([trace.loaded(each) for each in np.ravel(matrix)], np.shape(matrix))
+        np.array([trace.loaded(each) for each in np.ravel(matrix)], dtype=np.int64).reshape(np.shape(matrix))
         for matrix in (step.x, step.K, step.P, step.innovation)
     )
     operations = trace.build.listed()
     first, coefficients = operations[0][0], operations[-1][0] + 1
     at = np.arange(coefficients)  # the place of each value; a loaded coefficient has its own
     turned = _of_gain(operations, K) if pairs else set()
-    rows = []
-    for value, (code, a, b), _ in operations:
+    size, rows, truths = coefficients + len(step.coefficients), list[tuple[int, ...]](), dict[int, int]()
+    for value, (code, a, b), guard in operations:
         if code == CONSTANT:
             at[value] = coefficients + a
+            continue
+        if code == CHOOSE:
+            if guard not in truths:
+                truths[guard] = len(truths)
+                rows.append((codes.COMPARE, at[guard], size - 2, _UNEQUAL, truths[guard]))
+            rows.append((codes.CHOOSE, truths[guard], at[a], at[b], value))
             continue
         left, right = coefficients + a if code == MULTIPLY else at[a], at[b]
         rows.append((_CODES[code], *((right, left) if value in turned else (left, right)), 0, value))
@@ -237,8 +267,9 @@ def _listed(n: int, m: int, form: Form, pairs: bool) -> _Listed:
         at[[value for value, kind in trace.build.checks if kind == wanted]]
         for wanted in (DIVISOR, POSITIVE, NOT_NEGATIVE)
     )
-    size = coefficients + len(step.coefficients)
-    return _Listed(instructions, first, coefficients, size, at[x], at[K], at[P.ravel()], at[S], *checks)
+    taken = np.array([i * n + j for i, j in step.places])
+    layout = first, coefficients, size, len(truths), taken
+    return _Listed(instructions, *layout, at[x], at[K], at[P.ravel()], at[S], *checks)
 
 
 def _of_gain(operations: Sequence[tuple[int, tuple[int, int, int], int]], K: NDArray[np.int64]) -> set[int]:

@@ -357,9 +357,7 @@ class Run:
         """
         try:
             if self.form is Form.UD:
-                each = self.matrices
-                factors = FactorArrays(each.Phi, each.H, each.HT, self.UQ, self.UR, each.place)
-                advance_ud(self.tag, factors, z, self.steps, self.x, self.P, kept, notes)
+                self._advance_factors(z, kept, notes)
             else:
                 self._advance_covariances(z, kept, notes)
         except (OverflowError, ZeroDivisionError) as error:
@@ -373,6 +371,18 @@ class Run:
         else:
             if notes[STOPPED]:
                 self.reason = f"a zero pivot in the innovation covariance at step {notes[STOPPED]}"
+
+    def _advance_factors(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
+        """Take steps of the UD form."""
+        each, x, U = self.matrices, self.x, self.P
+        factors = FactorArrays(each.Phi, each.H, each.HT, self.UQ, self.UR, each.place)
+        loops = self.tag, factors, z, self.steps, x, U, kept, notes
+        asked = self.tag, self.form, each._replace(Q=self.UQ, R=self.UR)
+        if replay_pays(*asked, z, x, lambda: is_compiled(advance_ud, *loops)):
+            not_repeated = self.X[:0], self.C[:0], self.UR[:0]
+            if advance_by_replay(*asked, z, self.steps, x, U, not_repeated, kept, notes):
+                return
+        advance_ud(*loops)
 
     def _advance_covariances(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
         """Take steps of a form with covariances, on numbers of the type that its compiled step takes."""

@@ -182,8 +182,8 @@ class TracedStep(NamedTuple):
     coefficients : names of the coefficients.
     places : rows and columns of the entries of the covariance that are states.
     x, P : estimate (n,) and covariance (n, n), or factor, after the step.
-    K, innovation : gain (n, m), and innovation covariance (m, m); in the UD form, which has one for each measurement,
-        they are empty.
+    K : gain (n, m); in the UD form, that of one measurement after the other.
+    innovation : innovation covariance (m, m); in the UD form, which has none, it is empty.
     """
 
     trace: Trace
@@ -214,8 +214,8 @@ def traced_step(n: int, m: int, form: Form) -> TracedStep:
     if upper:
         P, _ = predict_ud(model.Phi, P, model.Q)
         ahead = product_in_order(model.Phi, x[:, None])[:, 0]
-        x, P, *_ = observed(observe_ud, model.H, model.R, z, ahead, P)
-        return TracedStep(trace, names, places, x, P, trace.values([], 0, m), trace.values([], 0, m))
+        x, P, gains, _ = observed(observe_ud, model.H, model.R, z, ahead, P)
+        return TracedStep(trace, names, places, x, P, np.stack(gains, axis=1), trace.values([], 0, m))
     found = kalman_step(trace.algebra(), form, model, x[:, None], P, z[:, None])
     trace.build.checks += [(trace.loaded(found.P[i, i]), POSITIVE) for i in range(n)]
     return TracedStep(trace, names, places, found.x[:, 0], found.P, found.K, trace.inverted[0])

@@ -65,7 +65,7 @@ def assert_same(one, other):
     [
         (fmt, form)
         for fmt in (*FORMATS, *OTHERS)
-        for form in (Form.INNOVATION, Form.JOSEPH, *HUNG)
+        for form in (Form.INNOVATION, Form.JOSEPH, Form.UD, *HUNG)
         if form is not Form.HUNG_SECOND_GAIN or fmt in FORMATS_OF_ALL_FORMS
     ],
 )
@@ -133,7 +133,6 @@ def test_the_bound_of_a_run_is_the_same(replays):
         {"fmt": FloatFormat(2, 12, "stochastic")},
         {"fmt": FloatFormat(2, 12), "sums": Sums(fused=True)},
         {"fmt": FloatFormat(2, 12), "compensated": True},
-        {"fmt": FloatFormat(2, 12), "form": "UD"},
     ],
 )
 def test_other_arithmetic_runs_in_the_compiled_loops(options, replays):
