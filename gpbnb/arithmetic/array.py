@@ -118,7 +118,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
         self = object.__new__(cls)
         self._format = fmt
         self.backend = backend
-        self.components = tuple(_frozen(part, backend.dtype) for part in components)
+        self.components = tuple([_frozen(part, backend.dtype) for part in components])
         return self
 
     @classmethod
@@ -282,7 +282,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
     def operand(self, other: Any) -> FloatArray:
         """Return the other operand as a FloatArray of this format, in which it must be exact."""
         if isinstance(other, FloatArray):
-            if other.format != self.format:
+            if other._format is not self._format and other._format != self._format:
                 raise ValueError(
                     f"got operands in {self.format} and {other.format}; needed one format; "
                     "convert one of them: fmt.array(x)"

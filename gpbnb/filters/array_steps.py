@@ -55,7 +55,7 @@ def if_nonzero(x: Any, changed: Callable[[], Any], unchanged: Any) -> Any:
 
     A number that records its operations, see :mod:`gpbnb.filters.tracing`, records both.
     """
-    if hasattr(x, "if_nonzero"):
+    if hasattr(type(x), "if_nonzero"):  # arrays would look for names that are spelled alike
         return x.if_nonzero(changed, unchanged)
     return changed() if x != 0 else unchanged
 

@@ -10,6 +10,7 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds import gains
 from gpbnb.bounds.gain_limits import FORMS, StepNumbers, chain, contracted, limits_of_gains, parts_of_a_step
 from gpbnb.bounds.gains import step_numbers
 from gpbnb.bounds.guarantee import guarantee, limits
@@ -184,3 +185,18 @@ def test_where_no_set_is_found() -> None:
     step = chain(given, np.eye(3))
     assert step is not None
     assert contracted(Form.INNOVATION, step, np.zeros((3, 3)), 2.0**-10) is None
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH], ids=str)
+def test_gains_to_which_no_norm_applies_are_enclosed_entry_by_entry(
+    form: Form, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The norm covers no cycle of matrices, however many states there are."""
+    model, fmt = cyclic(10, 2, cycle=31, decay=0.8), FloatFormat(2, 24)
+    found = gains.schedule(model, fmt, form, most=200)
+    monkeypatch.setattr(gains, "ENTRY_BY_ENTRY", 0)
+    again = gains.schedule(model, fmt, form, most=200)
+    assert found.limits is not None
+    assert again.limits is not None
+    assert again.enclosed == found.enclosed
+    assert np.array_equal(again.limits, found.limits)
