@@ -41,6 +41,22 @@ _NORMAL = np.array([10**k << (63 - n) for k, n in enumerate(_LENGTHS)], np.uint6
 _RECIPROCAL = np.array([(2**128 - 1) // (10**k << (63 - n)) - 2**64 for k, n in enumerate(_LENGTHS)], np.uint64)
 
 
+def _rounds_up(mode: int, odd: int, up: int, tie: int, inexact: int, negative: int) -> bool:
+    """Whether a magnitude rounds up in a mode, by its last digit and what is cut off; see :func:`increment`."""
+    if mode in (AWAY, EVEN):
+        return bool(up and not (mode == EVEN and tie and not odd))
+    outward = (mode == UP and not negative) or (mode == DOWN and negative) or (mode == ODD and not odd)
+    return bool(inexact and outward)
+
+
+# For each mode the answers of `_rounds_up` as bits, whose number has the bits odd, up, tie, inexact and negative. No
+# processor predicts them, so that a table costs less than branches.
+_BITS = [[at >> k & 1 for k in range(5)] for at in range(32)]
+_INCREMENTS = np.array(
+    [sum(_rounds_up(mode, *bits) << at for at, bits in enumerate(_BITS)) for mode in range(6)], np.uint64
+)
+
+
 @inner(forceinline=True)
 def _power(k: Any) -> Any:
     """10**k; with an unsigned index, numba need not test whether it is negative."""
@@ -105,10 +121,9 @@ def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, neg
         return np.uint64(up & fmt.nearest)
 
     def by_mode(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
-        mode, odd = fmt.mode, (m & _U1) == _U1
-        nearest = up & ((mode == AWAY) | ((mode == EVEN) & ((not tie) | odd)))
-        outward = ((mode == UP) & (not negative)) | ((mode == DOWN) & negative)
-        return np.uint64(nearest | (inexact & (outward | ((mode == ODD) & (not odd)))))
+        at = (m & _U1) | (np.uint64(up) << 1) | (np.uint64(tie) << 2)
+        at |= (np.uint64(inexact) << 3) | (np.uint64(negative) << 4)
+        return (_INCREMENTS[np.uint64(fmt.mode)] >> at) & _U1
 
     return by_mode if getattr(fmt, "instance_class", None) in (LimitedDecimal, Wide) else to_nearest_or_chopped
 

@@ -258,9 +258,9 @@ def _rounded_word(fmt: Any, negative: Any, n: Any, more: Any, e: Any) -> Any:
             n, more, drop = _U0, True, np.int64(64 >> digit)
         last = np.uint64((drop << digit) - 1)
         q = n >> last
-        more |= (q << last) != n
-        n, half = q >> _U1, (q & _U1) == _U1
-        n += increment(fmt, n, half, half & (not more), half | more, negative)
+        rest = np.uint64(more | ((q << last) != n))
+        n, half = q >> _U1, q & _U1
+        n += increment(fmt, n, half, half & ~rest, half | rest, negative)
         if n == _U0:
             return zero()
     if (n >> np.uint64(t << digit)) != _U0:  # a power of the base after a carry, or too large for fixed point
