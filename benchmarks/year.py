@@ -1,6 +1,8 @@
 """A year of Gravity Probe B, 3,153,600 steps: ``python -m benchmarks.year`` writes the table to ``benchmarks/results``.
 
-Times are those of the processor, of one core, so that what else the machine does enters little.
+Times are those of the processor, of one core, so that what else the machine does enters little. The aims, 6 s in base 2
+and 25 s in base 10, were set for a processor on which NumPy takes 36.6 s. On others they are these shares of NumPy's
+time.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from benchmarks.kalman import numpy_step
 from benchmarks.timing import machine
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.forms import Form
+from gpbnb.filters.replayed import only_compiled
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import BLOCK
 from gpbnb.report.display.tables import Table
@@ -29,6 +32,7 @@ from gpbnb.report.gravity_probe_b.model import TRUTH
 
 RESULTS = Path(__file__).parent / "results"
 RECORDS = 100
+BINARY_SHARE, DECIMAL_SHARE = 6 / 36.6, 25 / 36.6
 NUMPY_TAKES = 20  # one block of so many
 
 
@@ -80,9 +84,9 @@ def measure(steps: int = gravity_probe_b.YEAR) -> list[Timed]:
     binary, decimal = total.values()
     numpy_year = numpy_total * steps / numpy_steps
     return [
-        Timed("base 2, 24 bits, every operation rounded", binary, 6),
+        Timed("base 2, 24 bits, every operation rounded", binary, round(BINARY_SHARE * numpy_year, 1)),
         Timed("NumPy, float64, unrounded", numpy_year, None),
-        Timed("base 10, 8 digits, every operation rounded", decimal, 25),
+        Timed("base 10, 8 digits, every operation rounded", decimal, round(DECIMAL_SHARE * numpy_year, 1)),
         Timed(f"base 2, 24 bits, {RECORDS} records at once", many_records(steps), round(6 * binary, 1)),
         Timed("the mission model, base 2, 24 bits", mission_year(steps), None),
     ]
@@ -116,7 +120,8 @@ def mission_year(steps: int) -> float:
 
 
 def main() -> int:
-    found, about = measure(), machine()
+    with only_compiled():
+        found, about = measure(), machine()
     with (RESULTS / "year.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow((*Timed._fields, "reached"))
