@@ -22,6 +22,7 @@ LONGEST = (
     "book/integration.ipynb",
     "book/geometry.ipynb",
     "book/inversion.ipynb",
+    "tests/filters/test_blocks.py",
     "tests/bounds/test_certificates.py",
     "tests/guarantees/test_guarantees_filters.py",
     "tests/filters/test_nonlinear.py",
