@@ -72,7 +72,7 @@ class ReplayBudget:
     before_compiling, before_loading : seconds, in arithmetic whose loops must be compiled, and only be loaded.
     """
 
-    def __init__(self, before_compiling: float = 3.0, before_loading: float = 0.1) -> None:
+    def __init__(self, before_compiling: float = 1.0, before_loading: float = 0.1) -> None:
         self._limits = {False: before_compiling, True: before_loading}
         self._compiled = dict[Any, bool]()
         self._spent = dict[Any, float]()
