@@ -127,7 +127,12 @@ def main() -> int:
         writer.writerow((*Timed._fields, "reached"))
         writer.writerows((each.arithmetic, f"{each.seconds:.3g}", each.aim or "", each.reached) for each in found)
     body = tuple(
-        (each.arithmetic, f"{each.seconds:.3g} s", f"{each.aim:g} s" if each.aim else "", each.reached)
+        (
+            each.arithmetic,
+            f"{each.seconds:.3g}\N{NO-BREAK SPACE}s",
+            f"{each.aim:g}\N{NO-BREAK SPACE}s" if each.aim else "",
+            each.reached,
+        )
         for each in found
     )
     table = Table("a year", ("arithmetic", "processor time of a year", "aim", "reached"), body)
