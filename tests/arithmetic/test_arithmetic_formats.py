@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Context, Decimal
 from fractions import Fraction
@@ -21,6 +23,7 @@ from hypothesis import strategies as st
 from gpbnb.arithmetic.conversion import exact_fraction, exact_ratio
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, prints_as
+from gpbnb.arithmetic.kernels.exact import one_per_format
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 
@@ -325,3 +328,14 @@ def test_random_numbers_come_from_one_sequence_however_many_formats_are_in_use()
     assert second.backend is kept
     assert second.kernel is kept.kernel
     assert second.exact_backend.kernel is kept.kernel
+
+
+def test_threads_that_ask_at_the_same_time_get_one_object():
+    class Made:
+        def __init__(self, rules):
+            time.sleep(0.05)
+
+    made, rules = one_per_format(Made), FloatFormat(2, 12).rules
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(made, [rules] * 4))
+    assert all(each is found[0] for each in found)

@@ -8,6 +8,7 @@ their last digits are zeros. Every function computes the exact result and rounds
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
@@ -536,13 +537,15 @@ def one_per_format(make: Callable[[Rules], Made]) -> Callable[[Rules], Made]:
     A second one beside it would draw the random numbers of stochastic rounding from a sequence of its own.
     """
     alive: WeakValueDictionary[Rules, Made] = WeakValueDictionary()
+    lock = threading.Lock()
 
     @lru_cache(maxsize=256)
     @wraps(make)
     def made(rules: Rules) -> Made:
-        if (known := alive.get(rules)) is None:
-            alive[rules] = known = make(rules)
-        return known
+        with lock:
+            if (known := alive.get(rules)) is None:
+                alive[rules] = known = make(rules)
+            return known
 
     return made
 
