@@ -117,6 +117,8 @@ class CarriedBound:
         z, x, exact = taken.z, taken.x, self._exact
         xe, Ke, Pe, Se = _repeated(exact, z, first, x, covariances)
         steps, n, m = len(xe), x.shape[1], z.shape[1]
+        if not steps:
+            return 0
         y, q, T = np.empty((steps, m)), np.empty((steps, n)), np.empty((steps, n, n))
         residuals(exact, z[:steps], first, x[: steps + 1], covariances[: steps + 1], (xe, Pe), (y, q, T))
         before, measured, K, S, size = map(
@@ -129,8 +131,6 @@ class CarriedBound:
         model = StepModel(*(each[every % len(each)] for each in self._plain))
         off = evaluation_errors(model, before[:steps], size[:steps], measured[:steps], K, S, _UNIT)
         bounds = contraction_steps(self.now, model, Repeated(K, S, y, q, T), off)
-        if not steps:
-            return 0
         self.now = at_step(bounds, -1)
         at, last = np.searchsorted(self.checkpoint_steps, (first, first + steps), side="right")
         i = self.checkpoint_steps[at:last] - first - 1

@@ -55,7 +55,7 @@ class Contraction(NamedTuple):
     eta: Any
     #: bounds the relative error of the covariance.
     zeta: Any
-    #: bounds the norm of :math:`A_k`, at most about 1.
+    #: bounds the norm of :math:`A_k`, at most about 1. These three are floats, or (steps,) after several steps.
     alpha: Any
     #: (m,), bounds the effect of the covariance error on each column of the gain.
     gain: NDArray[np.float64]
@@ -139,13 +139,13 @@ def _as_one(arrays: Iterable[Array]) -> list[Array]:
 def contraction_steps(before: Contraction, model: StepModel, repeated: Repeated, off: EvaluationErrors) -> Contraction:
     """Propagate the bound through some steps as :func:`contraction_step` does, and return the bound after each.
 
-    Returns
-    -------
-    bounds : those after each step, each quantity with a first axis for the steps; see :func:`at_step`.
-
     Parameters
     ----------
     model, repeated, off : as for one step, each array with a first axis for the steps.
+
+    Returns
+    -------
+    bounds : those after each step, each quantity with a first axis for the steps; see :func:`at_step`.
     """
     K, q, T = repeated.K, repeated.q, repeated.T
     many = _many(*K.shape[-2:])
@@ -261,8 +261,7 @@ def evaluation_errors(
 def state_error_bound(bound: Contraction) -> Array:
     r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,).
 
-    This and the next two functions take the bound after one step or after each of some steps, with a first axis for
-    these.
+    Like the next two functions, it also takes the bounds after several steps, from :func:`contraction_steps`.
     """
     rows = _standard_deviations(bound)
     return rows * np.asarray(bound.eta)[..., np.newaxis]

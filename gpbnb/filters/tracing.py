@@ -182,7 +182,7 @@ class TracedStep(NamedTuple):
     coefficients : names of the coefficients.
     places : rows and columns of the entries of the covariance that are states.
     x, P : estimate (n,) and covariance (n, n), or factor, after the step.
-    K : gain (n, m); in the UD form, that of one measurement after the other.
+    K : gain (n, m). In the UD form, which takes one measurement after the other, each column is the gain of one.
     innovation : innovation covariance (m, m); in the UD form, which has none, it is empty.
     """
 

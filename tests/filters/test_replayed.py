@@ -94,6 +94,14 @@ def test_many_measurements_and_states_have_the_same_digits(fmt, replays):
     assert len(replays) == 3 * STEPS
 
 
+def test_the_ud_form_leaves_unchanged_what_a_measurement_does_not_see(replays):
+    """Each state is by itself, and only two are measured."""
+    given = model(Phi=np.diag([0.5, 0.75, 0.25]), H=[[1, 0, 0], [0, 0, 1]], Q=np.eye(3), R=np.eye(2), P0=np.eye(3))
+    one, other = both(lambda run: run.take(measurements()), given, FloatFormat(2, 11), "UD", range(1, STEPS + 1))
+    assert_same(one, other)
+    assert len(replays) == STEPS
+
+
 def test_a_run_goes_on_where_it_stood(replays):
     z = measurements()
     one, other = both(lambda run: [run.take(z[:2]), run.take(z[2:])], model(), FloatFormat(2, 11), "Joseph", (3, STEPS))

@@ -532,9 +532,9 @@ def _chopping(rules: Rules) -> ExactKernel:
 
 
 def one_per_format(make: Callable[[Rules], Made]) -> Callable[[Rules], Made]:
-    """Make an object of a format once, and again only if nobody uses it any more.
+    """Make only one object for each format at a time.
 
-    A second one beside it would draw the random numbers of stochastic rounding from a sequence of its own.
+    Two of them would draw the random numbers of stochastic rounding from two sequences.
     """
     alive: WeakValueDictionary[Rules, Made] = WeakValueDictionary()
     lock = threading.Lock()
