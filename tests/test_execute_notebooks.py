@@ -157,6 +157,17 @@ def test_notebooks_are_executed_if_their_key_is_new_or_their_outputs_cannot_be_t
     assert f"but others can write to {copy.root / 'cache'}; needed a folder that only you can write" in told
 
 
+def test_another_picture_is_a_difference(script, tmp_path):
+    def drawn(picture):
+        output = nbformat.v4.new_output("display_data", {"image/svg+xml": picture, "text/plain": "<Figure>"})
+        return nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("draw()", outputs=[output], id="a")])
+
+    nbformat.write(drawn("<svg>1</svg>"), tmp_path / "page.ipynb")
+    assert script.differences(tmp_path / "page.ipynb", drawn("<svg>1</svg>")) == []
+    (told,) = script.differences(tmp_path / "page.ipynb", drawn("<svg>2</svg>"))
+    assert re.search(r"\n-image/svg\+xml: picture \w{12}\n\+image/svg\+xml: picture \w{12}\n", told)
+
+
 def test_the_longest_are_named_and_start_first(script):
     paths = sorted((ROOT / "book").glob("*.ipynb"))
     assert {path.stem for path in paths} >= set(script.LONGEST)
