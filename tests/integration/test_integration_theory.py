@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy import integrate
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import BINARY64
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.integration import experiment, inputs, theory
 
@@ -48,6 +49,19 @@ def test_right_to_a_few_units_in_the_last_place_everywhere(name):
 @given(st.floats(1e-300, 1e300))
 def test_any_ratio_is_evaluated_stably(mu):
     assert experiment.accuracy("walk", mu).ulp.max() <= 1.5
+
+
+def test_numbers_of_a_format_have_the_errors_of_correctly_rounded_operations():
+    mu = np.geomspace(1e-9, 100, 60)
+    found = experiment.accuracy("walk", BINARY64.array(mu), printed=True)
+    for one, ulp in zip(mu, found.ulp, strict=True):
+        with mpmath.workprec(53):
+            phi = mpmath.exp(-mpmath.mpf(one))
+            evaluated = (1 + phi) / (1 - phi) - 2 / mpmath.mpf(one)
+        with mpmath.workdps(60):
+            m = mpmath.mpf(one)
+            exact = mpmath.coth(m / 2) - 2 / m
+            assert ulp == pytest.approx(float(abs(evaluated - exact)) / np.spacing(float(exact)), rel=1e-12)
 
 
 def test_as_printed_nothing_is_left_for_small_ratios():

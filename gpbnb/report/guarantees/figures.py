@@ -64,8 +64,11 @@ def reachable_corners(found: Guarantee) -> NDArray[np.float64]:
         halves += [*(rows @ G * limits).T]
         rows = rows @ F
     segments = np.array([half if (half[0], half[1]) > (0, 0) else -half for half in halves if half.any()])
-    segments = 2 * segments[np.argsort(np.arctan2(segments[:, 1], segments[:, 0]))]
-    lower = np.cumsum(np.vstack([-segments.sum(axis=0) / 2, segments]), axis=0)
+    # Segments whose directions differ only by rounding errors, the order of which is by chance, make one side.
+    directions, side = np.unique(np.round(np.arctan2(segments[:, 1], segments[:, 0]), 9), return_inverse=True)
+    sides = np.zeros((len(directions), 2))
+    np.add.at(sides, side, 2 * segments)
+    lower = np.cumsum(np.vstack([-sides.sum(axis=0) / 2, sides]), axis=0)
     return np.vstack([lower, -lower[1:-1]])
 
 

@@ -8,11 +8,15 @@ from numbers import Number
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gpbnb.arithmetic.array import FloatArray
+
 Floats = NDArray[np.float64]
 
 
 def _numbers(name: str, values: ArrayLike) -> Floats:
-    """Return numbers as float64; text and truth values are no numbers, although NumPy converts them."""
+    """Return numbers as float64, or as given if they have a format; text and truth values are no numbers."""
+    if isinstance(values, FloatArray):
+        return values  # type: ignore[return-value]  # it computes like an array
     try:
         given = np.asarray(values)
         if given.dtype.kind in "iuf" or (
@@ -27,8 +31,9 @@ def _numbers(name: str, values: ArrayLike) -> Floats:
 def positive_array(name: str, values: ArrayLike) -> Floats:
     """Return positive, finite numbers as an array; raise ValueError otherwise."""
     array = _numbers(name, values)
-    if not np.all((array > 0) & (array < np.inf)):
-        bad = array[~((array > 0) & (array < np.inf))].flat[0]
+    allowed = (array > 0) & np.isfinite(array)
+    if not np.all(allowed):
+        bad = array[~allowed].flat[0]
         raise ValueError(f"got {name} = {bad}; needed a positive, finite number; check its unit and sign")
     return array
 

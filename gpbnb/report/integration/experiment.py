@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
@@ -31,7 +32,7 @@ BAR: dict[str, Any] = {"disable": None, "delay": 2, "leave": False}  # progress 
 
 
 class Accuracy(NamedTuple):
-    """Errors of a float64 evaluation relative to a high-precision reference, in units in the last place."""
+    """Errors of an evaluation relative to a high-precision reference, in units in the last place of float64."""
 
     mu: NDArray[np.float64]
     ulp: NDArray[np.float64]
@@ -60,7 +61,8 @@ def accuracy(name: str, mu: ArrayLike, printed: bool = False) -> Accuracy:
     Parameters
     ----------
     name : "walk" for (35), or a field of ``Discretization``.
-    mu : (k,), positive.
+    mu : (k,), positive. Numbers of BINARY64 are evaluated with every operation correctly rounded, for "walk", so that
+        the errors are the same on every processor; NumPy's exponential function is not.
     printed : evaluate the form that cancels instead of the stable one; for "walk" and "q22".
     """
     if name != "walk" and name not in theory.Discretization._fields:
@@ -69,7 +71,8 @@ def accuracy(name: str, mu: ArrayLike, printed: bool = False) -> Accuracy:
         raise ValueError(f"got name {name!r} as printed; needed 'walk' or 'q22'")
     values = np.atleast_1d(np.asarray(mu, dtype=np.float64))
     if name == "walk":
-        found = theory.printed_walk_factor(values) if printed else theory.walk_factor(values)
+        given = mu if isinstance(mu, FloatArray) else values
+        found = np.asarray((theory.printed_walk_factor if printed else theory.walk_factor)(given), np.float64)
     else:
         found = theory.printed_discretization_q22(values) if printed else getattr(theory.discretize(values), name)
     errors = []

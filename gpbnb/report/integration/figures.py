@@ -122,7 +122,7 @@ def approximations(terms: int, ax: Axes) -> list[Artist]:
     for k, (c, colour) in enumerate(zip(theory.series(terms), colours(terms, (REFUTED, *SERIES)), strict=True)):
         total = total + float(c) * mu ** (2 * k + 1)
         error = np.abs(np.sqrt(np.where(total > 0, total, np.nan) / exact) - 1)
-        shown = np.where((error > 0) & (error < 10), error, np.nan)
+        shown = np.where((error > 1e-8) & (error < 10), error, np.nan)  # below are rounding errors
         artists += ax.plot(mu, shown, color=colour, ls="-" if k else "--", label=f"{k + 1} terms" if k else "(39)")
         last = k + 1 == terms
         at = int(np.argmax(error > (1e-5 if k else 1e-4)))

@@ -51,7 +51,7 @@ def langevin(x: ArrayLike) -> Floats:
         tail = square / (2 * k + 1 + tail)
     high = np.maximum(x, 2.0)
     far = (1 - 1 / high) - 2 * np.exp(-2 * high) / np.expm1(-2 * high)
-    return np.asarray(np.where(x <= 2.0, low / (3 + tail), far))
+    return np.where(x <= 2.0, low / (3 + tail), far)
 
 
 def walk_factor(mu: ArrayLike) -> Floats:
@@ -66,7 +66,7 @@ def printed_walk_factor(mu: ArrayLike) -> Floats:
     """Evaluate (35) in float64 exactly as printed; infinite where this divides by zero."""
     mu = positive_array("mu", mu)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return np.asarray((1 + np.exp(-mu)) / (1 - np.exp(-mu)) - 2 / mu)
+        return (1 + np.exp(-mu)) / (1 - np.exp(-mu)) - 2 / mu
 
 
 def series(terms: int) -> tuple[Fraction, ...]:
