@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from fractions import Fraction
 from functools import lru_cache, partial
 from typing import Any, cast
 
 import numpy as np
 from flint import arb, fmpq
+from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import entries
@@ -348,20 +348,23 @@ def _reversed_bits(n: int) -> Any:
 
 def _factors(fmt: Any, half: int, inverse: bool) -> ComplexArray:
     """Return the correctly rounded factors for k from 1 to half - 1."""
-    found = ComplexArray(*(fmt.array(list(part)) for part in _rounded_factors(fmt, half)))
+    found = ComplexArray(*(FloatArray.from_pairs(part[0], part[1], fmt) for part in _rounded_factors(fmt, half)))
     return found.conj() if inverse else found
 
 
 @lru_cache(maxsize=64)
-def _rounded_factors(fmt: Any, half: int) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]]:
+def _rounded_factors(fmt: Any, half: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return significands and exponents, each (2, half - 1), of the real and the imaginary parts."""
     if fmt.rounding is Rounding.STOCHASTIC:
         fmt = replace(fmt, rounding=Rounding.EVEN)  # constants are no results of a run
 
-    def rounded(enclosure: Callable[[], Any]) -> Fraction:
-        return rounded_enclosure(enclosure, fmt, lambda: "a factor of the Fourier transform")
+    def rounded(enclosures: Iterable[Callable[[], Any]]) -> NDArray[Any]:
+        what = "a factor of the Fourier transform"
+        pairs = [rounded_enclosure(each, fmt, lambda: what) for each in enclosures]
+        return np.array(pairs, dtype=object).reshape(-1, 2).T
 
     angles = [fmpq(k, half) for k in range(1, half)]
     return (
-        tuple(rounded(partial(arb.cos_pi_fmpq, angle)) for angle in angles),
-        tuple(rounded(partial(arb.sin_pi_fmpq, -angle)) for angle in angles),
+        rounded(partial(arb.cos_pi_fmpq, angle) for angle in angles),
+        rounded(partial(arb.sin_pi_fmpq, -angle) for angle in angles),
     )

@@ -18,6 +18,7 @@ from flint import arb, ctx, fmpz
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.flags import uncounted
 from gpbnb.arithmetic.kernels.backends import Floats
+from gpbnb.arithmetic.kernels.exact import ExactKernel, Pair
 from gpbnb.arithmetic.rounding import Rounding
 
 ELEMENTARY = (
@@ -105,15 +106,12 @@ def elementary(name: str, *arrays: Any) -> Any:
     if arrays[0].backend.records:
         return arrays[0].called(name, *arrays)
     quick = _by_float64(name, *arrays)
-    shape = arrays[0].shape
     if quick is None:
-        return _by_arb(name, arrays, np.ndindex(shape), np.empty(shape, dtype=object))
+        return _by_arb(name, arrays, np.ndindex(arrays[0].shape))
     result, doubtful = quick
     if not doubtful.any():
         return result
-    exactly = np.empty(shape, dtype=object)
-    exactly[~doubtful] = 0
-    return np.where(doubtful, _by_arb(name, arrays, map(tuple, np.argwhere(doubtful).tolist()), exactly), result)
+    return np.where(doubtful, _by_arb(name, arrays, map(tuple, np.argwhere(doubtful).tolist())), result)
 
 
 def _broadcast(arrays: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -146,22 +144,24 @@ def _by_float64(name: str, *arrays: Any) -> tuple[Any, Any] | None:
     return result, (low[0] != high[0]) | (~usual & (doubt > 0))
 
 
-def _by_arb(name: str, arrays: Any, indices: Iterable[tuple[int, ...]], rounded: Any) -> Any:
-    """Fill in the correctly rounded values at some indices, and return the array of the format."""
+def _by_arb(name: str, arrays: Any, indices: Iterable[tuple[int, ...]]) -> Any:
+    """Return the correctly rounded values at some indices, and zero at the others."""
     values: Any = [np.asarray(x.to_fractions(), dtype=object) for x in arrays]
-    fmt = arrays[0].format
+    fmt, shape = arrays[0].format, arrays[0].shape
+    significands, exponents = np.zeros(shape, dtype=object), np.zeros(shape, dtype=object)
     for index in indices:
         place = f" at {list(index)}" if index else ""
         try:
-            rounded[index] = _rounded(name, [each[index] for each in values], fmt, place)
+            significands[index], exponents[index] = _rounded(name, [each[index] for each in values], fmt, place)
         except OverflowError as error:
             raise OverflowError(f"np.{name}{place}: {error}") from None
-    return fmt.array(rounded) if rounded.shape else fmt.array(rounded.item())
+    return type(arrays[0]).from_pairs(significands, exponents, fmt)
 
 
-def _rounded(name: str, values: Sequence[Fraction], fmt: Any, place: str) -> Fraction:
+def _rounded(name: str, values: Sequence[Fraction], fmt: Any, place: str) -> Pair:
     if (whole := _rational(name, values)) is not None:
-        return Fraction(fmt.round(whole))
+        pair: Pair = fmt.kernel.from_ratio(whole.numerator, whole.denominator)
+        return pair
     function = _ENCLOSURES.get(name) or getattr(arb, name)
     return rounded_enclosure(
         lambda: function(*(arb(value.numerator) / arb(value.denominator) for value in values)),
@@ -170,7 +170,7 @@ def _rounded(name: str, values: Sequence[Fraction], fmt: Any, place: str) -> Fra
     )
 
 
-def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[], str]) -> Fraction:
+def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[], str]) -> Pair:
     """Round an irrational number correctly, of which Arb computes an interval in the precision that is set.
 
     Raises
@@ -179,12 +179,12 @@ def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[],
     ValueError : the interval contains a tie in every precision.
     """
     kernel, before, bits = fmt.kernel, ctx.prec, 128
-    drawn = getattr(kernel, "count", None)
+    drawn = kernel.count
 
-    def rounded(end: Any) -> Fraction:
-        if drawn is not None:
-            kernel.count = drawn  # so that stochastic rounding compares both ends with the same random bits
-        return Fraction(fmt.round(_exactly(end, fmt)))
+    def rounded(end: Any) -> Pair:
+        kernel.count = drawn  # so that stochastic rounding compares both ends with the same random bits
+        pair: Pair = kernel.from_ratio(*_ratio(end, kernel))
+        return pair
 
     finite = False
     try:
@@ -261,11 +261,12 @@ def _root(whole: int, order: int) -> int | None:
     return root if root**order == whole else None
 
 
-def _exactly(end: Any, fmt: Any) -> Fraction:
+def _ratio(end: Any, kernel: ExactKernel) -> tuple[int, int]:
+    """Return a number of Arb as numerator and denominator; its size is limited to what the format tells apart."""
     significand, exponent = (int(part) for part in end.mid().man_exp())
-    size, limits = exponent + significand.bit_length(), fmt.limits
+    size, limits = exponent + significand.bit_length(), kernel.limits
     if significand and limits and limits.overflow != "wrap" and (size < 0 or limits.overflow != "raise"):
-        digits = fmt.base.bit_length() * (abs(limits.emin) + fmt.precision)
+        digits = kernel.base.bit_length() * (abs(limits.emin) + kernel.precision)
         reach = digits + limits.largest.numerator.bit_length()
         size = max(-reach, min(reach, size))  # beyond the range, all sizes round alike
         exponent = size - significand.bit_length()
@@ -274,4 +275,4 @@ def _exactly(end: Any, fmt: Any) -> Fraction:
             f"got a result of about 2**{size}; needed one in the range of the format, between 2**-{_FARTHEST} and "
             f"2**{_FARTHEST} in size"
         )
-    return Fraction(significand) * Fraction(2) ** exponent
+    return (significand << exponent, 1) if exponent >= 0 else (significand, 1 << -exponent)
