@@ -15,7 +15,8 @@ The public interface::
     LinearSystem               a digital filter in any structure, a controller or an observer
     required_precision         the smallest precision that keeps a filter, or your own function, within a tolerance
     required_block_precisions  the same for each block of a Kalman filter; BlockFormats: a format for each block
-    required_fraction_bits     the same in fixed point; WordFormats: separate formats for coefficients, data, sums
+    required_fraction_bits     the same in fixed point
+    required_word_formats      the same for data, coefficients and sums of a digital filter, each in its WordFormats
     limit_cycles               every limit cycle of a filter in fixed point with a constant input
     limits, guarantee          limits on a filter, and a bound for every measurement within them, for ever
     emulate, Form              one run of a filter with every operation rounded, in one of the forms of its update
@@ -45,7 +46,7 @@ __all__ = [
     "LinearModel", "LinearSystem", "MicroscalingFormat", "NonlinearModel", "NonlinearSystem", "Rounding",
     "TracedFunction", "WordFormats", "emulate", "fft", "flags", "guarantee", "limit_cycles", "limits", "linalg",
     "microscaling_dot", "peek", "read_model", "required_block_precisions", "required_fraction_bits",
-    "required_precision", "survey_records", "write_code",
+    "required_precision", "required_word_formats", "survey_records", "write_code",
 ]
 # fmt: on
 

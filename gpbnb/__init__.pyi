@@ -75,6 +75,7 @@ from gpbnb.filters.system import LinearSystem as LinearSystem
 from gpbnb.filters.words import WordFormats as WordFormats
 from gpbnb.names import NAMED_FORMATS as NAMED_FORMATS
 from gpbnb.wordlength.blocks import required_block_precisions as required_block_precisions
+from gpbnb.wordlength.blocks import required_word_formats as required_word_formats
 from gpbnb.wordlength.code import write_code as write_code
 from gpbnb.wordlength.fixed_point import required_fraction_bits as required_fraction_bits
 from gpbnb.wordlength.models import read_model as read_model

@@ -47,6 +47,7 @@ HOMES = {
     "required_block_precisions": "gpbnb.wordlength.blocks",
     "required_fraction_bits": "gpbnb.wordlength.fixed_point",
     "required_precision": "gpbnb.wordlength.precision",
+    "required_word_formats": "gpbnb.wordlength.blocks",
     "survey_records": "gpbnb.wordlength.records",
     "write_code": "gpbnb.wordlength.code",
 }

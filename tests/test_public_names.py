@@ -30,7 +30,7 @@ HOMES = {
     "filters.words": "WordFormats",
     "bounds.guarantee": "guarantee limits",
     "bounds.limit_cycles": "limit_cycles",
-    "wordlength.blocks": "required_block_precisions",
+    "wordlength.blocks": "required_block_precisions required_word_formats",
     "wordlength.fixed_point": "required_fraction_bits",
     "filters.system": "LinearSystem",
     "wordlength.precision": "required_precision",

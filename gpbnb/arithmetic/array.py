@@ -178,8 +178,8 @@ class FloatArray(ComponentArray, NumPyProtocols):
                     known[ratio] = pair = fmt.kernel.from_decimal(*ratio)
                     if exactly and not fmt.kernel.is_exactly(pair, *ratio):
                         raise ValueError(
-                            f"got the operand {value!r}; needed a number that {fmt} holds exactly; round it first: "
-                            "fmt.array(...)"
+                            f"got the operand {value!r}; needed a number that {fmt} holds exactly; round it first by "
+                            "x.format.array(...), or compare x.to_float() with it"
                         )
             except (TypeError, ValueError, OverflowError) as error:
                 raise type(error)(f"{at_entry(np.unravel_index(i, given.shape))}{error}") from None

@@ -322,7 +322,8 @@ def inv(a: FloatArray, pivot: bool = False) -> FloatArray:
     ----------
     hung1984, ch. II, (33) and (93).
     """
-    return solve(a, a.format.array(np.eye(_square(a), dtype=int)), pivot)
+    n = _square(a)
+    return solve(a, a.format.array(np.eye(n, dtype=int)), pivot)
 
 
 def det(a: FloatArray) -> FloatArray:

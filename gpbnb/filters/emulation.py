@@ -30,7 +30,7 @@ class History:
     Parameters
     ----------
     steps : (c,), the steps that were reached.
-    state : (c, n), estimate minus reference, in the units of the states.
+    state : (c, n), error of the estimate: estimate minus reference, in the units of the states.
     gain, covariance : (c, n, m) and (c, n, n), likewise.
     reference : the reference at the same steps.
     indefinite : the first step at which a variance or a pivot of the innovation covariance was not positive, if any.
@@ -51,6 +51,11 @@ class History:
     stopped: int | None
     reason: str = ""
     repairs: tuple[str, ...] = ()
+
+    @property
+    def estimate(self) -> NDArray[np.float64]:
+        """The computed estimates in float64, (c, n), which are the reference plus its error."""
+        return np.asarray(self.reference.to_float("x")[: len(self.state)] + self.state)
 
     @property
     def state_norm(self) -> NDArray[np.float64]:
@@ -119,6 +124,11 @@ def emulate(
         round their own constants.
     sums, compensated : as for :class:`~gpbnb.filters.run.Run`.
 
+    Returns
+    -------
+    The *errors* of the estimate in ``state``, of the gain and of the covariance at the checkpoint steps, and in
+    ``estimate`` the estimates. If the run ended early, ``reason`` says why, and only the steps before are there.
+
     Raises
     ------
     TypeError : `model` is not a model, or `fmt` is not a format.
@@ -128,7 +138,10 @@ def emulate(
     """
     form = form_named(form)
     if not isinstance(model, LinearModel | NonlinearModel):
-        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel or a NonlinearModel")
+        raise TypeError(
+            f"got a model {type(model).__name__}; needed a LinearModel or a NonlinearModel; required_precision and "
+            "write_code also take a LinearSystem"
+        )
     if not isinstance(fmt, (FloatFormat, FixedFormat, BlockFormats)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or BlockFormats")
     if not hasattr(z, "to_fractions"):

@@ -94,7 +94,8 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("mixed rounding", lambda: V - FloatFormat(10, 4, CHOP).array(1), ValueError, "needed one format; convert one"),
     ("mixed solve", lambda: linalg.solve(rows(1), W[:1]), ValueError, "needed one format; convert one of them"),
     ("not representable", lambda: W + 0.1, ValueError,
-     f"got the operand 0.1; needed a number that {B8} holds exactly; round it first: fmt.array(...)"),
+     f"got the operand 0.1; needed a number that {B8} holds exactly; round it first by x.format.array(...), "
+     "or compare x.to_float() with it"),
     ("not representable, left", lambda: np.array([1, 257, 3]) * W, ValueError, "entry [1]: got the operand 257; neede"),
     ("not representable, ==", lambda: V == 0.1, ValueError, "got the operand 0.1; needed a number that"),
     ("no number", lambda: V + None, TypeError, "got None of type NoneType; needed a str, int, float, Decimal or Fract"),
@@ -159,6 +160,7 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("dot of lists", lambda: linalg.dot([1], V), TypeError, "x: got list; needed a FloatArray; write fmt.array(x)"),
     ("matmul of array", lambda: linalg.matmul(V, ONE), TypeError, "b: got ndarray; needed a FloatArray; write fmt.arr"),
     ("lu of array", lambda: linalg.lu(ONE), TypeError, "a: got ndarray; needed a FloatArray; write fmt.array(a)"),
+    ("inverse of array", lambda: linalg.inv(ONE), TypeError, "a: got ndarray; needed a FloatArray; write fmt.array(a)"),
     ("solve with list", lambda: linalg.solve(rows(2), [1, 2]), TypeError, "b: got list; needed a FloatArray; write fm"),
     ("not square", lambda: linalg.inv(D4.array([[1, 2]])), ValueError, "a: got shape (1, 2); needed a square matrix ("),
     ("empty matrix", lambda: linalg.lu(D4.array(np.ones((0, 0)))), ValueError, "a: got shape (0, 0); needed a square"),

@@ -97,6 +97,9 @@ def test_a_run_in_pieces_is_the_run_in_one(fmt, form):
 
 def test_the_norms_of_a_history():
     history = emulate(model(), measurements(), FloatFormat(10, 4), Form.HUNG, (2, 5))
+    rounded = Run(model(), FloatFormat(10, 4), Form.HUNG, (2, 5))
+    rounded.take(measurements())
+    assert history.estimate == pytest.approx(rounded.checkpoints().to_float("x"), rel=1e-14)
     assert history.steps.tolist() == [2, 5]
     for at in range(2):
         true = history.reference

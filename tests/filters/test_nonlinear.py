@@ -159,7 +159,7 @@ def test_emulate_refuses_what_a_nonlinear_filter_does_not_have():
         emulate(model, z, FloatFormat(2, 24), compensated=True)
     with pytest.raises(ValueError, match="got sums or compensated estimates for a nonlinear model; needed neither"):
         emulate(model, z, FloatFormat(2, 24), sums="pairwise")
-    with pytest.raises(TypeError, match="needed a LinearModel or a NonlinearModel"):
+    with pytest.raises(TypeError, match="required_precision and write_code also take a LinearSystem"):
         emulate(model.noise.H, z, FloatFormat(2, 24))
     stopped = emulate(model, z, FixedFormat(3, 20))
     assert stopped.stopped == 1
