@@ -130,6 +130,8 @@ class Guarantee:
             at = f"; the gain stays within known limits from step {self.schedule.enclosed}"
         return f"within {numbers} for ever, in {fmt}{at}"
 
+    __repr__ = __str__  # the fields have thousands of numbers
+
 
 def limits(
     n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, measurement: Any = math.inf

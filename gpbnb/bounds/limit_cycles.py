@@ -82,9 +82,11 @@ class LimitCycles:
             return f"outputs stay within {most} units of rest; too many states to try each"
         oscillations = sum(cycle.period > 1 for cycle in self.cycles)
         return (
-            f"{len(self.cycles)} cycles, of which {oscillations} oscillate; outputs stay within {most} units of rest, "
-            f"by a search of {self.searched} states"
+            f"{len(self.cycles) - oscillations} points of rest and {oscillations} oscillations; outputs stay within {most} "
+            f"units of rest, by a search of {self.searched} states"
         )
+
+    __repr__ = __str__
 
 
 def limit_cycles(

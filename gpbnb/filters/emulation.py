@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.blocks import BlockFormats
@@ -51,6 +52,14 @@ class History:
     stopped: int | None
     reason: str = ""
     repairs: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        fmt = self.fmt if isinstance(self.fmt, BlockFormats) else arithmetic(self.fmt)
+        if not len(self.steps):
+            return f"{self.form} in {fmt}: no checkpoint was reached; {self.reason}"
+        largest = ", ".join(f"{error:.2g}" for error in np.abs(self.state).max(axis=0))
+        ended = f"; {self.reason}" if self.reason else ""
+        return f"{self.form} in {fmt}, {self.steps[-1]} steps: largest error of each state {largest}{ended}"
 
     @property
     def estimate(self) -> NDArray[np.float64]:

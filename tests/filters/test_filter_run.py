@@ -101,6 +101,8 @@ def test_the_norms_of_a_history():
     rounded.take(measurements())
     assert history.estimate == pytest.approx(rounded.checkpoints().to_float("x"), rel=1e-14)
     assert history.steps.tolist() == [2, 5]
+    assert repr(history).startswith("Hung (1984) in 4 decimal digits")
+    assert " 5 steps: largest error of each state " in repr(history)
     for at in range(2):
         true = history.reference
         assert history.state_norm[at] == np.abs(history.state[at]).max()
