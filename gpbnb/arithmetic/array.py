@@ -18,7 +18,7 @@ from gpbnb.arithmetic.kernels.backends import Backend, Components
 from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.text import at_entry, decimal_text, in_columns, place
+from gpbnb.arithmetic.text import at_entry, decimal_text, in_columns, number_text, place
 from gpbnb.arithmetic.words import in_words
 
 _WIDTH = 120  # characters of a line of text
@@ -178,8 +178,8 @@ class FloatArray(ComponentArray, NumPyProtocols):
                     known[ratio] = pair = fmt.kernel.from_decimal(*ratio)
                     if exactly and not fmt.kernel.is_exactly(pair, *ratio):
                         raise ValueError(
-                            f"got the operand {value!r}; needed a number that {fmt} holds exactly; round it first by "
-                            "x.format.array(...), or compare x.to_float() with it"
+                            f"got the operand {number_text(value)}; needed a number that {fmt} holds exactly; "
+                            "round it first by x.format.array(...), or compare x.to_float() with it"
                         )
             except (TypeError, ValueError, OverflowError) as error:
                 raise type(error)(f"{at_entry(np.unravel_index(i, given.shape))}{error}") from None

@@ -6,6 +6,7 @@ result, so this result is correctly rounded.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import operator
 from collections.abc import Callable, Iterable, Sequence
@@ -62,7 +63,7 @@ _ENCLOSURES: dict[str, Callable[..., Any]] = {
 """Arb's functions where it has another name."""
 
 _MOST_BITS = 1 << 16
-_LONGEST = 1 << 20  # bits of a rational power that is formed exactly; a longer one is no number of a format, and no tie
+_LONGEST = 1 << 20  # bits of a rational power that is formed exactly; a longer one that is a tie is refused
 _FARTHEST = 1 << 25  # exponent of the largest and smallest result that is written out
 _DOUBT = 2.0**-48  # relative error that no float64 function of NumPy reaches: 16 units of the last digit or more
 _MOST_DIGITS = 44  # bits of a format for which such an interval seldom contains a tie
@@ -79,8 +80,9 @@ def elementary(name: str, *arrays: Any) -> Any:
 
     Functions of two numbers broadcast. The number zero has no sign: ``np.arctan2(0, x)`` is :math:`\pi` for each
     negative x, and 0 for the others. ``np.float_power(x, y)`` takes any y if x > 0, whole numbers y if x < 0, and
-    y >= 0 if x = 0, with :math:`0^0 = 1`. Arguments of any size are reduced exactly. A result that differs from a
-    number or tie of the format by less than about :math:`2^{-65000}` of its size is refused.
+    y >= 0 if x = 0, with :math:`0^0 = 1`. Arguments of sine, cosine and tangent are reduced exactly, up to about
+    :math:`2^{65000}` in size. A larger one is refused, and so is a result that differs from a number or tie of the
+    format by less than about :math:`2^{-65000}` of its size.
 
     Raises
     ------
@@ -179,7 +181,8 @@ def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[],
     ValueError : the interval contains a tie in every precision.
     """
     kernel, before, bits = fmt.kernel, ctx.prec, 128
-    drawn = kernel.count
+    drawn, limits = kernel.count, kernel.limits
+    modulus = float(limits.largest - limits.lowest) if limits and limits.overflow == "wrap" else None
 
     def rounded(end: Any) -> Pair:
         kernel.count = drawn  # so that stochastic rounding compares both ends with the same random bits
@@ -195,7 +198,8 @@ def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[],
             if finite:
                 with uncounted():
                     low, high = rounded(ball.lower()), rounded(ball.upper())
-                if low == high:
+                # Ends that differ by a whole range of a format that wraps around are rounded to the same number.
+                if low == high and (modulus is None or bool(4 * ball.rad() < modulus)):
                     return rounded(ball.lower()) if fmt.backend.special else low
             elif bits > 1024:
                 break
@@ -203,15 +207,17 @@ def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[],
     finally:
         ctx.prec = before
     if finite:
-        raise ValueError(f"got {what()}; needed an argument that is further from a tie")
+        raise ValueError(f"got {what()}; needed an argument that is smaller, or further from a tie")
     raise DomainError(f"got {what()}; needed an argument for which the result is finite and real")
 
 
 def _shown(value: Fraction) -> str:
-    try:
-        return repr(float(value))
-    except OverflowError:
-        return f"about 2**{value.numerator.bit_length() - value.denominator.bit_length()}"
+    near = math.inf
+    with contextlib.suppress(OverflowError):
+        near = float(value)
+    if math.isfinite(near) and (near or not value):
+        return repr(near)
+    return f"about 2**{value.numerator.bit_length() - value.denominator.bit_length()}"
 
 
 def _rational(name: str, values: Sequence[Fraction]) -> Fraction | None:

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.kernels.exact import ExactKernel, integer_text, kernel
+from gpbnb.arithmetic.kernels.exact import ExactKernel, integer_text, kernel, size_text
 from gpbnb.arithmetic.rounding import Rounding, Rules
+
+
+def number_text(value: Any) -> str:
+    """Return the text of a given number for a message, which is short if the number is a long integer."""
+    long = isinstance(value, int) and value.bit_length() > 128
+    return f"about {size_text(Fraction(value))}" if long else repr(value)
 
 
 def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: str, prefix: str) -> str:

@@ -83,7 +83,8 @@ class Guarantee:
     bound : (n,), bound of the error of each state after every step; infinite if there is none.
     steps : None if the bound holds for ever; otherwise the number of steps for which it holds.
     why : why the bound does not hold for ever; empty if it does.
-    history : (k, n), bounds after each of the first steps.
+    history : (k, n), bounds after each of the first steps. If the bound holds for ever, the last rows, as many as the
+        period has, also hold for all later steps of their phase.
     parts : (n, 4), the parts of each state's bound at the step where it is largest; see :data:`PARTS`.
     limits : limits on the filter without rounding: those given, and those that follow from them.
     schedule : the filter's coefficients.
@@ -395,7 +396,10 @@ def _sums(
     steps: int,
     budget: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """Return bounds after each step, and their parts; the last rows are those of the period, if there is a radius."""
+    """Return bounds after each step, their parts, and the number of steps in the sums.
+
+    If there is a radius, the last rows, as many as the period has, hold for all later steps of their phase, too.
+    """
     n, part, for_ever = given.program.n, _parts_of(given), radius is not None
     used, finite, size = _effects(found)
     if for_ever and not finite:  # a number may leave the range of the format
@@ -446,6 +450,8 @@ def _sums(
         after, after_parts = onward(arrays, given.first, lags, reach, size, largest)
         new = after.max(axis=0)
         if (new <= largest).all():
+            turn = -(len(after) % period)  # so that the first of them is for the next step
+            rows, row_parts = [*rows[-turn:], *rows[:-turn]], [*row_parts[-turn:], *row_parts[:-turn]]
             return np.concatenate([begin, after, rows]), np.concatenate([parts, after_parts, row_parts]), lags
         largest = np.maximum(largest, new * (1 + 2.0**-30))
     return np.full((1, n), math.inf), np.full((1, n, 4), math.inf), lags
@@ -470,10 +476,11 @@ def _from_measurements(given: Schedule, within: FilterLimits, most: int, for_eve
         if not all(np.isfinite(each).all() for each in (X, V, given.dK)):
             break
         limit = np.concatenate([np.tile(a, (given.steps, 1)) for a in (within.measurement, X, V)], axis=1)
-        slack = tiny * (np.abs(found.K) @ within.measurement + np.abs(found.gain) @ V) + given.dK @ V
-        slack += (tiny * np.abs(found.loop) + found.spread) @ X
+        with np.errstate(over="ignore", invalid="ignore"):
+            slack = tiny * (np.abs(found.K) @ within.measurement + np.abs(found.gain) @ V) + given.dK @ V
+            slack += (tiny * np.abs(found.loop) + found.spread) @ X
+            scale = (np.abs(G) * limit[:, None, :]).sum(axis=2).max(axis=0) + 1e-300
         arrays = Columns(found.F, found.spread, G, limit, slack, part)
-        scale = (np.abs(G) * limit[:, None, :]).sum(axis=2).max(axis=0) + 1e-300
         end = End(most, scale, 1e-9 * float(scale.max()))
         peak_x, peak_v = peaks(arrays, HPhi, Sizes(X, within.measurement, x0), given.first, early, for_ever, end)
         peak_x, peak_v = np.minimum(peak_x, within.state), np.minimum(peak_v, within.innovation)

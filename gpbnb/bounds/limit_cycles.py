@@ -82,8 +82,8 @@ class LimitCycles:
             return f"outputs stay within {most} units of rest; too many states to try each"
         oscillations = sum(cycle.period > 1 for cycle in self.cycles)
         return (
-            f"{len(self.cycles) - oscillations} points of rest and {oscillations} oscillations; outputs stay within {most} "
-            f"units of rest, by a search of {self.searched} states"
+            f"{len(self.cycles) - oscillations} points of rest and {oscillations} oscillations; outputs stay within "
+            f"{most} units of rest, by a search of {self.searched} states"
         )
 
     __repr__ = __str__

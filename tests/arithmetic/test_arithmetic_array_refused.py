@@ -96,6 +96,7 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("not representable", lambda: W + 0.1, ValueError,
      f"got the operand 0.1; needed a number that {B8} holds exactly; round it first by x.format.array(...), "
      "or compare x.to_float() with it"),
+    ("not representable, long", lambda: V < 10**5000 + 1, ValueError, "got the operand about 10**5000; needed a num"),
     ("not representable, left", lambda: np.array([1, 257, 3]) * W, ValueError, "entry [1]: got the operand 257; neede"),
     ("not representable, ==", lambda: V == 0.1, ValueError, "got the operand 0.1; needed a number that"),
     ("no number", lambda: V + None, TypeError, "got None of type NoneType; needed a str, int, float, Decimal or Fract"),

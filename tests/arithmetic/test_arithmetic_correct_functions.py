@@ -222,7 +222,18 @@ def test_results_far_beyond_the_range_are_not_written_out() -> None:
     assert np.exp(FixedFormat(9, 4, overflow="saturate").array(400)).item() == FixedFormat(9, 4).largest
 
 
+@pytest.mark.parametrize("fmt", [FixedFormat(8, 8, overflow="wrap"), FixedFormat(30, 2, overflow="wrap")], ids=str)
+@pytest.mark.parametrize("x", [1, 50, 100, 120])
+def test_results_that_wrap_around_many_times(fmt: FixedFormat, x: int) -> None:
+    units = 1 << fmt.fraction_bits
+    with gmpy2.context(precision=600):
+        whole = int(gmpy2.floor(gmpy2.exp(x) * units + gmpy2.mpfr("0.5")))
+    half = 1 << (fmt.integer_bits + fmt.fraction_bits)
+    expected = Fraction((whole + half) % (2 * half) - half, units)
+    assert np.exp(fmt.array(x)).to_fractions() == expected
+
+
 def test_sums_that_no_precision_separates_from_a_tie_are_refused() -> None:
     fmt = FloatFormat(2, 24, Rounding.CHOP)
-    with pytest.raises(ValueError, match="needed an argument that is further from a tie"):
+    with pytest.raises(ValueError, match="needed an argument that is smaller, or further from a tie"):
         np.exp(fmt.array(Fraction(-1, 2**70000)))

@@ -23,7 +23,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.program import advance, innovation_program, loop_program, sequential_program
-from gpbnb.filters.run import Run
+from gpbnb.filters.run import Run, reference_states
 from gpbnb.filters.system import biquad, controller, state_space
 from gpbnb.report.guarantees import derivation
 from gpbnb.report.guarantees.published import fixif_longitudinal, nile_local_level
@@ -226,6 +226,27 @@ def test_a_periodic_model() -> None:
     assert found.schedule.period % 3 == 0
     outcome = attack(found, 300, 60, plans=4)
     assert 0.05 < outcome.ratio <= 1
+
+
+def test_the_history_holds_in_each_phase_of_a_periodic_model() -> None:
+    matrices = {"H": [[[1]], [["0.29"]]], "Q": [[["0.13"]], [[23]]], "R": [["0.028"]]}
+    model, fmt = LinearModel([["0.9"]], **matrices, x0=[0], P0=[[1]]), FloatFormat(10, 9, Rounding.CHOP)
+    found = guarantee(model, fmt, limits(1, 1, measurement=3.3), Form.HUNG)
+    period, count = found.schedule.steps - found.schedule.first, 400
+    assert (period, found.steps) == (2, None)
+    settled = found.history[-period:]
+    assert settled.max() > 1.5 * settled.min()  # so that bounds in the other order would be wrong
+    later = settled[np.arange(count - len(found.history)) % period]
+    bounds = np.concatenate([found.history, later])
+    worst = np.zeros(count)
+    for kind in range(20):
+        signs = np.random.default_rng(kind).choice([-1, 1], count) if kind > 1 else np.full(count, 1 - 2 * kind)
+        z = fmt.array([[f"{3.3 * sign:.1f}"] for sign in signs])
+        exactly = reference_states(model.rounded(fmt), z.to_fractions())
+        errors = (Run(model, fmt, Form.HUNG, ()).states(z) - exactly).sum(axis=2)
+        worst = np.maximum(worst, np.abs(errors[:, 0]))
+    assert (worst <= bounds[:, 0]).all()
+    assert worst.max() > settled.min()  # the bounds in the other order are exceeded
 
 
 def test_the_computed_covariance_repeats_digit_for_digit() -> None:
