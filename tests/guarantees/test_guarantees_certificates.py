@@ -45,6 +45,7 @@ SMALLEST, STEPS = "filters of one state in three to six bits", "single steps, co
 COMPUTED: dict[tuple[str, str], tuple[str, ...]] = {
     ("code.ipynb", "required_precision(cascade, 1, 0.1, basis='guarantee', within=within)"): (OUTPUTS,),
     ("code.ipynb", "required_precision(cascade, 1, 0.1, basis='guarantee', within=wider)"): (OUTPUTS,),
+    ("code.ipynb", "required_word_formats(scaled, inputs, 0.001, 'guarantee')"): (OUTPUTS,),
     ("guarantee.ipynb", "guarantee(tracker(), FloatFormat(2, 24), within)"): (TRACKER,),
     ("guarantee.ipynb", "('guarantee', 'probable')"): ("tracker within 0.01 m",),
     ("guarantee.ipynb", "guarantee(tracker(), FloatFormat(2, 24), wider)"): WIDER,
