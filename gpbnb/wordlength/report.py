@@ -35,7 +35,7 @@ from gpbnb.wordlength.fixed_point import Basis as FixedBasis
 from gpbnb.wordlength.judging import judge
 from gpbnb.wordlength.precision import largest_errors, required_precision
 from gpbnb.wordlength.ranges import binary_ranges
-from gpbnb.wordlength.requirement import Basis, WordlengthAnswer
+from gpbnb.wordlength.requirement import PROOFS, Basis, WordlengthAnswer
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms that a report compares; the requested form comes first."""
@@ -467,7 +467,8 @@ def page(report: Report) -> str:
     answer = digits_text(report.digits, base, kind) if report.digits is not None else "no precision that can be run"
     verdict = f"needs <strong>{html.escape(answer)}</strong> to keep rounding errors within the tolerance"
     if report.format:
-        verdict = f"{'keeps' if report.met else 'does not keep'} rounding errors within the tolerance in "
+        missed = "is not proved to keep" if report.answers[0].basis in PROOFS else "does not keep"
+        verdict = f"{'keeps' if report.met else missed} rounding errors within the tolerance in "
         verdict += f"<strong>{html.escape(report.format)}</strong>"
     limiting = ""
     if report.limiting is not None:

@@ -30,6 +30,9 @@ Found = TypeVar("Found")
 
 Basis = Literal["emulation", "bound", "guarantee", "probable"]
 
+PROOFS: tuple[Basis, ...] = ("bound", "guarantee")
+"""Bases on which an error has a proved bound; one above the tolerance does not prove that the error is, too."""
+
 
 @dataclass(frozen=True)
 class WordlengthAnswer(ABC):
@@ -192,6 +195,14 @@ def without_evidence(basis: Basis, steps: int, ends: bool = False) -> str:
     """Describe that an error has no number, as "in a run of 60 steps" or "without a guarantee for ever"."""
     text = _evidence(basis, ends)[1].format(_steps(steps))
     return text if basis == "emulation" else f"without {text.removeprefix('by ')}"
+
+
+def bound_in_words(basis: Basis, steps: int, ends: bool = False) -> str:
+    """Name a bound, or three times the probable error, as in "the bound on this run of 60 steps"."""
+    if basis == "guarantee":
+        return f"the guaranteed bound for {_steps(steps) if ends else 'ever'}"
+    text = _evidence(basis, ends)[1].format(_steps(steps)).removeprefix("by ")
+    return f"the {text.removeprefix('a ')}" if basis == "bound" else text
 
 
 def _steps(count: int) -> str:
