@@ -29,6 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(report.text, flush=True)
     if report.mixed:
         print(report.mixed, flush=True)
+    if report.shortest:
+        print(report.shortest, flush=True)
     try:
         option = f"--report {given.report}"
         if given.report:

@@ -32,7 +32,7 @@ from gpbnb.wordlength.blocks import (
 )
 from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.judging import Judgement, judge
 from gpbnb.wordlength.precision import largest_errors, required_precision
 from gpbnb.wordlength.ranges import binary_ranges
 from gpbnb.wordlength.requirement import PROOFS, Basis, WordlengthAnswer
@@ -84,6 +84,8 @@ class Report:
     structure : structure that gives the answer for a digital filter or a constant gain; empty for another model.
     lacking : structures that the filter does not have, each with the reason.
     stored : what storing the coefficients does to a linear system at the answer; empty for another model.
+    shortest : structure that needs fewer digits than the answer, or that meets the tolerance where there is no answer,
+        and how to ask for it; empty if there is none.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Report:
     structure: str = ""
     lacking: dict[str, str] = field(default_factory=dict)
     stored: str = ""
+    shortest: str = ""
 
     @property
     def limiting(self) -> int | None:
@@ -337,6 +340,7 @@ def study(
         structure=first.structure,
         lacking=dict(asked.lacking),
         stored=stored,
+        shortest=_shorter(found, main),
     )
 
 
@@ -368,6 +372,21 @@ def _fewest(
         return answer.fmt.precision, dict(answer.tried)[answer.digits]
 
     return min(met or of_basis[:1], key=cost)
+
+
+def _shorter(found: Sequence[tuple[_Part, WordlengthAnswer]], answer: WordlengthAnswer) -> str:
+    """Name the structure that needs fewer digits than an answer, or that meets the tolerance where it does not."""
+    part, best = _fewest(found)
+    if not (part.structure and best.met and best.fmt is not None and best is not answer):
+        return ""
+    if answer.met and answer.fmt is not None and best.fmt.precision >= answer.fmt.precision:
+        return ""
+    named = f'{part.structure}, {{}} (structure = "{part.structure}", or "all")'
+    if isinstance(best, Judgement):
+        return named.format(f"which meets the tolerance in {format_text(best.fmt)}")
+    if isinstance(best.fmt, FixedFormat):
+        return "shortest: " + named.format(f"word of {1 + best.fmt.precision} bits")
+    return "fewest digits: " + named.format(digits_text(best.fmt.precision, best.fmt.base))
 
 
 def _digits_of_blocks(found: BlockRequirement) -> tuple[tuple[str, int | None, int | None], ...]:
@@ -485,6 +504,7 @@ def page(report: Report) -> str:
         f"<h1>Wordlength for {html.escape(report.name)}</h1>",
         f'<p class="answer">This {report.kind} {verdict}.</p>',
         f"<p>{html.escape(report.text)}.</p>",
+        f"<p>{html.escape(report.shortest[:1].upper() + report.shortest[1:])}.</p>" if report.shortest else "",
         f"<p>At this answer, {html.escape(report.stored)}.</p>" if report.stored else "",
         limiting,
         "<h2>Basis of the answer</h2>",

@@ -38,7 +38,7 @@ P0 = [[100, 0], [0, 100]]
 """
 MATRICES = {"A": [["0.5", 0], [0, "0.25"]], "B": [[1], [1]]}
 
-ANSWERED = SimpleNamespace(text="21 digits", mixed="", digits=21, met=True)
+ANSWERED = SimpleNamespace(text="21 digits", mixed="", shortest="", digits=21, met=True)
 
 
 @pytest.fixture

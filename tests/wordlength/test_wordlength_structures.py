@@ -63,6 +63,37 @@ def test_of_all_structures_the_one_with_the_fewest_digits_answers_and_is_written
     assert json.loads(proof.read_text(encoding="utf-8"))["format"]["precision"] == guaranteed
 
 
+def test_the_last_line_names_a_structure_that_needs_fewer_digits_or_alone_meets_the_tolerance(filters, capsys):
+    path, report = filters / "direct.toml", filters / "report.html"
+    path.write_text(f"b = {B.tolist()}\na = {A.tolist()}\n", encoding="utf-8")
+    given = [str(path), "--tolerance", "0.001", "--measurements", str(filters / "u.csv"), "--basis", "emulation"]
+
+    def last(*options):
+        status = main([*given, *options, "--report", str(report)])
+        shown, found = capsys.readouterr().out.splitlines(), json.loads(report.with_suffix(".json").read_text())
+        assert (found["shortest"] or found["text"]) == shown[-1]
+        digits = {each["label"].removesuffix(", emulation"): each["digits"] for each in found["answers"]}
+        return status, shown[-1], digits
+
+    status, line, digits = last()
+    fewest = min(digits, key=digits.get)
+    assert status == 0
+    assert digits[fewest] < digits["direct form II transposed"]
+    assert line == f'fewest digits: {fewest}, {digits[fewest]} bits (structure = "{fewest}", or "all")'
+    assert f"<p>Fewest digits: {fewest}, " in report.read_text(encoding="utf-8")
+    status, line, digits = last("--format", "BINARY16")
+    assert status == 1
+    assert digits["direct form II transposed"] is None
+    assert line.endswith('", or "all")')
+    assert ", which meets the tolerance in BINARY16 (structure = " in line
+    status, line, digits = last("--fixed", "--coefficients", "10")
+    assert status == 1
+    assert digits["direct form II transposed"] is None
+    assert line.startswith("shortest: balanced state space, word of ")
+    path.write_text(f'structure = "{fewest}"\n' + path.read_text(encoding="utf-8"), encoding="utf-8")
+    assert last()[1].startswith(f"{fewest}: ")
+
+
 def test_structures_that_a_filter_lacks_are_named_with_the_reason(filters, capsys):
     path, report = filters / "oscillator.toml", filters / "report.html"
     path.write_text("b = [1]\na = [1, 0, 1]\n", encoding="utf-8")
