@@ -52,6 +52,7 @@ COEFFICIENT_BITS = 15
 """Significant bits of a coefficient if none are given, as in a word of 16 bits."""
 LONGEST_COEFFICIENT = 53
 """Significant bits of a coefficient up to which more of them are tried where the coefficients limit a filter."""
+_SCALED = "with its sections scaled by powers of two (scale=True; in a TOML file, scale = true beside sos)"
 _MORE_INTEGER_BITS = 16
 """Integer bits beyond those of a run that a guarantee may need."""
 
@@ -488,11 +489,11 @@ class _Outputs(_Strategy):
         words = None if found.fmt is None else other.words(found.fmt)
         if words is None:
             limit = "" if fmt is not None else other.blame(largest)
-            return limit and f"with its sections scaled by powers of two (scale=True), {limit}"
+            return limit and f"{_SCALED}, {limit}"
         if fmt is not None and words.data.precision >= fmt.precision:
             return ""
         fraction, word = digits_text(words.data.fraction_bits, kind="fraction"), 1 + words.data.precision
-        return f"with its sections scaled by powers of two (scale=True), {fraction} in a word of {word} bits are enough"
+        return f"{_SCALED}, {fraction} in a word of {word} bits are enough"
 
 
 class _Runs(_Strategy):

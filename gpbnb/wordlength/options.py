@@ -35,7 +35,8 @@ The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps 
 B and u (or --inputs) and known offsets b of the states and d of the measurements. A digital filter has b and a, or sos,
 and perhaps structure, such as "direct form I", "cascade of direct form II transposed", "lattice" or "all"; its
 structures are compared side by side, and with "all", the one that needs the fewest digits (in fixed point, the
-shortest word) gives the answer and the code. Numbers are read as decimals.
+shortest word) gives the answer and the code. Beside sos, there may be pairing, order, and scale = true, which scales
+the sections of a cascade by powers of two. Numbers are read as decimals.
 With --form "constant gain", a Kalman filter is the linear system with the gain that it approaches; its inputs are the
 measurements.
 The file may name states, measurements, inputs and outputs, each with its unit: states = ["tilt (°)", "rate (°/s)"].

@@ -100,7 +100,8 @@ def test_a_cascade_says_what_scaling_its_sections_saves(basis):
     found, best = (required_fraction_bits(each, u, 1e-4, basis, coefficient_bits=24) for each in (given, scaled))
     word = 1 + best.fmt.precision
     assert word < found.fmt.precision - 10
-    saved = f"(scale=True), {best.fmt.fraction_bits} fraction bits in a word of {word} bits are enough"
+    how = "(scale=True; in a TOML file, scale = true beside sos)"
+    saved = f"{how}, {best.fmt.fraction_bits} fraction bits in a word of {word} bits are enough"
     assert str(found).count(f"; with its sections scaled by powers of two {saved}") == 1
     assert best.advice == ""
 
@@ -110,7 +111,10 @@ def test_a_cascade_without_an_answer_says_whether_scaling_gives_one():
     found = required_fraction_bits(LinearSystem.from_sections(sos), u, 1e-6, coefficient_bits=40)
     assert found.fmt is None
     best = required_fraction_bits(LinearSystem.from_sections(sos, scale=True), u, 1e-6, coefficient_bits=40)
-    assert f"(scale=True), {best.fmt.fraction_bits} fraction bits in a word of" in str(found)
+    assert (
+        f"(scale=True; in a TOML file, scale = true beside sos), {best.fmt.fraction_bits} fraction bits in a word of"
+        in str(found)
+    )
     assert "scale" not in str(required_fraction_bits(LOW_PASS, np.ones((50, 1)), 1e-30))
 
 

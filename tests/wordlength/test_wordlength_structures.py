@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, run_words
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.fixed_point import required_fraction_bits, with_fraction_bits
-from gpbnb.wordlength.models import read_filter, read_model
+from gpbnb.wordlength.models import DESIGN, read_filter, read_model
 
 SOS = signal.butter(4, 0.1, output="sos")
 B, A = signal.butter(4, 0.1)
@@ -115,6 +116,13 @@ def test_the_command_reads_its_file_once(filters, monkeypatch):
     monkeypatch.setattr(Path, "read_bytes", noted)
     main([str(filters / "sections.toml"), "--tolerance", "0.01", "--simulate", "step", "--steps", "20"])
     assert read.count("sections.toml") == 1
+
+
+def test_the_help_names_every_key_of_a_digital_filter(capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main(["--help"])
+    shown = re.findall(r"\w+", capsys.readouterr().out.partition("A digital filter has ")[2].partition("\nWith ")[0])
+    assert {*DESIGN} <= {*shown}
 
 
 def test_a_file_names_its_structure_or_all(filters):
