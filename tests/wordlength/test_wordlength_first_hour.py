@@ -214,6 +214,24 @@ def test_an_overflow_names_the_numbers_that_are_too_large():
     assert "coefficient b0: got a result of about 1" in str(judge(sections, FixedFormat(0, 15), 2, 1, z=[[0], [0]]))
 
 
+def test_fraction_bits_of_a_kalman_filter_end_with_the_compiled_loops():
+    """So that the answer says what is wrong with the integer bits, and not that there are no more loops."""
+    tracker = LinearModel(
+        [[1, "0.1"], [0, 1]], [[1, 0]], [["1e-4", 0], [0, "0.01"]], [["0.01"]], [0, 0], np.eye(2) * 99
+    )
+    z = np.arange(20).reshape(-1, 1) / 100
+    found = required_fraction_bits(tracker, z, 1e-2, like=FixedFormat(8, 8), form="UD")
+    assert not found.met
+    assert max(digits for digits, _ in found.tried) == 43
+    reason = emulate(tracker, z, FixedFormat(8, 20), "UD").reason
+    assert "use more integer bits" in reason
+    most = "43 fraction bits are the most with compiled loops"
+    assert found.why == f"43 fraction bits fail: the run is refused: {reason}; {most}"
+    assert required_fraction_bits(tracker, z, 1e-2, like=FixedFormat(30, 8), form="UD").met
+    with pytest.raises(ValueError, match="got 60 bits in fixed point; needed at most 51 for compiled loops"):
+        required_fraction_bits(tracker, z, 1e-2, like=FixedFormat(60, 8), form="UD")
+
+
 def test_a_format_too_small_for_the_model_misses_by_a_guarantee_as_by_emulation():
     wide = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [["1e6"]])
     found = judge(wide, BINARY16, 2, 1, basis="guarantee", within=limits(1, 1, 10, 10))
