@@ -19,6 +19,9 @@ from gpbnb.sweeps.numbers import plain_integer, plain_number
 BASES = ("emulation", "bound", "guarantee", "probable")
 """What an answer may be based on, as in ``gpbnb.wordlength.requirement.Basis``."""
 
+FIXED_BASES = ("emulation", "guarantee")
+"""What an answer in fixed point may be based on."""
+
 BASES_OF_NUMBERS = (2, 10, 16)
 """Bases of the formats that are searched."""
 
@@ -207,12 +210,21 @@ def _check(given: argparse.Namespace) -> None:
     if given.level is not None and not given.simulate:
         raise ValueError(f"got --level without --simulate; needed --simulate with one of {', '.join(SIGNALS)}")
     if given.fixed:
-        others = [
-            f"--{name}" for name in ("format", "digits", "base", "emin", "emax", "certificate") if getattr(given, name)
-        ]
-        if others or {"bound", "probable"} & {*(given.basis or ())}:
-            needed = "it without these, and the bases emulation and guarantee"
-            raise ValueError(f"got --fixed with {', '.join(others) or '--basis bound or probable'}; needed {needed}")
+        if given.certificate:
+            raise ValueError(
+                "got --fixed and --certificate; needed floating point for a certificate, since its checker covers no "
+                "fixed point; leave out one of the two"
+            )
+        names = ("format", "digits", "base", "emin", "emax")
+        if others := [f"--{name}" for name in names if getattr(given, name) is not None]:
+            raise ValueError(
+                f"got --fixed and {', '.join(others)}; needed --fixed alone, which searches the fraction bits; to "
+                "judge one format, leave out --fixed and write --format Q15 or --format 'fixed 4.12'"
+            )
+        if others := [f"--basis {each}" for each in given.basis or () if each not in FIXED_BASES]:
+            raise ValueError(
+                f"got --fixed and {', '.join(others)}; needed --basis emulation or guarantee, the bases of fixed point"
+            )
     if given.coefficients is not None:
         if given.mixed or not given.fixed:
             raise ValueError(
