@@ -56,7 +56,7 @@ class Judgement(WordlengthAnswer):
         return self.ratio <= 1
 
     def __str__(self) -> str:
-        name, times = _format_in_words(self.fmt), f"{self.ratio:.3g} times"
+        name, times = format_in_words(self.fmt), f"{self.ratio:.3g} times"
         missed = f"nothing is proved for {name}" if self.basis in PROOFS else f"{name} misses the tolerance"
         how = evidence(self.basis, self.steps, self.ends)
         if math.isinf(self.ratio):
@@ -70,7 +70,7 @@ class Judgement(WordlengthAnswer):
         return "; ".join([verdict, *self.warnings])
 
 
-def _format_in_words(fmt: FloatFormat | FixedFormat) -> str:
+def format_in_words(fmt: FloatFormat | FixedFormat) -> str:
     """Describe a format as the subject of a sentence, such as "16-bit fixed point (15 fraction bits)"."""
     if not isinstance(fmt, FixedFormat):
         return format_text(fmt)

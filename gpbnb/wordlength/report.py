@@ -23,6 +23,7 @@ from gpbnb.filters.named import form_named
 from gpbnb.filters.poles import stored_response
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.words import WordFormats
 from gpbnb.sweeps import machine
 from gpbnb.wordlength.blocks import (
     BlockRequirement,
@@ -32,7 +33,7 @@ from gpbnb.wordlength.blocks import (
 )
 from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.judging import Judgement, judge
+from gpbnb.wordlength.judging import Judgement, format_in_words, judge
 from gpbnb.wordlength.precision import largest_errors, required_precision
 from gpbnb.wordlength.ranges import binary_ranges
 from gpbnb.wordlength.requirement import PROOFS, Basis, WordlengthAnswer
@@ -349,8 +350,10 @@ def _stored(system: LinearSystem | None, answer: WordlengthAnswer) -> str:
     fmt = answer.stored
     if system is None or fmt is None or not system.as_filter().program.is_linear:
         return ""
+    kept = fmt if not isinstance(fmt, WordFormats) else fmt.coefficients or fmt.data
+    words = digits_text(kept, kind="significant") if isinstance(kept, int) else format_in_words(kept)
     try:
-        return str(stored_response(system, fmt))
+        return str(stored_response(system, fmt)._replace(format=words))
     except (ValueError, OverflowError):  # a filter that is not stable has no response
         return ""
 

@@ -95,6 +95,24 @@ def test_the_last_line_names_a_structure_that_needs_fewer_digits_or_alone_meets_
     assert last()[1].startswith(f"{fewest}: ")
 
 
+@pytest.mark.parametrize(
+    ("options", "stored"),
+    [
+        (["--fixed", "--coefficients", "9"], "9 significant bits"),
+        (["--digits", "12"], "12 bits"),
+        (["--format", "BINARY16"], "BINARY16"),
+        (["--format", "fixed 3.12"], "16-bit fixed point (12 fraction bits)"),
+    ],
+)
+def test_the_answer_names_only_the_format_of_the_coefficients_that_move_the_largest_pole(
+    options, stored, tmp_path, capsys
+):
+    path = tmp_path / "pole.toml"
+    path.write_text('b = ["0.1"]\na = [1, "-0.9"]\n', encoding="utf-8")
+    assert main([str(path), "--tolerance", "1", "--simulate", "step", "--basis", "emulation", *options]) == 0
+    assert f": coefficients stored in {stored} move the largest pole from size 0.9 to " in capsys.readouterr().err
+
+
 def test_structures_that_a_filter_lacks_are_named_with_the_reason(filters, capsys):
     path, report = filters / "oscillator.toml", filters / "report.html"
     path.write_text("b = [1]\na = [1, 0, 1]\n", encoding="utf-8")
