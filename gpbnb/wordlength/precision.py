@@ -106,8 +106,8 @@ def required_precision(
         requires more digits. "guarantee" bounds the error for every measurement sequence within limits; the bound
         holds for ever, or for `steps` steps if the filter never forgets its errors. "probable" takes three standard
         deviations of the error that independent roundings would cause. The last two do not depend on `z`; for them,
-        the search checks only the precisions next to the answer. Both assume sums from left to right without fused
-        multiply-add, and refuse stochastic rounding of a Kalman filter.
+        the search checks only the precisions next to the answer, and then that of binary32 or binary64. Both assume
+        sums from left to right without fused multiply-add, and refuse stochastic rounding of a Kalman filter.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.bounds.guarantee.limits`.
     emin, emax, subnormal : range of the formats, as in a :class:`gpbnb.arithmetic.formats.FloatFormat`; by default

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, Protocol, TypeVar, get_args
 
 import numpy as np
@@ -97,8 +97,8 @@ class Requirement(WordlengthAnswer):
     ends : whether the guarantee holds only for the steps asked for, because no precision has a guarantee for ever.
     untraced : why a function ran operation by operation, and not in compiled code; empty if it did not.
     processors : the largest error / tolerance of a run in binary32, and in binary64 if binary32 has too few bits or
-        misses the tolerance. Empty if no run was made: in another base, with directed rounding or a given range, and
-        for bounds, which hold for ties to even, too.
+        misses the tolerance. For a bound, which holds for ties to even, too, the bound / tolerance in their digits,
+        where `tried` has none. Empty in another base, with directed rounding or a given range.
     base : base of the formats tried.
     """
 
@@ -142,7 +142,8 @@ class Requirement(WordlengthAnswer):
             return f"no precision up to {most} {met} {by_evidence}{why}{end}"
         tried = dict(self.tried)
         why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
-        named = [f"{name} misses the tolerance: {ratio:.2g}" for name, ratio in self.processors if not ratio <= 1]
+        runs = self.processors if self.basis == "emulation" else ()
+        named = [f"{name} misses the tolerance: {ratio:.2g}" for name, ratio in runs if not ratio <= 1]
         named += [f"{self.processor_format} is enough"] if self.processor_format else []
         on_processors = f" ({'; '.join(named)})" if named else ""
         share = f"{tried[self.fmt.precision]:.2g} of the tolerance"
@@ -158,9 +159,9 @@ class Requirement(WordlengthAnswer):
         """
         if self.basis == "emulation":
             return next((name for name, ratio in self.processors if ratio <= 1), "")
-        ratios = dict(self.tried)
-        enough = (name for name, each in _on_processors(self.fmt) if ratios.get(each.precision, math.inf) <= 1)
-        return next(enough, "")
+        ratios, more = dict(self.tried), dict(self.processors)
+        formats = _on_processors(self.fmt)
+        return next((n for n, each in formats if ratios.get(each.precision, more.get(n, math.inf)) <= 1), "")
 
 
 def _on_processors(fmt: FloatFormat | None) -> tuple[tuple[str, FloatFormat], ...]:
@@ -315,7 +316,7 @@ class Asked(NamedTuple):
             cause,
             ends,
             untraced,
-            self._run_on_processors(found) if self.basis == "emulation" else (),
+            self._run_on_processors(found) if self.basis == "emulation" else self._bounds_on_processors(found),
             self.like.base,
         )
 
@@ -327,6 +328,20 @@ class Asked(NamedTuple):
                 ratio, _ = found.error(fmt)
                 runs.append((name, ratio))
         return tuple(runs)
+
+    def _bounds_on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:
+        """Bound the error in the digits of binary32, and of binary64 if these are not enough, where none was tried."""
+        tried, bounds = dict(found.tried), list[tuple[str, float]]()
+        for name, fmt in _on_processors(found.fmt):
+            if fmt.precision > found.largest:
+                break
+            ratio = tried.get(fmt.precision, math.nan)
+            if fmt.precision not in tried:
+                ratio, _ = found.error(replace(self.like, precision=fmt.precision))
+                bounds.append((name, ratio))
+            if ratio <= 1:
+                break
+        return tuple(bounds)
 
 
 def listed(numbers: Sequence[int]) -> str:

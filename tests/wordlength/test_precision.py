@@ -15,7 +15,8 @@ from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
-from gpbnb.bounds.guarantee import limits
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel, real_numbers
@@ -240,6 +241,23 @@ def test_an_answer_holds_in_every_step(form, steps):
         history = emulate(given, z, FloatFormat(2, digits), form, every, true)
         if not history.indefinite and not history.stopped:
             assert (np.abs(history.state) / tolerance).max() == pytest.approx(ratio, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("basis", ["guarantee", "probable"])
+def test_a_bound_for_ever_of_a_kalman_filter_names_the_processor_format_that_is_enough(basis):
+    """Above an answer of few bits, the search itself tries no format of a processor."""
+    walk = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
+    within = limits(1, 1, 10, 3)
+    for tolerance, bits, name in ((0.01, 24, "binary32"), (1e-9, 53, "binary64")):
+        found = required_precision(walk, 50, tolerance, basis=basis, within=within)
+        assert bits not in dict(found.tried)
+        assert found.fmt.precision < bits - 1
+        bound = guarantee(walk, replace(found.fmt, precision=bits), within, horizon=1)
+        error = bound.bound if basis == "guarantee" else 3 * probable_error(bound)
+        assert found.processors == ((name, pytest.approx(float(error[0]) / tolerance)),)
+        assert str(found).startswith(f"{found.precision} bits ({name} is enough): ")
+    assert required_precision(walk, 50, 0.01, basis=basis, within=within, largest=20).processors == ()
+    assert required_precision(walk, 50, 0.01, rounding="chop", basis=basis, within=within).processors == ()
 
 
 def test_masked_inputs_are_refused():
