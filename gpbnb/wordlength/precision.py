@@ -139,7 +139,7 @@ def required_precision(
     model = model_or_function(model)
     if not isinstance(model, LinearModel | NonlinearModel) and form is not Form.INNOVATION:
         raise ValueError(f"got the {form} form; needed none: only a LinearModel or a NonlinearModel has forms")
-    asked = Asked(whole_number("steps", steps), basis, like, largest, progress)
+    asked = Asked(_checked_steps(steps), basis, like, largest, progress)
     if callable(model):
         if within is not None:
             raise ValueError("got limits for a function; needed none: they are for models")
@@ -156,6 +156,17 @@ def required_precision(
     if z is None:
         z = simulated(model, asked.steps, whole_number("seed", seed, 0))
     return _for_record(model, asked, tolerances, form, z)
+
+
+def _checked_steps(steps: Any) -> int:
+    """Check the number of steps, and tell measurements in its place by their shape."""
+    shape = (len(steps),) if isinstance(steps, list | tuple) else np.shape(steps)
+    if shape:
+        raise ValueError(
+            f"got steps of shape {shape}; needed a whole number; pass measurements by name: "
+            "required_precision(model, steps, tolerance, z=z)"
+        )
+    return whole_number("steps", steps)
 
 
 def _for_record(model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], form: AnyForm, z: Any) -> Requirement:

@@ -374,9 +374,8 @@ def checked_tolerance(tolerance: Any, count: int, what: str, basis: str) -> NDAr
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"got tolerance {tolerance!r}; {needed}") from None
     if tolerances.shape not in ((), (count,)):
-        raise ValueError(
-            f"got tolerance {tolerance} of shape {tolerances.shape}; {needed}: one number, or {count} in a row"
-        )
+        got = f"tolerance {tolerance}" if tolerances.size <= 2 * count else "a tolerance"
+        raise ValueError(f"got {got} of shape {tolerances.shape}; {needed}: one number, or {count} in a row")
     if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
         raise ValueError(f"got tolerance {tolerance}; {needed}")
     if not isinstance(basis, str) or basis not in get_args(Basis):

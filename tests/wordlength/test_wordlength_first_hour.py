@@ -185,6 +185,16 @@ def test_a_digital_filter_has_named_inputs_and_outputs():
             lambda: required_fraction_bits(SYSTEM, [[1]], 1, form="UD"),
             "got the UD form; needed none: only a LinearModel or a NonlinearModel has forms",
         ),
+        (
+            lambda: required_precision(WALK, np.ones((1000, 1)), 1),
+            r"^got steps of shape \(1000, 1\); needed a whole number; pass measurements by name: required_precision\(",
+        ),
+        (lambda: required_precision(WALK, [[0.5]] * 1000, 1), r"^got steps of shape \(1000,\); needed a whole number"),
+        (
+            lambda: required_precision(WALK, 5, np.ones((1000, 1))),
+            r"^got a tolerance of shape \(1000, 1\); needed an error above 0 for each of the 1 states, one finite: one",
+        ),
+        (lambda: required_precision(WALK, 5, [1, 2]), r"^got tolerance \[1, 2\] of shape \(2,\); needed"),
         (lambda: required_precision(lambda: 1, 5, 1), "got a function that does not take .*fmt.*: .*; needed f.fmt."),
         (lambda: required_precision(lambda f, z: 1, 5, 1), "got a function that does not take .*; needed f.fmt.* z="),
         (lambda: FloatFormat(2, 8, emin=-5, emax=5, subnormal="no"), "subnormal: got 'no'; needed True or False"),
