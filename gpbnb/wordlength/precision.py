@@ -177,10 +177,16 @@ def _for_record(model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], 
         found = search(strategy)
         irregular = found.irregular or found.fmt is None
         advice = _better_form(strategy, search) if irregular else ""
-    if found.fmt is None and isinstance(sound, LinearModel) and sound.cycle == 1:
-        cause = unobserved(sound.Phi[0], sound.H[0], sound.state_names)
+    remedy = ""
+    if found.fmt is None and isinstance(sound, LinearModel):
+        cause = unobserved(sound.Phi[0], sound.H[0], sound.state_names) if sound.cycle == 1 else ""
+        remedy = "" if advice or cause else asked.in_more_digits(found)
+        if remedy:
+            advice = (
+                f"{digits_text(found.tried[-1][0], asked.like.base)} give {found.tried[-1][1]:.3g} times the tolerance"
+            )
         advice = "; ".join(filter(None, [advice, cause and f"{cause}, so that its errors never decay"]))
-    return asked.answer(found, form, advice, _repairs(model, sound, found.fmt, form))
+    return asked.answer(found, form, advice, _repairs(model, sound, found.fmt, form), remedy=remedy)
 
 
 def _for_ever(

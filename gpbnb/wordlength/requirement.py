@@ -19,7 +19,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.arithmetic.search import Outcome, Search
+from gpbnb.arithmetic.search import Outcome, Search, largest_by_default, largest_compiled
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.words import WordFormats
 
@@ -100,6 +100,7 @@ class Requirement(WordlengthAnswer):
         misses the tolerance. For a bound, which holds for ties to even, too, the bound / tolerance in their digits,
         where `tried` has none. Empty in another base, with directed rounding or a given range.
     base : base of the formats tried.
+    remedy : what runs in more digits than the search tried, if no precision meets the tolerance.
     """
 
     fmt: FloatFormat | MaybeNone
@@ -114,6 +115,7 @@ class Requirement(WordlengthAnswer):
     untraced: str = ""
     processors: tuple[tuple[str, float], ...] = ()
     base: int = 2
+    remedy: str = ""
 
     @property
     def precision(self) -> int | MaybeNone:
@@ -128,6 +130,8 @@ class Requirement(WordlengthAnswer):
         if self.advice:
             notes.append(self.advice)
         notes += self.warnings
+        if self.remedy:
+            notes.append(self.remedy)
         if self.untraced:
             notes.append(f"the function ran operation by operation: {self.untraced}")
         end = "".join(f"; {note}" for note in notes)
@@ -295,6 +299,7 @@ class Asked(NamedTuple):
         ends: bool = False,
         untraced: str = "",
         warnings: tuple[str, ...] = (),
+        remedy: str = "",
     ) -> Requirement:
         """Return the result of a search as the answer."""
         if found.undecided and not advice:
@@ -318,6 +323,18 @@ class Asked(NamedTuple):
             untraced,
             self._run_on_processors(found) if self.basis == "emulation" else self._bounds_on_processors(found),
             self.like.base,
+            remedy,
+        )
+
+    def in_more_digits(self, found: Search[FloatFormat]) -> str:
+        """Say what runs in more digits than a model, if the largest precision misses the tolerance in an emulation."""
+        ended = self.largest in (None, largest_compiled(self.like)) and 1 < found.tried[-1][1] < math.inf
+        if found.fmt is not None or self.basis != "emulation" or not ended:
+            return ""
+        most = digits_text(largest_by_default(self.like.base), self.like.base)
+        return (
+            "a filter written as a function of a format runs in more: required_precision(f, steps, tolerance, z=z), "
+            f"with f(fmt, z), tries up to {most}, and more with largest="
         )
 
     def _run_on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:

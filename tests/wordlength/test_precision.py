@@ -213,9 +213,29 @@ def test_no_precision_may_be_enough(model, base, most):
     words = {2: "53 bits", 16: "13 base-16 digits"}[base]
     assert str(found) == (
         f"no precision up to {words}, the most with compiled loops in base {base}, rounded nearest, meets the "
-        "tolerance in a run of 3 steps"
-        + (f"; {words} give {found.tried[-1][1]:.3g} times the tolerance" if model is not MODEL else "")
+        f"tolerance in a run of 3 steps; {words} give {found.tried[-1][1]:.3g} times the tolerance; a filter written "
+        "as a function of a format runs in more: required_precision(f, steps, tolerance, z=z), with f(fmt, z), tries "
+        f"up to { {2: '200 bits', 16: '50 base-16 digits'}[base] }, and more with largest="
     )
+    assert "function" not in str(required_precision(model, 3, 1e-30, base, z=Z[:3], largest=most - 1))
+    assert "function" not in str(required_precision(model, 3, 1e-30, base, z=Z[:3], basis="bound"))
+
+
+def test_a_function_runs_in_more_digits_than_its_model():
+    """The precision that the answer for a model without one suggests."""
+
+    def smoother(fmt, z):
+        keep, take, x, estimates = fmt.array("0.9"), fmt.array("0.1"), fmt.array(0), []
+        for value in z:
+            x = keep * x + take * value
+            estimates.append(x)
+        return estimates
+
+    system, z = LinearSystem([["0.9"]], [["0.1"]]), np.sin(np.arange(20))
+    assert not required_precision(system, 20, 1e-18, z=z.reshape(-1, 1)).met
+    found = required_precision(smoother, 20, 1e-18, z=z, largest=113)
+    assert 53 < found.precision < 113
+    assert "largest=" not in str(found)
 
 
 def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
