@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if other := uncovered(proof, code):
                 print(other)
         elif given.code:
-            print(f"{program}: no code, since no format meets the tolerance", file=sys.stderr)
+            print(f"{program}: no code, since no format is known to meet the tolerance", file=sys.stderr)
     except (ValueError, ArithmeticError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2
