@@ -17,29 +17,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         given = read(arguments)
         # These imports take a second, and help and refusals need none of them.
-        from gpbnb.wordlength.running import answer, certificate, read_files, write, write_code_of
+        from gpbnb.arithmetic.named import format_text
+        from gpbnb.wordlength.running import answer, certificate, read_files, uncovered, write, write_code_of
 
         asked = read_files(given)
         report = answer(asked, command, lambda text: print(text, file=sys.stderr, flush=True))
-        proof = certificate(asked, report) if given.certificate else ""
+        proof = certificate(asked, report) if given.certificate else None
     except (ValueError, OSError, ArithmeticError, ImportError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2
     print(report.text, flush=True)
     if report.mixed:
         print(report.mixed, flush=True)
+    if report.shortest:
+        print(report.shortest, flush=True)
     try:
         option = f"--report {given.report}"
         if given.report:
             write(report, given.report)
         option = f"--certificate {given.certificate}"
-        if given.certificate:
-            replace_file(given.certificate, proof.encode())
+        if proof is not None:
+            replace_file(given.certificate, proof.text.encode())
+            print(f"certificate: {given.certificate}, for {format_text(proof.fmt)}", flush=True)
         option = f"--code {given.code}"
         if given.code and report.met:
-            print("code:", *write_code_of(asked, report.structure))
+            code = write_code_of(asked, report.structure)
+            print("code:", *code.files)
+            if other := uncovered(proof, code):
+                print(other)
         elif given.code:
-            print(f"{program}: no code, since no format meets the tolerance", file=sys.stderr)
+            print(f"{program}: no code, since no format is known to meet the tolerance", file=sys.stderr)
     except (ValueError, ArithmeticError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2

@@ -22,7 +22,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text, rounding_named
-from gpbnb.arithmetic.search import Outcome, Search
+from gpbnb.arithmetic.search import Outcome, Search, largest_compiled
 from gpbnb.bounds.words import WordGuarantee, bounded_rounding, largest_rounding
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.forms import Form
@@ -52,6 +52,7 @@ COEFFICIENT_BITS = 15
 """Significant bits of a coefficient if none are given, as in a word of 16 bits."""
 LONGEST_COEFFICIENT = 53
 """Significant bits of a coefficient up to which more of them are tried where the coefficients limit a filter."""
+_SCALED = "with its sections scaled by powers of two (scale=True; in a TOML file, scale = true beside sos)"
 _MORE_INTEGER_BITS = 16
 """Integer bits beyond those of a run that a guarantee may need."""
 
@@ -240,7 +241,7 @@ def required_fraction_bits(
     TypeError : another kind of filter.
     ValueError : a tolerance is not above 0, no tolerance is finite, or the basis is neither of the two; inputs that do
         not fit; a guarantee for a function or a Kalman filter; a function or a Kalman filter without `like`; a `form`
-        for anything but a Kalman filter.
+        for anything but a Kalman filter; for a linear Kalman filter, more integer bits than compiled loops have.
     OverflowError : an output of a system as given is beyond the range of float64.
 
     Examples
@@ -272,6 +273,12 @@ def required_fraction_bits(
     else:
         strategy = _Runs(_of_runs(given, z, tolerance, basis, form, like).error, like)
     largest = LARGEST_FRACTION - 1
+    most = f"{largest} fraction bits are the most tried"
+    if isinstance(given, LinearModel):
+        replace(strategy.like, fraction_bits=strategy.least).check_compiled()
+        if (compiled := largest_compiled(strategy.like)) < largest:
+            largest = max(compiled, strategy.least)
+            most = f"{digits_text(largest, kind='fraction')} are the most with compiled loops"
     found = Search(strategy.error, strategy.like, (), largest=largest, least=strategy.least)
     ratios = dict(found.tried)
     if cause := strategy.cause():
@@ -284,7 +291,7 @@ def required_fraction_bits(
 
     if found.fmt is None:
         blame = strategy.blame(largest)
-        why = blame or f"{rejection(largest)}; {largest} fraction bits are the most tried"
+        why = blame or f"{rejection(largest)}; {most}"
         advice = "" if blame else strategy.advice(None)
         return FixedAnswer(None, basis, strategy.steps, found.tried, why, advice=advice)
     bits = found.fmt.fraction_bits
@@ -488,11 +495,11 @@ class _Outputs(_Strategy):
         words = None if found.fmt is None else other.words(found.fmt)
         if words is None:
             limit = "" if fmt is not None else other.blame(largest)
-            return limit and f"with its sections scaled by powers of two (scale=True), {limit}"
+            return limit and f"{_SCALED}, {limit}"
         if fmt is not None and words.data.precision >= fmt.precision:
             return ""
         fraction, word = digits_text(words.data.fraction_bits, kind="fraction"), 1 + words.data.precision
-        return f"with its sections scaled by powers of two (scale=True), {fraction} in a word of {word} bits are enough"
+        return f"{_SCALED}, {fraction} in a word of {word} bits are enough"
 
 
 class _Runs(_Strategy):

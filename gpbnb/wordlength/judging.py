@@ -8,7 +8,8 @@ from typing import Any, cast
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import format_text
+from gpbnb.arithmetic.named import format_text, rounding_text
+from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import check_limits
 from gpbnb.filters.forms import Form
@@ -17,10 +18,12 @@ from gpbnb.filters.named import compiled_form, form_named
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.precision import Guaranteed, Probable, survey_formats
 from gpbnb.wordlength.requirement import (
+    PROOFS,
     Asked,
     Basis,
     Strategy,
     WordlengthAnswer,
+    bound_in_words,
     checked_tolerance,
     evidence,
     for_ever_or_over,
@@ -53,11 +56,28 @@ class Judgement(WordlengthAnswer):
         return self.ratio <= 1
 
     def __str__(self) -> str:
+        name, times = format_in_words(self.fmt), f"{self.ratio:.3g} times"
+        missed = f"nothing is proved for {name}" if self.basis in PROOFS else f"{name} misses the tolerance"
         how = evidence(self.basis, self.steps, self.ends)
-        verdict = f"{format_text(self.fmt)} {'meets' if self.met else 'misses'} the tolerance"
         if math.isinf(self.ratio):
-            return f"{verdict}, {without_evidence(self.basis, self.steps, self.ends)}: {self.why}"
-        return "; ".join([f"{verdict}: {self.ratio:.2g} of it, {how}", *self.warnings])
+            return f"{missed}, {without_evidence(self.basis, self.steps, self.ends)}: {self.why}"
+        if self.met:
+            verdict = f"{name} meets the tolerance: {self.ratio:.2g} of it, {how}"
+        elif self.basis == "emulation":
+            verdict = f"{missed}: its error is {times} as large, {how}"
+        else:
+            verdict = f"{missed}: {bound_in_words(self.basis, self.steps, self.ends)} is {times} the tolerance"
+        return "; ".join([verdict, *self.warnings])
+
+
+def format_in_words(fmt: FloatFormat | FixedFormat) -> str:
+    """Describe a format as the subject of a sentence, such as "16-bit fixed point (15 fraction bits)"."""
+    if not isinstance(fmt, FixedFormat):
+        return format_text(fmt)
+    rounding = "" if fmt.rounding is Rounding.NEAREST else f", {rounding_text(fmt.rounding)}"
+    overflow = {"saturate": ", saturated", "wrap": ", wrapped around"}.get(fmt.overflow, "")
+    fraction = digits_text(fmt.fraction_bits, kind="fraction")
+    return f"{1 + fmt.precision}-bit fixed point ({fraction}{rounding}{overflow})"
 
 
 def judge(

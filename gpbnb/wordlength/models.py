@@ -346,7 +346,8 @@ def read_measurements(path: str | Path) -> NDArray[np.float64]:
     """Read measurements (steps, m) from a CSV file with a row for each step and a column for each measurement.
 
     Lines of text before the first numbers are headers, such as ``tilt (°)``. An empty cell or ``nan`` is a missing
-    measurement.
+    measurement. In a file with one column, a blank line between rows of numbers is an empty cell, too; blank lines
+    before the first number and after the last row are ignored, as are all those in a file with more columns.
 
     Raises
     ------
@@ -354,23 +355,29 @@ def read_measurements(path: str | Path) -> NDArray[np.float64]:
         UTF-8; the message has file and line.
     OSError : the file cannot be read.
     """
-    path, rows, first, begin = Path(path), list[list[float]](), list[str](), 0
+    path, rows, first, begin, blank = Path(path), list[list[float]](), list[str](), 0, 0
     written = set[int]()  # columns in which a cell is not empty
     reader = csv.reader(io.StringIO(_text(path), newline=""))
     try:
         for cells in ([cell.strip() for cell in each] for each in reader):
-            if not cells or cells[0].startswith("#"):
+            if not cells:
+                blank += 1
+                continue
+            if cells[0].startswith("#"):
                 continue
             _check_separator(cells)
             if not rows and _is_header(cells):
                 continue
             row = [_number(cell) for cell in cells]
             if not rows:
-                first, begin = cells, reader.line_num
+                first, begin, blank = cells, reader.line_num, 0
             elif len(cells) != len(first):
                 cure = "" if max(cells, first, key=len)[-1] else "; remove the comma at the end of the longer row"
                 raise ValueError(f"got {len(cells)} cells; needed {len(first)}, as in the rows above{cure}")
+            if len(first) == 1:
+                rows += [[math.nan]] * blank
             rows.append(row)
+            blank = 0
             written |= {i for i, cell in enumerate(cells) if cell}
     except (ValueError, csv.Error) as error:
         raise ValueError(f"{path.name}, line {reader.line_num}: {error}") from None

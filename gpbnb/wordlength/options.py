@@ -19,6 +19,9 @@ from gpbnb.sweeps.numbers import plain_integer, plain_number
 BASES = ("emulation", "bound", "guarantee", "probable")
 """What an answer may be based on, as in ``gpbnb.wordlength.requirement.Basis``."""
 
+FIXED_BASES = ("emulation", "guarantee")
+"""What an answer in fixed point may be based on."""
+
 BASES_OF_NUMBERS = (2, 10, 16)
 """Bases of the formats that are searched."""
 
@@ -35,7 +38,8 @@ The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps 
 B and u (or --inputs) and known offsets b of the states and d of the measurements. A digital filter has b and a, or sos,
 and perhaps structure, such as "direct form I", "cascade of direct form II transposed", "lattice" or "all"; its
 structures are compared side by side, and with "all", the one that needs the fewest digits (in fixed point, the
-shortest word) gives the answer and the code. Numbers are read as decimals.
+shortest word) gives the answer and the code. Beside sos, there may be pairing, order, and scale = true, which scales
+the sections of a cascade by powers of two. Numbers are read as decimals.
 With --form "constant gain", a Kalman filter is the linear system with the gain that it approaches; its inputs are the
 measurements.
 The file may name states, measurements, inputs and outputs, each with its unit: states = ["tilt (°)", "rate (°/s)"].
@@ -206,12 +210,21 @@ def _check(given: argparse.Namespace) -> None:
     if given.level is not None and not given.simulate:
         raise ValueError(f"got --level without --simulate; needed --simulate with one of {', '.join(SIGNALS)}")
     if given.fixed:
-        others = [
-            f"--{name}" for name in ("format", "digits", "base", "emin", "emax", "certificate") if getattr(given, name)
-        ]
-        if others or {"bound", "probable"} & {*(given.basis or ())}:
-            needed = "it without these, and the bases emulation and guarantee"
-            raise ValueError(f"got --fixed with {', '.join(others) or '--basis bound or probable'}; needed {needed}")
+        if given.certificate:
+            raise ValueError(
+                "got --fixed and --certificate; needed floating point for a certificate, since its checker covers no "
+                "fixed point; leave out one of the two"
+            )
+        names = ("format", "digits", "base", "emin", "emax")
+        if others := [f"--{name}" for name in names if getattr(given, name) is not None]:
+            raise ValueError(
+                f"got --fixed and {', '.join(others)}; needed --fixed alone, which searches the fraction bits; to "
+                "judge one format, leave out --fixed and write --format Q15 or --format 'fixed 4.12'"
+            )
+        if others := [f"--basis {each}" for each in given.basis or () if each not in FIXED_BASES]:
+            raise ValueError(
+                f"got --fixed and {', '.join(others)}; needed --basis emulation or guarantee, the bases of fixed point"
+            )
     if given.coefficients is not None:
         if given.mixed or not given.fixed:
             raise ValueError(

@@ -106,8 +106,8 @@ def required_precision(
         requires more digits. "guarantee" bounds the error for every measurement sequence within limits; the bound
         holds for ever, or for `steps` steps if the filter never forgets its errors. "probable" takes three standard
         deviations of the error that independent roundings would cause. The last two do not depend on `z`; for them,
-        the search checks only the precisions next to the answer. Both assume sums from left to right without fused
-        multiply-add, and refuse stochastic rounding of a Kalman filter.
+        the search checks only the precisions next to the answer, and then that of binary32 or binary64. Both assume
+        sums from left to right without fused multiply-add, and refuse stochastic rounding of a Kalman filter.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.bounds.guarantee.limits`.
     emin, emax, subnormal : range of the formats, as in a :class:`gpbnb.arithmetic.formats.FloatFormat`; by default
@@ -139,7 +139,7 @@ def required_precision(
     model = model_or_function(model)
     if not isinstance(model, LinearModel | NonlinearModel) and form is not Form.INNOVATION:
         raise ValueError(f"got the {form} form; needed none: only a LinearModel or a NonlinearModel has forms")
-    asked = Asked(whole_number("steps", steps), basis, like, largest, progress)
+    asked = Asked(_checked_steps(steps), basis, like, largest, progress)
     if callable(model):
         if within is not None:
             raise ValueError("got limits for a function; needed none: they are for models")
@@ -158,6 +158,17 @@ def required_precision(
     return _for_record(model, asked, tolerances, form, z)
 
 
+def _checked_steps(steps: Any) -> int:
+    """Check the number of steps, and tell measurements in its place by their shape."""
+    shape = (len(steps),) if isinstance(steps, list | tuple) else np.shape(steps)
+    if shape:
+        raise ValueError(
+            f"got steps of shape {shape}; needed a whole number; pass measurements by name: "
+            "required_precision(model, steps, tolerance, z=z)"
+        )
+    return whole_number("steps", steps)
+
+
 def _for_record(model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], form: AnyForm, z: Any) -> Requirement:
     """Find the answer for one measurement record, by emulation or by the bound of each run."""
     strategy = recorded_strategy(model, z, tolerances, form, asked.basis, asked.steps)
@@ -166,10 +177,16 @@ def _for_record(model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], 
         found = search(strategy)
         irregular = found.irregular or found.fmt is None
         advice = _better_form(strategy, search) if irregular else ""
-    if found.fmt is None and isinstance(sound, LinearModel) and sound.cycle == 1:
-        cause = unobserved(sound.Phi[0], sound.H[0], sound.state_names)
+    remedy = ""
+    if found.fmt is None and isinstance(sound, LinearModel):
+        cause = unobserved(sound.Phi[0], sound.H[0], sound.state_names) if sound.cycle == 1 else ""
+        remedy = "" if advice or cause else asked.in_more_digits(found)
+        if remedy:
+            advice = (
+                f"{digits_text(found.tried[-1][0], asked.like.base)} give {found.tried[-1][1]:.3g} times the tolerance"
+            )
         advice = "; ".join(filter(None, [advice, cause and f"{cause}, so that its errors never decay"]))
-    return asked.answer(found, form, advice, _repairs(model, sound, found.fmt, form))
+    return asked.answer(found, form, advice, _repairs(model, sound, found.fmt, form), remedy=remedy)
 
 
 def _for_ever(

@@ -23,6 +23,7 @@ from gpbnb.filters.named import form_named
 from gpbnb.filters.poles import stored_response
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.words import WordFormats
 from gpbnb.sweeps import machine
 from gpbnb.wordlength.blocks import (
     BlockRequirement,
@@ -32,10 +33,10 @@ from gpbnb.wordlength.blocks import (
 )
 from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.judging import Judgement, format_in_words, judge
 from gpbnb.wordlength.precision import largest_errors, required_precision
 from gpbnb.wordlength.ranges import binary_ranges
-from gpbnb.wordlength.requirement import Basis, WordlengthAnswer
+from gpbnb.wordlength.requirement import PROOFS, Basis, WordlengthAnswer
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms that a report compares; the requested form comes first."""
@@ -84,6 +85,8 @@ class Report:
     structure : structure that gives the answer for a digital filter or a constant gain; empty for another model.
     lacking : structures that the filter does not have, each with the reason.
     stored : what storing the coefficients does to a linear system at the answer; empty for another model.
+    shortest : structure that needs fewer digits than the answer, or that meets the tolerance where there is no answer,
+        and how to ask for it; empty if there is none.
     """
 
     name: str
@@ -112,6 +115,7 @@ class Report:
     structure: str = ""
     lacking: dict[str, str] = field(default_factory=dict)
     stored: str = ""
+    shortest: str = ""
 
     @property
     def limiting(self) -> int | None:
@@ -337,6 +341,7 @@ def study(
         structure=first.structure,
         lacking=dict(asked.lacking),
         stored=stored,
+        shortest=_shorter(found, main),
     )
 
 
@@ -345,8 +350,10 @@ def _stored(system: LinearSystem | None, answer: WordlengthAnswer) -> str:
     fmt = answer.stored
     if system is None or fmt is None or not system.as_filter().program.is_linear:
         return ""
+    kept = fmt if not isinstance(fmt, WordFormats) else fmt.coefficients or fmt.data
+    words = digits_text(kept, kind="significant") if isinstance(kept, int) else format_in_words(kept)
     try:
-        return str(stored_response(system, fmt))
+        return str(stored_response(system, fmt)._replace(format=words))
     except (ValueError, OverflowError):  # a filter that is not stable has no response
         return ""
 
@@ -368,6 +375,21 @@ def _fewest(
         return answer.fmt.precision, dict(answer.tried)[answer.digits]
 
     return min(met or of_basis[:1], key=cost)
+
+
+def _shorter(found: Sequence[tuple[_Part, WordlengthAnswer]], answer: WordlengthAnswer) -> str:
+    """Name the structure that needs fewer digits than an answer, or that meets the tolerance where it does not."""
+    part, best = _fewest(found)
+    if not (part.structure and best.met and best.fmt is not None and best is not answer):
+        return ""
+    if answer.met and answer.fmt is not None and best.fmt.precision >= answer.fmt.precision:
+        return ""
+    named = f'{part.structure}, {{}} (structure = "{part.structure}", or "all")'
+    if isinstance(best, Judgement):
+        return named.format(f"which meets the tolerance in {format_text(best.fmt)}")
+    if isinstance(best.fmt, FixedFormat):
+        return "shortest: " + named.format(f"word of {1 + best.fmt.precision} bits")
+    return "fewest digits: " + named.format(digits_text(best.fmt.precision, best.fmt.base))
 
 
 def _digits_of_blocks(found: BlockRequirement) -> tuple[tuple[str, int | None, int | None], ...]:
@@ -467,7 +489,8 @@ def page(report: Report) -> str:
     answer = digits_text(report.digits, base, kind) if report.digits is not None else "no precision that can be run"
     verdict = f"needs <strong>{html.escape(answer)}</strong> to keep rounding errors within the tolerance"
     if report.format:
-        verdict = f"{'keeps' if report.met else 'does not keep'} rounding errors within the tolerance in "
+        missed = "is not proved to keep" if report.answers[0].basis in PROOFS else "does not keep"
+        verdict = f"{'keeps' if report.met else missed} rounding errors within the tolerance in "
         verdict += f"<strong>{html.escape(report.format)}</strong>"
     limiting = ""
     if report.limiting is not None:
@@ -484,6 +507,7 @@ def page(report: Report) -> str:
         f"<h1>Wordlength for {html.escape(report.name)}</h1>",
         f'<p class="answer">This {report.kind} {verdict}.</p>',
         f"<p>{html.escape(report.text)}.</p>",
+        f"<p>{html.escape(report.shortest[:1].upper() + report.shortest[1:])}.</p>" if report.shortest else "",
         f"<p>At this answer, {html.escape(report.stored)}.</p>" if report.stored else "",
         limiting,
         "<h2>Basis of the answer</h2>",

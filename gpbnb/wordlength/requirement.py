@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, Protocol, TypeVar, get_args
 
 import numpy as np
@@ -19,7 +19,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.arithmetic.search import Outcome, Search
+from gpbnb.arithmetic.search import Outcome, Search, largest_by_default, largest_compiled
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.words import WordFormats
 
@@ -29,6 +29,9 @@ ANY_BINARY = FloatFormat(2, 2)
 Found = TypeVar("Found")
 
 Basis = Literal["emulation", "bound", "guarantee", "probable"]
+
+PROOFS: tuple[Basis, ...] = ("bound", "guarantee")
+"""Bases on which an error has a proved bound; one above the tolerance does not prove that the error is, too."""
 
 
 @dataclass(frozen=True)
@@ -94,9 +97,10 @@ class Requirement(WordlengthAnswer):
     ends : whether the guarantee holds only for the steps asked for, because no precision has a guarantee for ever.
     untraced : why a function ran operation by operation, and not in compiled code; empty if it did not.
     processors : the largest error / tolerance of a run in binary32, and in binary64 if binary32 has too few bits or
-        misses the tolerance. Empty if no run was made: in another base, with directed rounding or a given range, and
-        for bounds, which hold for ties to even, too.
+        misses the tolerance. For a bound, which holds for ties to even, too, the bound / tolerance in their digits,
+        where `tried` has none. Empty in another base, with directed rounding or a given range.
     base : base of the formats tried.
+    remedy : what runs in more digits than the search tried, if no precision meets the tolerance.
     """
 
     fmt: FloatFormat | MaybeNone
@@ -111,6 +115,7 @@ class Requirement(WordlengthAnswer):
     untraced: str = ""
     processors: tuple[tuple[str, float], ...] = ()
     base: int = 2
+    remedy: str = ""
 
     @property
     def precision(self) -> int | MaybeNone:
@@ -125,6 +130,8 @@ class Requirement(WordlengthAnswer):
         if self.advice:
             notes.append(self.advice)
         notes += self.warnings
+        if self.remedy:
+            notes.append(self.remedy)
         if self.untraced:
             notes.append(f"the function ran operation by operation: {self.untraced}")
         end = "".join(f"; {note}" for note in notes)
@@ -139,7 +146,8 @@ class Requirement(WordlengthAnswer):
             return f"no precision up to {most} {met} {by_evidence}{why}{end}"
         tried = dict(self.tried)
         why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
-        named = [f"{name} misses the tolerance: {ratio:.2g}" for name, ratio in self.processors if not ratio <= 1]
+        runs = self.processors if self.basis == "emulation" else ()
+        named = [f"{name} misses the tolerance: {ratio:.2g}" for name, ratio in runs if not ratio <= 1]
         named += [f"{self.processor_format} is enough"] if self.processor_format else []
         on_processors = f" ({'; '.join(named)})" if named else ""
         share = f"{tried[self.fmt.precision]:.2g} of the tolerance"
@@ -155,9 +163,9 @@ class Requirement(WordlengthAnswer):
         """
         if self.basis == "emulation":
             return next((name for name, ratio in self.processors if ratio <= 1), "")
-        ratios = dict(self.tried)
-        enough = (name for name, each in _on_processors(self.fmt) if ratios.get(each.precision, math.inf) <= 1)
-        return next(enough, "")
+        ratios, more = dict(self.tried), dict(self.processors)
+        formats = _on_processors(self.fmt)
+        return next((n for n, each in formats if ratios.get(each.precision, more.get(n, math.inf)) <= 1), "")
 
 
 def _on_processors(fmt: FloatFormat | None) -> tuple[tuple[str, FloatFormat], ...]:
@@ -192,6 +200,14 @@ def without_evidence(basis: Basis, steps: int, ends: bool = False) -> str:
     """Describe that an error has no number, as "in a run of 60 steps" or "without a guarantee for ever"."""
     text = _evidence(basis, ends)[1].format(_steps(steps))
     return text if basis == "emulation" else f"without {text.removeprefix('by ')}"
+
+
+def bound_in_words(basis: Basis, steps: int, ends: bool = False) -> str:
+    """Name a bound, or three times the probable error, as in "the bound on this run of 60 steps"."""
+    if basis == "guarantee":
+        return f"the guaranteed bound for {_steps(steps) if ends else 'ever'}"
+    text = _evidence(basis, ends)[1].format(_steps(steps)).removeprefix("by ")
+    return f"the {text.removeprefix('a ')}" if basis == "bound" else text
 
 
 def _steps(count: int) -> str:
@@ -283,6 +299,7 @@ class Asked(NamedTuple):
         ends: bool = False,
         untraced: str = "",
         warnings: tuple[str, ...] = (),
+        remedy: str = "",
     ) -> Requirement:
         """Return the result of a search as the answer."""
         if found.undecided and not advice:
@@ -304,8 +321,20 @@ class Asked(NamedTuple):
             cause,
             ends,
             untraced,
-            self._run_on_processors(found) if self.basis == "emulation" else (),
+            self._run_on_processors(found) if self.basis == "emulation" else self._bounds_on_processors(found),
             self.like.base,
+            remedy,
+        )
+
+    def in_more_digits(self, found: Search[FloatFormat]) -> str:
+        """Say what runs in more digits than a model, if the largest precision misses the tolerance in an emulation."""
+        ended = self.largest in (None, largest_compiled(self.like)) and 1 < found.tried[-1][1] < math.inf
+        if found.fmt is not None or self.basis != "emulation" or not ended:
+            return ""
+        most = digits_text(largest_by_default(self.like.base), self.like.base)
+        return (
+            "a filter written as a function of a format runs in more: required_precision(f, steps, tolerance, z=z), "
+            f"with f(fmt, z), tries up to {most}, and more with largest="
         )
 
     def _run_on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:
@@ -316,6 +345,20 @@ class Asked(NamedTuple):
                 ratio, _ = found.error(fmt)
                 runs.append((name, ratio))
         return tuple(runs)
+
+    def _bounds_on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:
+        """Bound the error in the digits of binary32, and of binary64 if these are not enough, where none was tried."""
+        tried, bounds = dict(found.tried), list[tuple[str, float]]()
+        for name, fmt in _on_processors(found.fmt):
+            if fmt.precision > found.largest:
+                break
+            ratio = tried.get(fmt.precision, math.nan)
+            if fmt.precision not in tried:
+                ratio, _ = found.error(replace(self.like, precision=fmt.precision))
+                bounds.append((name, ratio))
+            if ratio <= 1:
+                break
+        return tuple(bounds)
 
 
 def listed(numbers: Sequence[int]) -> str:
@@ -348,9 +391,8 @@ def checked_tolerance(tolerance: Any, count: int, what: str, basis: str) -> NDAr
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"got tolerance {tolerance!r}; {needed}") from None
     if tolerances.shape not in ((), (count,)):
-        raise ValueError(
-            f"got tolerance {tolerance} of shape {tolerances.shape}; {needed}: one number, or {count} in a row"
-        )
+        got = f"tolerance {tolerance}" if tolerances.size <= 2 * count else "a tolerance"
+        raise ValueError(f"got {got} of shape {tolerances.shape}; {needed}: one number, or {count} in a row")
     if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
         raise ValueError(f"got tolerance {tolerance}; {needed}")
     if not isinstance(basis, str) or basis not in get_args(Basis):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED, arithmetic
+from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED, arithmetic, format_text
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
@@ -56,6 +56,20 @@ class CommandInput(NamedTuple):
     bases: Sequence[Basis]
     z: Any
     origin: str
+
+
+class Certified(NamedTuple):
+    """The text of a certificate, and the format for which it proves a guarantee."""
+
+    text: str
+    fmt: FloatFormat
+
+
+class WrittenCode(NamedTuple):
+    """The files of a filter in C, and the format in which it computes."""
+
+    files: tuple[Path, ...]
+    fmt: AnyFormat
 
 
 def read_files(options: argparse.Namespace) -> CommandInput:
@@ -199,7 +213,7 @@ def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: Linear
         )
 
 
-def certificate(asked: CommandInput, report: Report) -> str:
+def certificate(asked: CommandInput, report: Report) -> Certified:
     """Return the certificate of the first guarantee in a report; that of a linear system bounds its roundings only.
 
     Raises
@@ -223,12 +237,13 @@ def certificate(asked: CommandInput, report: Report) -> str:
     if isinstance(chosen, LinearModel):
         within = limits(chosen.n, chosen.m, **_sizes(given))
         form = form_named(_form(given))
-        return guarantee(chosen, fmt, within, form, horizon=report.steps).certificate()
+        return Certified(guarantee(chosen, fmt, within, form, horizon=report.steps).certificate(), fmt)
     made = filter_schedule(chosen.as_filter(), fmt)
-    return from_schedule(made, limits(made.program.n, made.program.m, **_sizes(given)), report.steps).certificate()
+    within = limits(made.program.n, made.program.m, **_sizes(given))
+    return Certified(from_schedule(made, within, report.steps).certificate(), fmt)
 
 
-def write_code_of(asked: CommandInput, structure: str = "") -> tuple[Path, ...]:
+def write_code_of(asked: CommandInput, structure: str = "") -> WrittenCode:
     """Write the filter of a command line as C, into the folder of its option ``--code``.
 
     The format is the one that is judged, or the answer in fixed point, or else the first of binary32 and binary64 that
@@ -256,15 +271,15 @@ def _written(
     fmt: AnyFormat,
     within: FilterLimits | None,
     structure: str | None,
-) -> tuple[Path, ...]:
+) -> WrittenCode:
     """Write the code of a filter; vectors of a Kalman filter are its first measurements, if none of them is missing."""
     given, own, z = asked.options, asked.own, asked.z
     if not isinstance(own, LinearModel):
-        return write_code(model, fmt, None, given.code, within=within, structure=structure)
+        return WrittenCode(write_code(model, fmt, None, given.code, within=within, structure=structure), fmt)
     if z is None:
         z = simulated_measurements(own, given.steps or DEFAULT_STEPS)
     vectors = None if np.isnan(z[:VECTORS]).any() else z[:VECTORS]
-    return write_code(own, fmt, given.form, given.code, inputs=vectors, within=within)
+    return WrittenCode(write_code(own, fmt, given.form, given.code, inputs=vectors, within=within), fmt)
 
 
 def _words_within_tolerance(asked: CommandInput, system: LinearSystem) -> tuple[WordFormats, FilterLimits]:
@@ -293,6 +308,14 @@ def _type_within_tolerance(
         f"got --code {given.code}, and neither binary32 nor binary64 meets the tolerance; needed a larger tolerance, "
         "or --format with fixed point"
     )
+
+
+def uncovered(proof: Certified | None, code: WrittenCode) -> str:
+    """Say that a certificate does not cover code in another format; empty if it does, or if there is none."""
+    if proof is None or code.fmt == proof.fmt or isinstance(code.fmt, WordFormats):
+        return ""
+    name = format_text(code.fmt)
+    return f"the certificate does not cover this code, which is in {name}: add --format {name} for both in one format"
 
 
 def write(report: Report, page: Path) -> None:

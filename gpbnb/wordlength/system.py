@@ -66,7 +66,8 @@ def required_system_precision(
     if not cause:
         advice = "" if found.fmt is not None else _too_many_digits(system, found, asked.like.base)
         warnings = strategy.warnings() if found.fmt is not None and isinstance(strategy, EmulatedSystem) else ()
-        return asked.answer(found, advice=advice, ends=ends, warnings=warnings)
+        remedy = "" if _is_long(system) else asked.in_more_digits(found)
+        return asked.answer(found, advice=advice, ends=ends, warnings=warnings, remedy=remedy)
     if asked.basis == "probable":
         return asked.answer(found, cause=f"{cause}, {_FOR_SOME_STEPS}")
     grow = "grow with every step, whatever the precision" if asked.basis == "emulation" else "add up with every step"

@@ -15,7 +15,8 @@ from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
-from gpbnb.bounds.guarantee import limits
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel, real_numbers
@@ -212,9 +213,29 @@ def test_no_precision_may_be_enough(model, base, most):
     words = {2: "53 bits", 16: "13 base-16 digits"}[base]
     assert str(found) == (
         f"no precision up to {words}, the most with compiled loops in base {base}, rounded nearest, meets the "
-        "tolerance in a run of 3 steps"
-        + (f"; {words} give {found.tried[-1][1]:.3g} times the tolerance" if model is not MODEL else "")
+        f"tolerance in a run of 3 steps; {words} give {found.tried[-1][1]:.3g} times the tolerance; a filter written "
+        "as a function of a format runs in more: required_precision(f, steps, tolerance, z=z), with f(fmt, z), tries "
+        f"up to { {2: '200 bits', 16: '50 base-16 digits'}[base] }, and more with largest="
     )
+    assert "function" not in str(required_precision(model, 3, 1e-30, base, z=Z[:3], largest=most - 1))
+    assert "function" not in str(required_precision(model, 3, 1e-30, base, z=Z[:3], basis="bound"))
+
+
+def test_a_function_runs_in_more_digits_than_its_model():
+    """The precision that the answer for a model without one suggests."""
+
+    def smoother(fmt, z):
+        keep, take, x, estimates = fmt.array("0.9"), fmt.array("0.1"), fmt.array(0), []
+        for value in z:
+            x = keep * x + take * value
+            estimates.append(x)
+        return estimates
+
+    system, z = LinearSystem([["0.9"]], [["0.1"]]), np.sin(np.arange(20))
+    assert not required_precision(system, 20, 1e-18, z=z.reshape(-1, 1)).met
+    found = required_precision(smoother, 20, 1e-18, z=z, largest=113)
+    assert 53 < found.precision < 113
+    assert "largest=" not in str(found)
 
 
 def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
@@ -240,6 +261,23 @@ def test_an_answer_holds_in_every_step(form, steps):
         history = emulate(given, z, FloatFormat(2, digits), form, every, true)
         if not history.indefinite and not history.stopped:
             assert (np.abs(history.state) / tolerance).max() == pytest.approx(ratio, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("basis", ["guarantee", "probable"])
+def test_a_bound_for_ever_of_a_kalman_filter_names_the_processor_format_that_is_enough(basis):
+    """Above an answer of few bits, the search itself tries no format of a processor."""
+    walk = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
+    within = limits(1, 1, 10, 3)
+    for tolerance, bits, name in ((0.01, 24, "binary32"), (1e-9, 53, "binary64")):
+        found = required_precision(walk, 50, tolerance, basis=basis, within=within)
+        assert bits not in dict(found.tried)
+        assert found.fmt.precision < bits - 1
+        bound = guarantee(walk, replace(found.fmt, precision=bits), within, horizon=1)
+        error = bound.bound if basis == "guarantee" else 3 * probable_error(bound)
+        assert found.processors == ((name, pytest.approx(float(error[0]) / tolerance)),)
+        assert str(found).startswith(f"{found.precision} bits ({name} is enough): ")
+    assert required_precision(walk, 50, 0.01, basis=basis, within=within, largest=20).processors == ()
+    assert required_precision(walk, 50, 0.01, rounding="chop", basis=basis, within=within).processors == ()
 
 
 def test_masked_inputs_are_refused():

@@ -91,8 +91,10 @@ def test_the_command_answers_in_fraction_bits(tmp_path, capsys):
     assert printed.startswith(f"direct form I: {required_fraction_bits(system, z, 0.01)}\n")
     assert str(required_word_formats(system, z, 0.01)) in printed
     for more, message in (
-        (["--digits", "9"], "got --fixed with --digits"),
-        (["--basis", "bound"], "got --fixed with --basis bound or probable"),
+        (["--digits", "9"], "got --fixed and --digits; needed --fixed alone, which searches the fraction bits; to jud"),
+        (["--emin", "0", "--emax", "9"], "got --fixed and --emin, --emax; needed --fixed alone"),
+        (["--basis", "bound"], "got --fixed and --basis bound; needed --basis emulation or guarantee"),
+        (["--certificate", "x.json"], "got --fixed and --certificate; needed floating point for a certificate"),
         (["--basis", "guarantee", "--measurement", "1"], "got --fixed and --measurement"),
     ):
         assert main([*asked, *more]) == 2

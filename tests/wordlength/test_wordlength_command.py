@@ -38,7 +38,7 @@ P0 = [[100, 0], [0, 100]]
 """
 MATRICES = {"A": [["0.5", 0], [0, "0.25"]], "B": [[1], [1]]}
 
-ANSWERED = SimpleNamespace(text="21 digits", mixed="", digits=21, met=True)
+ANSWERED = SimpleNamespace(text="21 digits", mixed="", shortest="", digits=21, met=True)
 
 
 @pytest.fixture
@@ -227,6 +227,15 @@ def test_a_digital_filter_comes_with_a_certificate_and_code_of_the_file_as_it_wa
     content = json.loads(path.read_text(encoding="utf-8"))
     assert "fixed coefficients" in prove(content)
     assert content["limits"]["measurement"] == ["2"]
+    shown, bits = capsys.readouterr().out, content["format"]["precision"]
+    assert bits != 24
+    assert f"\ncertificate: {path}, for {bits} bits\ncode: " in shown
+    assert "\nthe certificate does not cover this code, which is in BINARY32: add --format BINARY32 for" in shown
+    assert main([*given, "--format", "BINARY32"]) == 0
+    shown = capsys.readouterr().out
+    assert f"\ncertificate: {path}, for BINARY32\ncode: " in shown
+    assert "does not cover" not in shown
+    assert json.loads(path.read_text(encoding="utf-8"))["format"]["precision"] == 24
 
 
 def test_a_guarantee_refuses_measurements_with_gaps(files, capsys):

@@ -12,6 +12,7 @@ import pytest
 from scipy import signal
 
 from gpbnb import (
+    BINARY16,
     FixedFormat,
     FloatFormat,
     LinearSystem,
@@ -20,6 +21,7 @@ from gpbnb import (
     required_fraction_bits,
     required_precision,
 )
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import Outcome
 from gpbnb.filters.sections import scaled
 from gpbnb.filters.structures import DIRECT, cascade, sections_of
@@ -98,7 +100,8 @@ def test_a_cascade_says_what_scaling_its_sections_saves(basis):
     found, best = (required_fraction_bits(each, u, 1e-4, basis, coefficient_bits=24) for each in (given, scaled))
     word = 1 + best.fmt.precision
     assert word < found.fmt.precision - 10
-    saved = f"(scale=True), {best.fmt.fraction_bits} fraction bits in a word of {word} bits are enough"
+    how = "(scale=True; in a TOML file, scale = true beside sos)"
+    saved = f"{how}, {best.fmt.fraction_bits} fraction bits in a word of {word} bits are enough"
     assert str(found).count(f"; with its sections scaled by powers of two {saved}") == 1
     assert best.advice == ""
 
@@ -108,7 +111,10 @@ def test_a_cascade_without_an_answer_says_whether_scaling_gives_one():
     found = required_fraction_bits(LinearSystem.from_sections(sos), u, 1e-6, coefficient_bits=40)
     assert found.fmt is None
     best = required_fraction_bits(LinearSystem.from_sections(sos, scale=True), u, 1e-6, coefficient_bits=40)
-    assert f"(scale=True), {best.fmt.fraction_bits} fraction bits in a word of" in str(found)
+    assert (
+        f"(scale=True; in a TOML file, scale = true beside sos), {best.fmt.fraction_bits} fraction bits in a word of"
+        in str(found)
+    )
     assert "scale" not in str(required_fraction_bits(LOW_PASS, np.ones((50, 1)), 1e-30))
 
 
@@ -218,12 +224,30 @@ def test_a_coefficient_beyond_a_format_is_named_alike_on_every_basis(basis):
     found = str(judge(sections, FixedFormat(0, 15), 20, 1e-3, basis=basis, z=z, within=within))
     assert "coefficient a1_1: got a result of about -1." in found
     assert "WordFormats(data, coefficients), or --fixed --mixed in the command" in found
-    without = {
-        "emulation": "in a run of 20 steps",
-        "bound": "without a bound on this run of 20 steps",
-        "guarantee": "without a guarantee for ever",
+    words = "16-bit fixed point (15 fraction bits)"
+    verdict = {
+        "emulation": f"{words} misses the tolerance, in a run of 20 steps",
+        "bound": f"nothing is proved for {words}, without a bound on this run of 20 steps",
+        "guarantee": f"nothing is proved for {words}, without a guarantee for ever",
     }[basis]
-    assert found.startswith(f"fixed point of 16 bits, 15 of them fraction misses the tolerance, {without}: coefficient")
+    assert found.startswith(f"{verdict}: coefficient")
+
+
+def test_a_bound_that_is_too_large_proves_no_miss():
+    system, u, within = LinearSystem([["0.875"]], [["0.125"]]), np.ones((60, 1)), limits(1, 1, measurement=1)
+    text = {
+        "emulation": "BINARY16 misses the tolerance: its error is {} times as large, observed in 60 steps",
+        "bound": "nothing is proved for BINARY16: the bound on this run of 60 steps is {} times the tolerance",
+        "guarantee": "nothing is proved for BINARY16: the guaranteed bound for ever is {} times the tolerance",
+        "probable": "BINARY16 misses the tolerance: three times the probable error is {} times the tolerance",
+    }
+    for basis, expected in text.items():
+        found = judge(system, BINARY16, 60, 1e-4, basis=basis, z=u, within=within)
+        assert found.ratio > 1
+        assert str(found) == expected.format(f"{found.ratio:.3g}")
+    saturated = FixedFormat(3, 4, Rounding.CHOP, overflow="saturate")
+    found = str(judge(system, saturated, 60, 1e-4, z=u))
+    assert found.startswith("8-bit fixed point (4 fraction bits, chopped, saturated) misses the tolerance: its error")
 
 
 def test_refusals_describe_formats_in_words():
@@ -231,7 +255,7 @@ def test_refusals_describe_formats_in_words():
     for basis in ("emulation", "bound", "guarantee"):
         z, within = np.full((3, 1), 100), limits(1, 1, measurement=100)
         found = str(judge(system, FixedFormat(3, 12), 3, 1, basis=basis, z=z, within=within))
-        assert "fixed point of 16 bits, 12 of them fraction" in found
+        assert "16-bit fixed point (12 fraction bits)" in found
         assert "FixedFormat(" not in found
     words = WordFormats(FixedFormat(2, 12), FixedFormat(0, 15))
     with pytest.raises(OverflowError, match="beyond the range of fixed point of 16 bits, 15 of them fraction; needed"):

@@ -39,6 +39,11 @@ TOML = "Phi=[[1,1],[0,1]]\nH=[[1,0]]\nQ=[[1,0],[0,1]]\nR=[[1]]\nx0=[0,0]\nP0=[[1
         ("# time; a remark\n1\n", [[1]]),
         ('"a; b",c\n1,2\n', [[1, 2]]),
         ("Na,K\n1,2\n", [[1, 2]]),
+        # without the blank line, the last measurement would come a step early
+        ("z\n1\n2\n\n3\n", [[1], [2], [math.nan], [3]]),
+        ("\nz\n\n1\n\n\n2\r\n\r\n# a remark\n3\n\n\n", [[1], [math.nan], [math.nan], [2], [math.nan], [3]]),
+        ('1\n\n""\n', [[1], [math.nan], [math.nan]]),
+        ("1,2\n\n3,4\n\n", [[1, 2], [3, 4]]),
     ],
 )
 def test_a_file_is_read(text, rows, tmp_path):
@@ -180,6 +185,16 @@ def test_a_digital_filter_has_named_inputs_and_outputs():
             lambda: required_fraction_bits(SYSTEM, [[1]], 1, form="UD"),
             "got the UD form; needed none: only a LinearModel or a NonlinearModel has forms",
         ),
+        (
+            lambda: required_precision(WALK, np.ones((1000, 1)), 1),
+            r"^got steps of shape \(1000, 1\); needed a whole number; pass measurements by name: required_precision\(",
+        ),
+        (lambda: required_precision(WALK, [[0.5]] * 1000, 1), r"^got steps of shape \(1000,\); needed a whole number"),
+        (
+            lambda: required_precision(WALK, 5, np.ones((1000, 1))),
+            r"^got a tolerance of shape \(1000, 1\); needed an error above 0 for each of the 1 states, one finite: one",
+        ),
+        (lambda: required_precision(WALK, 5, [1, 2]), r"^got tolerance \[1, 2\] of shape \(2,\); needed"),
         (lambda: required_precision(lambda: 1, 5, 1), "got a function that does not take .*fmt.*: .*; needed f.fmt."),
         (lambda: required_precision(lambda f, z: 1, 5, 1), "got a function that does not take .*; needed f.fmt.* z="),
         (lambda: FloatFormat(2, 8, emin=-5, emax=5, subnormal="no"), "subnormal: got 'no'; needed True or False"),
@@ -207,6 +222,24 @@ def test_an_overflow_names_the_numbers_that_are_too_large():
     assert "coefficient C1_1: got a result of about 3" in str(judge(large, FixedFormat(0, 15), 2, 1, z=[[0], [0]]))
     sections = LinearSystem.from_coefficients([1, 2, 1], [1, "-1.5", "0.75"])
     assert "coefficient b0: got a result of about 1" in str(judge(sections, FixedFormat(0, 15), 2, 1, z=[[0], [0]]))
+
+
+def test_fraction_bits_of_a_kalman_filter_end_with_the_compiled_loops():
+    """So that the answer says what is wrong with the integer bits, and not that there are no more loops."""
+    tracker = LinearModel(
+        [[1, "0.1"], [0, 1]], [[1, 0]], [["1e-4", 0], [0, "0.01"]], [["0.01"]], [0, 0], np.eye(2) * 99
+    )
+    z = np.arange(20).reshape(-1, 1) / 100
+    found = required_fraction_bits(tracker, z, 1e-2, like=FixedFormat(8, 8), form="UD")
+    assert not found.met
+    assert max(digits for digits, _ in found.tried) == 43
+    reason = emulate(tracker, z, FixedFormat(8, 20), "UD").reason
+    assert "use more integer bits" in reason
+    most = "43 fraction bits are the most with compiled loops"
+    assert found.why == f"43 fraction bits fail: the run is refused: {reason}; {most}"
+    assert required_fraction_bits(tracker, z, 1e-2, like=FixedFormat(30, 8), form="UD").met
+    with pytest.raises(ValueError, match="got 60 bits in fixed point; needed at most 51 for compiled loops"):
+        required_fraction_bits(tracker, z, 1e-2, like=FixedFormat(60, 8), form="UD")
 
 
 def test_a_format_too_small_for_the_model_misses_by_a_guarantee_as_by_emulation():

@@ -30,7 +30,9 @@ from gpbnb.wordlength.requirement import Basis
 
 SYSTEM = 'A = [[0.875]]\nB = [[0.125]]\ninputs = ["sensor (V)"]\noutputs = ["level (V)"]\n'
 FILTER = "Phi = [[1]]\nH = [[1]]\nQ = [[0.01]]\nR = [[1]]\nx0 = [0]\nP0 = [[1]]\n"
-REPORT = SimpleNamespace(text="12 bits", mixed="", met=True, to_html=lambda: "<p>new</p>", to_json=lambda: "{}")
+REPORT = SimpleNamespace(
+    text="12 bits", mixed="", shortest="", met=True, to_html=lambda: "<p>new</p>", to_json=lambda: "{}"
+)
 
 
 @pytest.fixture

@@ -238,6 +238,9 @@ def test_a_judged_format_is_named_in_the_answer():
     assert "This Kalman filter keeps rounding errors within the tolerance in BFLOAT16 ." in text_of(kept.to_html())
     missed = text_of(replace(kept, met=False, digits=None).to_html())
     assert "This Kalman filter does not keep rounding errors within the tolerance in BFLOAT16 ." in missed
+    bounded = replace(kept, met=False, digits=None, answers=(replace(REPORT.answers[0], basis="guarantee"),))
+    unproved = "This Kalman filter is not proved to keep rounding errors within the tolerance in BFLOAT16 ."
+    assert unproved in text_of(bounded.to_html())
     assert "exponents -126 to 127" in missed
     assert "These runs have unlimited exponents" not in missed
 
