@@ -61,6 +61,8 @@ class BlockRequirement:
             f"at a time, the blocks need {each}; one format for all needs {self.uniform.precision}"
         )
 
+    __repr__ = __str__
+
 
 def required_block_precisions(
     model: AnyModel,
@@ -176,6 +178,8 @@ class WordRequirement:
         if self.words is None:
             return str(self.data)
         return f"{self.words}: {self.ratio:.2g} of the tolerance, by {self.data.basis}"
+
+    __repr__ = __str__
 
 
 MOST_COEFFICIENT_BITS = 24

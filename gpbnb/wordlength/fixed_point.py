@@ -74,7 +74,7 @@ class ScaledFilter:
     gain: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FixedAnswer(WordlengthAnswer):
     """The smallest number of fraction bits that meets a tolerance.
 

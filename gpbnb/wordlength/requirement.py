@@ -76,8 +76,11 @@ class WordlengthAnswer(ABC):
     def __str__(self) -> str:
         """Say the answer in words."""
 
+    def __repr__(self) -> str:
+        return str(self)
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Requirement(WordlengthAnswer):
     """The smallest precision that meets a tolerance, and the basis of this answer.
 
