@@ -69,7 +69,7 @@ class WrittenCode(NamedTuple):
     """The files of a filter in C, and the format in which it computes."""
 
     files: tuple[Path, ...]
-    fmt: AnyFormat
+    fmt: FloatFormat | FixedFormat | WordFormats
 
 
 def read_files(options: argparse.Namespace) -> CommandInput:
