@@ -64,6 +64,11 @@ def test_numbers_of_a_format_have_the_errors_of_correctly_rounded_operations():
             assert ulp == pytest.approx(float(abs(evaluated - exact)) / np.spacing(float(exact)), rel=1e-12)
 
 
+def test_numbers_of_a_format_must_be_positive_too():
+    with pytest.raises(ValueError, match="got mu = -2; needed a positive, finite number"):
+        theory.walk_factor(BINARY64.array([1, -2]))
+
+
 def test_as_printed_nothing_is_left_for_small_ratios():
     # The error of exp, up to 2**-54, is one of 2·2**-54/μ² in the quotient, beside μ/6: 6/μ³ units of its last place.
     for mu in (1e-2, 1e-3, 1e-4):

@@ -33,7 +33,7 @@ def positive_array(name: str, values: ArrayLike) -> Floats:
     array = _numbers(name, values)
     allowed = (array > 0) & np.isfinite(array)
     if not np.all(allowed):
-        bad = array[~allowed].flat[0]
+        bad = array[~allowed].ravel()[0]
         raise ValueError(f"got {name} = {bad}; needed a positive, finite number; check its unit and sign")
     return array
 
