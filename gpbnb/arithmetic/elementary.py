@@ -198,7 +198,7 @@ def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[],
             if finite:
                 with uncounted():
                     low, high = rounded(ball.lower()), rounded(ball.upper())
-                # Ends that differ by a whole range of a format that wraps around are rounded to the same number.
+                # In a format that wraps around, ends that are a whole range apart round to the same number, too.
                 if low == high and (modulus is None or bool(4 * ball.rad() < modulus)):
                     return rounded(ball.lower()) if fmt.backend.special else low
             elif bits > 1024:

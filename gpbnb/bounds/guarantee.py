@@ -83,8 +83,8 @@ class Guarantee:
     bound : (n,), bound of the error of each state after every step; infinite if there is none.
     steps : None if the bound holds for ever; otherwise the number of steps for which it holds.
     why : why the bound does not hold for ever; empty if it does.
-    history : (k, n), bounds after each of the first steps. If the bound holds for ever, the last rows, as many as the
-        period has, also hold for all later steps of their phase.
+    history : (k, n), bounds after each of the first steps. If the bound holds for ever, the last rows are one for each
+        phase of the period, and also hold for all later steps in this phase.
     parts : (n, 4), the parts of each state's bound at the step where it is largest; see :data:`PARTS`.
     limits : limits on the filter without rounding: those given, and those that follow from them.
     schedule : the filter's coefficients.
@@ -398,7 +398,7 @@ def _sums(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
     """Return bounds after each step, their parts, and the number of steps in the sums.
 
-    If there is a radius, the last rows, as many as the period has, hold for all later steps of their phase, too.
+    If there is a radius, there is a last row for each phase of the period, which holds for all later steps in it, too.
     """
     n, part, for_ever = given.program.n, _parts_of(given), radius is not None
     used, finite, size = _effects(found)

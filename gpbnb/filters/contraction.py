@@ -55,7 +55,8 @@ class Contraction(NamedTuple):
     eta: Any
     #: bounds the relative error of the covariance.
     zeta: Any
-    #: bounds the norm of :math:`A_k`, at most about 1. These three are floats, or (steps,) after several steps.
+    #: bounds the norm of :math:`A_k`, and is at most about 1. The bounds eta, zeta and alpha are floats for one step,
+    #: and arrays (steps,) for several.
     alpha: Any
     #: (m,), bounds the effect of the covariance error on each column of the gain.
     gain: NDArray[np.float64]

@@ -170,8 +170,8 @@ def advance_by_replay(
 ) -> bool:
     """Take steps as :func:`gpbnb.filters.kernels.step.advance` or ``advance_ud`` does, and return True; or take none.
 
-    It takes none if a number has no result in the arithmetic: the loops then report where. In the UD form, it also
-    takes none if a variance is not positive, because the loops look only at variances that they use.
+    It takes none if an operation has no result in the arithmetic; the loops then take the steps, and report where. In
+    the UD form, it also takes none if a variance is not positive, because the loops look only at variances they use.
 
     Parameters
     ----------

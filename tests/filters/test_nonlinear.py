@@ -124,7 +124,7 @@ def test_fraction_bits_of_a_linear_filter_are_those_of_its_functions(form):
     one, other = (required_fraction_bits(each, z, 0.01, like=FixedFormat(8, 1), form=form) for each in (linear, alike))
     assert one.fmt is not None
     assert one.fmt == other.fmt
-    # The search of the linear filter ends with its compiled loops, so it tries other numbers of bits.
+    # Compiled loops limit the search of the linear filter, so the two searches try different numbers of bits.
     bits, tried, others = one.fmt.fraction_bits, dict(one.tried), dict(other.tried)
     both = tried.keys() & others.keys()
     assert {bits - 1, bits} <= both

@@ -49,8 +49,8 @@ def _rounds_up(mode: int, odd: int, up: int, tie: int, inexact: int, negative: i
     return bool(inexact and outward)
 
 
-# For each mode, the answers of `_rounds_up` to all 32 combinations of odd, up, tie, inexact and negative, one bit each.
-# A processor cannot predict the combination, so a table costs less than branches.
+# For each mode, 32 bits with the answer of `_rounds_up` to each combination of odd, up, tie, inexact and negative. A
+# processor cannot predict which combination comes next, so looking it up costs less than branches.
 _BITS = [[at >> k & 1 for k in range(5)] for at in range(32)]
 _INCREMENTS = np.array(
     [sum(_rounds_up(mode, *bits) << at for at, bits in enumerate(_BITS)) for mode in range(6)], np.uint64
