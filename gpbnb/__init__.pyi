@@ -1,7 +1,5 @@
 from gpbnb.arithmetic import linalg as linalg
 from gpbnb.arithmetic.array import FloatArray as FloatArray
-from gpbnb.arithmetic.complex_array import ComplexArray as ComplexArray
-from gpbnb.arithmetic.complex_array import fft as fft
 from gpbnb.arithmetic.exits import peek as peek
 from gpbnb.arithmetic.fixed import FixedFormat as FixedFormat
 from gpbnb.arithmetic.flags import flags as flags

@@ -20,7 +20,6 @@ ALIASES = {
 
 HOMES = {
     "BlockFormats": "gpbnb.filters.blocks",
-    "ComplexArray": "gpbnb.arithmetic.complex_array",
     "FixedFormat": "gpbnb.arithmetic.fixed",
     "FixedIntervalSmoother": "gpbnb.filters.smoothing",
     "FloatArray": "gpbnb.arithmetic.array",
@@ -35,7 +34,6 @@ HOMES = {
     "TracedFunction": "gpbnb.arithmetic.traced",
     "WordFormats": "gpbnb.filters.words",
     "emulate": "gpbnb.filters.emulation",
-    "fft": "gpbnb.arithmetic.complex_array",
     "flags": "gpbnb.arithmetic.flags",
     "guarantee": "gpbnb.bounds.guarantee",
     "limit_cycles": "gpbnb.bounds.limit_cycles",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
-from typing import Any, Self, cast
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -291,9 +291,6 @@ class FloatArray(ComponentArray, NumPyProtocols):
         return self.from_values(other, self.format, exactly=True)
 
     def _binary(self, name: str, left: Any, right: Any) -> FloatArray:
-        other = right if left is self else left
-        if not isinstance(other, FloatArray) and getattr(other, "__array_ufunc__", self) is None:
-            return cast(FloatArray, NotImplemented)  # to the other operand, as NumPy's arrays do
         a, b = self.operand(left), self.operand(right)
         broadcast(name, a.shape, b.shape)
         if name == "divide" and not a.backend.special and (zero := _first(b.components[0] == 0)) is not None:
