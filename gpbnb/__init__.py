@@ -7,7 +7,6 @@ The public interface::
     BINARY32, BFLOAT16, ...    the formats of processors; NAMED_FORMATS lists them
     linalg                     dot, matmul, lu, solve, inv, det, cholesky with every operation rounded
     flags                      how often results overflow, underflow or are inexact, in a format with infinity and NaN
-    MicroscalingFormat         blocks of FP8, FP6 or FP4 numbers with one scale; microscaling_dot: their inner product
     LinearModel                a linear dynamic model for a Kalman filter
     NonlinearModel             functions of a state for an extended or unscented Kalman filter
     NonlinearSystem            a step of your own, from state and inputs to the next state and outputs
@@ -42,9 +41,9 @@ __all__ = [
     "BFLOAT16", "BINARY16", "BINARY32", "BINARY64", "BINARY128", "DECIMAL32", "DECIMAL64", "DECIMAL128", "FP4_E2M1",
     "FP6_E2M3", "FP6_E3M2", "FP8_E4M3", "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32",
     "BlockFormats", "FixedFormat", "FixedIntervalSmoother", "FloatArray", "FloatFormat", "Form",
-    "LinearModel", "LinearSystem", "MicroscalingFormat", "NonlinearModel", "NonlinearSystem", "Rounding",
+    "LinearModel", "LinearSystem", "NonlinearModel", "NonlinearSystem", "Rounding",
     "TracedFunction", "WordFormats", "emulate", "flags", "guarantee", "limit_cycles", "limits", "linalg",
-    "microscaling_dot", "peek", "read_model", "required_block_precisions", "required_fraction_bits",
+    "peek", "read_model", "required_block_precisions", "required_fraction_bits",
     "required_precision", "required_word_formats", "survey_records", "write_code",
 ]
 # fmt: on

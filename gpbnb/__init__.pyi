@@ -4,8 +4,6 @@ from gpbnb.arithmetic.exits import peek as peek
 from gpbnb.arithmetic.fixed import FixedFormat as FixedFormat
 from gpbnb.arithmetic.flags import flags as flags
 from gpbnb.arithmetic.formats import FloatFormat as FloatFormat
-from gpbnb.arithmetic.microscaling import MicroscalingFormat as MicroscalingFormat
-from gpbnb.arithmetic.microscaling import microscaling_dot as microscaling_dot
 from gpbnb.arithmetic.named import (
     BFLOAT16 as BFLOAT16,
 )
