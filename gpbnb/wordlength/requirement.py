@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, Protocol, TypeVar, get_args
 
 import numpy as np
@@ -99,9 +99,8 @@ class Requirement(WordlengthAnswer):
     limit : the reason why the search ended at the last precision of `tried`. It is shown if there is no answer.
     ends : whether the guarantee holds only for the steps asked for, because no precision has a guarantee for ever.
     untraced : why a function ran operation by operation, and not in compiled code; empty if it did not.
-    processors : the largest error / tolerance of a run in binary32, and in binary64 if binary32 has too few bits or
-        misses the tolerance. For a bound, which holds for ties to even, too, the bound / tolerance in their digits,
-        where `tried` has none. Empty in another base, with directed rounding or a given range.
+    processors : the largest error or bound / tolerance in binary32, and in binary64 if binary32 has too few bits or
+        does not meet the tolerance. Empty in another base, with directed rounding or a given range.
     base : base of the formats tried.
     remedy : what runs in more digits than the search tried, if no precision meets the tolerance.
     """
@@ -149,8 +148,8 @@ class Requirement(WordlengthAnswer):
             return f"no precision up to {most} {met} {by_evidence}{why}{end}"
         tried = dict(self.tried)
         why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
-        runs = self.processors if self.basis == "emulation" else ()
-        named = [f"{name} misses the tolerance: {ratio:.2g}" for name, ratio in runs if not ratio <= 1]
+        misses = "is not proved to meet" if self.basis in PROOFS else "misses"
+        named = [f"{name} {misses} the tolerance: {ratio:.2g}" for name, ratio in self.processors if not ratio <= 1]
         named += [f"{self.processor_format} is enough"] if self.processor_format else []
         on_processors = f" ({'; '.join(named)})" if named else ""
         share = f"{tried[self.fmt.precision]:.2g} of the tolerance"
@@ -160,18 +159,13 @@ class Requirement(WordlengthAnswer):
     def processor_format(self) -> str:
         """Name of the smaller format of binary32 and binary64 that meets the tolerance; empty if none is known.
 
-        An observed answer rests on a run in this format itself, which rounds ties to even and has a limited range. A
-        bound holds for either rounding of ties, and says nothing about the range. There is no name in other bases,
-        with directed rounding, or with a given range.
+        It rests on a run or a bound in this format itself, with ties to even, its range and its subnormal numbers.
+        There is no name in other bases, with directed rounding, or with a given range.
         """
-        if self.basis == "emulation":
-            return next((name for name, ratio in self.processors if ratio <= 1), "")
-        ratios, more = dict(self.tried), dict(self.processors)
-        formats = _on_processors(self.fmt)
-        return next((n for n, each in formats if ratios.get(each.precision, more.get(n, math.inf)) <= 1), "")
+        return next((name for name, ratio in self.processors if ratio <= 1), "")
 
 
-def _on_processors(fmt: FloatFormat | None) -> tuple[tuple[str, FloatFormat], ...]:
+def _processors_with(fmt: FloatFormat | None) -> tuple[tuple[str, FloatFormat], ...]:
     """Return the names and formats of processors that have the digits of a format and round to nearest as it does."""
     if fmt is None or fmt.base != 2 or fmt.limits is not None or fmt.rounding not in (Rounding.NEAREST, Rounding.EVEN):
         return ()
@@ -324,7 +318,7 @@ class Asked(NamedTuple):
             cause,
             ends,
             untraced,
-            self._run_on_processors(found) if self.basis == "emulation" else self._bounds_on_processors(found),
+            self._on_processors(found),
             self.like.base,
             remedy,
         )
@@ -340,28 +334,14 @@ class Asked(NamedTuple):
             f"with f(fmt, z), tries up to {most}, and more with largest="
         )
 
-    def _run_on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:
-        """Run in binary32, and in binary64 if that is not enough, where the search tried as many digits."""
-        runs = list[tuple[str, float]]()
-        for name, fmt in _on_processors(found.fmt):
-            if fmt.precision in dict(found.tried) and not any(ratio <= 1 for _, ratio in runs):
+    def _on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:
+        """Return the error or bound / tolerance in binary32, and in binary64 if that is not enough."""
+        ratios = list[tuple[str, float]]()
+        for name, fmt in _processors_with(found.fmt):
+            if fmt.precision <= found.largest and not any(each <= 1 for _, each in ratios):
                 ratio, _ = found.error(fmt)
-                runs.append((name, ratio))
-        return tuple(runs)
-
-    def _bounds_on_processors(self, found: Search[FloatFormat]) -> tuple[tuple[str, float], ...]:
-        """Bound the error in the digits of binary32, and of binary64 if these are not enough, where none was tried."""
-        tried, bounds = dict(found.tried), list[tuple[str, float]]()
-        for name, fmt in _on_processors(found.fmt):
-            if fmt.precision > found.largest:
-                break
-            ratio = tried.get(fmt.precision, math.nan)
-            if fmt.precision not in tried:
-                ratio, _ = found.error(replace(self.like, precision=fmt.precision))
-                bounds.append((name, ratio))
-            if ratio <= 1:
-                break
-        return tuple(bounds)
+                ratios.append((name, ratio))
+        return tuple(ratios)
 
 
 def listed(numbers: Sequence[int]) -> str:
