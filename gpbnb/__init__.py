@@ -6,7 +6,6 @@ The public interface::
     FixedFormat                fixed point: integer bits, fraction bits, overflow
     BINARY32, BFLOAT16, ...    the formats of processors; NAMED_FORMATS lists them
     linalg                     dot, matmul, lu, solve, inv, det, cholesky with every operation rounded
-    flags                      how often results overflow, underflow or are inexact, in a format with infinity and NaN
     LinearModel                a linear dynamic model for a Kalman filter
     NonlinearModel             functions of a state for an extended or unscented Kalman filter
     NonlinearSystem            a step of your own, from state and inputs to the next state and outputs
@@ -42,7 +41,7 @@ __all__ = [
     "FP6_E2M3", "FP6_E3M2", "FP8_E4M3", "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32",
     "BlockFormats", "FixedFormat", "FixedIntervalSmoother", "FloatArray", "FloatFormat", "Form",
     "LinearModel", "LinearSystem", "NonlinearModel", "NonlinearSystem", "Rounding",
-    "TracedFunction", "WordFormats", "emulate", "flags", "guarantee", "limit_cycles", "limits", "linalg",
+    "TracedFunction", "WordFormats", "emulate", "guarantee", "limit_cycles", "limits", "linalg",
     "peek", "read_model", "required_block_precisions", "required_fraction_bits",
     "required_precision", "required_word_formats", "survey_records", "write_code",
 ]

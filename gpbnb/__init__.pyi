@@ -2,7 +2,6 @@ from gpbnb.arithmetic import linalg as linalg
 from gpbnb.arithmetic.array import FloatArray as FloatArray
 from gpbnb.arithmetic.exits import peek as peek
 from gpbnb.arithmetic.fixed import FixedFormat as FixedFormat
-from gpbnb.arithmetic.flags import flags as flags
 from gpbnb.arithmetic.formats import FloatFormat as FloatFormat
 from gpbnb.arithmetic.named import (
     BFLOAT16 as BFLOAT16,

@@ -33,7 +33,6 @@ HOMES = {
     "TracedFunction": "gpbnb.arithmetic.traced",
     "WordFormats": "gpbnb.filters.words",
     "emulate": "gpbnb.filters.emulation",
-    "flags": "gpbnb.arithmetic.flags",
     "guarantee": "gpbnb.bounds.guarantee",
     "limit_cycles": "gpbnb.bounds.limit_cycles",
     "limits": "gpbnb.bounds.guarantee",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.assignment import At
-from gpbnb.arithmetic.conversion import entries, exact_ratio, special_number
+from gpbnb.arithmetic.conversion import entries, exact_ratio
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import check_exit, entering
 from gpbnb.arithmetic.functions import floor_divide, kept, lines, power, remainder
@@ -131,10 +131,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
         return self.from_components(self.format.exact_backend, self.backend.to_exact(self.components), self.format)
 
     def to_pairs(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return significands and exponents as Python integers; each entry is ``m * base**e``, normalized.
-
-        The significand of infinity, NaN or a negative zero, in a format that has them, is a float.
-        """
+        """Return significands and exponents as Python integers; each entry is ``m * base**e``, normalized."""
         check_exit(self, "to_pairs()")
         m, e = self.on_exact_backend().components
         return m, e
@@ -150,11 +147,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
                 return values
             if (components := cls._converted(values, fmt)) is not None:
                 return cls.from_components(fmt.backend, components, fmt)
-            if values.backend.special:
-                with entering(fmt):
-                    check_exit(values, "to_pairs()")
-                values = values.to_numbers()
-            elif values.format.base == fmt.base:
+            if values.format.base == fmt.base:
                 with entering(fmt):
                     pairs = values.to_pairs()
                 m, e = np.frompyfunc(fmt.kernel.from_ratio, 3, 2)(pairs[0], 1, pairs[1])
@@ -170,9 +163,6 @@ class FloatArray(ComponentArray, NumPyProtocols):
         known: dict[Any, Any] = {}
         for i, value in enumerate(given.ravel().tolist()):
             try:
-                if fmt.backend.special and (special := special_number(value)) is not None:
-                    read.append(cls._special(special, fmt, exactly))
-                    continue
                 ratio = exact_ratio(value)
                 if random or ratio not in known:
                     known[ratio] = pair = fmt.kernel.from_decimal(*ratio)
@@ -197,19 +187,6 @@ class FloatArray(ComponentArray, NumPyProtocols):
             check_exit(values, "to_pairs()")
         components: Components | None = fmt.backend.from_backend(values.backend, values.components)
         return components
-
-    @staticmethod
-    def _special(value: float, fmt: Any, exactly: bool) -> tuple[Any, int]:
-        pair: tuple[Any, int] = fmt.kernel.special(value)
-        if exactly and pair[0] != pair[0] and value == value:
-            raise ValueError(f"got the operand {value!r}; needed a number of {fmt}, which has NaN and no infinity")
-        return pair
-
-    def to_numbers(self) -> NDArray[Any]:
-        """Return Fractions, and floats for infinity, NaN and negative zero, in an object array."""
-        kernel = self.format.kernel
-        convert = np.frompyfunc(lambda m, e: m if type(m) is float else kernel.to_fraction(m, e), 2, 1)
-        return np.asarray(convert(*self.on_exact_backend().components), dtype=object)
 
     def __reduce__(self) -> tuple[Any, ...]:
         check_exit(self, "pickle")
@@ -293,7 +270,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
     def _binary(self, name: str, left: Any, right: Any) -> FloatArray:
         a, b = self.operand(left), self.operand(right)
         broadcast(name, a.shape, b.shape)
-        if name == "divide" and not a.backend.special and (zero := _first(b.components[0] == 0)) is not None:
+        if name == "divide" and (zero := _first(b.components[0] == 0)) is not None:
             at = f" at {place(zero)} of the divisor" if zero else ""
             raise ZeroDivisionError(
                 f"got a division by zero{at}; needed a divisor other than zero; test x == 0 before dividing"
@@ -319,7 +296,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
         return self.from_components(backend, components, self.format)
 
     def _unary(self, name: str) -> FloatArray:
-        if name == "sqrt" and not self.backend.special and (negative := _first(self.components[0] < 0)) is not None:
+        if name == "sqrt" and (negative := _first(self.components[0] < 0)) is not None:
             at = f" at {place(negative)}" if negative else ""
             raise NegativeRootError(
                 f"got the square root of a negative number{at}; needed x >= 0; test x < 0 before, or take abs(x)"

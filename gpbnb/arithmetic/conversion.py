@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence, Set
@@ -93,22 +92,6 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
             raise ValueError(_not_finite(value)) from None
         return int(p), int(q), 0
     raise TypeError(f"got {value!r} of type {type(value).__name__}; needed {_ACCEPTED}")
-
-
-def special_number(value: Any) -> float | None:
-    """Read infinity, NaN or a negative zero, as a number or in text; None for everything else."""
-    if isinstance(value, str):
-        if _NOT_FINITE.fullmatch(value):
-            return float(value)
-        zero = _DECIMAL.fullmatch(value)
-        return -0.0 if zero and zero[1] == "-" and not zero[2].strip("0.") else None
-    if isinstance(value, Decimal):
-        found = math.nan if value.is_nan() else float(value) if value.is_infinite() or not value else 0.0
-    elif hasattr(value, "as_integer_ratio") and not isinstance(value, (Rational, np.integer)):
-        found = float(value) if value != value or value in (math.inf, -math.inf) or value == 0 else 0.0
-    else:
-        return None
-    return found if found != 0 or math.copysign(1, found) < 0 else None
 
 
 def _of_mpmath_or_flint(value: Any) -> tuple[int, int, int] | None:

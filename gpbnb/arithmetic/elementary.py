@@ -17,7 +17,6 @@ import numpy as np
 from flint import arb, ctx, fmpz
 
 from gpbnb.arithmetic.exits import stays
-from gpbnb.arithmetic.flags import uncounted
 from gpbnb.arithmetic.kernels.backends import Floats
 from gpbnb.arithmetic.kernels.exact import ExactKernel, Pair
 from gpbnb.arithmetic.rounding import Rounding
@@ -164,22 +163,7 @@ def _rounded(name: str, values: Sequence[Fraction], fmt: Any, place: str) -> Pai
     if (whole := _rational(name, values)) is not None:
         pair: Pair = fmt.kernel.from_ratio(whole.numerator, whole.denominator)
         return pair
-    function = _ENCLOSURES.get(name) or getattr(arb, name)
-    return rounded_enclosure(
-        lambda: function(*(arb(value.numerator) / arb(value.denominator) for value in values)),
-        fmt,
-        lambda: f"np.{name} of {' and '.join(map(_shown, values))}{place}",
-    )
-
-
-def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[], str]) -> Pair:
-    """Round an irrational number correctly, of which Arb computes an interval in the precision that is set.
-
-    Raises
-    ------
-    DomainError : the interval stays infinite; `what` names the number.
-    ValueError : the interval contains a tie in every precision.
-    """
+    enclosure, given = _ENCLOSURES.get(name) or getattr(arb, name), f"np.{name} of {' and '.join(map(_shown, values))}"
     kernel, before, bits = fmt.kernel, ctx.prec, 128
     drawn, limits = kernel.count, kernel.limits
     modulus = float(limits.largest - limits.lowest) if limits and limits.overflow == "wrap" else None
@@ -193,22 +177,21 @@ def rounded_enclosure(enclosure: Callable[[], Any], fmt: Any, what: Callable[[],
     try:
         while bits <= _MOST_BITS:
             ctx.prec = bits
-            ball = enclosure()
+            ball = enclosure(*(arb(value.numerator) / arb(value.denominator) for value in values))
             finite = ball.is_finite()
             if finite:
-                with uncounted():
-                    low, high = rounded(ball.lower()), rounded(ball.upper())
+                low, high = rounded(ball.lower()), rounded(ball.upper())
                 # In a format that wraps around, ends that are a whole range apart round to the same number, too.
                 if low == high and (modulus is None or bool(4 * ball.rad() < modulus)):
-                    return rounded(ball.lower()) if fmt.backend.special else low
+                    return low
             elif bits > 1024:
                 break
             bits *= 2
     finally:
         ctx.prec = before
     if finite:
-        raise ValueError(f"got {what()}; needed an argument that is smaller, or further from a tie")
-    raise DomainError(f"got {what()}; needed an argument for which the result is finite and real")
+        raise ValueError(f"got {given}{place}; needed an argument that is smaller, or further from a tie")
+    raise DomainError(f"got {given}{place}; needed an argument for which the result is finite and real")
 
 
 def _shown(value: Fraction) -> str:

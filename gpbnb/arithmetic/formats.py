@@ -33,8 +33,7 @@ LARGEST_EXPONENT = 2**20
 class FloatFormat(NumberFormat[FloatArray]):
     r"""Floating-point numbers :math:`\pm.d_1 d_2 \dots d_t \times b^e`, with any exponent unless a range is given.
 
-    Zero is a number of every format. Infinity, NaN and negative zero are numbers of a format with
-    ``overflow="infinity"``, and of no other.
+    Zero is a number of every format; infinity, NaN and negative zero are numbers of none.
 
     Parameters
     ----------
@@ -53,28 +52,20 @@ class FloatFormat(NumberFormat[FloatArray]):
         :meth:`~gpbnb.arithmetic.number_format.NumberFormat.restart` or a run of a filter restarts it.
     overflow : what happens to a result that is beyond the largest number after rounding. "raise" raises an
         OverflowError that names the operation and the entry. "saturate" takes the largest number, with the sign of the
-        result. "infinity" computes as IEEE 754 does by default, with infinity, NaN and a sign of zero; see the notes.
+        result.
 
     Raises
     ------
     TypeError : a parameter has the wrong type.
     ValueError : ``base < 2`` or ``precision < 1``, or so many digits that numbers do not fit in memory; an unknown
         rounding; `emin` or `emax` without the other, ``emin > emax``, or exponents too large to compute with; a
-        largest number that is not in the format; an unknown `overflow`, an `overflow` without a range, or "infinity"
-        in a format that has no words left for infinity and NaN, such as FP6.
+        largest number that is not in the format; an unknown `overflow`, or an `overflow` without a range.
 
     Notes
     -----
-    A range is applied after rounding, as in IEEE 754. With "raise" and "saturate", a division by zero and the root of a
-    negative number raise an error.
-
-    With ``overflow="infinity"``, the operations ``+ - * /``, square root and fused multiply-add give what IEEE 754
-    requires for every operand: a result that overflows becomes infinite, or the largest number if the rounding is
-    directed toward it; there is only one NaN. E4M3, which has NaN and no infinity, gives NaN in its place. Elementary
-    functions, remainders and sorting need finite entries, and treat negative zero as zero.
-    :func:`~gpbnb.arithmetic.flags.flags` counts the exceptions of IEEE 754. Such a format computes on Python integers,
-    about a thousand times slower than compiled loops. Filters have compiled loops for "saturate" in base 2 up to 53
-    bits, or 52 if ties go away from zero, and in base 16.
+    A range is applied after rounding, as in IEEE 754. A division by zero and the root of a negative number raise an
+    error. Filters have compiled loops for "saturate" in base 2 up to 53 bits, or 52 if ties go away from zero, and in
+    base 16.
 
     References
     ----------
@@ -173,10 +164,6 @@ class FloatFormat(NumberFormat[FloatArray]):
                 raise ValueError(
                     f"largest: got {self.given_largest}; needed a number of the format with the exponent emax"
                 )
-        if self.overflow == "infinity" and not self._special:
-            raise ValueError(
-                f"got {self}, in which every word stores a finite number; needed overflow 'raise' or 'saturate'"
-            )
 
     def __repr__(self) -> str:
         text = f"base={self.base}, precision={self.precision}, rounding={self.rounding}"
@@ -197,19 +184,7 @@ class FloatFormat(NumberFormat[FloatArray]):
         """The limits of the range; None if exponents are unlimited."""
         if self.emin is None or self.emax is None:
             return None
-        overflow = self._special if self.overflow == "infinity" else self.overflow
-        return Limits(self.emin, self.subnormal, self.largest, -self.largest, overflow)
-
-    @property
-    def _special(self) -> str:
-        """What words that store no finite number mean: "infinity" and NaN, only "NaN", or "" if there are none."""
-        low, high = self._range
-        if (self.base, self.subnormal) not in _WORDS:
-            return "infinity"
-        layout = FloatLayout.of(self.base, self.precision, low, high, self.subnormal)
-        if layout.field(high) < (1 << layout.exponent_bits) - 1 and layout.stored_bits:
-            return "infinity"
-        return "NaN" if self.largest < self._nines else ""
+        return Limits(self.emin, self.subnormal, self.largest, -self.largest, self.overflow)
 
     @property
     def _nines(self) -> Fraction:
@@ -275,11 +250,7 @@ class FloatFormat(NumberFormat[FloatArray]):
             raise ValueError(
                 f"got {self}, which has no bits; needed a range emin, emax, and base 2, or base 16 with subnormal=False"
             )
-        made = FloatLayout.of(self.base, self.precision, self.emin, self.emax, self.subnormal)
-        if self.overflow != "infinity":
-            return made
-        largest = self.kernel.from_ratio(self.largest.numerator, self.largest.denominator)
-        return made._replace(special=self._special, largest=made.bits(*largest))
+        return FloatLayout.of(self.base, self.precision, self.emin, self.emax, self.subnormal)
 
     @cached_property
     def rules(self) -> Rules:

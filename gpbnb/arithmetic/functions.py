@@ -77,7 +77,7 @@ def decimals(x: Any, count: int = 0) -> Any:
 
 
 def copysign(x: Any, y: Any) -> Any:
-    """Return entries of the size of x with the sign of y; zero counts as positive in a format where it has no sign."""
+    """Return entries of the size of x with the sign of y; zero counts as positive."""
     other = np.signbit(x) != np.signbit(y)
     return np.where(other, -np.where(other, x, x.operand(0)), x)
 
@@ -168,18 +168,18 @@ def _chosen(x: Any, axis: int | None, better: Callable[[Any, Any], Any]) -> Any:
     while len(left) > 1:
         half = len(left) // 2
         first, second, rest = left[:half], left[half : 2 * half], left[2 * half :]
-        left = np.concatenate([np.where(_or_nan(better(second, first), second), second, first), rest])
+        left = np.concatenate([np.where(better(second, first), second, first), rest])
     return left[0]
 
 
 def argmax(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     """Return the index of the largest entry, the first of equal ones."""
-    return np.argmax(_or_nan(x == largest(x, axis, keepdims=True), x), axis=axis, keepdims=keepdims)
+    return np.argmax(x == largest(x, axis, keepdims=True), axis=axis, keepdims=keepdims)
 
 
 def argmin(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     """Return the index of the smallest entry, the first of equal ones."""
-    return np.argmax(_or_nan(x == smallest(x, axis, keepdims=True), x), axis=axis, keepdims=keepdims)
+    return np.argmax(x == smallest(x, axis, keepdims=True), axis=axis, keepdims=keepdims)
 
 
 @stays
@@ -199,35 +199,23 @@ def sort(x: Any, axis: int | None = -1) -> Any:
 
 
 def maximum(a: Any, b: Any) -> Any:
-    """Return the larger entry of two arrays at each place, or NaN if one of them is NaN; nothing is rounded."""
-    return np.where(_or_nan(a > b, a), a, b)
+    """Return the larger entry of two arrays at each place; nothing is rounded."""
+    return np.where(a > b, a, b)
 
 
 def minimum(a: Any, b: Any) -> Any:
-    """Return the smaller entry of two arrays at each place, or NaN if one of them is NaN; nothing is rounded."""
-    return np.where(_or_nan(a < b, a), a, b)
+    """Return the smaller entry of two arrays at each place; nothing is rounded."""
+    return np.where(a < b, a, b)
 
 
-def fmax(a: Any, b: Any) -> Any:
-    """Return the larger entry of two arrays at each place, or the other one if one of them is NaN."""
-    return np.where(_or_nan(a > b, b), a, b)
+def signbit(x: Any) -> Any:
+    """Whether each entry is negative."""
+    return x < 0
 
 
-def fmin(a: Any, b: Any) -> Any:
-    """Return the smaller entry of two arrays at each place, or the other one if one of them is NaN."""
-    return np.where(_or_nan(a < b, b), a, b)
-
-
-def _or_nan(chosen: Any, x: Any) -> Any:
-    """Choose also the entries that are NaN, in a format that has it."""
-    return chosen | special("isnan", x) if x.backend.special else chosen
-
-
-def special(question: str, x: Any) -> Any:
-    """Answer "isnan", "isinf", "isfinite" or "signbit" for each entry."""
-    if x.backend.special:
-        return getattr(np, question)(x.backend.signs(x.components))[()]
-    return x < 0 if question == "signbit" else np.full(x.shape, question == "isfinite")[()]
+def everywhere(answer: bool, x: Any) -> Any:
+    """Return the same answer for each entry, as to "isnan": no number of a format is infinite or NaN."""
+    return np.full(x.shape, answer)[()]
 
 
 def sign(x: Any) -> Any:
@@ -237,8 +225,7 @@ def sign(x: Any) -> Any:
     ------
     ValueError : 1 is not a number of the format, as in fixed point without integer bits.
     """
-    rest = np.where(special("isnan", x), x, x.operand(0)) if x.backend.special else x.operand(0)
-    return np.where(x > 0, 1, np.where(x < 0, -1, rest))
+    return np.where(x > 0, 1, np.where(x < 0, -1, x.operand(0)))
 
 
 def full_like(x: Any, fill: Any) -> Any:

@@ -4,9 +4,8 @@ The named formats are those of IEEE 754, accelerators, IBM's hexadecimal floatin
 
 All IEEE and accelerator formats round to nearest, ties to even, with gradual underflow; use
 ``dataclasses.replace(BINARY32, rounding=Rounding.UP)`` for another rounding. Overflow is an error, and there is no
-infinity, NaN or negative zero; ``replace(BINARY32, overflow="infinity")`` has them, and ``replace(FP8_E4M3,
-overflow="saturate")`` takes the largest number. IBM's machines chop, and a result below their smallest number becomes
-zero.
+infinity, NaN or negative zero; ``replace(FP8_E4M3, overflow="saturate")`` takes the largest number. IBM's machines
+chop, and a result below their smallest number becomes zero.
 
 References
 ----------
@@ -42,7 +41,7 @@ FP8_E5M2 = _ieee(2, 3, 15)
 #: Its largest number is 1.75 * 2**8, since the significand of all ones means NaN there.
 FP8_E4M3 = FloatFormat(2, 4, Rounding.EVEN, emin=-6, emax=8, largest=Fraction(448))
 
-#: Elements of the microscaling formats, at most 28, 7.5 and 6; they have no infinity and no NaN.
+#: Elements of OCP's microscaling formats, whose largest numbers are 28, 7.5 and 6.
 FP6_E3M2 = FloatFormat(2, 3, Rounding.EVEN, emin=-2, emax=4)
 FP6_E2M3 = FloatFormat(2, 4, Rounding.EVEN, emin=0, emax=2)
 FP4_E2M1 = FloatFormat(2, 2, Rounding.EVEN, emin=0, emax=2)
@@ -111,7 +110,7 @@ def arithmetic(fmt: NumberFormat) -> str:
     if least is None:
         return digits(fmt) + rounding
     flushed = "" if getattr(fmt, "subnormal", True) else ", no subnormal numbers"
-    overflow = {"saturate": ", saturated", "infinity": ", with infinity and NaN"}.get(getattr(fmt, "overflow", ""), "")
+    overflow = ", saturated" if getattr(fmt, "overflow", "") == "saturate" else ""
     return f"{digits(fmt)}{rounding}, exponents {least} to {largest}{flushed}{overflow}"
 
 

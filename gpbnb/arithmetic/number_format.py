@@ -165,7 +165,7 @@ class NumberFormat(ABC, Generic[Made]):
     def from_bits(self, bits: Any) -> Made:
         """Return the numbers that words store; the inverse of :meth:`gpbnb.arithmetic.array.FloatArray.to_bits`.
 
-        A negative zero becomes zero, and infinity and NaN are refused, unless the format has them.
+        A negative zero becomes zero.
 
         Parameters
         ----------
@@ -188,9 +188,6 @@ class NumberFormat(ABC, Generic[Made]):
         values = np.empty(given.shape, dtype=object)
         for index, word in np.ndenumerate(given):
             m, e = layout.pair(word)
-            if type(m) is float:
-                values[index] = m
-                continue
             values[index] = value = self.kernel.to_fraction(m, e)
             try:
                 stored = self.round(value) == value

@@ -92,7 +92,7 @@ DRAW_BITS = 24
 
 
 #: What happens to a result beyond the limits of a floating-point format.
-FLOAT_OVERFLOWS = ("raise", "saturate", "infinity")
+FLOAT_OVERFLOWS = ("raise", "saturate")
 
 
 class Limits(NamedTuple):
@@ -105,8 +105,7 @@ class Limits(NamedTuple):
     #: The largest number and the most negative one.
     largest: Fraction
     lowest: Fraction
-    #: What happens to results beyond these, which is "raise", "saturate", "wrap", or in a float format "infinity", or
-    #: "NaN" where it has no infinity.
+    #: What happens to results beyond these: "raise", "saturate", or in fixed point "wrap".
     overflow: str = "raise"
     #: Whether all numbers have the same spacing, as in fixed point.
     fixed: bool = False

@@ -47,8 +47,6 @@ def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: s
 
 def decimal_text(m: int, e: int, form: ExactKernel) -> str:
     """Return decimal digits that round to ``m * base**e`` in the format of a kernel, exact in base 10."""
-    if type(m) is float:  # infinity, NaN or negative zero
-        return "-0" if m == 0 else str(m)
     if m == 0:
         return "0"
     if form.base == 10:

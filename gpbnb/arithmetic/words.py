@@ -7,8 +7,7 @@ of the exponent follows from the range.
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple, Protocol, cast
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,9 +38,6 @@ class FloatLayout(NamedTuple):
     exponent_bits: int
     stored_bits: int
     leading_one: bool
-    #: "infinity" or "NaN" if words beyond that of the largest number store them; otherwise such words store nothing.
-    special: str = ""
-    largest: int = 0
 
     @classmethod
     def of(cls, base: int, precision: int, emin: int, emax: int, subnormal: bool) -> FloatLayout:
@@ -57,14 +53,7 @@ class FloatLayout(NamedTuple):
         return 1 + self.exponent_bits + self.stored_bits
 
     def bits(self, m: int, e: int) -> int:
-        """Return the word of a number whose m has `precision` digits, or of infinity, NaN and negative zero.
-
-        Raises
-        ------
-        ValueError : infinity or NaN in a format that stores the leading one, where no bits of them are documented.
-        """
-        if type(m) is float:
-            return self._special_bits(m)
+        """Return the word of a number whose m has `precision` digits."""
         if m == 0:
             return 0
         sign, field = int(m < 0) << (self.width - 1), e + self.precision - 1 - self.emin
@@ -74,38 +63,12 @@ class FloatLayout(NamedTuple):
         return sign | ((field << self.stored_bits) + abs(m) if field >= 0 else abs(m) >> -field)
 
     def pair(self, word: int) -> Pair:
-        """Return m and e of the number that a word stores; infinity and NaN give one beyond the range.
-
-        In a format that has them, infinity, NaN and negative zero are floats.
-        """
+        """Return m and e of the number that a word stores; infinity and NaN give one beyond the range."""
         sign, rest = divmod(word, 1 << (self.width - 1))
         field, m = divmod(rest, 1 << self.stored_bits)
-        if self.special and self.leading_one:
-            if sign and not rest:
-                return cast(Pair, (-0.0, 0))
-            if self.special == "NaN" and rest > self.largest:
-                return cast(Pair, (math.nan, 0))
-            if self.special == "infinity" and field == (1 << self.exponent_bits) - 1:
-                return cast(Pair, (math.nan if m else -math.inf if sign else math.inf, 0))
         if self.leading_one and field:
             field, m = field - 1, m + (1 << self.stored_bits)
         return (-m if sign else m, field + self.emin - self.precision + 1) if m else ZERO
-
-    def field(self, exponent: int) -> int:
-        """Return the exponent field of normal numbers from ``base**exponent`` to the next power."""
-        return exponent - self.emin + self.leading_one
-
-    def _special_bits(self, value: float) -> int:
-        """Return the word of infinity, the quiet NaN without a payload, or negative zero."""
-        sign = int(math.copysign(1, value) < 0) << (self.width - 1)
-        if value == 0:
-            return sign
-        if not self.leading_one:
-            raise ValueError(f"got {value}, for which this layout has no documented bits; needed a finite number")
-        ones = (1 << self.exponent_bits) - 1 << self.stored_bits
-        if math.isinf(value):
-            return sign | ones
-        return ones | (1 << self.stored_bits - 1 if self.special == "infinity" else (1 << self.stored_bits) - 1)
 
 
 class FixedLayout(NamedTuple):

@@ -13,7 +13,6 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.kernels.exact import SPECIAL
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_run import (
@@ -65,7 +64,7 @@ class NonlinearRun(SteppedRun):
 
     Raises
     ------
-    ValueError : a form that nonlinear filters, the unscented filter or blocks do not have; a format with infinities.
+    ValueError : a form that nonlinear filters, the unscented filter or blocks do not have.
     OverflowError : the model has entries beyond the range of the format.
     """
 
@@ -79,10 +78,6 @@ class NonlinearRun(SteppedRun):
     ) -> None:
         check_form(model, form, isinstance(fmt, BlockFormats))
         each = [getattr(fmt, name) for name in BLOCKS] if isinstance(fmt, BlockFormats) else [fmt] * len(BLOCKS)
-        if any(one.overflow in SPECIAL for one in each):
-            raise ValueError(
-                "got a format with infinities for a nonlinear filter; needed another overflow, such as 'raise'"
-            )
         of_state, of_gain, of_covariance, of_innovation = each
         super().__init__(model.n, model.m, of_state.array, form, checkpoint_steps)
         self.model, self.fmt = model, fmt

@@ -455,12 +455,6 @@ def test_a_constant_that_changes_changes_the_reference():
     assert first.tolist() == second.tolist()
 
 
-def test_a_format_with_infinities_is_refused():
-    fmt = FloatFormat(2, 11, emin=-14, emax=15, overflow="infinity")
-    with pytest.raises(ValueError, match="got a format with infinities for a nonlinear filter"):
-        NonlinearRun(by_functions(), fmt)
-
-
 def test_forms_that_a_nonlinear_filter_does_not_have_are_refused():
     fmt = FloatFormat(2, 24)
     for form in (Form.HUNG, Form.HUNG_SECOND_GAIN, ArrayForm.COMPENSATED):

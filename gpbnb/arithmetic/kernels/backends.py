@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel, one_per_format
+from gpbnb.arithmetic.kernels.exact import kernel, one_per_format
 from gpbnb.arithmetic.kernels.selection import fusing_tag, tag_of, wide_tag
 from gpbnb.arithmetic.kernels.tags import (
     FARTHEST,
@@ -49,7 +49,6 @@ class Backend(ABC):
 
     dtype: Any
     records = False  # whether it only records operations, and holds no numbers
-    special = False  # whether it holds infinity, NaN and negative zero
 
     def __init__(self, rules: Rules) -> None:
         self.rules = rules
@@ -148,28 +147,6 @@ class Exact(Backend):
 
     def _ufunc(self, name: str, inputs: int, outputs: int) -> Any:
         return np.frompyfunc(getattr(self.kernel, name), inputs, outputs)
-
-
-class Special(Exact):
-    """A format with infinity, NaN and negative zero, whose significands are floats; see :class:`SpecialKernel`."""
-
-    special = True
-
-    def apply(self, name: str, *operands: Components) -> Components:
-        with np.errstate(all="ignore"):  # of Python's own floats; exceptions are counted by the kernel
-            return super().apply(name, *operands)
-
-    def compare(self, a: Components, b: Components) -> Array:
-        """Compare each pair of entries: -1, 0 or 1, or NaN, for which every comparison but != is false."""
-        return np.asarray(self._ufunc("compare", 4, 1)(*a, *b), dtype=np.float64)
-
-    def signs(self, components: Components) -> Array:
-        """Return infinity, NaN and zeros as float64, and 1 or -1 for other numbers."""
-        return np.asarray(np.frompyfunc(_sign, 1, 1)(components[0]), dtype=np.float64)
-
-
-def _sign(m: Any) -> float:
-    return m if type(m) is float else float((m > 0) - (m < 0))
 
 
 _NAMES = {
@@ -616,8 +593,7 @@ class TwoWords(Looped):
 @one_per_format
 def exact(rules: Rules) -> Exact:
     """Return the backend that holds every number of a format."""
-    special = rules.limits is not None and rules.limits.overflow in SPECIAL
-    return Special(rules) if special else Exact(rules)
+    return Exact(rules)
 
 
 @one_per_format

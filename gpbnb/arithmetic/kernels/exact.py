@@ -7,7 +7,6 @@ their last digits are zeros. Every function computes the exact result and rounds
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable
 from decimal import Decimal
@@ -17,13 +16,9 @@ from math import isqrt, log2, log10
 from typing import Any, TypeVar, cast
 from weakref import WeakValueDictionary
 
-from gpbnb.arithmetic.flags import signal
 from gpbnb.arithmetic.rounding import DRAW_BITS, Limits, Rounding, Rules
 
 Pair = tuple[int, int]
-
-SPECIAL = ("infinity", "NaN")
-"""What formats with infinity and NaN, or with NaN alone, give beyond their range."""
 
 ZERO: Pair = (0, 0)
 Made = TypeVar("Made")
@@ -371,166 +366,6 @@ class ExactKernel:
         return (m * self.power(shift) if shift >= 0 else m // self.power(-shift)), e - shift
 
 
-class SpecialKernel(ExactKernel):
-    """Operations of a format with infinity, NaN and negative zero, as IEEE 754 defines them.
-
-    The pair of a special number is ``(math.inf, 0)``, ``(-math.inf, 0)``, ``(math.nan, 0)`` or ``(-0.0, 0)``; a float
-    is never the significand of another number. Exceptions are counted by :mod:`gpbnb.arithmetic.flags`.
-    """
-
-    def __init__(self, rules: Rules) -> None:
-        super().__init__(rules)
-        self._free = ExactKernel(rules._replace(limits=None))
-
-    def special(self, value: float) -> Pair:
-        """Return the pair of infinity, NaN or negative zero; a format without infinity has NaN in its place."""
-        if math.isinf(value) and cast(Limits, self.limits).overflow == "NaN":
-            value = math.nan
-        return cast(Pair, (value, 0))
-
-    def from_ratio(self, p: int, q: int, e: int = 0) -> Pair:
-        return self.special(p) if type(p) is float else super().from_ratio(p, q, e)
-
-    def is_exactly(self, pair: Pair, p: int, q: int, k: int) -> bool:
-        return p == 0 == pair[0] if type(pair[0]) is float else super().is_exactly(pair, p, q, k)
-
-    def add(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
-        return self.fused(m1, e1, 1, 0, m2, e2)
-
-    def subtract(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
-        return self.add(m1, e1, *self.negative(m2, e2))
-
-    def multiply(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
-        if _is_usual(m1) and _is_usual(m2):
-            return super().multiply(m1, e1, m2, e2)
-        product = _stand_in(m1) * _stand_in(m2)
-        return self._invalid() if math.isnan(product) and not _has_nan(m1, m2) else self._plain(product)
-
-    def divide(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
-        if _is_usual(m1) and _is_usual(m2):
-            return super().divide(m1, e1, m2, e2)
-        a, b = _stand_in(m1), _stand_in(m2)
-        if _has_nan(m1, m2):
-            return self.special(math.nan)
-        if (a == 0 == b) or (math.isinf(a) and math.isinf(b)):
-            return self._invalid()
-        if b == 0:
-            if math.isfinite(a):
-                signal(self.rules, "divide_by_zero")
-            return self.special(math.copysign(math.inf, a) * math.copysign(1, b))
-        return self._plain(a / b)
-
-    def fused(self, m1: int, e1: int, m2: int, e2: int, m3: int, e3: int) -> Pair:
-        if _is_usual(m1) and _is_usual(m2) and _is_usual(m3):
-            if m1 * m2 * m3 > 0 or not self._cancel(m1 * m2, e1 + e2, m3, e3):
-                return super().fused(m1, e1, m2, e2, m3, e3)
-            return self.special(-0.0) if self.rounding is Rounding.DOWN else ZERO
-        if _has_nan(m1, m2, m3):
-            return self.special(math.nan)
-        product, c = _stand_in(m1) * _stand_in(m2), _stand_in(m3)
-        total = product + c
-        if math.isnan(total):
-            return self._invalid()
-        if math.isinf(total):
-            return self.special(total)
-        if c != 0:  # and the product is zero
-            return m3, e3
-        if product != 0:
-            return super().multiply(m1, e1, m2, e2)
-        down = self.rounding is Rounding.DOWN and math.copysign(1, product) != math.copysign(1, c)
-        return self._plain(-0.0 if down else total)
-
-    def sqrt(self, m: int, e: int) -> Pair:
-        if m < 0:
-            return self._invalid()
-        return super().sqrt(m, e) if _is_usual(m) else (m, e)
-
-    def negative(self, m: int, e: int) -> Pair:
-        return (-m, e) if _is_usual(m) else self._plain(-_stand_in(m))
-
-    def absolute(self, m: int, e: int) -> Pair:
-        return (abs(m), e) if _is_usual(m) else self._plain(abs(_stand_in(m)))
-
-    def compare(self, m1: int, e1: int, m2: int, e2: int) -> int:
-        """-1, 0 or 1, or NaN if one of the numbers is NaN."""
-        if _is_usual(m1) and _is_usual(m2):
-            return super().compare(m1, e1, m2, e2)
-        a, b = _stand_in(m1), _stand_in(m2)
-        return cast(int, math.nan) if _has_nan(m1, m2) else (a > b) - (a < b)
-
-    def to_fraction(self, m: int, e: int) -> Fraction:
-        if type(m) is float and m != 0:
-            raise ValueError(f"got {m}, which is no Fraction; needed a finite number; select entries by np.isfinite(x)")
-        return super().to_fraction(int(m), e)
-
-    def to_float(self, m: int, e: int) -> float:
-        return m if type(m) is float else super().to_float(m, e)
-
-    def _plain(self, value: float) -> Pair:
-        """Return the pair of zero, infinity or NaN."""
-        return ZERO if value == 0 and math.copysign(1, value) > 0 else self.special(value)
-
-    def _invalid(self) -> Pair:
-        signal(self.rules, "invalid")
-        return self.special(math.nan)
-
-    def _cancel(self, m1: int, e1: int, m2: int, e2: int) -> bool:
-        """Whether two numbers, not necessarily normalized, add up to zero."""
-        e = min(e1, e2)
-        return m1 * self.power(e1 - e) + m2 * self.power(e2 - e) == 0
-
-    def _round_integer(self, n: int, e: int) -> Pair:
-        return self._noted(super()._round_integer(n, e), n, 1, e)
-
-    def _round_quotient(self, p: int, q: int, e: int) -> Pair:
-        return self._noted(super()._round_quotient(p, q, e), p, q, e)
-
-    def _noted(self, pair: Pair, p: int, q: int, e: int) -> Pair:
-        """Count the exceptions of rounding ``p / q * base**e``, not zero, to a pair."""
-        m, exponent = pair
-        if type(m) is not float and p * self.power(max(e - exponent, 0)) == m * q * self.power(max(exponent - e, 0)):
-            return pair
-        signal(self.rules, "inexact")
-        if m == 0 or (abs(m) < math.inf and exponent <= self.quantum):
-            # Tiny results are those below the smallest normal number, in base 10 before rounding, in others after
-            # rounding to t digits with unlimited exponents.
-            self._free.count = self.count
-            kernel = self._free if self.base != 10 else _chopping(self.rules)
-            if kernel._round_quotient(p, q, e)[1] < self.quantum:
-                signal(self.rules, "underflow")
-        return pair
-
-    def _within(self, sign: int, m: int, e: int) -> Pair:
-        pair = super()._within(sign, m, e)
-        return self.special(-0.0) if pair == ZERO and sign < 0 else pair
-
-    def _beyond(self, positive: bool, e: int, count: int = 1) -> Pair:
-        signal(self.rules, "overflow")
-        toward_zero = {Rounding.CHOP: True, Rounding.ODD: True, Rounding.UP: not positive, Rounding.DOWN: positive}
-        if toward_zero.get(self.rounding, False):
-            return self._normalized(self._largest if positive else self._lowest, self.quantum)
-        return self.special(math.inf if positive else -math.inf)
-
-
-def _is_usual(m: int) -> bool:
-    """Whether a significand is that of a finite number other than zero."""
-    return type(m) is not float and m != 0
-
-
-def _has_nan(*significands: int) -> bool:
-    return any(m != m for m in significands)
-
-
-def _stand_in(m: int) -> float:
-    """Return a float that behaves like a number in operations whose result is zero, infinite or NaN."""
-    return m if type(m) is float else float((m > 0) - (m < 0))
-
-
-@lru_cache(maxsize=256)
-def _chopping(rules: Rules) -> ExactKernel:
-    return ExactKernel(rules._replace(limits=None, rounding=Rounding.CHOP))
-
-
 def one_per_format(make: Callable[[Rules], Made]) -> Callable[[Rules], Made]:
     """Make only one object for each format at a time.
 
@@ -553,5 +388,4 @@ def one_per_format(make: Callable[[Rules], Made]) -> Callable[[Rules], Made]:
 @one_per_format
 def kernel(rules: Rules) -> ExactKernel:
     """Return the kernel of a format."""
-    special = rules.limits is not None and rules.limits.overflow in SPECIAL
-    return SpecialKernel(rules) if special else ExactKernel(rules)
+    return ExactKernel(rules)

@@ -9,7 +9,7 @@ from typing import Any, Protocol, cast, get_args
 import numpy as np
 
 from gpbnb.arithmetic.kernels import tags
-from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel
+from gpbnb.arithmetic.kernels.exact import kernel
 from gpbnb.arithmetic.rounding import DRAW_BITS, Order, Rounding, Rules, digits_text
 
 LARGEST_PRECISION = {2: 53, 10: 18, 16: 13}  # with compiled loops for filters
@@ -215,8 +215,6 @@ def compiled_tag(rules: Rules) -> tags.Tag:
         why = f"stochastic rounding in base {base}; needed base 2 for compiled loops"
     elif limits is not None and limits.overflow == "wrap":
         why = "overflow that wraps around; needed 'raise' or 'saturate' for compiled loops"
-    elif limits is not None and limits.overflow in SPECIAL:
-        why = "overflow to infinity; needed 'raise' or 'saturate' for compiled loops"
     elif limits is not None and limits.overflow == "saturate" and base == 10:
         why = "overflow that saturates in base 10; needed 'raise' for compiled loops"
     elif precision > (most := _longest(base, rounding, limits is not None) - (limits is not None and limits.fixed)):

@@ -1,0 +1,118 @@
+"""Results beyond the range that become the largest number, against Fractions and ml_dtypes."""
+
+from __future__ import annotations
+
+import operator
+from dataclasses import replace
+from functools import cache
+
+import ml_dtypes
+import numpy as np
+import pytest
+from test_arithmetic_processors import DETERMINISTIC, expected
+
+import gpbnb
+from gpbnb import (
+    BINARY32,
+    BINARY64,
+    DECIMAL32,
+    FP4_E2M1,
+    FP6_E3M2,
+    FP8_E4M3,
+    IBM_HEX32,
+    FixedFormat,
+    FloatFormat,
+    Rounding,
+)
+from gpbnb.arithmetic.kernels.backends import Compiled
+
+OPERATIONS = {"add": operator.add, "subtract": operator.sub, "multiply": operator.mul, "divide": operator.truediv}
+NATIVE = {
+    "FP8_E4M3": ml_dtypes.float8_e4m3fn,
+    "FP8_E5M2": ml_dtypes.float8_e5m2,
+    "FP6_E3M2": ml_dtypes.float6_e3m2fn,
+    "FP6_E2M3": ml_dtypes.float6_e2m3fn,
+    "FP4_E2M1": ml_dtypes.float4_e2m1fn,
+}
+
+
+@pytest.mark.parametrize("name", NATIVE)
+@pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS)
+def test_every_pair_saturated(name, operation):
+    """All pairs of finite numbers without a zero divisor, in compiled loops, on Python integers, and by definition."""
+    fmt = replace(getattr(gpbnb, name), overflow="saturate")
+    words = np.arange(2**fmt.layout.width, dtype=np.uint8)
+    x = fmt.from_bits(words[np.isfinite(words.view(NATIVE[name]).astype(np.float64))])
+    numbers = x.to_fractions().tolist()
+    assert isinstance(x.backend, Compiled)
+    a, b = (part.ravel() for part in np.meshgrid(np.arange(len(x)), np.arange(len(x)), indexing="ij"))
+    if operation is operator.truediv:
+        a, b = a[numbers_differ := np.array([numbers[i] != 0 for i in b])], b[numbers_differ]
+    found = operation(x[a], x[b])
+    assert isinstance(found.backend, Compiled)
+    slow = operation(x[a[::7]].on_exact_backend(), x[b[::7]].on_exact_backend())
+    assert (slow == found[::7]).all()
+    beyond = 0
+    finite = replace(fmt, overflow="raise")
+    rounded = cache(lambda exact: expected(exact, finite))  # pairs have few different results
+    for value, i, j in zip(found.to_fractions().tolist(), a.tolist(), b.tolist(), strict=True):
+        exact = operation(numbers[i], numbers[j])
+        wanted = rounded(exact)
+        beyond += wanted is None
+        assert value == (wanted if wanted is not None else fmt.largest if exact > 0 else -fmt.largest)
+    assert beyond > 0
+
+
+@pytest.mark.parametrize("mode", DETERMINISTIC)
+@pytest.mark.parametrize("fmt", [FP6_E3M2, FP4_E2M1, FP8_E4M3, DECIMAL32, BINARY32, BINARY64, IBM_HEX32], ids=str)
+def test_a_saturated_result_is_the_largest_number_in_every_rounding(fmt, mode):
+    fmt = replace(fmt, overflow="saturate", rounding=mode)
+    big = fmt.array([fmt.largest, -fmt.largest])
+    assert (big + big).to_fractions().tolist() == [fmt.largest, -fmt.largest]
+    assert (big * big).to_fractions().tolist() == [fmt.largest] * 2
+    assert fmt.array([2 * fmt.largest, fmt.largest / 2]).to_fractions().tolist()[0] == fmt.largest
+    assert big.multiply_add(big, -big).to_fractions().tolist() == [fmt.largest] * 2
+    assert (np.stack([big, big]) @ big.reshape(2, 1)).to_fractions()[0, 0] == fmt.largest
+
+
+def test_470_saturates_in_e4m3():
+    assert replace(FP8_E4M3, overflow="saturate").round(470) == 448
+    with pytest.raises(OverflowError, match="needed at most 448 in size"):
+        FP8_E4M3.round(470)
+
+
+@pytest.mark.parametrize("name", NATIVE)
+def test_every_binary16_number_is_converted_as_by_ml_dtypes(name):
+    """Its way through binary32 is exact for 16 bits, so it rounds once; beyond the range, FP8 is infinite or NaN."""
+    given = np.arange(2**16, dtype=np.uint16).view(np.float16)
+    given = given[np.isfinite(given)]
+    with np.errstate(all="ignore"):
+        theirs = given.astype(NATIVE[name]).astype(np.float64)
+    fmt = getattr(gpbnb, name)
+    found, finite = replace(fmt, overflow="saturate").array(given).to_float(), np.isfinite(theirs)
+    assert np.array_equal(found[finite], theirs[finite])
+    assert np.array_equal(found[~finite], (np.sign(given) * float(fmt.largest))[~finite])
+    assert finite.all() == (not name.startswith("FP8"))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: replace(BINARY32, overflow="wrap"), "overflow: got 'wrap'; needed one of 'raise', 'saturate'"),
+        (lambda: FloatFormat(2, 8, overflow="saturate"), "or overflow without a range; needed emin and emax as well"),
+        (replace(DECIMAL32, overflow="saturate").check_compiled, "got overflow that saturates in base 10; needed"),
+    ],
+)
+def test_what_a_format_does_not_have_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_overflow_raises_unless_the_format_says_otherwise():
+    assert BINARY32.overflow == "raise"
+    assert "overflow" not in repr(BINARY32)
+    saturating = replace(BINARY32, overflow="saturate")
+    assert eval(repr(saturating), {"FloatFormat": FloatFormat, "Rounding": Rounding}) == saturating
+    assert FixedFormat(0, 15, overflow="saturate").round(2) == FixedFormat(0, 15).largest
+    with pytest.raises(ZeroDivisionError):
+        saturating.array(1) / 0
