@@ -1,6 +1,6 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help address book test certificates proof test-pages test-portable verify-sweeps notebooks lint format exactness bench mutants environment screenshots pdf poster serve clean
+.PHONY: help address book test certificates proof test-pages test-portable verify-sweeps notebooks lint format exactness bench mutants environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
@@ -132,9 +132,6 @@ pdf: .venv/made-for ## the whole book as one PDF, printed by Chromium
 	@rm -rf _build/singlehtml
 	.venv/bin/jupyter-book build . -W -n --keep-going --builder custom --custom-builder singlehtml
 	$(PY) -m tests.pages.pdf
-
-poster: .venv/made-for ## one page, A1, as SVG and PDF
-	$(PY) -m tests.pages.poster
 
 serve: .venv/made-for ## serve the built book on loopback, port 8000
 	@test -f $(HTML)/index.html || $(MAKE) book

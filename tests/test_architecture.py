@@ -20,7 +20,6 @@ REPORT = (
     TOPICS,
     ("gravity_probe_b",),  # its answers are compared with the bounds of the report of 1984
     ("wordlengths", "calculators", "pictures", "ledger", "ledger_options", "stored", "evidence"),
-    ("poster",),
 )
 LAYERS = (*LIBRARY, ("warm",), *(tuple(f"report.{name}" for name in names) for names in REPORT), ("ledger",))
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

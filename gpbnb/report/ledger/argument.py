@@ -82,11 +82,11 @@ def inherited(rows: Iterable[Row]) -> dict[tuple[str, str], int]:
     return dict(found)
 
 
-def figure(rows: Iterable[Row], height: float = 4.6) -> Figure:
-    """Draw the parts as boxes, and what they pass on as arrows, in a figure of this height in inches."""
+def figure(rows: Iterable[Row]) -> Figure:
+    """Draw the parts as boxes, and what they pass on as arrows."""
     rows = list(rows)
     found, passed = stages(rows), inherited(rows)
-    fig, (ax,) = style.figure(height=height)
+    fig, (ax,) = style.figure(height=4.6)
     half = (0.6, 0.31)
     for topic, stage in found.items():
         x, y = PLACES[topic]
