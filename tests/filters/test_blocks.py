@@ -29,6 +29,8 @@ class Rounds(NamedTuple):
 
     def product(self, A, B):
         """Products of rows and columns, summed from left to right; exact zeros and factors of one change nothing."""
+        assert self.take(A) == A, "a block multiplies only numbers of its format"
+        assert self.take(B) == B
 
         def entry(row, column):
             total = None
@@ -43,6 +45,8 @@ class Rounds(NamedTuple):
         return [[self.store(a) for a in row] for row in A]
 
     def plus(self, A, B, sign=1):
+        assert self.take(A) == A, "a block adds only numbers of its format"
+        assert self.take(B) == B
         return [[self.store(a + sign * b) for a, b in zip(*rows, strict=True)] for rows in zip(A, B, strict=True)]
 
 
@@ -54,18 +58,23 @@ class Filter:
         self.Phi, self.H, self.Q, self.R = (
             [[model(a) for a in row] for row in given[k]] for k in ("Phi", "H", "Q", "R")
         )
+        self.model = model
         self.x = [[blocks["state"].store(model(a))] for a in given["x0"]]
         P = [[model(a) for a in row] for row in given["P0"]]
-        self.RI = inverse(model, self.R)
         if form is Form.UD:
-            P, self.UQ, self.UR = (factors(model, each) for each in (P, self.Q, self.R))
+            P, self.UQ = factors(model, P), factors(model, self.Q)
         self.P = blocks["covariance"].take(P)
 
     def step(self, z):
-        z = [[self.blocks["state"].store(a)] for a in z]
-        if self.form is Form.UD:
-            self.step_ud(z)
-            return
+        """Take a step with the measurements that are not missing; the gain of the others is zero."""
+        seen = [i for i, each in enumerate(z) if np.isfinite(each)]
+        H, R = [self.H[i] for i in seen], [[self.R[i][j] for j in seen] for i in seen]
+        z = [[self.blocks["state"].store(Fraction(float(z[i])))] for i in seen]
+        K = (self.step_ud if self.form is Form.UD else self.step_with_covariance)(H, R, z)
+        self.K = [[row[seen.index(i)] if i in seen else ZERO for i in range(len(self.H))] for row in K]
+
+    def step_with_covariance(self, H, R, z):
+        """Predict, and update unless every measurement is missing; return the gain."""
         p, s, g, x = (self.blocks[name] for name in ("covariance", "innovation", "gain", "state"))
         V = transposed(
             p.plus(
@@ -73,33 +82,37 @@ class Filter:
                 transposed(p.take(self.Q)),
             )
         )
-        PHt = transposed(s.product(s.take(self.H), transposed(s.take(V))))
-        S = s.plus(s.product(s.take(self.H), PHt), s.take(self.R))
+        if not z:
+            self.x, self.P = x.product(x.take(self.Phi), self.x), V
+            return [[] for _ in V]
+        PHt = transposed(s.product(s.take(H), transposed(s.take(V))))
+        S = s.plus(s.product(s.take(H), PHt), s.take(R))
         K = g.product(g.take(PHt), g.take(inverse(s.store, S)))
 
         def remaining(K):
-            return p.plus(eye(len(self.Phi)), p.product(p.take(K), p.take(self.H)), -1)
+            return p.plus(eye(len(self.Phi)), p.product(p.take(K), p.take(H)), -1)
 
         W = remaining(K)
         if self.form is Form.JOSEPH:
-            outer = p.product(p.product(p.take(K), p.take(self.R)), transposed(p.take(K)))
+            outer = p.product(p.product(p.take(K), p.take(R)), transposed(p.take(K)))
             self.P = p.plus(p.product(p.product(W, V), transposed(W)), outer)
         else:
             self.P = p.product(W, V)
         if self.form is Form.HUNG_SECOND_GAIN:
-            K = g.product(g.product(g.take(self.P), transposed(g.take(self.H))), g.take(self.RI))
+            K = g.product(g.product(g.take(self.P), transposed(g.take(H))), g.take(inverse(self.model, R)))
             W = remaining(K)
         if self.form in (Form.HUNG, Form.HUNG_SECOND_GAIN):
             u, v = x.product(x.product(x.take(W), x.take(self.Phi)), self.x), x.product(x.take(K), z)
         else:
             u = x.product(x.take(self.Phi), self.x)
-            v = x.product(x.take(K), x.plus(z, x.product(x.take(self.H), u), -1))
-        self.x, self.K = x.plus(u, v), K
+            v = x.product(x.take(K), x.plus(z, x.product(x.take(H), u), -1))
+        self.x = x.plus(u, v)
+        return K
 
-    def step_ud(self, z):
-        """Thornton's prediction and Bierman's update."""
+    def step_ud(self, H, R, z):
+        """Thornton's prediction and Bierman's update; return the gains of one measurement after the other."""
         p, s, g, x = (self.blocks[name].store for name in ("covariance", "innovation", "gain", "state"))
-        n, m = len(self.Phi), len(self.H)
+        n, m, UR, gains = len(self.Phi), len(z), factors(self.model, R), []
         UQ = self.blocks["covariance"].take(self.UQ)
         unit = [[self.P[i][j] if i < j else Fraction(i == j) for j in range(n)] for i in range(n)]
         W = [
@@ -119,9 +132,9 @@ class Filter:
                 U[i][j] = p(total / d)
                 W[i] = [p(a - p(U[i][j] * b)) for a, b in zip(W[i], W[j], strict=True)]
         self.x = self.blocks["state"].product(self.blocks["state"].take(self.Phi), self.x)
-        y = decorrelated(x, self.blocks["state"].take(self.UR), z)
-        UR = self.blocks["innovation"].take(self.UR)
-        rows = decorrelated(s, UR, self.blocks["innovation"].take(self.H))
+        y = decorrelated(x, self.blocks["state"].take(UR), z)
+        UR = self.blocks["innovation"].take(UR)
+        rows = decorrelated(s, UR, self.blocks["innovation"].take(H))
         for i in range(m):
             h, e = rows[i], y[i][0]
             for j in range(n):
@@ -148,7 +161,9 @@ class Filter:
             for j in range(n):
                 K[j] = g(K[j] / g(a))
                 self.x[j][0] = x(self.x[j][0] + x(x(K[j]) * e))
+            gains.append(K)
         self.P = U
+        return [[gain[j] for gain in gains] for j in range(n)]
 
 
 def factors(r, A):
@@ -167,7 +182,7 @@ def factors(r, A):
 
 def decorrelated(r, UR, A):
     C = [row[:] for row in A]
-    for j in range(len(A[0])):
+    for j in range(len(A[0]) if A else 0):
         for i in range(len(A) - 1, -1, -1):
             for k in range(i + 1, len(A)):
                 C[i][j] = r(C[i][j] - r(UR[i][k] * C[k][j]))
@@ -188,6 +203,8 @@ FRACTIONS = {
     for key, rows in GIVEN.items()
 }
 Z = np.random.default_rng(8).normal(size=(12, 2))
+Z[3] = Z[5, 0] = Z[8:10] = np.nan
+"""Measurements, of which some are missing: rows of K H are then zero, and rows of I - K H the identity's."""
 
 
 @pytest.mark.parametrize("form", list(Form), ids=str)
@@ -198,6 +215,9 @@ Z = np.random.default_rng(8).normal(size=(12, 2))
         (2, {"state": 24, "gain": 30, "covariance": 9, "innovation": 53}, None, "nearest"),
         (2, {"state": 8, "gain": 12, "covariance": 16, "innovation": 10}, 20, "even"),
         (10, {"state": 4, "gain": 3, "covariance": 9, "innovation": 5}, None, "chop"),
+        (10, {"state": 8, "gain": 7, "covariance": 4, "innovation": 6}, None, "nearest"),
+        (10, {"state": 12, "gain": 7, "covariance": 10, "innovation": 11}, None, "even"),
+        (16, {"state": 6, "gain": 5, "covariance": 3, "innovation": 13}, None, "chop"),
     ],
 )
 def test_each_block_computes_in_its_own_format_as_plain_loops_do(form, base, digits, sums, rounding):
@@ -211,15 +231,18 @@ def test_each_block_computes_in_its_own_format_as_plain_loops_do(form, base, dig
         floating(base, max(digits.values()), rounding),
         {name: Rounds(r, r if within is None else within) for name, r in rounds.items()},
     )
-    run = Run(MODEL, blocks, form, range(1, len(Z) + 1))
-    run.take(Z)
-    x, P = run.exactly(run.X), run.exactly(run.C)
+    x, K, P = taken(blocks, form)
     for k, z in enumerate(Z):
-        slow.step([Fraction(each) for each in z.tolist()])
-        assert x[k].tolist() == slow.x
-        assert P[k].tolist() == slow.P
-        if form is not Form.UD:
-            assert run.exactly(run.G)[k].tolist() == slow.K
+        slow.step(z)
+        assert (x[k].tolist(), P[k].tolist(), K[k].tolist()) == (slow.x, slow.P, slow.K)
+
+
+def taken(blocks, form):
+    """Estimates, gains and covariances, or factors, after each step of a run of the package."""
+    model, z = MODEL.without_missing(Z)
+    run = Run(model, blocks, form, range(1, len(Z) + 1))
+    run.take(z)
+    return run.exactly(run.X), run.exactly(run.G), run.exactly(run.C)
 
 
 def test_a_covariance_in_binary64_beside_binary32_is_that_of_plain_loops():
@@ -228,22 +251,17 @@ def test_a_covariance_in_binary64_beside_binary32_is_that_of_plain_loops():
     slow = Filter(FRACTIONS, Form.UD, double, rounds)
     blocks = BlockFormats.uniform(BINARY32).with_block("covariance", BINARY64)
     assert blocks.model == FloatFormat(2, 53, "even")
-    run = Run(MODEL, blocks, Form.UD, range(1, len(Z) + 1))
-    run.take(Z)
-    x, U = run.exactly(run.X), run.exactly(run.C)
+    x, _, U = taken(blocks, Form.UD)
     for k, z in enumerate(Z):
-        slow.step([Fraction(each) for each in z.tolist()])
+        slow.step(z)
         assert (x[k].tolist(), U[k].tolist()) == (slow.x, slow.P)
 
 
 @pytest.mark.parametrize("form", list(Form), ids=str)
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 12), FloatFormat(2, 24, "even", -126, 127), FloatFormat(10, 6, "chop")])
 def test_equal_blocks_are_one_format(form, fmt):
-    one, blocks = Run(MODEL, fmt, form, [3, 12]), Run(MODEL, BlockFormats.uniform(fmt), form, [3, 12])
-    for run in (one, blocks):
-        run.take(Z)
-    assert one.checkpoints().x.tolist() == blocks.checkpoints().x.tolist()
-    assert one.checkpoints().P.tolist() == blocks.checkpoints().P.tolist()
+    for one, blocks in zip(taken(fmt, form), taken(BlockFormats.uniform(fmt), form), strict=True):
+        assert one.tolist() == blocks.tolist()
 
 
 def test_an_overflow_names_the_quantity_of_the_block_whose_range_it_leaves():
@@ -284,9 +302,10 @@ def test_blocks_go_with_no_other_sums_and_no_bound(options):
 
 def test_errors_of_a_run_with_blocks_are_those_from_the_reference():
     blocks = BlockFormats.uniform(FloatFormat(2, 40)).with_block("state", FloatFormat(2, 12))
-    found = emulate(MODEL, Z, blocks, checkpoint_steps=[12])
-    run = Run(MODEL, blocks, Form.INNOVATION, [12])
-    run.take(Z)
+    model, z = MODEL.without_missing(Z)
+    found = emulate(model, z, blocks, checkpoint_steps=[12])
+    run = Run(model, blocks, Form.INNOVATION, [12])
+    run.take(z)
     difference = run.checkpoints().x[0] - found.reference.x[0]
     assert found.state[0].tolist() == pytest.approx(difference.astype(float).tolist(), rel=1e-12)
     assert found.fmt is blocks

@@ -276,12 +276,13 @@ def factor_each(fmt: Any, a: Any, U: Any) -> Any:
 
 
 @borrowing
-def _subtract_gain(fmt: Any, identity: Any, K: Any, hT: Any, KT: Any, T: Any, F: Any, W: Any) -> None:
-    """W = I - K H; KT becomes K', and T and F are overwritten."""
-    transpose(fmt, K, KT)
-    product_with_units(fmt, hT, KT, T)
-    transpose(fmt, T, F)
-    difference(fmt, identity, F, W)
+def _subtract_gain(fmt: Any, model: Any, K: Any, hT: Any, KT: Any, T: Any, F: Any, W: Any, own: Any) -> None:
+    """W = I - K H in the covariance block; KT becomes K', and T and F are overwritten."""
+    covariance = of_covariance(fmt)
+    transpose(covariance, taken(fmt, covariance, K, own.tall), KT)
+    product_with_units(covariance, taken(fmt, covariance, hT, own.HT), KT, T)
+    transpose(covariance, T, F)
+    difference(covariance, taken(fmt, covariance, model.identity, own.square), F, W)
 
 
 @borrowing
@@ -304,7 +305,7 @@ def _filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any
 
     Returns 1 if all variances and pivots are positive, -1 if one is not, and 0 if a pivot is zero; x is then invalid.
     """
-    Phi, PhiT, H, HT, Q, R, RI, identity, increment, _carried, place = model
+    Phi, PhiT, H, HT, Q, R, RI, _identity, increment, _carried, place = model
     V, T, W, F, WT, K, PHt, B, KT, HD, S, SI, pivots, _y, _g, u, v = work
     state, gain, covariance, innovation = of_state(fmt), of_gain(fmt), of_covariance(fmt), of_innovation(fmt)
     phi, h, r = Phi[k % Phi.shape[0]], H[k % H.shape[0]], R[k % R.shape[0]]
@@ -332,13 +333,12 @@ def _filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any
         product_with_units(gain, taken(fmt, gain, pivots, own.small), taken(fmt, gain, HD, own.wide), KT)
         transpose(gain, KT, K)
         place[0] = _COVARIANCE
-        own_K, own_hT = taken(fmt, covariance, K, own.tall), taken(fmt, covariance, hT, own.HT)
-        _subtract_gain(covariance, identity, own_K, own_hT, KT, T, F, W)
+        _subtract_gain(fmt, model, K, hT, KT, T, F, W, own)
         if form == _JOSEPH:
             transpose(covariance, W, WT)
             product(covariance, W, V, T)
             product(covariance, T, WT, F)
-            product_by_sparse(covariance, own_K, taken(fmt, covariance, r, own.small), B)
+            product_by_sparse(covariance, taken(fmt, covariance, K, own.tall), taken(fmt, covariance, r, own.small), B)
             product(covariance, B, KT, T)
             matrix_sum(covariance, F, T, P)
         else:
@@ -348,8 +348,7 @@ def _filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any
             own_hT = taken(fmt, gain, hT, own.HT)
             product_by_sparse(gain, taken(fmt, gain, P, own.square), own_hT, B)
             product(gain, B, taken(fmt, gain, RI[k % R.shape[0]], own.small), K)
-            own_K, own_hT = taken(fmt, covariance, K, own.tall), taken(fmt, covariance, hT, own.HT)
-            _subtract_gain(covariance, identity, own_K, own_hT, KT, T, F, W)
+            _subtract_gain(fmt, model, K, hT, KT, T, F, W, own)
         place[0] = _ESTIMATE
         if increment.shape[0] == 0 and form in (_HUNG, _HUNG_SECOND_GAIN):
             transpose(covariance, W, WT)
