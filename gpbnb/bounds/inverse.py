@@ -31,7 +31,7 @@ import numpy as np
 
 from gpbnb.arithmetic import linalg, search
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import above, column_sum, gamma, gamma_probabilistic
+from gpbnb.arithmetic.bounds import above, gamma, gamma_probabilistic
 from gpbnb.arithmetic.conversion import exact_fraction
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.linalg import LU
@@ -46,10 +46,11 @@ def wilkinson(factors: LU, x: FloatArray) -> float:
     r"""Bound from the growth of the numbers, after Wilkinson.
 
     .. math:: \|X - A^{-1}\| \le \|X\|\,\frac{g}{1-g}, \qquad
-        g = \gamma_{3n}\,n\,l\,n\,u\,\|X\|
+        g = \gamma_{3n}\,n\,l\,n\,u\,\|X\| + (1+\gamma_{3n})\,\eta\,n\,((2n+u)\,(\|X\| + n\,l) + 2n)
 
     where l and u are the largest sizes of entries in the factors; l = 1 with partial pivoting. The product
-    :math:`n l\,n u` bounds :math:`\||L||U|\|`.
+    :math:`n l\,n u` bounds :math:`\||L||U|\|`. A result that underflows is wrong by at most η, the smallest positive
+    number of the format; without limits of its exponents, η = 0.
 
     Parameters
     ----------
@@ -58,17 +59,18 @@ def wilkinson(factors: LU, x: FloatArray) -> float:
 
     Raises
     ------
-    ValueError : g ≥ 1, or 3nβ ≥ 1: more digits are needed.
+    ValueError : g ≥ 1, or 3nβ ≥ 1: more digits are needed; or overflow raises no error.
 
     References
     ----------
     Wilkinson 1961; Higham 2002, Theorem 9.5.
     """
-    n = len(x)
-    norm = float(column_sum(abs(x.to_float())))
-    largest = float(np.max(abs(factors.lower.to_float()))) * float(np.max(abs(factors.upper.to_float())))
-    g = _count(n, x.format) * n * n * largest * norm
-    return _solved(norm * g, g, n, x.format.base)
+    n, norm = len(x), column_sum_norm(rationals(x))
+    lower, upper = (abs(exact(each)).max() for each in (factors.lower, factors.upper))
+    weight = gamma(3 * n, x.format.unit_roundoff)
+    underflows = n * ((2 * n + upper) * (norm + n * lower) + 2 * n)
+    g = weight * n * n * lower * upper * norm + (1 + weight) * _smallest(x) * underflows
+    return _solved(norm * g, g, x.format.base)
 
 
 def higham(factors: LU, x: FloatArray) -> float:
@@ -77,7 +79,12 @@ def higham(factors: LU, x: FloatArray) -> float:
     Each column of X solves :math:`(A + \Delta A_j)\hat x_j = u_j` with
     :math:`|\Delta A_j| \le \gamma_{3n} P^T|\hat L||\hat U|`, so that
 
-    .. math:: \|X - A^{-1}\| \le \frac{\||X|G\|}{1 - \|G\|}, \qquad G = \gamma_{3n} P^T|\hat L||\hat U||X|.
+    .. math:: \|X - A^{-1}\| \le \frac{\||X|G\|}{1 - \|G\|}, \qquad
+        G = \gamma_{3n} P^T|\hat L||\hat U||X| + (1+\gamma_{3n})\,\eta\,(\mathbf 1 e^T|X| + P^T|\hat L|e\mathbf 1^T
+        + 2n \mathbf 1\mathbf 1^T), \qquad e_i = 2n + |\hat u_{ii}|
+
+    where a result that underflows is wrong by at most η: one of the 2n products and sums of an entry, or a quotient,
+    whose error counts times its divisor.
 
     Parameters
     ----------
@@ -85,13 +92,13 @@ def higham(factors: LU, x: FloatArray) -> float:
 
     Raises
     ------
-    ValueError : ‖G‖ ≥ 1, or 3nβ ≥ 1: more digits are needed.
+    ValueError : ‖G‖ ≥ 1, or 3nβ ≥ 1: more digits are needed; or overflow raises no error.
 
     References
     ----------
     Higham 2002, Theorem 9.4.
     """
-    return _from_factors(factors, x, _count(len(x), x.format))
+    return _from_factors(factors, x, gamma(3 * len(x), x.format.unit_roundoff))
 
 
 def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> float:
@@ -102,7 +109,7 @@ def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> f
 
     Raises
     ------
-    ValueError : ‖G‖ ≥ 1; or the format chops, so that roundings do not have mean zero.
+    ValueError : ‖G‖ ≥ 1; or the format chops, so that roundings do not have mean zero; or its overflow raises no error.
 
     References
     ----------
@@ -113,7 +120,7 @@ def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> f
             f"got {x.format}; this bound needs rounding to nearest, whose errors can average out. Use higham."
         )
     n = len(x)
-    one = gamma_probabilistic(n, x.format.unit_roundoff, failure / (3 * n**3))
+    one = Fraction(gamma_probabilistic(n, x.format.unit_roundoff, failure / (3 * n**3)))
     return _from_factors(factors, x, 3 * one + one * one)
 
 
@@ -124,28 +131,37 @@ def rule_of_thumb(factors: LU, x: FloatArray) -> float:
     ----------
     Wilkinson 1961, who uses the square root in place of the count.
     """
-    return _from_factors(factors, x, math.sqrt(3 * len(x)) * float(x.format.unit_roundoff))
+    return _from_factors(factors, x, Fraction(math.sqrt(3 * len(x))) * x.format.unit_roundoff)
 
 
-def _count(n: int, fmt: NumberFormat) -> float:
-    return float(gamma(3 * n, fmt.unit_roundoff))
+def _smallest(x: FloatArray) -> Fraction:
+    """Return the largest error of a result that underflows; refuse formats with another overflow than an error."""
+    fmt = x.format
+    if fmt.limits is not None and fmt.overflow != "raise":
+        raise ValueError(
+            f"got {fmt}; this bound needs overflow 'raise', because a result beyond the range is wrong by more than "
+            "rounding. Use a_posteriori, which holds however the inverse was computed."
+        )
+    return Fraction(0) if fmt.limits is None else fmt.smallest
 
 
-def _from_factors(factors: LU, x: FloatArray, weight: float) -> float:
-    sizes = abs(x.to_float())
-    product = abs(factors.lower.to_float()) @ abs(factors.upper.to_float())
-    rows = np.empty_like(product)
-    rows[factors.permutation] = product
-    g = weight * (rows @ sizes)
-    return _solved(float(column_sum(sizes @ g)), float(column_sum(g)), len(x), x.format.base)
+def _from_factors(factors: LU, x: FloatArray, weight: Fraction) -> float:
+    n = len(x)
+    sizes, L, U = (abs(exact(each)) for each in (x, factors.lower, factors.upper))
+    lower = np.empty_like(L)
+    lower[factors.permutation] = L
+    e = 2 * n + U.diagonal()
+    underflows = (1 + weight) * _smallest(x) * (e @ sizes + (lower @ e)[:, np.newaxis] + 2 * n)
+    G = rationals(lower) * rationals(U) * rationals(sizes) * flint.fmpq(*weight.as_integer_ratio())
+    G += rationals(underflows)
+    return _solved(column_sum_norm(rationals(sizes) * G), column_sum_norm(G), x.format.base)
 
 
-def _solved(first: float, ratio: float, n: int, base: int) -> float:
-    """Return first / (1 - ratio), rounded up; no number here has passed through more than 8n roundings of float64."""
-    slack = 1 + 16 * n * 2.0**-53
-    if not ratio * slack < 1:
-        raise ValueError(f"‖G‖ must be below 1 to prove a bound; got {ratio:.3g}. Use more {digit_unit(base)}.")
-    return first * slack / (1 - ratio * slack) * slack
+def _solved(first: Fraction, ratio: Fraction, base: int) -> float:
+    """Return first / (1 - ratio), rounded up."""
+    if ratio >= 1:
+        raise ValueError(f"‖G‖ must be below 1 to prove a bound; got {float(ratio):.3g}. Use more {digit_unit(base)}.")
+    return above(first / (1 - ratio))
 
 
 # -- ball arithmetic ------------------------------------------------------------------------------
@@ -263,13 +279,20 @@ def true_error(x: Any, inverse: Any) -> Fraction:
 # -- how many digits are enough? ------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ProvedInverse:
-    """A computed inverse whose relative error norm is proved to be at most `bound`."""
+    r"""A computed inverse X with its error :math:`\|X - A^{-1}\|/\|A^{-1}\|`, exact but for rounding up to float64."""
 
     fmt: FloatFormat
     inverse: FloatArray
-    bound: float
+    error: float
+    tolerance: float
+
+    def __str__(self) -> str:
+        digits = digits_text(self.fmt.precision, self.fmt.base)
+        return f"{digits}: {self.error / self.tolerance:.2g} of the tolerance, by comparison with the exact inverse"
+
+    __repr__ = __str__
 
 
 def smallest_precision(
@@ -280,11 +303,12 @@ def smallest_precision(
     pivot: bool = True,
     largest: int | None = None,
 ) -> ProvedInverse:
-    r"""Find the fewest digits in which the computed inverse of a matrix is proved to be within a tolerance.
+    r"""Find the fewest digits in which the computed inverse of a matrix is within a tolerance of the exact one.
 
     In each precision that :func:`gpbnb.arithmetic.search.smallest_precision` tries, the matrix is rounded and inverted,
-    and :func:`a_posteriori` compares the result X with the matrix as given. The function proves
-    :math:`\|X - A^{-1}\| \le \text{tolerance}\,\|A^{-1}\|`, including the rounding of the entries.
+    and the result X is compared with the exact inverse of the matrix as given:
+
+    .. math:: \|X - A^{-1}\| \le \text{tolerance}\,\|A^{-1}\|
 
     Parameters
     ----------
@@ -297,13 +321,18 @@ def smallest_precision(
 
     Returns
     -------
-    guarantee : the format, the inverse and its bound. The next higher precision meets the tolerance as well, unless it
+    answer : the format, the inverse and its error. The next higher precision meets the tolerance as well, unless it
         is above `largest`.
 
     Raises
     ------
     ValueError : `tolerance` is not above 0, `a` is not square, or no precision up to `largest` is enough.
     numpy.linalg.LinAlgError : `a` is singular, so no precision helps.
+
+    Examples
+    --------
+    >>> smallest_precision([[2, 1], [1, 3]], 1e-3)
+    9 bits: 0.73 of the tolerance, by comparison with the exact inverse
     """
     check_relative(tolerance)
     if largest is None:
@@ -313,29 +342,30 @@ def smallest_precision(
     given = exact(a)
     if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
         raise ValueError(f"a must be a square matrix (n, n) with n at least 1; got shape {given.shape}")
-    true_inverse(given)
+    inverse = true_inverse(given)
+    size = column_sum_norm(inverse)
     tried: dict[FloatFormat, ProvedInverse] = {}
     why: dict[int, str] = {}
 
     def meets(fmt: FloatFormat) -> bool:
         try:
             x = linalg.inv(fmt.array(given), pivot)
-            tried[fmt] = ProvedInverse(fmt, x, _relative(a_posteriori(given, x), x))
-        except (np.linalg.LinAlgError, ValueError) as error:  # it is singular in so few digits, or no bound was proved
+        except np.linalg.LinAlgError as error:  # it is singular in so few digits
             why[fmt.precision] = str(error)
             return False
-        return tried[fmt].bound <= tolerance
+        tried[fmt] = ProvedInverse(fmt, x, above(true_error(x, inverse) / size), float(tolerance))
+        return tried[fmt].error <= tolerance
 
     found = search.smallest_precision(meets, base, rounding, largest=largest)
     if found is not None:
         return tried[found]
-    best = min((each.bound for each in tried.values()), default=math.inf)
-    reached = f"the best proved bound is {best:.3g}"
-    if best == math.inf:
-        reached = f"no precision gives a bound at all: in {digits_text(max(why), base)} {why[max(why)]}"
+    if tried:
+        reached = f"the least error is {min(each.error for each in tried.values()):.3g}"
+    else:
+        reached = f"in {digits_text(max(why), base)} {why[max(why)]}"
     raise ValueError(
-        f"got no inverse in at most {digits_text(largest, base)} with a proved relative error of at "
-        f"most {float(tolerance):.3g}; {reached}. Increase largest or the tolerance."
+        f"got no inverse in at most {digits_text(largest, base)} with a relative error of at most "
+        f"{float(tolerance):.3g}; {reached}. Increase largest or the tolerance."
     )
 
 
@@ -349,13 +379,3 @@ def check_relative(tolerance: Any) -> None:
     number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
     if not number or not 0 < tolerance < math.inf:
         raise ValueError(f"got tolerance {tolerance!r}; needed a relative error above 0, such as 1e-6")
-
-
-def _relative(bound: float, x: FloatArray) -> float:
-    """Turn a bound of ‖X - A⁻¹‖ into a bound relative to ‖A⁻¹‖, which is at least ‖X‖ - bound."""
-    with _working(128):
-        norm = flint.arb(flint.fmpq(*column_sum_norm(rationals(x)).as_integer_ratio())) - flint.arb(bound)
-        if not norm > 0:
-            more = f"use more {digit_unit(x.format.base)}"
-            raise ValueError(f"the bound exceeds the norm of the inverse: no relative error is proved; {more}")
-        return _upper(flint.arb(bound) / norm)

@@ -310,7 +310,7 @@ def test_inverse_knows_its_condition():
     assert found.scaled == pytest.approx(np.linalg.cond(plain * np.outer(scale, scale), 1), rel=1e-9)
     beta = float(FloatFormat(2, found.expected).unit_roundoff)
     assert found.scaled * beta <= 1e-3 < 2 * found.scaled * beta
-    assert found.proved == smallest_precision(matrix, 1e-3, 2).fmt.precision
+    assert found.needed == smallest_precision(matrix, 1e-3, 2).fmt.precision
 
 
 def test_units_of_powers_of_two_change_nothing():
@@ -375,7 +375,7 @@ def test_cells():
             "condition $\\kappa_1$": "120",
             "$\\kappa_1$, scaled": "45",
             "bits, rule of thumb": "6",
-            "bits, proved": "7",
+            "bits needed": "7",
         }
     ]
 

@@ -228,16 +228,16 @@ class InversePrecision(NamedTuple):
     condition: float
     scaled: float
     expected: int
-    proved: int
+    needed: int
 
 
 def inverse_precision(
     name: str, matrix: NDArray[Any], tolerance: float, rounding: Rounding = Rounding.NEAREST
 ) -> InversePrecision:
-    r"""Return bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` tolerance, and proved bits.
+    r"""Return bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` tolerance, and the bits that are needed.
 
     D scales by powers of two to a diagonal near 1, as a choice of units would. Elimination makes the same rounding
-    errors with and without D. :func:`gpbnb.bounds.inverse.smallest_precision` proves the other number.
+    errors with and without D. :func:`gpbnb.bounds.inverse.smallest_precision` finds the other number.
 
     Parameters
     ----------
@@ -268,8 +268,8 @@ def inverse_precision(
     pairs = ((matrix, inverse), (scaled, true_inverse(scaled)))
     conditions = [column_sum_norm(rationals(a)) * column_sum_norm(b) for a, b in pairs]
     expected = report_bounds.precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
-    proved = smallest_precision(matrix, tolerance, 2, rounding).fmt.precision
-    return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, proved)
+    needed = smallest_precision(matrix, tolerance, 2, rounding).fmt.precision
+    return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, needed)
 
 
 def rescaled(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:

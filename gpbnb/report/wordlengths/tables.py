@@ -68,9 +68,9 @@ def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt:
 
 
 def inverse_precisions(found: Sequence[InversePrecision]) -> Table:
-    """Tabulate the bits that inverses need, by the rule of thumb and proved."""
+    """Tabulate the bits that inverses need, by the rule of thumb and in fact."""
     body = tuple(
-        (each.name, short(each.condition), short(each.scaled), str(each.expected), str(each.proved)) for each in found
+        (each.name, short(each.condition), short(each.scaled), str(each.expected), str(each.needed)) for each in found
     )
-    header = ("matrix", "condition $\\kappa_1$", "$\\kappa_1$, scaled", "bits, rule of thumb", "bits, proved")
+    header = ("matrix", "condition $\\kappa_1$", "$\\kappa_1$, scaled", "bits, rule of thumb", "bits needed")
     return Table(f"{len(body)} inverses", header, body)
