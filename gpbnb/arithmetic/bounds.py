@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import sys
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
+
+from gpbnb.arithmetic.conversion import exact_fraction
 
 
 def column_sum(a: NDArray[Any]) -> Any:
@@ -82,5 +87,30 @@ def above(value: Fraction) -> float:
     >>> above(Fraction(1, 10)) >= Fraction(1, 10), above(Fraction(1, 4))
     (True, 0.25)
     """
-    near = float(value)
+    try:
+        near = float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -sys.float_info.max
     return near if Fraction(near) >= value else math.nextafter(near, math.inf)
+
+
+def all_above(values: Any) -> NDArray[np.float64]:
+    """Return the least float64 numbers that are not below given ones: numbers as exact as text, or infinite, or NaN.
+
+    Examples
+    --------
+    >>> all_above(["1e-3", math.inf]).tolist(), -all_above([-Fraction(1, 10)])[0] <= Fraction(1, 10)
+    ([0.001, inf], True)
+    """
+    given = np.asarray(values)
+    if given.dtype == np.float64:
+        return given
+    found = [_above_number(each) for each in given.ravel().tolist()]
+    return np.array(found, dtype=np.float64).reshape(given.shape)
+
+
+def _above_number(value: Any) -> float:
+    with contextlib.suppress(TypeError, ValueError, OverflowError):
+        if not math.isfinite(near := float(value)):
+            return near
+    return above(exact_fraction(value))

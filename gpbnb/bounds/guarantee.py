@@ -34,6 +34,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
@@ -139,7 +140,7 @@ def limits(
 ) -> FilterLimits:
     """Set limits on the states, innovations or measurements of the exact filter.
 
-    Each limit is one number for all entries, or one number per entry.
+    Each limit is one number for all entries, or one number per entry; those that float64 does not hold are rounded up.
 
     Raises
     ------
@@ -150,7 +151,7 @@ def limits(
     n, m = whole_number("states", n), whole_number("measurements", m)
     for name, each, size in (("state", state, n), ("innovation", innovation, m), ("measurement", measurement, m)):
         try:
-            given = np.asarray(each, dtype=np.float64)
+            given = all_above(each)
         except (TypeError, ValueError):
             raise ValueError(f"got {each!r} on the {name}; needed numbers, one or {size}") from None
         if given.shape not in ((), (1,), (size,)):

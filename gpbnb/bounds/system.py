@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
@@ -66,7 +67,7 @@ def output_errors(
     """
     if any(system.x0):
         raise ValueError(f"got a first state {system.x0.tolist()}; needed x0 = 0 for a bound")
-    largest = np.broadcast_to(np.asarray(largest, dtype=np.float64), (system.m,))
+    largest = np.broadcast_to(all_above(largest), (system.m,))
     if not system.as_filter().program.is_linear:
         return limited_errors(system, fmt, largest, steps)
     if steps is None and (cause := system.unstable(fmt)):

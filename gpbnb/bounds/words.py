@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
@@ -166,7 +167,7 @@ class WordGuarantee:
 
     def __init__(self, system: LinearSystem, largest: Any, steps: int | None = None) -> None:
         self.system, self._made, self._steps = system, system.as_filter(), steps
-        self._largest = np.broadcast_to(np.asarray(largest, dtype=np.float64), (system.m,))
+        self._largest = np.broadcast_to(all_above(largest), (system.m,))
         self._known = dict[tuple[Fraction, ...], _Gains]()
         if any(system.x0):
             raise ValueError(f"got a first state {system.x0.tolist()}; needed x0 = 0 for a bound")

@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -425,7 +426,7 @@ class _Outputs(_Strategy):
         super().__init__(like, goal)
         self._system, self._inputs, self._words_of, self._widens = system, inputs, words_of, widens
         self._true = system.outputs(inputs)
-        largest = np.abs(inputs.astype(np.float64)).max(axis=0)
+        largest = all_above(np.abs(inputs).max(axis=0))
         if basis == "guarantee" and not is_stable(system.A):
             self.steps = len(inputs)
         self._proof = WordGuarantee(system, largest, self.steps) if basis == "guarantee" else None

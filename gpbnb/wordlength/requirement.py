@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
+from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -370,7 +371,7 @@ def checked_tolerance(tolerance: Any, count: int, what: str, basis: str) -> NDAr
         tolerances = np.asarray(tolerance)
         if tolerances.dtype.kind not in "iufO":
             raise ValueError("no real numbers")
-        tolerances = tolerances.astype(np.float64)
+        tolerances = -all_above(-tolerances)  # rounded down
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"got tolerance {tolerance!r}; {needed}") from None
     if tolerances.shape not in ((), (count,)):

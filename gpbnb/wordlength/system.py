@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search
@@ -118,11 +119,11 @@ def system_strategy(
     largest = np.array([np.inf])
     if u is not None:
         u = system_inputs(system, u, asked.steps)
-        largest = np.abs(u.astype(np.float64)).max(axis=0)
+        largest = all_above(np.abs(u).max(axis=0))
     if basis in ("guarantee", "probable"):
         if within is None:
             raise ValueError(f'got basis "{basis}" without limits; needed within=limits(..., measurement=...)')
-        largest = np.asarray(within.measurement, dtype=np.float64)
+        largest = within.measurement
         if largest.shape != (system.m,):
             raise ValueError(
                 f"got limits of shape {largest.shape} on the measurement; needed ({system.m},), one for each input: "

@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic.bounds import gamma, gamma_probabilistic
+from gpbnb.arithmetic.bounds import all_above, gamma, gamma_probabilistic
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, integers, inverse_of, max_norm, row_sum_norm
 
@@ -181,3 +181,15 @@ REFUSED = [
 def test_refused_with_what_came_and_what_was_needed(function, arguments, error, message):
     with pytest.raises(error, match=message):
         function(*arguments)
+
+
+def test_numbers_that_float64_does_not_hold_are_rounded_up():
+    tiny = Fraction(1, 10**20)
+    values = [1 + tiny, 1 - tiny, -1 - tiny, "0.1", Decimal("0.3"), 2**53 + 1, Fraction(1, 10**400), 0.7, np.float32(0.1)]
+    found = all_above(np.array(values, dtype=object))
+    for each, value in zip(found.tolist(), exact(values), strict=True):
+        assert Fraction(math.nextafter(each, -math.inf)) < value <= Fraction(each)
+    assert all_above(["0.1", math.inf])[1] == all_above(10**400) == math.inf
+    assert np.isnan(all_above([Fraction(1), math.nan])[1])
+    assert all_above(-(10**400)) == -np.finfo(float).max
+    assert all_above(np.eye(2)).tolist() == [[1, 0], [0, 1]]

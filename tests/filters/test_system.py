@@ -75,6 +75,28 @@ def test_bounds_hold_and_are_not_far_above():
     assert required_precision(SMALL, 1, 1e-3, basis="guarantee", within=within).tried == found.tried
 
 
+@pytest.mark.parametrize("basis", ["bound", "guarantee"])
+def test_a_bound_counts_inputs_that_float64_does_not_hold(basis):
+    """An input just above 1 is rounded up to the next number of a format, twice as far as one just below."""
+    u = 1 + Fraction(1, 10**20)
+    delay = LinearSystem([[0]], [[1]], [[1]])
+    question = {"z": [[u]] * 5} if basis == "bound" else {"within": limits(1, 1, measurement=u)}
+    found = required_precision(delay, 5, 0.0008, basis=basis, rounding="up", **question)
+    outputs = delay.outputs([[u]] * 5, FloatFormat(2, found.fmt.precision, "up"))[1:, 0]
+    error = max(abs(exact(y).sum() - u) for y in outputs)
+    assert 0.999 < error / Fraction(dict(found.tried)[found.fmt.precision] * 0.0008) <= 1
+
+
+def test_a_tolerance_that_float64_does_not_hold_is_not_exceeded():
+    """The bound of storing an input of 1 in t bits is 2**-t: one digit less does not meet a tolerance just below."""
+    delay, within = LinearSystem([[0]], [[1]], [[1]]), limits(1, 1, measurement=1)
+    largest = required_precision(delay, 5, 2.0**-12, basis="guarantee", within=within)
+    bound = Fraction(dict(largest.tried)[largest.fmt.precision]) / 2**12
+    for tolerance, more in ((bound, 0), (bound - Fraction(1, 10**30), 1)):
+        asked = required_precision(delay, 5, tolerance, basis="guarantee", within=within)
+        assert asked.fmt.precision == largest.fmt.precision + more
+
+
 @pytest.mark.parametrize("basis", ["emulation", "bound"])
 def test_units_of_states_inputs_and_outputs_do_not_matter(basis):
     x, u, y = Fraction(2) ** -40, Fraction(2) ** 30, Fraction(2) ** -10
