@@ -29,7 +29,7 @@ class FixedArray(FloatArray):
     __slots__ = ()
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, repr=False)
 class FixedFormat(NumberFormat[FixedArray]):
     r"""Two's complement fixed point: multiples of :math:`2^{-f}` from :math:`-2^i` to :math:`2^i - 2^{-f}`.
 
@@ -91,6 +91,14 @@ class FixedFormat(NumberFormat[FixedArray]):
             )
         if self.overflow not in _POLICIES:
             raise ValueError(f"overflow: got {self.overflow!r}; needed one of {', '.join(map(repr, _POLICIES))}")
+
+    def __repr__(self) -> str:
+        text = f"integer_bits={self.integer_bits}, fraction_bits={self.fraction_bits}, rounding={self.rounding}"
+        if self.overflow != "raise":
+            text += f", overflow={self.overflow!r}"
+        if self.seed:
+            text += f", seed={self.seed}"
+        return f"FixedFormat({text})"
 
     @property
     def unit(self) -> Fraction:

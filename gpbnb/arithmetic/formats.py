@@ -172,7 +172,8 @@ class FloatFormat(NumberFormat[FloatArray]):
         if not self.subnormal:
             text += ", subnormal=False"
         if self.given_largest is not None:
-            text += f", largest={self.given_largest}"
+            whole = self.given_largest.denominator == 1
+            text += f", largest={self.given_largest}" if whole else f", largest='{self.given_largest}'"
         if self.seed:
             text += f", seed={self.seed}"
         if self.overflow != "raise":

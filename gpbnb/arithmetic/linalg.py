@@ -466,10 +466,11 @@ def _rows(rows: list[FloatArray]) -> FloatArray:
 def _swap_largest(
     work: FloatArray, order: NDArray[np.intp], multipliers: list[FloatArray], k: int
 ) -> tuple[FloatArray, NDArray[np.intp], list[FloatArray]]:
-    size = abs(work[:, 0])
+    # Sizes as numbers that are not positive, which fixed point has for its lowest number, too.
+    minus = [each if each < 0 else -each for each in work[:, 0]]
     largest = 0
     for i in range(1, len(work)):
-        if size[i] > size[largest]:
+        if minus[i] < minus[largest]:
             largest = i
     if largest == 0:
         return work, order, multipliers

@@ -53,9 +53,13 @@ def decimal_text(m: int, e: int, form: ExactKernel) -> str:
         digits, exponent = integer_text(abs(m)), e
     else:
         try:
-            digits, exponent = _shortened(abs(m), e, form)
+            found = _shortened(m, e, form)
         except OverflowError:  # otherwise the decimal exponent would have millions of digits
             return f"{integer_text(m)}*{integer_text(form.base)}**{integer_text(e)}"
+        if found is None:
+            p, q = form.to_fraction(m, e).as_integer_ratio()
+            return f"{integer_text(p)}/{integer_text(q)}"
+        digits, exponent = found
     digits, exponent = digits.rstrip("0"), exponent + len(digits) - len(digits.rstrip("0"))
     sign = "-" if m < 0 else ""
     point = len(digits) + exponent
@@ -69,22 +73,26 @@ def decimal_text(m: int, e: int, form: ExactKernel) -> str:
     return f"{sign}{digits[0]}{tail}e{'+' if point > 0 else ''}{integer_text(point - 1)}"
 
 
-def _shortened(m: int, e: int, form: ExactKernel) -> tuple[str, int]:
-    """Return enough decimal digits to distinguish ``m * base**e`` from its neighbours in the format.
+def _shortened(m: int, e: int, form: ExactKernel) -> tuple[str, int] | None:
+    """Return enough decimal digits of ``abs(m) * base**e`` to distinguish it from its neighbours in the format.
 
-    If the format chops, the digits are rounded up, so that chopping gives this number and not the one below. For a
-    format that may round to a number other than the nearest, the function returns all digits.
+    Where the format rounds in one direction, the digits err in the other, so that rounding gives this number and not
+    its neighbour. Roundings without a direction get all digits, or None if there is no end of them.
     """
-    value = form.to_fraction(m, e)
+    value = form.to_fraction(abs(m), e)
     if form.rounding not in (*Rounding.documented(), Rounding.EVEN):
         places = max(value.denominator.bit_length() - 1, 0)
         if 10**places % value.denominator == 0:
             return integer_text(int(value * 10**places)), -places
+        if form.rounding not in (Rounding.UP, Rounding.DOWN):
+            return None
     count = math.ceil(form.precision * math.log10(form.base)) + 2
     decimal = kernel(Rules(10, count, Rounding.NEAREST))
     digits, exponent = decimal.from_ratio(value.numerator, value.denominator)
-    if not form.nearest and decimal.to_fraction(digits, exponent) < value:
-        digits += 1
+    outward = form.rounding is Rounding.CHOP or (form.rounding is Rounding.DOWN) == (m > 0)
+    error = decimal.to_fraction(digits, exponent) - value
+    if not form.nearest and error and (error < 0) == outward:
+        digits += 1 if outward else -1
     return integer_text(digits), exponent
 
 

@@ -275,7 +275,7 @@ class Run:
             if x.dtype == np.float64:
                 some[:] = x if x.ndim == 3 else x[..., 0]
             else:
-                pairs_as_floats(x, some)
+                _nearest_floats(x, some)
         return out
 
     def use_measurement_matrices(self, H: NDArray[np.float64], decimals: int | None = None) -> None:
@@ -427,6 +427,18 @@ class Run:
             gains[at] = combined_gain(list(K[at].T), UR[step % len(UR)], H[step % len(H)])
             covariances[at] = covariance_of_factors(U[at])
         return gains, covariances
+
+
+def _nearest_floats(pairs: NDArray[np.int64], out: NDArray[np.float64]) -> None:
+    """Convert decimal numbers to the nearest float64, infinite beyond its range."""
+    pairs_as_floats(pairs, out)
+    for at in map(tuple, np.argwhere(np.isnan(out))):
+        m, e = pairs[at].tolist()
+        power = 10 ** min(abs(e), 400)  # which is beyond the range for every m
+        try:
+            out[at] = m / power if e < 0 else float(m * power)
+        except OverflowError:
+            out[at] = math.copysign(math.inf, m)
 
 
 def _ascending(checkpoint_steps: Sequence[int]) -> NDArray[np.int64]:

@@ -57,6 +57,9 @@ _WORDS = (
 _TINY = 2.0**-700
 """A decayed state below this becomes zero where its products would leave the range of float64."""
 
+MOST_INPUTS = 100_000
+"""Largest number of inputs of a sum, whose operations are listed in seconds."""
+
 
 @dataclass(frozen=True, eq=False)
 class LinearFilter:
@@ -442,8 +445,8 @@ class LinearSystem:
 
         Raises
         ------
-        ValueError : an unknown order; `count` or `block` is not a whole number above 0; or there is a single input and
-            `running` is False.
+        ValueError : an unknown order; `count` or `block` is not a whole number above 0; more than 100,000 inputs; or
+            there is a single input and `running` is False.
 
         Examples
         --------
@@ -456,6 +459,8 @@ class LinearSystem:
         found = structure_named(order, SUMS)
         if count == 1 and not running:
             raise ValueError("got the sum of one input; needed at least two, or running=True")
+        if count > MOST_INPUTS:
+            raise ValueError(f"got the sum of {count} inputs; needed at most {MOST_INPUTS}; add sums of fewer inputs")
         made = sum_structure(count, found, block, running)
         usual = "a running sum" if running else f"a {found} sum" if found != "left" else "a sum from left to right"
         return cls.from_filter(_named(made, usual if name is None else name))

@@ -185,7 +185,17 @@ def test_refused_with_what_came_and_what_was_needed(function, arguments, error, 
 
 def test_numbers_that_float64_does_not_hold_are_rounded_up():
     tiny = Fraction(1, 10**20)
-    values = [1 + tiny, 1 - tiny, -1 - tiny, "0.1", Decimal("0.3"), 2**53 + 1, Fraction(1, 10**400), 0.7, np.float32(0.1)]
+    values = [
+        1 + tiny,
+        1 - tiny,
+        -1 - tiny,
+        "0.1",
+        Decimal("0.3"),
+        2**53 + 1,
+        Fraction(1, 10**400),
+        0.7,
+        np.float32(0.1),
+    ]
     found = all_above(np.array(values, dtype=object))
     for each, value in zip(found.tolist(), exact(values), strict=True):
         assert Fraction(math.nextafter(each, -math.inf)) < value <= Fraction(each)

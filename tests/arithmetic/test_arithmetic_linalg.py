@@ -161,6 +161,18 @@ class TestPivoting:
         assert linalg.lu(a, pivot=True).permutation.tolist() == [1, 2, 0]
         assert linalg.lu(a[[0, 2, 1]], pivot=True).permutation.tolist()[0] == 1
 
+    @pytest.mark.parametrize("overflow", ["raise", "saturate", "wrap"])
+    @pytest.mark.parametrize("fraction_bits", [5, 100])
+    def test_the_lowest_number_of_fixed_point_is_larger_than_the_largest(
+        self, overflow: str, fraction_bits: int
+    ) -> None:
+        """In the compiled loops and without them; the absolute value of -4 does not fit."""
+        fmt = FixedFormat(2, fraction_bits, overflow=overflow)
+        for row in ([fmt.largest, 1], [1, 1]):
+            a = fmt.array([row, [-4, Fraction(1, 2)]])
+            assert linalg.lu(a, pivot=True).permutation.tolist() == [1, 0]
+        assert linalg.lu(fmt.array([[-4, 1], [fmt.largest, 1]]), pivot=True).permutation.tolist() == [0, 1]
+
     def test_nothing_is_swapped_for_an_equal(self) -> None:
         a = self.FMT.array([[2, 1], [-2, 5]])
         assert linalg.lu(a, pivot=True).permutation.tolist() == [0, 1]

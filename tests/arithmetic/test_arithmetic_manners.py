@@ -219,6 +219,9 @@ def test_pandas_leaves_an_operation_to_an_array_of_a_format():
     assert found.to_fractions().tolist() == [1, 2]
 
 
+NAMES = {"FloatFormat": FloatFormat, "FixedFormat": FixedFormat, "Rounding": Rounding}
+
+
 @pytest.mark.parametrize("fmt", [*FORMATS, FloatFormat(2, 24)], ids=str)
 @pytest.mark.parametrize("shape", [(), (3,), (40,), (12, 5), (2, 3, 4), (0,), (0, 3)], ids=str)
 def test_the_format_stands_in_the_first_line_of_the_text(fmt, shape):
@@ -226,8 +229,37 @@ def test_the_format_stands_in_the_first_line_of_the_text(fmt, shape):
     lines = repr(x).splitlines()
     assert lines[0].startswith(f"{fmt}.array(")
     assert max(map(len, lines[1:]), default=0) <= 120
-    made = {"FloatFormat": FloatFormat, "FixedFormat": FixedFormat, "Rounding": Rounding}
-    back = eval(repr(x).replace("<Rounding.NEAREST: 'nearest'>", "Rounding.NEAREST"), made)
+    back = eval(repr(x), NAMES)
     assert isinstance(back, FloatArray)
     assert back.shape == x.shape
     assert (back == x).all()
+
+
+@pytest.mark.parametrize(
+    "fmt",
+    [
+        *(FixedFormat(2, 5, each, "wrap", seed=3) for each in Rounding),
+        FixedFormat(0, 15, overflow="saturate"),
+        FloatFormat(2, 60, emin=-10, emax=-1, largest=Fraction(2**60 - 3, 2**60)),
+        FloatFormat(2, 4, Rounding.EVEN, -6, 8, largest=448),
+    ],
+    ids=str,
+)
+def test_the_text_of_a_format_is_code_that_makes_it(fmt):
+    assert eval(repr(fmt), NAMES) == fmt
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+@pytest.mark.parametrize(("base", "precision"), [(2, 3), (3, 1), (3, 2), (6, 2), (7, 2), (10, 1), (16, 1), (60, 1)])
+def test_the_text_of_every_number_is_read_back(base, precision, rounding):
+    """All significands, also those with an even last digit, with exponents around zero and far from it."""
+    fmt = FloatFormat(base, precision, rounding)
+    numbers = [
+        sign * m * Fraction(base) ** e
+        for m in range(base ** (precision - 1), base**precision)
+        for e in (*range(-5, 6), -40, 40)
+        for sign in (1, -1)
+    ]
+    x = fmt.array(numbers)
+    assert x.to_fractions().tolist() == numbers
+    assert fmt.array([str(each) for each in x]).to_fractions().tolist() == numbers

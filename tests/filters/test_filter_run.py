@@ -407,3 +407,15 @@ def test_a_step_releases_exactly_the_arrays_that_it_makes():
         check=True,
     )
     assert found.stdout.split() == ["True", "0", "0"] * 4
+
+
+@pytest.mark.parametrize("digits", [5, 17])
+@pytest.mark.parametrize("power", [0, 25, 44, -30, -150])
+def test_estimates_of_many_records_in_base_10_are_the_nearest_floats(digits, power):
+    fmt, scale = FloatFormat(10, digits), Fraction(10) ** power
+    one = LinearModel([["0.9"]], [[1]], [[scale**2 / 10]], [[scale**2]], [scale], [[scale**2]])
+    z = np.array([0.7, 2.1, 1.3, 0.2]) * float(scale)
+    found = Run(one, fmt, Form.INNOVATION, (), records=2).carry(np.stack([z, -z], axis=1)[:, None, :], 1)
+    single = Run(one, fmt, Form.INNOVATION, range(1, 5))
+    single.take(fmt.array(z.reshape(-1, 1)))
+    assert found[:, 0, 0].tolist() == [float(each) for each in single.exactly(single.X).ravel()]

@@ -376,3 +376,8 @@ def test_sizes_beyond_float64_are_named():
         assert (
             "in 53 bits got a system whose largest gain is beyond the range of float64; scale its inputs" in found.why
         )
+
+
+def test_a_sum_of_too_many_inputs_is_refused_before_it_is_listed():
+    with pytest.raises(ValueError, match=r"got the sum of 10000000 inputs; needed at most 100000; add sums of fewer"):
+        LinearSystem.sum(10**7)

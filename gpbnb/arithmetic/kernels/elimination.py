@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import (
-    absolute,
     add,
     check,
     compare,
@@ -26,6 +25,12 @@ from gpbnb.arithmetic.kernels.scalar import (
 )
 
 
+@inner
+def _minus_size(fmt: Any, x: Any) -> Any:
+    """Return -abs(x), which fixed point has for its lowest number, too."""
+    return x if less(fmt, x, zero(fmt)) else negative(fmt, x)
+
+
 @compiled
 def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
     """Factor a (n, n): the upper factor on and above the diagonal, the multipliers of the lower factor below it.
@@ -37,7 +42,7 @@ def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
         if pivot:
             largest = k
             for i in range(k + 1, n):
-                if less(fmt, absolute(fmt, load(fmt, a, (largest, k))), absolute(fmt, load(fmt, a, (i, k)))):
+                if less(fmt, _minus_size(fmt, load(fmt, a, (i, k))), _minus_size(fmt, load(fmt, a, (largest, k)))):
                     largest = i
             if largest != k:
                 order[k], order[largest] = order[largest], order[k]

@@ -14,15 +14,17 @@ _POWERS = np.array([10.0**k for k in range(23)])  # exact
 
 @compiled
 def pairs_as_floats(pairs: Any, out: Any) -> None:
-    """Convert decimal numbers, (steps, n, records, 2), to float64 with at most two roundings."""
+    """Convert decimal numbers, (steps, n, records, 2), to the nearest float64; NaN where that takes more digits."""
     for k in range(out.shape[0]):
         for i in range(out.shape[1]):
             for j in range(out.shape[2]):
-                m, e = np.float64(pairs[k, i, j, 0]), pairs[k, i, j, 1]
-                if -22 <= e <= 0:
-                    out[k, i, j] = m / _POWERS[-e]
+                m, e = pairs[k, i, j, 0], pairs[k, i, j, 1]
+                if m == 0:
+                    out[k, i, j] = 0.0
+                elif abs(m) > 2**53 or abs(e) > 22:
+                    out[k, i, j] = np.nan
                 else:
-                    out[k, i, j] = m * _POWERS[e] if 0 < e <= 22 else m * 10.0**e
+                    out[k, i, j] = np.float64(m) / _POWERS[-e] if e < 0 else np.float64(m) * _POWERS[e]
 
 
 @compiled
