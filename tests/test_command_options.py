@@ -63,7 +63,6 @@ OPTIONS = {
             "--chapter": (None, "chapter number as in the document, such as II; default: all"),
             "--section": (None, "one or more section numbers; 9 includes 9.1 and 9.2; default: all"),
             "--output": (None, "file to write, replacing any existing file; default: stdout"),
-            "--fresh": (False, "run every check again instead of using stored findings"),
             "--version": (argparse.SUPPRESS, "show program's version number and exit"),
         },
     ),

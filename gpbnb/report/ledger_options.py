@@ -33,6 +33,5 @@ def ledger_parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--output", type=Path, metavar="FILE", help="file to write, replacing any existing file; default: stdout"
     )
-    made.add_argument("--fresh", action="store_true", help="run every check again instead of using stored findings")
     made.add_argument("--version", action="version", version=f"gpbnb {gpbnb.__version__}")
     return made

@@ -2,13 +2,11 @@
 
 import importlib
 import inspect
-import re
 import sys
 
 import pytest
-from faults import RECORDED
 
-from gpbnb.report.ledger import Row, agreement, counts, load_statements, rows
+from gpbnb.report.ledger import Row, agreement, counts, examine, load_statements, select
 from gpbnb.report.ledger.checking import TOPICS, in_reading_order, owners
 from gpbnb.report.ledger.finding import Verdict, compare
 from gpbnb.report.ledger.registry import takes_statement
@@ -37,14 +35,8 @@ def test_each_topic_has_the_checks_of_its_own_module():
         assert checks is importlib.import_module(f"gpbnb.report.ledger.checks.{name}").CHECKS
 
 
-def test_every_entry_has_a_finding_on_record():
-    """Those of `faults.check_texts`."""
-    assert {re.search(r"  (\S+)", line)[1] for line in RECORDED} == {each.id for each in INVENTORY}
-    assert len(RECORDED) == len(INVENTORY)
-
-
 def test_one_row_an_entry_in_order(complete):
-    found = rows(topics=topics(complete))
+    found = examine(INVENTORY, topics(complete))
     assert tuple(row.statement for row in found) == INVENTORY
     assert [row.statement.id for row in found if row.finding] == [
         entry.id for entry in INVENTORY if entry.id.startswith("hung1984.I.")
@@ -53,13 +45,13 @@ def test_one_row_an_entry_in_order(complete):
 
 
 def test_a_function_that_checks_several_entries_is_called_once(complete):
-    found = rows(document="hung1984", chapter="I", topics=topics(complete))
+    found = examine(select(INVENTORY, "hung1984", "I"), topics(complete))
     assert {row.outcome for row in found} == {"misprint"}
     assert importlib.import_module(complete).CALLS == [1]
 
 
 def test_only_the_selected_checks_are_run(complete):
-    found = rows(document="savage2016", topics=topics(complete))
+    found = examine(select(INVENTORY, "savage2016"), topics(complete))
     assert {row.statement.document for row in found} == {"savage2016"}
     assert {row.outcome for row in found} == {"missing"}
     assert importlib.import_module(complete).CALLS == []
@@ -67,7 +59,7 @@ def test_only_the_selected_checks_are_run(complete):
 
 def test_an_iterator_of_entries_will_do(complete):
     some = tuple(entry for entry in INVENTORY if entry.id.startswith("hung1984.I."))
-    assert tuple(row.statement for row in rows(iter(some), topics=topics(complete))) == some
+    assert tuple(row.statement for row in examine(iter(some), topics(complete))) == some
 
 
 def test_a_check_of_no_entry_is_refused(topic):
@@ -75,39 +67,13 @@ def test_a_check_of_no_entry_is_refused(topic):
     with pytest.raises(
         ValueError, match=r"got a check of 'hung1984\.II\.eq999' in stray; needed an id from statements"
     ):
-        rows(topics=topics(name))
+        owners(INVENTORY, topics(name))
 
 
 def test_two_topics_with_one_entry_are_refused(topic, complete):
     name = topic("rival", '@CHECKS.add("hung1984.I.two-tasks")\ndef rival():\n    return compare(True, "1")\n')
     with pytest.raises(ValueError, match=f"checks of 'hung1984.I.two-tasks' in {complete} and in rival"):
-        rows(topics=topics(complete, name))
-
-
-def test_failing_checks_are_raised_together_with_their_ids(topic):
-    name = topic(
-        "failing",
-        """
-        @CHECKS.add("hung1984.II.eq1", "hung1984.II.eq2")
-        def divides():
-            return 1 / 0
-
-        @CHECKS.add("hung1984.II.eq3")
-        def nothing():
-            pass
-
-        @CHECKS.add("hung1984.II.eq4")
-        def fine():
-            return compare(True, "1")
-        """,
-    )
-    with pytest.raises(ExceptionGroup, match="checks of 3 entries failed") as caught:
-        rows(topics=topics(name))
-    first, second = caught.value.exceptions
-    assert isinstance(first, ZeroDivisionError)
-    assert first.__notes__ == ["in the check of hung1984.II.eq1", "in the check of hung1984.II.eq2"]
-    assert isinstance(second, TypeError)
-    assert second.__notes__ == ["in the check of hung1984.II.eq3"]
+        owners(INVENTORY, topics(complete, name))
 
 
 def made(verdict, number, section="2", **place):

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from gpbnb.report.ledger import command as command
-from gpbnb.report.ledger import load_statements, rows, table
+from gpbnb.report.ledger import examine, load_statements, select, table
 from gpbnb.report.ledger.render import to_csv
 
 INVENTORY = load_statements()
@@ -104,7 +104,7 @@ def test_sections(ledger, complete):
 
 
 def test_formats(ledger, complete):
-    part = rows(document="hung1984", chapter="I", topics=made(complete))
+    part = examine(select(INVENTORY, "hung1984", "I"), made(complete))
     chosen = ("--document", "hung1984", "--chapter", "I")
     assert ledger(complete, *chosen).stdout.decode() == to_csv(part)
     assert ledger(complete, *chosen, "--format", "markdown").stdout.decode() == table(part).markdown() + "\n"

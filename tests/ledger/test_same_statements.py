@@ -7,8 +7,7 @@ from itertools import combinations
 import pytest
 import sympy as sp
 
-from gpbnb.report.ledger import load_statements
-from gpbnb.report.ledger.checking import examine_once
+from gpbnb.report.ledger import load_statements, rows
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict
 from gpbnb.report.ledger.formula import Number, Relation, Words
 from gpbnb.report.ledger.statements import Statement
@@ -66,8 +65,7 @@ def content(statement):
 @pytest.fixture(scope="module")
 def judged():
     """What each statement says, and its verdict."""
-    rows = examine_once([statement for statement in load_statements() if statement.form])
-    return {row.statement.id: (content(row.statement), row.finding.verdict) for row in rows}
+    return {row.statement.id: (content(row.statement), row.finding.verdict) for row in rows() if row.statement.form}
 
 
 def test_equal_statements_have_the_same_verdict(judged):

@@ -8,7 +8,7 @@
     ledger.error_table(rows)
 """
 
-from gpbnb.report.ledger.checking import Row, counts, examine, rows
+from gpbnb.report.ledger.checking import Row, counts, examine
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.html import CHAPTERS, Html
 from gpbnb.report.ledger.legibility import load_legibility
@@ -29,6 +29,7 @@ from gpbnb.report.ledger.render import table
 from gpbnb.report.ledger.roots import by_root, load_roots
 from gpbnb.report.ledger.squares import root_squares, squares
 from gpbnb.report.ledger.statements import Statement, load_statements, quote, select
+from gpbnb.report.ledger.stored import rows
 
 __all__ = [
     "CHAPTERS",

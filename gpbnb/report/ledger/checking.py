@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from gpbnb.arithmetic.conversion import MaybeNone
-from gpbnb.caching import PACKAGE
-from gpbnb.report.ledger import cache
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.finding import Finding, Verdict
 from gpbnb.report.ledger.registry import Check, Checks, takes_statement
-from gpbnb.report.ledger.statements import Statement, load_statements, select
+from gpbnb.report.ledger.statements import Statement
 
 MISSING = "missing"
 FAILED = "failed"
@@ -103,99 +99,6 @@ def examine(
                 results[check] = result
         rows.append(Row(statement, result) if isinstance(result, Finding) else Row(statement, None, result))
     return tuple(rows)
-
-
-def examine_once(
-    statements: Iterable[Statement],
-    topics: Mapping[str, Checks] = TOPICS,
-    progress: Callable[[Sequence[Statement]], Iterable[Statement]] = iter,
-) -> tuple[Row, ...]:
-    """Run :func:`examine`, but reuse each finding until a source or datum on which it depends changes.
-
-    Checks that are not part of the package run every time.
-    """
-    chosen = tuple(statements)
-    by_module: dict[Path | None, list[Statement]] = {}
-    for statement in chosen:
-        by_module.setdefault(_module(statement, topics), []).append(statement)
-    found: dict[Statement, Row] = {}
-    for module, inside in by_module.items():
-        if module is not None:
-            found |= _known(inside, cache.known(module))
-    # One count of all checks to run, although each module's checks run by themselves.
-    shown = iter(progress([each for inside in by_module.values() for each in inside if each not in found]))
-
-    def counted(some: Sequence[Statement]) -> Iterable[Statement]:
-        for each in some:
-            next(shown, None)
-            yield each
-
-    for module, inside in by_module.items():
-        missing = [each for each in inside if each not in found]
-        if module is None:
-            found |= {row.statement: row for row in examine(missing, topics, counted)}
-        elif missing:
-            with cache.shared(module) as findings:
-                found |= _known(missing, findings)  # another process may have run some checks in the meantime
-                for row in examine([each for each in missing if each not in found], topics, counted):
-                    found[row.statement] = row
-                    if row.finding is not None:
-                        findings.put(row.statement, row.finding)
-    next(shown, None)  # so that it ends
-    return tuple(found[statement] for statement in chosen)
-
-
-def _known(statements: Iterable[Statement], findings: cache.Findings) -> dict[Statement, Row]:
-    pairs = ((each, findings.get(each)) for each in statements)
-    return {each: Row(each, finding) for each, finding in pairs if finding is not None}
-
-
-def _module(statement: Statement, topics: Mapping[str, Checks]) -> Path | None:
-    """Return the file of the package that contains the check of a statement, if there is one."""
-    check = next((checks[statement.id] for checks in topics.values() if statement.id in checks), None)
-    if check is None:
-        return None
-    path = Path(inspect.getfile(inspect.unwrap(check))).resolve()
-    return path if path.is_relative_to(PACKAGE) else None
-
-
-def rows(
-    entries: Iterable[Statement] | None = None,
-    document: str | None = None,
-    chapter: str | None = None,
-    sections: str | Iterable[str | int] | None = None,
-    topics: Mapping[str, Checks] = TOPICS,
-) -> tuple[Row, ...]:
-    """Check a part of the ledger.
-
-    Parameters
-    ----------
-    entries : the whole inventory, by default that of the package.
-    document, chapter, sections : the part, as in `select`; all by default. Only the checks of this part run.
-    topics : the checks of each topic.
-
-    Returns
-    -------
-    rows : one row for each entry, in the order of the inventory; the finding is None if there is no check.
-
-    Raises
-    ------
-    ExceptionGroup : checks raised errors; each error has a note with the id of the statement.
-    ValueError : see `owners`; also if the selection is empty.
-    """
-    inventory = load_statements() if entries is None else tuple(entries)
-    chosen = select(inventory, document, chapter, sections)
-    owners(inventory, topics)
-    examined = examine_once(chosen, topics)
-    errors: list[Exception] = []
-    for row in examined:
-        if row.error is not None:
-            row.error.add_note(f"in the check of {row.statement.id}")
-            if row.error not in errors:
-                errors.append(row.error)
-    if errors:
-        raise ExceptionGroup(f"checks of {sum(row.error is not None for row in examined)} entries failed", errors)
-    return examined
 
 
 def counts(rows: Iterable[Row]) -> dict[str, int]:

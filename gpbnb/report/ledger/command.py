@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from gpbnb.caching import replace_file
-from gpbnb.report.ledger.checking import FAILED, MISSING, Row, counts, examine, examine_once, owners
+from gpbnb.report.ledger.checking import FAILED, MISSING, Row, counts, examine, owners
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.render import FORMATS, describe
 from gpbnb.report.ledger.statements import Statement, load_statements, select
@@ -35,8 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         owners(inventory, TOPICS)
     except (OSError, ValueError) as error:
         parser.error(str(error))
-    run = examine if arguments.fresh else examine_once
-    rows = run(chosen, TOPICS, _progress)
+    rows = examine(chosen, TOPICS, _progress)
     content = FORMATS[arguments.format](rows).encode()
     try:
         if arguments.output is not None:

@@ -319,11 +319,6 @@ def test_an_entry_is_named_by_the_last_step_that_changed_it():
         names["b_hat"](2, 2)
 
 
-def test_findings_are_the_same_again(rows):
-    again = faults.examined(ENTRIES)
-    assert [row.finding for row in again] == [row.finding for row in rows]
-
-
 def test_pivoting_is_not_needed_if_it_does_not_mend_what_fails(monkeypatch):
     """Without a pivot the inversion fails as before; with one it now finds another matrix."""
     inv = first_approach.linalg.inv

@@ -1,0 +1,74 @@
+"""The findings on all statements, stored in ``findings.csv``.
+
+``make findings`` runs every check and writes the table; a test runs the checks again and compares.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+from gpbnb.report.ledger.checking import Row, examine
+from gpbnb.report.ledger.finding import Finding, Verdict
+from gpbnb.report.ledger.statements import load_statements, select
+
+FILE = Path(__file__).with_name("findings.csv")
+COLUMNS = ("id", "recomputed", "agrees", "verdict", "note", "root")
+_AGREES = {"true": True, "false": False, "": None}
+
+
+@cache
+def load_findings() -> dict[str, Finding]:
+    """Read ``findings.csv``: statement id → finding."""
+    with FILE.open(encoding="utf-8", newline="") as file:
+        return {
+            line["id"]: Finding(
+                line["recomputed"], _AGREES[line["agrees"]], Verdict(line["verdict"]), line["note"], line["root"]
+            )
+            for line in csv.DictReader(file)
+        }
+
+
+def rows(
+    document: str | None = None, chapter: str | None = None, sections: str | Iterable[str | int] | None = None
+) -> tuple[Row, ...]:
+    """Return the stored findings on a part of the ledger; no check runs.
+
+    Parameters
+    ----------
+    document, chapter, sections : the part, as in `select`; all by default.
+
+    Returns
+    -------
+    rows : one row for each statement, in the order of the inventory; the finding is None if none is stored.
+    """
+    found = load_findings()
+    return tuple(Row(each, found.get(each.id)) for each in select(load_statements(), document, chapter, sections))
+
+
+def to_table(rows: Iterable[Row]) -> str:
+    """Write rows as ``findings.csv`` stores them.
+
+    Raises
+    ------
+    ExceptionGroup : checks raised errors.
+    """
+    rows = tuple(rows)
+    if errors := [row.error for row in rows if row.error is not None]:
+        raise ExceptionGroup("checks failed", errors)
+    out = io.StringIO(newline="")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row in rows:
+        if (found := row.finding) is not None:
+            agrees = next(text for text, value in _AGREES.items() if value is found.agrees)
+            writer.writerow((row.statement.id, found.recomputed, agrees, found.verdict.value, found.note, found.root))
+    return out.getvalue()
+
+
+def write_findings() -> None:
+    """Run every check and store the findings."""
+    FILE.write_text(to_table(examine(load_statements())), encoding="utf-8", newline="")
