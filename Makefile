@@ -1,12 +1,18 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help address book test certificates proof test-pages test-portable verify-sweeps notebooks lint format exactness bench mutants environment screenshots pdf serve clean
+.PHONY: help address book test certificates proof test-pages test-portable verify-sweeps notebooks findings lint format exactness bench mutants environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
 HTML := _build/html
 UV_COMPILE := uv --no-config pip compile pyproject.toml --extra report --universal --python-version 3.11 --fork-strategy fewest \
 	--only-binary :all: --generate-hashes --no-emit-index-url --custom-compile-command "make environment" --quiet
+
+# Outputs are stored without times, versions and the moments at which a text was flushed, which differ between runs.
+EXECUTE := --log-level=WARN --to notebook --execute --inplace --ExecutePreprocessor.record_timing=False \
+	--Exporter.preprocessors=nbconvert.preprocessors.CoalesceStreamsPreprocessor \
+	--ClearMetadataPreprocessor.enabled=True --ClearMetadataPreprocessor.clear_cell_metadata=False \
+	--ClearMetadataPreprocessor.preserve_nb_metadata_mask="{'kernelspec', ('language_info', 'name')}"
 
 # Caches and settings that would else go to the home folder, or come from it and change a result.
 export PIP_CACHE_DIR := $(HERE)/.cache/pip
@@ -47,17 +53,16 @@ help: ## list the targets
 	@scripts/make-venv.sh
 	@printf '%s\n' '$(HERE)' > $@
 
-# Pages that gave a warning would be taken from the doctrees, without one, the next time.
-book: .venv/made-for ## execute the notebooks and build the HTML book; what has not changed is not computed again
-	@rm -f $(HTML)/index.html
-	.venv/bin/jupyter-book build . -W -n --keep-going || { rm -rf _build/.doctrees; exit 1; }
+# Any page may show a number of any other, which Sphinx does not follow: all pages are built anew, in seconds.
+book: .venv/made-for ## build the HTML book from the notebooks and their stored outputs
+	@rm -rf $(HTML) _build/.doctrees _build/jupyter_execute
+	.venv/bin/jupyter-book build . -W -n --keep-going
 	@test -f $(HTML)/index.html || { echo "make book: $(HTML)/index.html was not built" >&2; exit 1; }
 	@printf '\nThe book is ready. Open it in a browser, no network needed:\n  %s\n  file://%s\n' \
 		'$(HTML)/index.html' '$(HERE)/$(HTML)/index.html'
 
 test: .venv/made-for ## unit and property tests, the examples in docstrings, and every notebook against its stored outputs
-	$(PY) scripts/execute_notebooks.py --check
-	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder -p no:nbval --ignore=tests/pages tests
+	$(PY) -m pytest --nbval --ignore=tests/pages
 
 certificates: .venv/made-for ## write a certificate of every guarantee in the book and check it; WORDS="tracker Nile" picks filters
 	$(PY) -m gpbnb.report.guarantees.certificates $(WORDS)
@@ -69,7 +74,7 @@ proof: ## check proof/guarantee.v, the theorem behind a certificate; needs Coq (
 test-pages: .venv/made-for ## the built book in a real Chromium without a network
 	@test -f $(HTML)/index.html || $(MAKE) book
 	@$(PY) -m tests.pages.browser
-	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder tests/pages
+	$(PY) -m pytest tests/pages
 
 test-portable: .venv/made-for ## notebooks and numerical tests as on other machines; SETTINGS="nehalem locale-de" picks some, QUICK=1 a part
 	$(PY) scripts/portable.py $(if $(QUICK),--quick) $(SETTINGS)
@@ -77,8 +82,11 @@ test-portable: .venv/made-for ## notebooks and numerical tests as on other machi
 verify-sweeps: .venv/made-for ## a sample of every stored sweep computed again on this machine; SAMPLE=5 takes more cells
 	$(PY) -m gpbnb.report.stored verify --sample $(or $(SAMPLE),1)
 
-notebooks: .venv/made-for ## execute the notebooks in place
-	$(PY) scripts/execute_notebooks.py
+notebooks: .venv/made-for ## execute the notebooks in place; NOTEBOOKS="book/kalman.ipynb" picks some
+	ls -S $(or $(NOTEBOOKS),book/*.ipynb) | GPBNB_QUIET=1 xargs -P 2 -n 1 .venv/bin/jupyter nbconvert $(EXECUTE)
+
+findings: .venv/made-for ## run every check of the ledger and store the findings
+	$(PY) -c "from gpbnb.report.ledger import stored; stored.write_findings()"
 
 lint: .venv/made-for ## ruff and mypy, and warnings of replaced words
 	$(PY) -m ruff check .
@@ -91,7 +99,7 @@ format: .venv/made-for ## let ruff lay out the code and mend what it can
 	$(PY) -m ruff format .
 
 exactness: .venv/made-for ## billions of operations compared with independent arithmetic, digit for digit, and more altered statements; it resumes
-	GPBNB_ALTERATIONS=more $(PY) -m pytest -q -n 2 --dist loadgroup --no-loadscope-reorder tests/ledger/test_alterations.py
+	GPBNB_ALTERATIONS=more $(PY) -m pytest -q tests/ledger/test_alterations.py
 	$(PY) -m benchmarks.exactness
 	$(PY) -m benchmarks.wide
 	$(PY) -m benchmarks.processors

@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import platform
 import re
 import stat
 import sys
@@ -35,11 +34,9 @@ except ImportError:  # on Windows, access lists protect the user's folders
 PACKAGE = Path(__file__).resolve().parent
 """The folder of the package."""
 
-_SETTINGS = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE")
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _READING = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
 _SEAL = hashlib.sha256().digest_size
-_NO_DATA = (".py", ".pyc", ".tmp", ".lock")
 _IMPORTED = IMPORTED
 _KEPT = 30 * 24 * 3600.0  # seconds after the last use
 _MOST_LINKS = 40  # in one path, as in Linux
@@ -48,7 +45,6 @@ _WARNING = (
     "remove it, or set GPBNB_CACHE_DIR to another folder\n"
 )
 
-_PACKAGE = re.compile(r"[\w.-]+")
 _IMPORT = re.compile(
     rb"""^[ \t]*(?: from [ \t]+ (?P<module>[\w.]+) [ \t]+ import [ \t]* (?P<names>\([^)]*\)|[^\n]*)
                  | import [ \t]+ (?P<plain>[^\n]*) )""",
@@ -284,16 +280,6 @@ def unlock(path: Path, handle: IO[bytes] | None) -> None:
         handle.close()
 
 
-@contextlib.contextmanager
-def locked(path: Path, longest_wait: float) -> Iterator[None]:
-    """Hold the lock of a file within a ``with`` block; see :func:`lock`."""
-    handle = lock(path, longest_wait)
-    try:
-        yield
-    finally:
-        unlock(path, handle)
-
-
 def _beside(path: Path) -> Path:
     return path.with_name(f"{path.name}.lock")
 
@@ -309,65 +295,6 @@ def digest(paths: Iterable[Path]) -> str:
     return found.hexdigest()
 
 
-def environment(sources: Iterable[Path], code: str = "", also: Iterable[str] = ()) -> tuple[str, ...]:
-    """Describe what a result may depend on besides sources and data: Python, the processor, and packages.
-
-    The packages are those that the sources import, and those that these need. Another package that is installed or
-    upgraded changes nothing.
-
-    Parameters
-    ----------
-    sources : source files that the result depends on.
-    code : further code that it depends on, such as that of a notebook.
-    also : names of packages that it depends on without an import, such as one that runs the code.
-    """
-    imports = frozenset[str]().union(*map(_foreign, (*map(_content, set(sources)), code.encode())))
-    wanted = {name for module in imports for name in _providers().get(module, ())}
-    return *_machine(), *_versions(frozenset((*wanted, *also)))
-
-
-@cache
-def _machine() -> tuple[str, ...]:
-    import llvmlite.binding as llvm  # takes longer than all imports of this module
-
-    features = sorted(name for name, there in llvm.get_host_cpu_features().items() if there)
-    settings = [f"{name}={os.environ.get(name, '')}" for name in _SETTINGS]
-    processor = (platform.system(), platform.machine(), llvm.get_host_cpu_name())
-    return platform.python_version(), *processor, *features, *settings
-
-
-@cache
-def _providers() -> dict[str, list[str]]:
-    """Names of the installed packages that provide each module."""
-    from importlib.metadata import packages_distributions
-
-    return dict(packages_distributions())
-
-
-@cache
-def _versions(packages: frozenset[str]) -> tuple[str, ...]:
-    """Name and version of packages and of all that they need; of optional needs, those that are installed."""
-    from importlib.metadata import PackageNotFoundError, distribution
-
-    found: dict[str, str] = {}
-    waiting = [_canonical(name) for name in packages]
-    while waiting:
-        if (name := waiting.pop()) in found:
-            continue
-        try:
-            package = distribution(name)
-        except PackageNotFoundError:
-            continue
-        found[name] = package.version
-        needs = [need for need in package.requires or () if "extra ==" not in need]
-        waiting += [_canonical(match[0]) for need in needs if (match := _PACKAGE.match(need))]
-    return tuple(f"{name}=={version}" for name, version in sorted(found.items()))
-
-
-def _canonical(name: str) -> str:
-    return re.sub(r"[-_.]+", "-", name).lower()
-
-
 def changed_since_import(paths: Iterable[Path]) -> bool:
     """Tell whether a file changed after this process imported the package, so that the process may run old code."""
     return any(_changed(path.stat()) > _IMPORTED for path in paths)
@@ -380,36 +307,14 @@ def _changed(status: os.stat_result) -> float:
 
 def imported(path: Path) -> frozenset[Path]:
     """List a source file of the package and all files of the package that it imports, directly or indirectly."""
-    return _following([path.resolve()])
-
-
-def imported_by(code: str) -> frozenset[Path]:
-    """List all files of the package that some code imports, directly or indirectly."""
-    return _following(_named(code.encode()))
-
-
-def _following(first: Iterable[Path]) -> frozenset[Path]:
     found: set[Path] = set()
-    waiting = list(first)
+    waiting = [path.resolve()]
     while waiting:
         file = waiting.pop()
         if file not in found:
             found.add(file)
             waiting += _named(_content(file)) - found
     return frozenset(found)
-
-
-def with_data(sources: Iterable[Path]) -> frozenset[Path]:
-    """Add the data files next to source files."""
-    found = set(sources)
-    for folder in {path.parent for path in found}:
-        found |= {path for path in folder.iterdir() if path.is_file() and path.suffix not in _NO_DATA}
-    return frozenset(found)
-
-
-def forget() -> None:
-    """Forget all digests, so that files are read again for the next digest."""
-    _content.cache_clear()
 
 
 @cache
@@ -434,11 +339,6 @@ def _imports(code: bytes) -> frozenset[str]:
         if whole:  # any public name may be used
             names |= set(HOMES.values())
     return frozenset(names)
-
-
-def _foreign(code: bytes) -> frozenset[str]:
-    """List the modules outside the package that some code imports, without what is below them."""
-    return frozenset(name.partition(".")[0] for name in _imports(code)) - {PACKAGE.name}
 
 
 @cache

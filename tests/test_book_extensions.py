@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import re
-import time
-from concurrent.futures import Future
 from enum import Enum
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,6 +18,7 @@ from sphinx.application import Sphinx
 from sphinx.errors import ConfigError
 from sphinx.util.docutils import docutils_namespace
 
+from gpbnb.names import HOMES, NAMED_FORMATS
 from gpbnb.report.ledger import PAGES, load_statements
 from gpbnb.report.ledger.page import address
 
@@ -69,6 +67,31 @@ def test_other_sections_stay_as_they_are():
     assert unfolded(*lines) == [*lines[:2], "x", "    one", *lines[3:]]
 
 
+@pytest.mark.parametrize(
+    ("defined", "public"),
+    [
+        ("gpbnb.arithmetic.formats.FloatFormat", "gpbnb.FloatFormat"),
+        ("gpbnb.arithmetic.formats.FloatFormat.round", "gpbnb.FloatFormat.round"),
+        ("gpbnb.arithmetic.linalg.inv", "gpbnb.linalg.inv"),
+        ("gpbnb.arithmetic.formats.FloatFormats", None),
+        ("gpbnb.filters.program.Program", None),
+    ],
+)
+def test_a_public_name_is_linked_wherever_it_is_defined(defined, public):
+    asked = []
+    domain = SimpleNamespace(resolve_xref=lambda *given: asked.append(given[4]))
+    node = {"refdomain": "py", "reftarget": defined, "reftype": "class", "refdoc": "book/api"}
+    env = SimpleNamespace(get_domain=lambda name: domain)
+    book.link_public_name(SimpleNamespace(builder=None), env, node, None)
+    assert asked == [public][: public is not None]
+
+
+def test_the_reference_documents_every_public_name():
+    text = (FOLDER.parent / "api.md").read_text(encoding="utf-8")
+    documented = set(re.findall(r"^\.\. auto\w+:: gpbnb\.(\w+)$", text, re.MULTILINE))
+    assert documented == {*HOMES, "NAMED_FORMATS"} - set(NAMED_FORMATS)
+
+
 def test_only_an_enum_hides_its_arguments():
     colour = Enum("colour", ["RED"])
     assert book.hide_enum_arguments(None, "class", "colour", colour, None, "(value)", None) == ("", None)
@@ -93,7 +116,6 @@ def test_figures_have_one_numbering_through_the_book():
         },
     )
     of = SimpleNamespace(config=SimpleNamespace(root_doc="index"))
-    given = {page: {kind: dict(each) for kind, each in kinds.items()} for page, kinds in env.toc_fignumbers.items()}
     assert book.number_figures(of, env) == []
     assert {page: kinds.get("figure") for page, kinds in env.toc_fignumbers.items()} == {
         "index": {"a": (1,)},
@@ -102,8 +124,6 @@ def test_figures_have_one_numbering_through_the_book():
         "below": None,
     }
     assert env.toc_fignumbers["index"]["table"] == {"t": (1,)}
-    book.keep_chapter_numbers(of, env)  # as Sphinx left them, or it would write every page anew
-    assert env.toc_fignumbers == given
 
 
 def app(folder, builder="html"):
@@ -120,31 +140,6 @@ def test_the_first_page_leads_to_the_root(tmp_path):
     assert 'http-equiv="refresh" content="0; url=book/index.html"' in text
     assert '<a href="book/index.html">' in text
     assert text.count("The title") == 2
-
-
-RELATIONS = {
-    "book/a": (None, None, "book/b"),
-    "book/b": (None, "book/a", "book/api"),
-    "book/api": (None, "book/b", "book/api/x"),
-    "book/api/x": ("book/api", "book/api", "book/c"),
-    "book/c": (None, "book/api/x", None),
-}
-
-
-@pytest.mark.parametrize(
-    ("page", "before", "after"),
-    [("book/a", None, "b"), ("book/b", "a", "c"), ("book/c", "b", None), ("book/api", None, None)],
-)
-def test_links_to_the_next_page_pass_over_the_reference(page, before, after):
-    builder = SimpleNamespace(
-        relations=RELATIONS,
-        get_relative_uri=lambda page, target: target.removeprefix("book/"),
-        render_partial=lambda title: {"title": title},
-    )
-    made = SimpleNamespace(builder=builder, env=SimpleNamespace(titles={name: name for name in RELATIONS}))
-    context = {"prev": {"link": "old"}, "next": {"link": "old"}}
-    book.skip_reference(made, page, "page.html", context, None)
-    assert [context[way] and context[way]["link"] for way in ("prev", "next")] == [before, after]
 
 
 def test_a_failed_build_is_left_alone(tmp_path):
@@ -184,18 +179,6 @@ def test_mathjax_loads_the_parts_that_come_along():
     listed = re.search(r"^        load: \[(.*)\]$", settings, re.MULTILINE)[1].replace('"', "").split(", ")
     files = {f"{part.replace('[tex]', 'input/tex/extensions')}.js" for part in listed}
     assert files | {"startup.js", "output/chtml/fonts"} == set(weight.MATHJAX_PARTS)
-
-
-def test_listings_older_than_a_template_are_written_anew(tmp_path):
-    old, new, template = (tmp_path / name for name in ("_modules/a.html", "_modules/b.html", "templates/x/layout.html"))
-    for age, path in ((30, old), (20, template), (10, new)):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-        os.utime(path, (time.time() - age,) * 2)
-    config = SimpleNamespace(templates_path=["templates"])
-    weight.renew_listings(SimpleNamespace(config=config, srcdir=tmp_path, outdir=tmp_path))
-    assert not old.exists()
-    assert new.exists()
 
 
 @pytest.mark.parametrize(("equations", "kept"), [({"book/a": True}, 3), ({"book/b": True}, 1), ({}, 1)])
@@ -368,62 +351,6 @@ def table(*rows):
     made = [nodes.row("", *(nodes.entry("", nodes.paragraph("", cell)) for cell in row)) for row in rows]
     group += [nodes.thead("", made[0]), nodes.tbody("", *made[1:])]
     return nodes.table("", group)
-
-
-# -- executed notebooks --------------------------------------------------------------------------------
-
-notebooks = load("gpbnb_notebooks")
-
-
-def book_with(tmp_path, outputs, env):
-    """A build of a book with one notebook, whose execution gives some outputs."""
-    cells = [SimpleNamespace(get=lambda name: outputs)]
-    executed: Future = Future()
-    executed.set_result({Path("a.ipynb"): SimpleNamespace(cells=cells)})
-    config = SimpleNamespace(gpbnb_outputs="")
-    return SimpleNamespace(config=config, env=env, outdir=tmp_path / "html", gpbnb_executed=executed)
-
-
-def test_a_changed_output_makes_all_pages_be_read_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(notebooks.execute_notebooks, "write", lambda path, notebook: None)
-    env = SimpleNamespace(found_docs={"book/b", "book/a"}, doc2path=lambda name: f"{name}.md")
-
-    def outdated(outputs):
-        app = book_with(tmp_path, outputs, env)
-        found = notebooks.outdated(app, env, *3 * (set(),))
-        notebooks.use_copy(app, "book/a", [""])
-        return found
-
-    assert outdated("first") == []  # Sphinx reads all of a new book anyway
-    assert outdated("first") == []
-    assert outdated("second") == ["book/a", "book/b"]
-    assert outdated("second") == []
-
-
-def test_only_pages_of_the_package_are_read_before_the_outputs_are_known(tmp_path):
-    env = SimpleNamespace(doc2path=lambda name: f"{name}.md")
-    app = book_with(tmp_path, "first", env)
-    app.gpbnb_executed = Future()
-    app.gpbnb_executed.set_exception(ExceptionGroup("notebooks failed", [RuntimeError("a.ipynb failed")]))
-    notebooks.use_copy(app, "book/api/gpbnb", [""])
-    with pytest.raises(notebooks.ExtensionError, match=r"a\.ipynb failed"):
-        notebooks.use_copy(app, "book/a", [""])
-
-
-def test_pages_whose_source_is_gone_are_removed(tmp_path):
-    kept = ["index.html", "book/a.html", "_modules/gpbnb/x.html", "_modules/index.html", "_static/part.html"]
-    gone = ["book/old.html", "_modules/gpbnb/old.html"]
-    for name in kept + gone:
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).touch()
-    env = SimpleNamespace(found_docs={"book/a"}, _viewcode_modules={"gpbnb.x": ()})
-    builder = SimpleNamespace(name="html", get_target_uri=lambda name: f"{name}.html")
-    app = SimpleNamespace(outdir=tmp_path, env=env, builder=builder)
-    notebooks.remove_old_pages(app, RuntimeError("a build that failed"))
-    assert all((tmp_path / name).exists() for name in kept + gone)
-    notebooks.remove_old_pages(app, None)
-    there = [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.html")]
-    assert sorted(there) == sorted(kept)
 
 
 # -- descriptions, Open Graph, sitemap ------------------------------------------------------------------

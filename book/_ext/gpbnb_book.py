@@ -14,10 +14,8 @@ from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.util.inspect import TypeAliasForwardRef
 
+from gpbnb.names import HOMES
 from gpbnb.report.display.tables import POWER
-
-REFERENCE = "book/api"
-"""The pages of modules, and the page above them: nobody reads these in order."""
 
 FIRST_PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -141,40 +139,20 @@ def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:
         node.rawsource = mended
 
 
-def omit_modules_without_listing(app: Sphinx, env: BuildEnvironment) -> None:
-    """Leave modules without Python source out of the index of source listings."""
-    env._viewcode_modules = {name: found for name, found in getattr(env, "_viewcode_modules", {}).items() if found}
-
-
-def mend_listing_links(
-    app: Sphinx, pagename: str, templatename: str, context: dict, doctree: nodes.document | None
-) -> None:
-    """Lead each link of a source listing to the module whose page describes the name.
-
-    Viewcode names the same module in all links of a listing.
-    """
-    if not pagename.startswith("_modules/"):
-        return
-    described = app.env.get_domain("py").objects
-
-    def mended(match: re.Match[str]) -> str:
-        place = f"{match['module']}.{match['name']}"
-        return match["before"] + place if place in described else match[0]
-
-    link = r'<div class="viewcode-block" id="(?P<name>[^"]+)">\n<a class="viewcode-back" href="[^"#]*?'
-    context["body"] = re.sub(rf'(?P<before>{link}(?P<module>[^"#/]+)\.html#)[^"]+', mended, context["body"])
-
-
-def keep_chapter_numbers(app: Sphinx, env: BuildEnvironment) -> list[str]:
-    """Give Sphinx back the numbers by chapter, with which it looks for pages whose numbers have changed."""
-    env.toc_fignumbers = getattr(env, "gpbnb_numbers_by_chapter", env.toc_fignumbers)
-    return []
+def link_public_name(app: Sphinx, env: BuildEnvironment, node: nodes.Element, content: nodes.Node) -> nodes.Node | None:
+    """Link a public name to its place in the reference; signatures name the module that defines it."""
+    target = node.get("reftarget", "")
+    for name, module in HOMES.items():
+        defined = module if name == "linalg" else f"{module}.{name}"
+        if node.get("refdomain") == "py" and f"{target}.".startswith(f"{defined}."):
+            public = target.replace(defined, f"gpbnb.{name}", 1)
+            domain = env.get_domain("py")
+            return domain.resolve_xref(env, node["refdoc"], app.builder, node["reftype"], public, node, content)
+    return None
 
 
 def number_figures(app: Sphinx, env: BuildEnvironment) -> list[str]:
     """Number figures from 1 to the end of the book, also on pages without a chapter number."""
-    env.gpbnb_numbers_by_chapter = {page: dict(kinds) for page, kinds in env.toc_fignumbers.items()}
-    env.toc_fignumbers = {page: dict(kinds) for page, kinds in env.toc_fignumbers.items()}
     number = 0
     for page in pages_in_order(env, app.config.root_doc):
         figures = env.toc_fignumbers.get(page, {}).get("figure", {})
@@ -190,33 +168,16 @@ def pages_in_order(env: BuildEnvironment, page: str) -> list[str]:
     return [page, *(each for child in env.toctree_includes.get(page, ()) for each in pages_in_order(env, child))]
 
 
-def skip_reference(app: Sphinx, pagename: str, templatename: str, context: dict, doctree: object) -> None:
-    """Lead the links to the previous and to the next page past the pages of modules."""
-    relations = getattr(app.builder, "relations", {})
-    for way, position in (("prev", 1), ("next", 2)):
-        target = None if pagename.startswith(REFERENCE) else relations.get(pagename, (None,) * 3)[position]
-        while target and target.startswith(REFERENCE):
-            target = relations[target][position]
-        if not target:
-            context[way] = None
-        elif context.get(way):
-            link = app.builder.get_relative_uri(pagename, target)
-            context[way] = {"link": link, "title": app.builder.render_partial(app.env.titles[target])["title"]}
-
-
 def setup(app: Sphinx) -> dict:
     pybtex.plugin.register_plugin("pybtex.style.formatting", "short_names", ShortNames)
     app.connect("autodoc-process-docstring", unfold_fields, priority=400)
     # Without it, a signature such as "Numbers | None" stays a text, whose names are ambiguous; Sphinx 8.2 has it.
     TypeAliasForwardRef.__or__ = TypeAliasForwardRef.__ror__ = lambda self, other: Union[self, other]  # noqa: UP007
     app.connect("autodoc-process-signature", hide_enum_arguments)
+    app.connect("missing-reference", link_public_name)
     app.connect("doctree-resolved", write_powers)
     app.connect("doctree-resolved", mend_links)
     # Sphinx numbers the figures with the priority 500.
-    app.connect("env-get-updated", keep_chapter_numbers, priority=100)
     app.connect("env-get-updated", number_figures, priority=900)
-    app.connect("env-updated", omit_modules_without_listing)
-    app.connect("html-page-context", mend_listing_links)
-    app.connect("html-page-context", skip_reference)
     app.connect("build-finished", write_first_page, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -8,23 +8,15 @@ from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.util.docutils import SphinxDirective
 
-import gpbnb
+from gpbnb.report import ledger
 
 ERRORS = ("wrong", "inconsistent", "not reproduced")
 """What a chapter lists; misprints and faults of the scan are in the complete ledger."""
 
 
 @cache
-def ledger():
-    """The package of the ledger, which takes seconds to import: meanwhile the notebooks run already."""
-    from gpbnb.report import ledger
-
-    return ledger
-
-
-@cache
 def all_rows():
-    return ledger().rows()
+    return ledger.rows()
 
 
 class Ledger(SphinxDirective):
@@ -44,12 +36,11 @@ class Ledger(SphinxDirective):
     final_argument_whitespace = True
 
     def run(self) -> list[nodes.Node]:
-        package = Path(gpbnb.__file__).parent
-        for path in (*package.rglob("*.py"), *package.rglob("*.csv")):
+        for path in Path(ledger.__file__).parent.iterdir():
             self.env.note_dependency(str(path))
         what, *detail = (" ".join(argument.split()) for argument in self.arguments)
         if what == "counts":
-            parsed = self.parse_text_to_nodes(ledger().count_table(all_rows(), detail[0]).page())
+            parsed = self.parse_text_to_nodes(ledger.count_table(all_rows(), detail[0]).page())
             for table in (found for node in parsed for found in node.findall(nodes.table)):
                 table["classes"].append("counts")
             return parsed
@@ -60,30 +51,30 @@ class Ledger(SphinxDirective):
         return [nodes.raw("", self.html(what, *detail), format="html")]
 
     def html(self, what: str, detail: str = "") -> str:
-        rows, verdict = all_rows(), ledger().finding.Verdict
+        rows, verdict = all_rows(), ledger.finding.Verdict
         match what:
             case "page":
-                page = next(page for page in ledger().PAGES if page.name == detail)
-                return ledger().ledger_page(rows, page).html
+                page = next(page for page in ledger.PAGES if page.name == detail)
+                return ledger.ledger_page(rows, page).html
             case "errors":
-                return ledger().error_table(ledger().select_topic(rows, detail, *map(verdict, ERRORS))).html
+                return ledger.error_table(ledger.select_topic(rows, detail, *map(verdict, ERRORS))).html
             case "printed":
                 title, _, names = detail.rpartition(": ")
                 chosen_rows = [row for row in rows if row.statement.id in names.split()]
                 if len(chosen_rows) != len(names.split()):
                     raise self.error(f"unknown statement in {names!r}")
-                return ledger().printed_table(chosen_rows, title).html
+                return ledger.printed_table(chosen_rows, title).html
             case "verdict":
                 chosen = verdict(detail)
-                return ledger().note_table(row for row in rows if row.finding and row.finding.verdict is chosen).html
+                return ledger.note_table(row for row in rows if row.finding and row.finding.verdict is chosen).html
             case "undone":
                 chosen = verdict(detail)
                 items = (row for row in rows if row.statement.kind == "open")
-                return ledger().note_table((r for r in items if r.finding and r.finding.verdict is chosen), True).html
+                return ledger.note_table((r for r in items if r.finding and r.finding.verdict is chosen), True).html
             case "squares":
-                return ledger().squares(rows).html
+                return ledger.squares(rows).html
             case "root-squares":
-                return ledger().root_squares(rows).html
+                return ledger.root_squares(rows).html
             case "argument":
                 from gpbnb.report.ledger.argument import chain_of_errors  # matplotlib takes a second to import
 
@@ -93,9 +84,9 @@ class Ledger(SphinxDirective):
 
                 return with_correction().html
             case "roots":
-                return ledger().root_table(rows).html
+                return ledger.root_table(rows).html
             case "claims":
-                return ledger().claim_table(rows).html
+                return ledger.claim_table(rows).html
         raise self.error(f"no part of the ledger is called {what!r}")
 
 
@@ -107,12 +98,12 @@ def count(name, rawtext, text, lineno, inliner, options=None, content=None):
     """
     rows = all_rows()
     if text.startswith("claims"):
-        outcomes = [*ledger().claim_outcomes(rows).values()]
+        outcomes = [*ledger.claim_outcomes(rows).values()]
         found = outcomes.count(text.removeprefix("claims ")) if " " in text else len(outcomes)
     elif text == "roots":
-        found = len(ledger().by_root(rows))
+        found = len(ledger.by_root(rows))
     elif text == "damaged":
-        found = len(ledger().load_legibility())
+        found = len(ledger.load_legibility())
     else:
         words = text.replace("not reproduced", "not-reproduced").split()
         kept = [
@@ -125,8 +116,8 @@ def count(name, rawtext, text, lineno, inliner, options=None, content=None):
 def add_labels(app: Sphinx, env: BuildEnvironment) -> None:
     """Give each statement a label: the rows are HTML, in which Sphinx finds none."""
     standard = env.get_domain("std")
-    for statement in ledger().load_statements():
-        page = next(page for page in ledger().PAGES if page.holds(statement))
+    for statement in ledger.load_statements():
+        page = next(page for page in ledger.PAGES if page.holds(statement))
         name = f"book/{page.name}"
         if name not in env.found_docs:
             continue

@@ -129,15 +129,6 @@ def copy_mathjax(folder: Path) -> None:
         copy_asset(str(source / part), str(target if (source / part).is_dir() else target.parent))
 
 
-def renew_listings(app: Sphinx) -> None:
-    """Remove listings of source that are older than a template: Sphinx writes them anew for a newer source alone."""
-    templates = [path for folder in app.config.templates_path for path in Path(app.srcdir, folder).rglob("*.html")]
-    newest = max((path.stat().st_mtime for path in templates), default=0)
-    for page in Path(app.outdir, "_modules").rglob("*.html"):
-        if page.stat().st_mtime < newest:
-            page.unlink()
-
-
 def leave_out_mathjax(app: Sphinx, pagename: str, templatename: str, context: dict, doctree: object) -> None:
     """Load MathJax on pages with formulas alone; Sphinx also loads it on those that only list such a page."""
     if app.builder.name == "html" and not app.env.get_domain("math").data["has_equations"].get(pagename):
@@ -162,7 +153,6 @@ def lighten(app: Sphinx, error: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> dict:
-    app.connect("builder-inited", renew_listings)
     app.connect("html-page-context", leave_out_mathjax, priority=900)
     app.connect("build-finished", lighten, priority=700)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-// Sphinx's search, which leaves out numbers, sorts modules before chapters, and cuts its snippets out of code and TeX.
+// Sphinx's search, which leaves out numbers, sorts names of the package before chapters, and cuts its snippets out of code and TeX.
 const SEPARATOR = /(?<=\d)(?:,|\{,\}|\\,|\u2009|\u202f)(?=\d{3}(?!\d))/g; // as in book/_ext/gpbnb_search.py
 const SNIPPET = 240; // characters
 const BLOCKS = "p, li, dd, dt, figcaption, th, td, h1, h2, h3";
@@ -14,8 +14,8 @@ Search._parseQuery = (query) => {
   return [joined, words, excluded, marked, names];
 };
 
-// Chapters first, then the ledger, then the pages of modules.
-const RANKS = [["book/api", 0], ["_modules/", 0], ["book/ledger-", 1000]];
+// Chapters first, then the ledger, then the reference of the package.
+const RANKS = [["book/api", 0], ["book/ledger-", 1000]];
 Scorer.score = ([page, , , , score]) => score + (RANKS.find(([start]) => page.startsWith(start))?.[1] ?? 2000);
 
 // A formula reads as text where it is a number or a letter, and is left out otherwise.

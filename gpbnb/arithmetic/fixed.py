@@ -136,5 +136,5 @@ class FixedFormat(NumberFormat[FixedArray]):
         return Rules(2, self.precision, self.rounding, self.limits, self.seed)
 
     def array(self, values: Any) -> FixedArray:
-        """Round numbers into a :class:`FixedArray`; see :meth:`gpbnb.arithmetic.formats.FloatFormat.array`."""
+        """Round numbers into an array of this format; see :meth:`gpbnb.arithmetic.formats.FloatFormat.array`."""
         return FixedArray.from_values(values, self)

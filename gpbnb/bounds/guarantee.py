@@ -86,7 +86,8 @@ class Guarantee:
     why : why the bound does not hold for ever; empty if it does.
     history : (k, n), bounds after each of the first steps. If the bound holds for ever, the last rows are one for each
         phase of the period, and also hold for all later steps in this phase.
-    parts : (n, 4), the parts of each state's bound at the step where it is largest; see :data:`PARTS`.
+    parts : (n, 4), the parts of each state's bound at the step where it is largest: roundings of the estimate,
+        roundings of the closed loop, errors of the gain, older errors.
     limits : limits on the filter without rounding: those given, and those that follow from them.
     schedule : the filter's coefficients.
     lags : number of earlier steps that the sums include.

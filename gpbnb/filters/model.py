@@ -377,8 +377,7 @@ class LinearModel:
 
         Raises
         ------
-        OverflowError : the absolute value of an entry is not between 2**-:data:`LARGEST_EXPONENT` and
-            2**:data:`LARGEST_EXPONENT`.
+        OverflowError : the absolute value of an entry is not between 2**-450 and 2**450.
         """
         for letter in (*_LETTERS, *_INPUTS):
             given = getattr(self, letter)

@@ -195,7 +195,7 @@ def required_word_formats(
 ) -> WordRequirement:
     """Lower the formats of data, coefficients and sums in this order to the smallest within a tolerance.
 
-    The data are lowered with :data:`MOST_COEFFICIENT_BITS` for each coefficient and exact sums that are rounded once
+    The data are lowered with 24 bits for each coefficient and exact sums that are rounded once
     when they are stored. Then the significant bits of the coefficients are lowered, and last the fraction bits of the
     sums, to no fewer than those of the data, and their integer bits. Sums wrap around.
 

@@ -230,7 +230,9 @@ def required_fraction_bits(
     basis : "emulation" of these measurements; or "guarantee", for a system for all inputs that are never larger than
         the largest of `z`, with a proof that nothing overflows, and for a scaled filter for all measurements that do
         not overflow. For a linear Kalman filter, call :func:`gpbnb.bounds.guarantee.guarantee` instead.
-    rounding, coefficient_bits, wide : as for :func:`emulated`.
+    rounding : rounding of each operation.
+    coefficient_bits : significant bits of each coefficient; each coefficient has its own binary point.
+    wide : whether sums of products are kept exactly and rounded once.
     like : formats for a system or a function, in place of `rounding`, `coefficient_bits` and `wide`. They set the
         integer bits, the rounding and the overflow. The search changes the fraction bits of the data, and those of the
         sums by the same number. Coefficients change with the data if they have the format of the data; otherwise they

@@ -76,10 +76,11 @@ def read_model(
 
     Parameters
     ----------
-    source : the path of a TOML file, or a mapping with the same keys: those in :data:`KALMAN` for a Kalman filter, in
-        :data:`SYSTEM` for a linear system or in :data:`DESIGN` for a digital filter, and optionally those in
-        :data:`NAMES`. Or a discrete system of ``scipy.signal`` or python-control, of a class in :data:`SYSTEMS`; it is
-        read as a linear system that starts at rest. Or a filter of FilterPy, of a class in :data:`FILTERS`; its current
+    source : the path of a TOML file, or a mapping with the same keys: Phi, H, Q, R, x0 and P0 for a Kalman filter;
+        A, B and optionally C, D and x0 for a linear system; b and a, or sos, for a digital filter. Lists of names are
+        optional: states, measurements, inputs, outputs. Or a discrete StateSpace or TransferFunction of
+        ``scipy.signal`` or python-control, or a ZerosPolesGain of ``scipy.signal``; it is read as a linear system that
+        starts at rest. Or a KalmanFilter, SquareRootKalmanFilter or FadingKalmanFilter of FilterPy; its current
         estimate becomes the first estimate, and a step means ``predict()`` or ``predict(u)``, then ``update(z)``,
         without other arguments.
     u : (steps, p), known inputs of a Kalman filter, in place of those in `source`; the source must have B.

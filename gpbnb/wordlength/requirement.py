@@ -88,7 +88,11 @@ class Requirement(WordlengthAnswer):
     Parameters
     ----------
     fmt : None if no precision up to the limit of the search meets the tolerance.
-    basis, steps, tried, warnings : as of a :class:`WordlengthAnswer`.
+    basis : "emulation", for the observed errors with these measurements; or "bound", for the largest possible errors.
+    steps : steps of the filter.
+    tried : digits, and largest error or bound / tolerance over states and steps; infinite if the run stopped, a number
+        overflowed, a variance was no longer positive, or no bound exists.
+    warnings : reasons why an observed answer may not hold for other inputs.
     why : the reason why an error is infinite, for the largest precision at which it is infinite; empty if all errors
         are finite. The answer shows this reason if it prevented a smaller answer.
     form : form of the filter.

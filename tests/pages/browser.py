@@ -76,17 +76,6 @@ def pages() -> list[str]:
     return sorted(p.as_posix() for p in every if p.parts[0] != "_static" and p.parts != ("index.html",))
 
 
-def opened() -> list[str]:
-    """The pages that tests open; the longest listing of source and the longest API page stand for the others."""
-    left = pages()
-    for folder in ("_modules/gpbnb/", "book/api/"):
-        alike = sorted(
-            (each for each in left if each.startswith(folder)), key=lambda each: (HTML / each).stat().st_size
-        )
-        left = [each for each in left if each not in alike[:-1]]
-    return left
-
-
 def chromium() -> str | None:
     """Path of the machine's Chromium; the environment variable CHROMIUM overrides the search."""
     names = (os.environ.get("CHROMIUM"), "chromium", "chromium-browser", "google-chrome")

@@ -90,11 +90,11 @@ def look_at(open_page):
 
 
 # All tests of one address follow each other.
-@pytest.fixture(params=[(a, s) for a in tools.opened() for s in tools.SIZES], ids="-".join)
+@pytest.fixture(params=[(a, s) for a in tools.pages() for s in tools.SIZES], ids="-".join)
 def page(request, look_at):
     return look_at(*request.param)
 
 
-@pytest.fixture(params=tools.opened(), ids=lambda address: f"{address}-paper")
+@pytest.fixture(params=tools.pages(), ids=lambda address: f"{address}-paper")
 def paper(request, look_at):
     return look_at(request.param, "paper")

@@ -17,7 +17,7 @@ PAGES = tools.pages()
 FORMULAS = 12
 """Formulas that axe looks at, at the beginning and at the end of a page."""
 LONG_PAGES = ("book/kalman.html", "book/inversion.html", "book/ledger-1984-3.html")
-CHAPTERS = [each for each in PAGES if each.startswith("book/") and not each.startswith(("book/api/", "book/ledger-"))]
+CHAPTERS = [each for each in PAGES if each.startswith("book/") and not each.startswith("book/ledger-")]
 
 
 def on_a_desktop(addresses):
@@ -79,7 +79,7 @@ def test_never_scrolls_sideways(page):
     assert page.evaluate("[document.documentElement.scrollWidth, window.scrollX]") == [page.viewport_size["width"], 0]
 
 
-@on_a_desktop(tools.opened())
+@on_a_desktop(tools.pages())
 def test_on_a_desktop_only_formulas_scroll(page):
     """Code, outputs and tables fit the column; a formula scrolls only where it has no place left to break."""
     scrolling = page.locator("article :is(div, pre)").evaluate_all(
@@ -291,7 +291,7 @@ def test_no_page_is_too_heavy():
     assert {address: size for address, size in sizes.items() if size > tools.HEAVIEST} == {}
 
 
-@on_a_desktop(tools.opened())
+@on_a_desktop(tools.pages())
 def test_no_page_is_too_high(page):
     assert page.evaluate("document.documentElement.scrollHeight") <= tools.HIGHEST
 

@@ -10,10 +10,10 @@ import pytest
 from . import browser as tools
 
 PAGES = [each for each in tools.pages() if each.startswith("book/")]
-REFERENCE = ("book/api.html", "book/api/")
+REFERENCE = "book/api.html"
 HEAVIEST = 1_500_000  # bytes of a page with its pictures, scripts, styles and fonts
 on_a_desktop = pytest.mark.parametrize(
-    "page", [(each, "desktop") for each in tools.opened()], ids="-".join, indirect=True
+    "page", [(each, "desktop") for each in tools.pages()], ids="-".join, indirect=True
 )
 RESULTS = """() => [...document.querySelectorAll("#search-results li")].map((each) => ({
   page: new URL(each.querySelector("a").href).pathname.slice(1),
@@ -37,7 +37,7 @@ def search(open_page):
 
 
 def rank(page):
-    return 2 if page.startswith((*REFERENCE, "_modules/")) else 1 if page.startswith("book/ledger-") else 0
+    return 2 if page == REFERENCE else 1 if page.startswith("book/ledger-") else 0
 
 
 @pytest.mark.parametrize(("words", "number"), [("6606", "6606"), ("3153600", "3153600"), ("3,153,600", "3153600")])
@@ -50,7 +50,7 @@ def test_the_search_finds_a_number(search, words, number):
 
 
 @pytest.mark.parametrize("words", ["precision", "bound", "tolerance", "required_precision"])
-def test_the_search_shows_chapters_first_and_modules_last(search, words):
+def test_the_search_shows_chapters_first_and_the_reference_last(search, words):
     ranks = [rank(each["page"]) for each in search(words)]
     assert {0, 2} <= set(ranks)
     assert ranks == sorted(ranks)
@@ -74,27 +74,13 @@ def neighbour(address, way):
     return f"book/{link[1]}" if link else None
 
 
-def test_the_next_page_leads_through_the_book_and_past_the_reference():
+def test_the_next_page_leads_through_the_whole_book():
     read = ["book/index.html"]
     while following := neighbour(read[-1], "right-next"):
         assert following not in read
         assert neighbour(following, "left-prev") == read[-1]
         read.append(following)
-    assert set(read) == {each for each in PAGES if not each.startswith(REFERENCE)}
-
-
-def test_pages_of_modules_have_no_next_page():
-    modules = [each for each in PAGES if each.startswith(REFERENCE)]
-    assert len(modules) > 100
-    assert [each for each in modules if neighbour(each, "right-next") or neighbour(each, "left-prev")] == []
-
-
-def test_the_reference_stands_last_and_lists_its_modules_on_its_own_page_alone():
-    for address in ("book/index.html", "book/kalman.html"):
-        text = (tools.HTML / address).read_text(encoding="utf-8")
-        listed = re.findall(r'<li class="toctree-l1[^>]*><a class="reference internal" href="([^"]+)"', text)
-        assert listed[-1] == "api.html"
-        assert "api/gpbnb.filters.run.html" not in text
+    assert set(read) == set(PAGES)
 
 
 def test_folded_code_is_opaque_as_soon_as_it_is_opened_for_a_print(open_page):
@@ -129,7 +115,7 @@ def description(address):
 
 def test_a_description_can_be_read_alone():
     """It consists of whole sentences, and speaks of no figure, no other chapter, and nothing that went before."""
-    told = {each: description(each) for each in PAGES if not each.startswith("book/api/")}
+    told = {each: description(each) for each in PAGES}
     assert [each for each, text in told.items() if not text.endswith((".", "?"))] == []
     leaning = re.compile(
         r"^(This (?!page|book)|That|Those|It|They|Here|Each|The (figure|table|formula|previous))\b|\bFig\.|∎"
