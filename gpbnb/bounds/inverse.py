@@ -136,7 +136,7 @@ def rule_of_thumb(factors: LU, x: FloatArray) -> float:
 
 def _smallest(x: FloatArray) -> Fraction:
     """Return the largest error of a result that underflows; refuse formats with another overflow than an error."""
-    fmt = x.format
+    fmt: Any = x.format
     if fmt.limits is not None and fmt.overflow != "raise":
         raise ValueError(
             f"got {fmt}; this bound needs overflow 'raise', because a result beyond the range is wrong by more than "
