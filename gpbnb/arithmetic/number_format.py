@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar, cast
 
 import numpy as np
 
@@ -41,6 +42,8 @@ class NumberFormat(ABC, Generic[Made]):
     precision: int
     #: Applied to every result.
     rounding: Rounding
+    #: What happens to a result beyond the range.
+    overflow: str
 
     @property
     @abstractmethod
@@ -141,6 +144,23 @@ class NumberFormat(ABC, Generic[Made]):
         OverflowError : the result is too long to write out as a Fraction.
         """
         return self.kernel.to_fraction(*self.kernel.from_decimal(*exact_ratio(value)))
+
+    @cached_property
+    def strict(self) -> Self:
+        """The same format, whose overflow is an error; stochastic rounding becomes chopping."""
+        random = self.rounding is Rounding.STOCHASTIC
+        return replace(cast(Any, self), overflow="raise", rounding=Rounding.CHOP if random else self.rounding)
+
+    def store(self, values: Any) -> Made:
+        """Round numbers that are given, not computed, such as coefficients, into an array.
+
+        Raises
+        ------
+        OverflowError : a number is beyond the range, whatever the format does with a result there.
+        """
+        if self.overflow != "raise":
+            self.strict.array(values)
+        return self.array(values)
 
     def zeros(self, shape: int | tuple[int, ...]) -> Made:
         """Return an array of zeros.

@@ -138,7 +138,7 @@ def raised_as_stored(
         return is_definite(candidate, strictly)
 
     def store(candidate: NDArray[Any]) -> NDArray[Any]:
-        return np.asarray(fmt.array(candidate).to_fractions(), dtype=object)
+        return np.asarray(fmt.store(candidate).to_fractions(), dtype=object)
 
     try:
         found = raised_until(matrix, sound, least_shift(fmt), LARGEST_STORED_SHIFT, store)

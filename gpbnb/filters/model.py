@@ -452,7 +452,7 @@ class LinearModel:
             if (given := getattr(self, letter)) is None:
                 continue
             try:
-                made[letter] = fmt.array(given)
+                made[letter] = fmt.store(given)
             except OverflowError as error:
                 raise OverflowError(f"{letter}: {error}") from None
             if letter in _COVARIANCES and random:

@@ -92,7 +92,7 @@ class NonlinearRun(SteppedRun):
         self._R, self._Q = list(arrays["R"]), list(arrays["Q"])
         P = arrays["P0"]
         if form in FACTORED:
-            self._R = [stored_in.array(upper_factors(one)) for one in sound.R]
+            self._R = [stored_in.store(upper_factors(one)) for one in sound.R]
             self._Q = [self._factors(upper_factors(one), stored_in) for one in sound.Q]
             P = self._factors(upper_factors(sound.P0), stored_in)
         self.P = of_covariance.array(P)
@@ -101,7 +101,7 @@ class NonlinearRun(SteppedRun):
         self._u = None if model.u is None else of_state.array(model.u)
 
     def _factors(self, factors: NDArray[Any], fmt: FloatFormat) -> FloatArray:
-        stored = fmt.array(factors)
+        stored = fmt.store(factors)
         return root_of_factors(stored) if self.form in ROOTS else stored
 
     def _check(self, z: Any) -> None:

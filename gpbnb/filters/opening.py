@@ -163,6 +163,19 @@ def as_packed(fmt: FloatFormat | FixedFormat | None, values: Any) -> NDArray[Any
     return packed_array(fmt.array(values))
 
 
+def stored_start(fmt: FloatFormat | FixedFormat, x0: Any) -> FloatArray:
+    """Round a first state into a format.
+
+    Raises
+    ------
+    OverflowError : an entry is beyond the range of the format.
+    """
+    try:
+        return fmt.store(x0)
+    except OverflowError as error:
+        raise OverflowError(f"x0: {error}") from None
+
+
 def double_doubles_of(array: FloatArray) -> NDArray[np.float64]:
     """Round the numbers of an array to the nearest double-doubles, (..., 2); exact in base 2 and 16."""
     if isinstance(array.backend, Compiled):

@@ -274,14 +274,14 @@ class FixedIntervalSmoother:
     def _by_roots(self, fmt: FloatFormat | FixedFormat) -> list[SmoothedStep]:
         model = self.model
         fmt.restart()
-        Phi, H = ([fmt.array(each) for each in cycle] for cycle in (model.Phi, model.H))
-        SQ = [root_of_factors(fmt.array(upper_factors(each))) for each in model.Q]
-        UR = [fmt.array(upper_factors(each)) for each in model.R]
-        S = root_of_factors(fmt.array(upper_factors(model.P0)))
+        Phi, H = ([fmt.store(each) for each in cycle] for cycle in (model.Phi, model.H))
+        SQ = [root_of_factors(fmt.store(upper_factors(each))) for each in model.Q]
+        UR = [fmt.store(upper_factors(each)) for each in model.R]
+        S = root_of_factors(fmt.store(upper_factors(model.P0)))
         parts = (Phi, H, SQ, UR)
         models = [RootModel(*(_member(each, k) for each in parts)) for k in range(len(self.z))]
         identity = fmt.array(np.eye(model.n, dtype=int))
-        return smooth_roots(models, fmt.array(model.x0), S, list(fmt.array(self.z)), identity)
+        return smooth_roots(models, fmt.store(model.x0), S, list(fmt.array(self.z)), identity)
 
 
 def _member(cycle: Sequence[Each], k: int) -> Each:

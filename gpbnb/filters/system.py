@@ -26,7 +26,7 @@ from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
-from gpbnb.filters.opening import as_packed, widened_array
+from gpbnb.filters.opening import as_packed, packed_array, stored_start, widened_array
 from gpbnb.filters.program import AT_MOST, Program, advance, matrices
 from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
 from gpbnb.filters.structures import (
@@ -102,7 +102,7 @@ class LinearFilter:
         """
         fmt.restart()
         try:
-            return np.asarray(fmt.array(self.coefficients).to_fractions(), dtype=object)
+            return np.asarray(fmt.store(self.coefficients).to_fractions(), dtype=object)
         except OverflowError:
             raise self._beyond(fmt) from None
 
@@ -114,7 +114,7 @@ class LinearFilter:
         OverflowError : a coefficient beyond the range of the format; the message names it.
         """
         try:
-            return as_packed(fmt, self.coefficients)
+            return packed_array(fmt.store(self.coefficients))
         except OverflowError:
             raise self._beyond(fmt) from None
 
@@ -123,7 +123,7 @@ class LinearFilter:
         names = self.program.coefficient_names or [str(i) for i in range(len(self.coefficients))]
         for name, value in zip(names, self.coefficients, strict=True):
             try:
-                fmt.round(value)
+                fmt.strict.round(value)
             except OverflowError as error:
                 cure = _WORDS if isinstance(fmt, FixedFormat) else ""
                 return OverflowError(f"coefficient {name}: {error}{cure}")
@@ -588,7 +588,7 @@ class LinearSystem:
                 z = as_packed(fmt, inputs)
             except OverflowError as error:
                 raise OverflowError(f"inputs: {error}") from None
-            x = as_packed(fmt, start)
+            x = packed_array(stored_start(fmt, start))
         program, first = given.program, x.copy()
         out = _advanced(tag, program, coefficients, z, x)
         if out is None:

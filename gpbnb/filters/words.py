@@ -174,7 +174,7 @@ def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
     for i, value in enumerate(made.coefficients):
         fmt = words.data if i in limits else words.coefficients if words.coefficients is not None else words.data
         try:
-            stored[i] = FloatFormat(2, fmt).round(value) if isinstance(fmt, int) else fmt.round(value)
+            stored[i] = FloatFormat(2, fmt).round(value) if isinstance(fmt, int) else fmt.strict.round(value)
         except OverflowError:
             name = program.coefficient_names[i] if program.coefficient_names else f"coefficient {i}"
             text = arithmetic(fmt) if isinstance(fmt, FixedFormat) else digits_text(fmt, kind="significant")
@@ -238,7 +238,20 @@ def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats) ->
         start = exact([0] * given.program.n)
     made = integer_program(given, words)
     data = words.data
-    return IntegerRun(run_integers(made, integers_of(u, data), integers_of(start[None], data)[0]), data.unit)
+    return IntegerRun(run_integers(made, integers_of(u, data), first_integers(start, data)), data.unit)
+
+
+def first_integers(x0: Any, fmt: FixedFormat) -> NDArray[Any]:
+    """Round a first state as :func:`integers_of` does.
+
+    Raises
+    ------
+    OverflowError : an entry is beyond the range, whatever the format does with a result there.
+    """
+    try:
+        return integers_of(np.asarray(x0)[None], fmt.strict)[0]
+    except OverflowError as error:
+        raise OverflowError(f"x0: {error}") from None
 
 
 def integers_of(values: Any, fmt: FixedFormat) -> NDArray[Any]:

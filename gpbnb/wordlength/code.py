@@ -34,6 +34,7 @@ from gpbnb.filters.forms import CONSTANT_GAIN, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.nonlinear_system import NonlinearSystem
+from gpbnb.filters.opening import stored_start
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_measurements
@@ -234,14 +235,14 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
     if isinstance(fmt, FloatFormat):
         arithmetic = CodeFloats(_type_of(fmt))
         stored = made.stored(fmt)[None]
-        start = np.asarray(fmt.array(system.x0).to_fractions(), dtype=object)
+        start = np.asarray(stored_start(fmt, system.x0).to_fractions(), dtype=object)
         step = CodeStep(without_exact(made.program, stored), stored, start)
     else:
         words = _words(fmt)
         stored = integer_program(made, words).coefficients[None]
         # With sums of their own, also a sum with zero may round or overflow.
         program = made.program if words.sums is not None else without_exact(made.program, stored)
-        start = np.asarray(words.data.array(system.x0).to_fractions(), dtype=object)
+        start = np.asarray(stored_start(words.data, system.x0).to_fractions(), dtype=object)
         step = CodeStep(program, stored, start)
         arithmetic = word_arithmetic(step, words)
 
@@ -326,7 +327,7 @@ def _of_nonlinear(system: NonlinearSystem, fmt: AnyFormat) -> Prepared:
     kind = _type_of(fmt) if isinstance(fmt, FloatFormat) else ""
     words = _words(fmt) if isinstance(fmt, FixedFormat) else None
     program, coefficients = system.program(fmt)
-    step = CodeStep(program, coefficients, np.asarray(fmt.array(system.x0).to_fractions(), dtype=object))
+    step = CodeStep(program, coefficients, np.asarray(stored_start(fmt, system.x0).to_fractions(), dtype=object))
     arithmetic = CodeFloats(kind) if words is None else word_arithmetic(step, words)
     return Prepared(
         step,

@@ -1,0 +1,110 @@
+"""Overflow is for results: a number of a filter that its format cannot hold is refused, by name, in every format."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpbnb import (
+    FP8_E4M3,
+    FixedFormat,
+    FixedIntervalSmoother,
+    FloatFormat,
+    LinearModel,
+    LinearSystem,
+    NonlinearSystem,
+    WordFormats,
+    emulate,
+    limit_cycles,
+    required_fraction_bits,
+    write_code,
+)
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.words import run_words
+
+SHORT = [
+    FixedFormat(1, 14, overflow="saturate"),
+    FixedFormat(1, 14, "chop", overflow="wrap"),
+    FixedFormat(1, 14, "stochastic", overflow="saturate"),
+    FloatFormat(2, 8, emin=-6, emax=0, overflow="saturate"),
+]
+"""Formats of numbers below 2."""
+
+MODEL = {
+    "Phi": [[1, "0.1"], [0, 1]],
+    "H": [[1, 0]],
+    "Q": [["0.01", 0], [0, "0.01"]],
+    "R": [["0.5"]],
+    "x0": [0, 0],
+    "P0": [[1, 0], [0, 1]],
+}
+Z = np.full((20, 1), 0.1)
+
+
+def system(largest="-1.5", first=(0, 0)):
+    made = LinearSystem.from_coefficients(["0.02", "0.04", "0.02"], [1, largest, "0.64"])
+    return replace(made, x0=list(first)) if any(first) else made
+
+
+@pytest.mark.parametrize("fmt", SHORT, ids=str)
+@pytest.mark.parametrize("letter", MODEL)
+def test_a_model_beyond_the_range_is_refused_by_its_letter(fmt, letter, tmp_path):
+    larger = np.array(MODEL[letter], dtype=object)
+    larger[(0,) * larger.ndim] = 4
+    model = LinearModel(**{**MODEL, letter: larger})
+    if fmt.overflow != "wrap":  # which has no compiled loops
+        assert len(emulate(LinearModel(**MODEL), Z, fmt).state)
+        for form in ("innovation", "UD", "symmetrized"):
+            with pytest.raises(OverflowError, match=rf"^{letter}: "):
+                emulate(model, Z, fmt, form)
+    if isinstance(fmt, FixedFormat) and fmt.rounding is not Rounding.STOCHASTIC:
+        with pytest.raises(OverflowError, match=rf"^{letter}: "):
+            write_code(model, fmt, None, tmp_path)
+    with pytest.raises(OverflowError):
+        FixedIntervalSmoother(model, Z).run(fmt)
+
+
+@pytest.mark.parametrize("fmt", SHORT, ids=str)
+def test_a_coefficient_or_a_first_state_of_a_system_is_refused(fmt):
+    def run(given):
+        return given.outputs(Z, fmt) if fmt.overflow != "wrap" else run_words(given, Z, WordFormats(fmt)).states
+
+    assert len(run(system()))
+    with pytest.raises(OverflowError, match="a1"):
+        run(system("-2.5"))
+    with pytest.raises(OverflowError, match="x0: "):
+        run(system(first=(3, 0)))
+
+
+@pytest.mark.parametrize("overflow", ["saturate", "wrap"])
+def test_no_word_stores_another_coefficient(overflow, tmp_path):
+    words = WordFormats(FixedFormat(0, 15, overflow=overflow))
+    for question in (
+        lambda: limit_cycles(system(), words),
+        lambda: write_code(system(), words, None, tmp_path),
+        lambda: write_code(system(), words.data, None, tmp_path),
+    ):
+        with pytest.raises(OverflowError, match="a1"):
+            question()
+    assert not list(tmp_path.iterdir())
+    found = required_fraction_bits(system(), Z, 0.01, like=words)
+    assert not found.met
+    assert "a1" in found.why
+
+
+def test_no_code_has_another_first_state(tmp_path):
+    def step(fmt, x, u):
+        y = fmt.array("0.5") * u + x
+        return y, y
+
+    with pytest.raises(OverflowError, match="x0: "):
+        write_code(NonlinearSystem(step, [3], 1), FixedFormat(1, 14, overflow="saturate"), None, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_results_still_saturate_and_inputs_do():
+    fmt = replace(FP8_E4M3, overflow="saturate")
+    doubled = LinearSystem([[0]], [[2]], [[1]], [[0]])
+    assert float(doubled.outputs([[400], [1000], [0]], fmt).max()) == 448
