@@ -31,6 +31,9 @@ from gpbnb.filters.replayed import advance_by_replay, replay_pays
 
 Array = NDArray[np.float64]
 
+DECAYED = 2.0**-700
+"""Size below which an entry of the estimate becomes zero where a step would leave the range of float64."""
+
 _UNIT = 2.0**-100  # of double-double
 
 
@@ -85,6 +88,7 @@ class CarriedBound:
         off = np.zeros((n, n))
         if first is not None:  # the first factors may have errors
             off = np.abs((first - stored.P0).astype(np.float64)) * (1 + 2.0**-50)
+        self._dropped = False  # whether an entry of a state counted as zero
         #: The bound after the last step that was taken.
         self.now: Contraction = contraction_start(given["P0"], np.zeros(n), off)
 
@@ -96,14 +100,18 @@ class CarriedBound:
         """Continue the bound over steps that a run has taken, and save it at checkpoint steps.
 
         Each step is repeated in double-double from the run's state before that step, and its residuals enter the bound.
-        If a step cannot
-        be repeated, there is no bound from there on.
+        Entries of the state below :data:`DECAYED` count as zero, so that this size is added to the bound. If a step
+        cannot be repeated, there is no bound from there on.
 
         Parameters
         ----------
         first : how many steps were taken before these.
         """
         try:
+            sizes = np.abs(taken.x[..., 0])
+            decayed = (sizes > 0) & (sizes < DECAYED)
+            if decayed.any():
+                taken, self._dropped = taken._replace(x=np.where(decayed[..., np.newaxis], 0.0, taken.x)), True
             covariances = np.empty_like(taken.P)
             (represented if self.form == Form.UD else symmetric_parts)(taken.P, covariances)
             done = self._take(first, taken, covariances)
@@ -140,7 +148,8 @@ class CarriedBound:
             for j, k in enumerate(i):
                 of_step = exact.H[(first + k) % len(exact.H)], taken.UR[(first + k) % len(taken.UR)]
                 whole_gain(taken.gains[k], *of_step, used[j])
-        self.saved.state[at:last] = state_error_bound(some)
+        bound = state_error_bound(some)
+        self.saved.state[at:last] = np.nextafter(bound + DECAYED, np.inf) if self._dropped else bound
         self.saved.gain[at:last] = gain_error_bound(some, K[i], used[..., 0], off.gain[i])
         self.saved.covariance[at:last] = covariance_error_bound(some)
         return steps

@@ -16,9 +16,9 @@ from gpbnb.arithmetic.kernels.compiling import is_compiled
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Free, Hardware32, Hardware64, Tag
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.rounding import Order
+from gpbnb.arithmetic.rounding import Limits, Order
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
+from gpbnb.filters.bounded_steps import DECAYED, Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
@@ -142,7 +142,7 @@ class Run:
         )
         self.notes = np.zeros(4, dtype=np.int64)
         increment = as_packed(self.fmt, model.Phi - np.eye(n, dtype=int)) if compensated else None
-        self.matrices = step_arrays(start, as_packed(self.fmt, np.eye(n)), increment)
+        self.matrices = step_arrays(start, as_packed(self.fmt and self.fmt.strict, np.eye(n)), increment)
         self._step_tag: Tag = Free(self.tag) if isinstance(self.tag, Hardware32 | Hardware64) else self.tag
         self._stepped = self._as_stepped(self.matrices)
         #: Why the run stopped, if it did.
@@ -247,8 +247,8 @@ class Run:
             first, end = self.steps, begin + BLOCK
             x, K, P = self.take_block(z[begin:end])
             if done := len(x) - 1:
-                each = (widened(part) for part in (x, P, K[1:], self.UR))
-                carried.take(first, Taken(exact_z[begin : begin + done], *each))
+                each = (widened(part) for part in (P, K[1:], self.UR))
+                carried.take(first, Taken(exact_z[begin : begin + done], widened_estimates(x), *each))
             if self.stopped:
                 return
 
@@ -311,7 +311,7 @@ class Run:
         x : (steps done, n, 2), as double-double.
         """
         found = [np.zeros((0, self.model.n, 2))]
-        found += [widened(x)[1:, :, 0] for x, _ in self.blocks(z)]
+        found += [widened_estimates(x)[1:, :, 0] for x, _ in self.blocks(z)]
         return np.concatenate(found)
 
     def blocks(self, z: Any) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
@@ -350,49 +350,91 @@ class Run:
     def advance(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
         """Take one step per packed measurement, (steps, m, columns of x), up to one that ends the run.
 
+        Formats without a range run in float64. Where a step would leave it, for example because an estimate decays
+        below 2**-960, entries of the estimate below 2**-700 become zero first.
+
         Parameters
         ----------
         kept : the checkpoint steps; arrays for estimates, gains and covariances, or factors, at them.
         notes : the status of the run, which is brought up to date.
         """
-        try:
-            if self.form is Form.UD:
-                self._advance_factors(z, kept, notes)
+        changed = self.x, self.P, self._stepped.carried, notes
+        while True:
+            before = [each.copy() for each in changed]
+            try:
+                self._advance(z, kept, notes)
+            except (OverflowError, ZeroDivisionError) as error:
+                place, done = int(self.matrices.place[0]), int(notes[DONE] - before[-1][DONE])
+                for each, old in zip(changed, before, strict=True):
+                    each[...] = old
+                self._advance(z[:done], kept, notes)  # up to the step that could not be taken
+                z = z[done:]
+                if isinstance(error, OverflowError) and self._drop_decayed():
+                    continue
+                notes[STOPPED] = notes[DONE] + 1
+                self.reason = f"{self._fault(error)} in {QUANTITIES[place]} at step {notes[STOPPED]}"
+                if self.form is Form.UD and isinstance(self.fmt, FixedFormat) and isinstance(error, OverflowError):
+                    self.reason += (
+                        "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
+                    )
             else:
-                self._advance_covariances(z, kept, notes)
-        except (OverflowError, ZeroDivisionError) as error:
-            notes[STOPPED] = notes[DONE] + 1
-            kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
-            self.reason = f"{kind} in {QUANTITIES[int(self.matrices.place[0])]} at step {notes[STOPPED]}"
-            if self.form is Form.UD and isinstance(self.fmt, FixedFormat) and isinstance(error, OverflowError):
-                self.reason += (
-                    "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
-                )
+                if notes[STOPPED]:
+                    self.reason = f"a zero pivot in the innovation covariance at step {notes[STOPPED]}"
+            return
+
+    def _advance(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
+        if self.form is Form.UD:
+            self._advance_factors(z, kept, notes)
         else:
-            if notes[STOPPED]:
-                self.reason = f"a zero pivot in the innovation covariance at step {notes[STOPPED]}"
+            self._advance_covariances(z, kept, notes)
+
+    @property
+    def _limits(self) -> Limits | None:
+        """The limits of the estimate's format."""
+        fmt = self.fmt if self.block_formats is None else self.block_formats.state
+        return None if fmt is None else fmt.limits
+
+    def _drop_decayed(self) -> bool:
+        """Set small entries of the estimate to zero; return whether there were any."""
+        if self.x.dtype != np.float64 or self._limits is not None:
+            return False
+        sizes = np.abs(self.x if self.x.ndim == 2 else self.x[..., 0])
+        decayed = (sizes > 0) & (sizes < DECAYED)
+        self.x[decayed] = 0.0
+        self._stepped.carried[decayed.any(axis=1)] = 0.0  # what compensated summation carries is smaller still
+        return bool(decayed.any())
+
+    def _fault(self, error: Exception) -> str:
+        """Return in words what ended the run; only a format with a range has an overflow."""
+        if isinstance(error, ZeroDivisionError):
+            return "a division by zero"
+        if self._limits is None:
+            return "a number beyond the range of the compiled loops"
+        if self.x.dtype != np.float64 and self._limits.subnormal:
+            return "an overflow, or a subnormal number, which has no compiled loops in base 10,"
+        return "overflow"
 
     def _advance_factors(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
         """Take steps of the UD form."""
-        each, x, U = self.matrices, self.x, self.P
+        each, x, U, done = self.matrices, self.x, self.P, int(notes[DONE])
         factors = FactorArrays(each.Phi, each.H, each.HT, self.UQ, self.UR, each.place)
-        loops = self.tag, factors, z, self.steps, x, U, kept, notes
+        loops = self.tag, factors, z, done, x, U, kept, notes
         asked = self.tag, self.form, each._replace(Q=self.UQ, R=self.UR)
         if replay_pays(*asked, z, x, lambda: is_compiled(advance_ud, *loops)):
             not_repeated = self.X[:0], self.C[:0], self.UR[:0]
-            if advance_by_replay(*asked, z, self.steps, x, U, not_repeated, kept, notes):
+            if advance_by_replay(*asked, z, done, x, U, not_repeated, kept, notes):
                 return
         advance_ud(*loops)
 
     def _advance_covariances(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
         """Take steps of a form with covariances, on numbers of the type that its compiled step takes."""
-        steps, *results = kept
+        (steps, *results), done = kept, int(notes[DONE])
         given = [z, self.x, self.P, self.UR[:0], *results]
         used = [each.astype(self._stepped.Phi.dtype, copy=False) for each in given]
 
         def arguments(arrays: list[NDArray[Any]]) -> tuple[Any, ...]:
             z, x, P, none, *found = arrays
-            return z, self.steps, x, P, (found[0][:0], found[2][:0], none), (steps, *found), notes
+            return z, done, x, P, (found[0][:0], found[2][:0], none), (steps, *found), notes
 
         loops = self._step_tag, int(self.form), self._stepped, *arguments(used)
         asked = self.tag, self.form, self.matrices
@@ -462,6 +504,14 @@ def widened(packed: NDArray[Any]) -> NDArray[np.float64]:
         return np.ascontiguousarray(packed)
     wide = np.empty(packed.shape)
     widen(Decimal(1, True), packed, wide)  # of any precision
+    return wide
+
+
+def widened_estimates(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """Convert as :func:`widened` does; decimal numbers that are too small for double-double become zero."""
+    wide = widened(packed)
+    if packed.dtype != np.float64:
+        wide[np.isnan(wide[..., 0]) & (packed[..., 1] < 0)] = 0.0
     return wide
 
 

@@ -1,0 +1,94 @@
+"""Estimates that decay below the range of the compiled loops become zero; nothing overflows."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb import FloatFormat, LinearModel, required_precision, survey_records
+from gpbnb.filters.run import Run, Sums
+
+MODEL = LinearModel([["0.9"]], [["1"]], [["0.01"]], [["1"]], ["0"], [["1"]])
+STEPS = 5000
+
+
+def impulse(steps):
+    z = np.zeros((steps, 1))
+    z[0] = 1
+    return z
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"base": 10}, {"base": 16}, {"form": "UD"}, {"basis": "bound"}, {"basis": "bound", "base": 10}],
+    ids=str,
+)
+def test_silence_after_a_record_changes_no_answer(options):
+    """The errors are largest while the estimate is large, so that a short record has the same answer."""
+    long, short = (
+        required_precision(MODEL, steps, 1e-3, z=impulse(steps), largest=12, **options) for steps in (STEPS, 100)
+    )
+    assert long.met
+    assert long.fmt == short.fmt
+    assert dict(long.tried)[long.precision] == pytest.approx(dict(short.tried)[long.precision], rel=1e-9)
+
+
+def test_an_estimate_has_its_digits_until_it_becomes_zero():
+    fmt = FloatFormat(2, 20)
+    run = Run(MODEL, fmt, "innovation", range(1, STEPS + 1))
+    run.take(impulse(STEPS))
+    x, K = (run.checkpoints().to_float(letter).reshape(-1) for letter in "xK")
+    ended = int(np.argmax(x == 0))
+    assert 2.0**-962 < x[ended - 1] < 2.0**-700
+    assert not x[ended:].any()
+    for k in range(1, ended):
+        ahead = fmt.round(fmt.round("0.9") * Fraction(x[k - 1]))
+        assert Fraction(x[k]) == fmt.round(ahead - fmt.round(Fraction(K[k]) * ahead))
+
+
+@pytest.mark.parametrize("options", [{"compensated": True}, {"sums": Sums(fused=True)}, {"form": "Hung"}], ids=str)
+def test_how_many_steps_are_taken_at_once_does_not_matter(options):
+    z, found = impulse(STEPS), []
+    for at_once in (STEPS, 700):
+        run = Run(MODEL, FloatFormat(2, 20), **{"form": "innovation", "checkpoint_steps": (), **options})
+        found.append(np.concatenate([run.states(z[begin : begin + at_once]) for begin in range(0, STEPS, at_once)]))
+        assert run.stopped is None
+    assert (found[0] == found[1]).all()
+    assert not found[0][-1].any()
+
+
+def test_two_estimates_decay_at_their_own_time_and_a_late_measurement_counts():
+    model = LinearModel(
+        [["0.5", 0], [0, "0.9"]], np.eye(2), [["0.01", 0], [0, "0.01"]], np.eye(2), [1, 1], np.eye(2), name="two"
+    )
+    z = np.zeros((STEPS, 2))
+    z[-1] = 1
+    late = Run(model, FloatFormat(2, 20), "innovation", ()).states(z)
+    first = int(np.argmax(late[:, 0, 0] == 0))
+    assert first < int(np.argmax(late[:, 1, 0] == 0)) < STEPS - 1
+    assert (late[-1, :, 0] > 0).all()
+    checkpoints = Run(model, FloatFormat(2, 20), "innovation", (first, STEPS))
+    checkpoints.take(z)
+    assert (checkpoints.checkpoints().to_float("x") == late[[first - 1, -1], :, 0]).all()
+
+
+def test_many_records_that_end_in_silence_are_surveyed():
+    z = impulse(STEPS)
+    found = survey_records(MODEL, [z, z / 2], 1e-3, [FloatFormat(2, 20)])
+    assert "refused" not in str(found)
+
+
+def test_a_covariance_that_decays_beyond_the_loops_is_not_called_an_overflow():
+    still = LinearModel([["0.9"]], [["1"]], [[0]], [["1"]], ["0"], [["1"]])
+    found = required_precision(still, STEPS, 1e-3, z=np.ones((STEPS, 1)), largest=12)
+    assert not found.met
+    assert "a number beyond the range of the compiled loops in the " in found.why
+    assert "overflow" not in str(found)
+
+
+def test_a_decimal_format_with_subnormal_numbers_says_that_they_have_no_loops():
+    found = required_precision(MODEL, 3000, 1e-3, base=10, emin=-95, emax=96, z=impulse(3000), largest=8)
+    assert not found.met
+    assert "a subnormal number, which has no compiled loops in base 10, in the estimate" in found.why
