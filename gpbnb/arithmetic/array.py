@@ -28,6 +28,10 @@ MANY = 100
 """In arrays with more entries than this, equal entries are converted once; for fewer, remembering takes longer."""
 
 
+class WholeNumberError(ValueError):
+    """A whole number as an operand that a format has too few digits, or too small a range, to hold."""
+
+
 class NegativeRootError(DomainError):
     """The square root of a negative number."""
 
@@ -167,7 +171,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
                 if random or ratio not in known:
                     known[ratio] = pair = fmt.kernel.from_decimal(*ratio)
                     if exactly and not fmt.kernel.is_exactly(pair, *ratio):
-                        raise ValueError(
+                        raise (WholeNumberError if ratio[1] == 1 and ratio[2] >= 0 else ValueError)(
                             f"got the operand {number_text(value)}; needed a number that {fmt} holds exactly; "
                             "round it first by x.format.array(...), or compare x.to_float() with it"
                         )

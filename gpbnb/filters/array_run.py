@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.algebra import Algebra
-from gpbnb.arithmetic.array import FloatArray, NegativeRootError
+from gpbnb.arithmetic.array import FloatArray, NegativeRootError, WholeNumberError
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
@@ -115,7 +115,7 @@ class SteppedRun(ABC):
                 return
             try:
                 K, definite = self._step(self.steps, measured)
-            except (ZeroDivisionError, OverflowError, DomainError) as error:
+            except (ZeroDivisionError, OverflowError, DomainError, WholeNumberError) as error:
                 self.stopped = self.steps + 1
                 self.reason = f"{_fault(error)} at step {self.stopped}"
                 return
@@ -155,6 +155,8 @@ def _fault(error: Exception) -> str:
         return "overflow"
     if isinstance(error, NegativeRootError):
         return "the square root of a negative number"
+    if isinstance(error, WholeNumberError):
+        return "a whole number that the format does not hold exactly"
     return "an argument outside the domain of a function" if isinstance(error, DomainError) else "a division by zero"
 
 

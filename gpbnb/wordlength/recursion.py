@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.array import FloatArray, WholeNumberError
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import kept_in, lifted
 from gpbnb.arithmetic.fixed import FixedFormat
@@ -31,7 +31,7 @@ Recursion = Callable[..., Any]
 SPARE_BITS = 37
 """Bits that the reference has beyond the highest precision; a second run that checks it has half as many again."""
 
-_STOPS = (ZeroDivisionError, OverflowError, DomainError, np.linalg.LinAlgError)
+_STOPS = (ZeroDivisionError, OverflowError, DomainError, WholeNumberError, np.linalg.LinAlgError)
 
 SETTLED = 2.0**-20
 """Largest difference allowed between the two runs of the reference, as a share of the tolerance."""
@@ -47,8 +47,8 @@ def required_recursion_precision(run: Recursion, asked: Asked, tolerance: Any, z
         ``fmt.array("0.1")``. Pass data that the function takes from elsewhere through ``fmt.array``, too, before any
         operation: operations before that are not emulated. The function is traced once, and its operations then run in
         compiled code; see :class:`gpbnb.arithmetic.traced.TracedFunction` for what cannot be traced and runs as it is.
-        A precision in which it divides by zero, overflows, or leaves the domain of a function, as np.arcsin of a number
-        rounded to more than 1, does not suffice.
+        A precision in which it divides by zero, overflows, leaves the domain of a function, as np.arcsin of a number
+        rounded to more than 1, or takes a whole number that the format does not hold as an operand, does not suffice.
     asked : the question. Its basis can only be "emulation", where errors are differences from the same function in a
         reference with :data:`SPARE_BITS` beyond the highest precision to try, by default that of
         :func:`gpbnb.arithmetic.search.largest_by_default`. An answer that needs no more digits than compiled loops

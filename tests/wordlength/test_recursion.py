@@ -5,7 +5,17 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, LinearSystem, required_precision
+from gpbnb import (
+    BFLOAT16,
+    FixedFormat,
+    FloatFormat,
+    LinearSystem,
+    NonlinearModel,
+    required_block_precisions,
+    required_fraction_bits,
+    required_precision,
+    survey_records,
+)
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.array_run import ArrayRun
@@ -255,3 +265,53 @@ def test_a_function_that_stops_in_its_reference_says_so():
         ZeroDivisionError, match=r"the function stops in its reference of 237 bits: .* division by zero"
     ):
         required_precision(lambda fmt, z: 1 / (z - z), 200, 1e-3, z=Z)
+
+
+def running_mean(fmt, values):
+    mean, found = fmt.array(0), []
+    for count, value in enumerate(values, 1):
+        mean = mean + (value - mean) / count
+        found.append(mean)
+    return np.stack(found)
+
+
+@pytest.mark.parametrize(
+    ("function", "z", "tolerances", "least"),
+    [
+        (running_mean, np.sin(0.01 * np.arange(300)), (1e-1, 1e-3, 1e-5), 8),
+        (lambda fmt, z: z / 10, [1, 2], (1, 0.05), 3),
+    ],
+)
+def test_a_precision_that_cannot_hold_a_whole_number_is_not_enough(function, z, tolerances, least):
+    """The answer holds every whole number that the function takes, whatever precisions the search tries on its way."""
+    for tolerance in tolerances:
+        found = required_precision(function, len(z), tolerance, z=z)
+        assert found.precision >= least
+        assert all(ratio == np.inf for digits, ratio in found.tried if digits < least)
+    (_, short), (_, long) = survey(function, z, 1, [2, 24])
+    assert short == np.inf
+    assert long < 1
+    with pytest.raises(ValueError, match="got the operand 10; needed a number that"):
+        FloatFormat(2, 2).array(1) / 10
+
+
+def test_a_whole_number_in_a_nonlinear_filter_lacks_digits_like_any_other():
+    """A beacon 1234 m away needs 10 bits."""
+    model = NonlinearModel(
+        lambda x: np.stack([x[0] + x[1] / 8, x[1]]),
+        None,
+        lambda x: np.stack([np.hypot(1234 - x[0], 777)]),
+        None,
+        Q=np.diag([0, 2**-10]),
+        R=[[4]],
+        x0=[0, 1],
+        P0=np.eye(2),
+    )
+    z = np.hypot(1234 - np.arange(1, 11) / 8, 777)[:, None]
+    found = required_precision(model, 10, 10.0, z=z)
+    assert found.precision == 10
+    assert "in 9 bits the run is refused: a whole number that the format does not hold exactly at step 1" in str(found)
+    blocks = required_block_precisions(model, 10, 10.0, z=z).formats
+    assert blocks.state.precision >= 10
+    assert "inf" in str(survey_records(model, [z], 10.0, [BFLOAT16]))
+    assert required_fraction_bits(model, z, 10.0, like=FixedFormat(22, 4)).met
