@@ -55,7 +55,7 @@ LONGEST_COEFFICIENT = 53
 """Significant bits of a coefficient up to which more of them are tried where the coefficients limit a filter."""
 _SCALED = "with its sections scaled by powers of two (scale=True; in a TOML file, scale = true beside sos)"
 _MORE_INTEGER_BITS = 16
-"""Integer bits beyond those of a run that a guarantee may need."""
+"""Integer bits beyond those of a run without rounding that a run in a format, or a guarantee, may need."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +214,8 @@ def required_fraction_bits(
     """Find the smallest number of fraction bits with which errors stay within a tolerance.
 
     As in floating point, a format qualifies only if the format with one more bit also meets the tolerance. Without
-    `like`, the word has as many integer bits as the run needs; for a guarantee, as many as every admissible run needs.
+    `like`, the word has as many integer bits as the run in the format needs; for a guarantee, as many as every
+    admissible run needs.
 
     Parameters
     ----------
@@ -332,21 +333,35 @@ class _Strategy:
     like : a format with the integer bits, the rounding and the overflow of those to try.
     goal : tolerances.
     least : lowest number of fraction bits.
+    widens : whether a format in which a number overflows gets more integer bits.
     steps : number of steps for which a guarantee holds; None if it holds for ever.
     """
 
     steps: int | None = None
 
-    def __init__(self, like: FixedFormat, goal: NDArray[np.float64]) -> None:
-        self.like, self.goal = like, goal
+    def __init__(self, like: FixedFormat, goal: NDArray[np.float64], widens: bool = False) -> None:
+        self.like, self.goal, self._widens = like, goal, widens
         self.least = max(0, 1 - like.integer_bits)
+        self._more = dict[int, int]()  # integer bits that a number of fraction bits needs beyond those of `like`
 
     def error(self, fmt: FixedFormat) -> Outcome:
         """Return the largest error over its tolerance, or infinity and why a run is refused."""
-        try:
-            return Outcome(largest_ratio(self.errors(fmt), self.goal))
-        except (OverflowError, ValueError) as error:
-            return Outcome(math.inf, f"are refused: {error}")
+        refused = ""
+        for more in range(1 + _MORE_INTEGER_BITS if self._widens else 1):
+            try:
+                errors = self.errors(replace(fmt, integer_bits=fmt.integer_bits + more))
+            except OverflowError as error:
+                refused = refused or str(error)
+            except ValueError as error:
+                return Outcome(math.inf, f"are refused: {error}")
+            else:
+                self._more[fmt.fraction_bits] = more
+                return Outcome(largest_ratio(errors, self.goal))
+        return Outcome(math.inf, f"are refused: {refused}")
+
+    def wide_enough(self, fmt: FixedFormat) -> FixedFormat:
+        """Return a format with the integer bits that its fraction bits needed."""
+        return replace(fmt, integer_bits=fmt.integer_bits + self._more.get(fmt.fraction_bits, 0))
 
     def errors(self, fmt: FixedFormat) -> NDArray[np.float64]:
         """Return the largest error of each state or output."""
@@ -385,7 +400,7 @@ class _States(_Strategy):
         options: tuple[int, bool],
         basis: Basis,
     ) -> None:
-        super().__init__(FixedFormat(integer_bits(given, z), LARGEST_FRACTION, rounding), goal)
+        super().__init__(FixedFormat(integer_bits(given, z), LARGEST_FRACTION, rounding), goal, widens=True)
         self._given, self._z, self._options = given, z, options
         self._bounds: NDArray[np.float64] | None = None
         self._cause = ""
@@ -402,7 +417,7 @@ class _States(_Strategy):
         return np.asarray(abs(emulated(self._given, self._z, fmt, *self._options)).max(axis=0))
 
     def words(self, fmt: FixedFormat) -> WordFormats | None:
-        return _words(self._given.filter, fmt, *self._options)
+        return _words(self._given.filter, self.wide_enough(fmt), *self._options)
 
     def cause(self) -> str:
         return self._cause
@@ -425,14 +440,13 @@ class _Outputs(_Strategy):
         widens: bool,
         scaled: Callable[[], _Outputs | None],
     ) -> None:
-        super().__init__(like, goal)
-        self._system, self._inputs, self._words_of, self._widens = system, inputs, words_of, widens
+        super().__init__(like, goal, widens)
+        self._system, self._inputs, self._words_of = system, inputs, words_of
         self._true = system.outputs(inputs)
         largest = all_above(np.abs(inputs).max(axis=0))
         if basis == "guarantee" and not is_stable(system.A):
             self.steps = len(inputs)
         self._proof = WordGuarantee(system, largest, self.steps) if basis == "guarantee" else None
-        self._more = dict[int, int]()
         self._scaled = scaled
 
     def errors(self, fmt: FixedFormat) -> NDArray[np.float64]:
@@ -440,17 +454,7 @@ class _Outputs(_Strategy):
             found = run_words(self._system, self._inputs, self._words_of(fmt)).outputs(self._system.p)
             error = (found[..., 0] - self._true[..., 0]) + (found[..., 1] - self._true[..., 1])
             return np.asarray(np.abs(error).max(axis=0))
-        more = 0
-        while True:
-            try:
-                wider = replace(fmt, integer_bits=fmt.integer_bits + more)
-                bounds = self._proof.errors(self._words_of(wider))
-                self._more[fmt.fraction_bits] = more
-                return bounds
-            except OverflowError:
-                if not self._widens or more == _MORE_INTEGER_BITS:
-                    raise
-                more += 1
+        return self._proof.errors(self._words_of(fmt))
 
     def of_words(self, words: WordFormats) -> Outcome:
         """Return the largest error or bound over its tolerance in these formats, or infinity and the reason."""
@@ -458,7 +462,7 @@ class _Outputs(_Strategy):
         return self.error(words.data)
 
     def words(self, fmt: FixedFormat) -> WordFormats | None:
-        return self._words_of(replace(fmt, integer_bits=fmt.integer_bits + self._more.get(fmt.fraction_bits, 0)))
+        return self._words_of(self.wide_enough(fmt))
 
     def warnings(self) -> tuple[str, ...]:
         return () if self._proof is not None else weak_evidence(self._system, self._true, self.goal)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from small_filter import unscaled
 
+from gpbnb import BINARY64, LinearSystem, WordFormats, required_fraction_bits, required_word_formats
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.words import largest_rounding
@@ -213,3 +214,41 @@ def test_without_an_answer_the_most_that_was_tried_is_named() -> None:
     answer = fixed_point.required_fraction_bits(made, z, 1e-300)
     assert answer.fmt is None
     assert str(answer).endswith("; 59 fraction bits are the most tried")
+
+
+def near_a_power_of_two(seed):
+    """A stable system and inputs whose largest number, without rounding, is just below a power of two."""
+    rng = np.random.default_rng(seed)
+    system = LinearSystem([["0.9", "0.1"], ["0", "0.8"]], [[0], [rng.choice(["0.2", "0.5", "0.7"])]], [[1, 0]], [[0]])
+    u = np.sin(rng.uniform(0.1, 0.5) * np.arange(60))[:, None]
+    sizes = [np.abs(u).max(), np.abs(system.states(u, BINARY64)[..., 0]).max()]
+    return system, u * ((1 - 2.0**-12) / max(sizes) * 2.0 ** rng.integers(-2, 3))
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("basis", ["emulation", "guarantee"])
+def test_no_other_integer_bits_give_a_shorter_word(seed, basis):
+    system, u = near_a_power_of_two(seed)
+    tolerance = 0.02 * np.abs(system.outputs(u)[..., 0]).max()
+    found = required_fraction_bits(system, u, tolerance, basis)
+    for integer_bits in range(found.fmt.integer_bits - 2, found.fmt.integer_bits + 3):
+        like = WordFormats(FixedFormat(integer_bits, 20), 15, None)
+        other = required_fraction_bits(system, u, tolerance, basis, like=like)
+        assert not other.met or other.fmt.precision >= found.fmt.precision
+
+
+def test_limits_that_a_run_never_reaches_need_integer_bits_too():
+    controller = LinearSystem.pid("0.8", "0.05", limits=(-1, 1))
+    u = 0.05 * np.sin(0.3 * np.arange(60))[:, None]
+    given = required_fraction_bits(controller, u, 0.01, like=FixedFormat(1, 14))
+    found = required_fraction_bits(controller, u, 0.01)
+    assert found.fmt == given.fmt
+    assert required_word_formats(controller, u, 0.01).words.data == found.fmt
+
+
+def test_a_scaled_filter_gets_the_integer_bits_of_its_run_in_the_format():
+    z = np.ones((60, 1))
+    given = ScaledFilter(state_space([["0.5"]], [["0.4999"]]), np.zeros(1, int), np.zeros(1, int), np.zeros((1, 1)))
+    found = required_fraction_bits(given, z * 0.9999, 0.02)
+    assert found.met
+    assert np.abs(fixed_point.emulated(given, z * 0.9999, found.fmt)).max() <= 0.02
