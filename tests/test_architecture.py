@@ -19,7 +19,7 @@ REPORT = (
     ("display", "measurement", "confidence"),
     TOPICS,
     ("gravity_probe_b",),  # its answers are compared with the bounds of the report of 1984
-    ("wordlengths", "calculators", "pictures", "ledger", "ledger_options", "stored", "evidence"),
+    ("wordlengths", "pictures", "ledger", "ledger_options", "stored", "evidence"),
 )
 LAYERS = (*LIBRARY, ("warm",), *(tuple(f"report.{name}" for name in names) for names in REPORT), ("ledger",))
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}

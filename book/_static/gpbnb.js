@@ -10,6 +10,15 @@ document.addEventListener("DOMContentLoaded", () => {
   for (const entry of document.querySelectorAll('[role="doc-biblioentry"]')) entry.setAttribute("role", "listitem");
 });
 
+// Only pages with a form that computes load its script.
+const FOLDER = document.currentScript.src;
+document.addEventListener("DOMContentLoaded", () => {
+  if (!document.querySelector("form[data-calculator]")) return;
+  const script = document.createElement("script");
+  script.src = new URL("calculators.js", FOLDER);
+  document.head.append(script);
+});
+
 // MathJax 3 breaks no lines. A long formula may break before a relation or a sign and after a comma, within brackets
 // only if these are long: what lies between two such places is held together, and the style sheet lets the rest wrap.
 const LONG = 9; // em

@@ -15,6 +15,7 @@ DERIVATIONS = steps.Derivations(
     derivation.propagated,
     derivation.general,
     derivation.corrected,
+    derivation.forgotten,
     derivation.scalar_conditions,
     derivation.smallest,
     derivation.contraction,
@@ -59,6 +60,12 @@ NAMES = {
         "signs of their own: second coefficient": "k*(4*n + 3*m + 4) + k*(3*k - 1)/2*(6*n + 3*m + 5)",
         "errors of $P_{k-1}$ carried on: first coefficient": "k*(6*n + 3*m + 5) + k*(k - 1)/2*(3*n + m + 2)",
         "and second: of third order in $k$": "(3*n + m + 2)/6",
+    },
+    "forgotten": {
+        "sum of $f^{k-i}$: one more step": "(1 - f**(k + 1))/(1 - f)",
+        "$a_0$ is at least $a_i$, with $i = j+1$": (
+            "(k - j - 1)*(6*n + 3*m + 5) + 4*n + 3*m + 4 + (k*(k - 1)/2 - j*(j - 1)/2)*(3*n + m + 2)"
+        ),
     },
     "scalar_conditions": {
         r"where $\kappa=\frac16$, possible and allowed are equal": "3",

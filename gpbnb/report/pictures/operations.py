@@ -14,11 +14,10 @@ from matplotlib.patches import FancyArrowPatch
 from gpbnb.bounds.contributions import Contributions, contributions
 from gpbnb.bounds.guarantee import Guarantee
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, innovation_program
-from gpbnb.report.calculators.page import Input
 from gpbnb.report.display import style
 from gpbnb.report.guarantees.certificates import tracker_guarantee
 from gpbnb.report.guarantees.table import FORMAT
-from gpbnb.report.pictures.picture import Picture, short_number
+from gpbnb.report.pictures.picture import Input, Picture, short_number
 from gpbnb.wordlength.examples import tracker
 
 STATES = {"position": "m", "velocity": "m/s"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 from typing import Any
@@ -12,7 +12,6 @@ from typing import Any
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
-from gpbnb.report.calculators.page import Input, Runtime, input_field
 from gpbnb.report.display.style import TEXT
 from gpbnb.report.display.vector import address
 
@@ -20,6 +19,46 @@ from gpbnb.report.display.vector import address
 def short_number(number: float, digits: int = 6) -> float:
     """Round a number of the data to a few digits, which no processor computes differently."""
     return float(f"{number:.{digits}g}")
+
+
+@dataclass(frozen=True)
+class Input:
+    """A number that the reader enters.
+
+    Parameters
+    ----------
+    name : its name in the script.
+    label : its name for the reader, including letter and unit.
+    least, most : accepted range.
+    slider : range of the slider, which may be smaller; if `log`, the slider moves in decades.
+    whole : whether it must be a whole number.
+    choices : names for 0, 1, …, if only these values are accepted.
+    """
+
+    name: str
+    label: str
+    least: float
+    most: float
+    slider: tuple[float, float] = (0.0, 1.0)
+    whole: bool = False
+    log: bool = False
+    choices: tuple[str, ...] = ()
+
+    def html(self, value: str) -> str:
+        """Return a field that shows this value, or the name of this choice, in the form of calculators.js."""
+        if self.choices:
+            options = "".join(
+                f'<option value="{i}"{" selected" * (text == value)}>{escape(text)}</option>'
+                for i, text in enumerate(self.choices)
+            )
+            field = f'<select name="{self.name}">{options}</select>'
+        else:
+            kind = " data-whole" * self.whole + " data-log" * self.log
+            field = (
+                f'<input name="{self.name}" value="{value}" data-least="{self.least:g}" data-most="{self.most:g}" '
+                f'data-slider="{self.slider[0]:g} {self.slider[1]:g}"{kind}>'
+            )
+        return f"<label>{escape(self.label)} {field}</label>"
 
 
 @dataclass(frozen=True)
@@ -51,40 +90,29 @@ class Picture:
     alt: str
 
     def _repr_html_(self) -> str:
-        return "\n".join((Runtime()._repr_html_(), self.html()))
-
-    def html(self) -> str:
-        """Return the HTML of the picture alone, without the style and the script that all pictures share."""
-        title, every = escape(self.title), " ".join(f"calculator-{self.id}-{each.name}" for each in self.inputs)
         parts = (
             '<div class="picture">',
             f'<p class="picture-still"><img alt="{escape(self.alt)}" src="{escape(self.still_address())}"></p>',
-            f'<form class="calculator" id="calculator-{self.id}" aria-label="{title}" hidden novalidate>',
-            '<div class="calculator-inputs">',
-            *(input_field(self.id, each, self.start[each.name]) for each in self.inputs),
+            f'<form class="calculator" data-calculator="{self.id}" aria-label="{escape(self.title)}" hidden>',
+            '<div class="calculator-fields">',
+            *(each.html(self.start[each.name]) for each in self.inputs),
             "</div>",
             '<figure class="calculator-figure"><div class="calculator-drawing" role="img" aria-label=""></div>'
-            f'<ul class="calculator-legend"></ul><figcaption>{escape(self.caption)}</figcaption></figure>',
-            f'<output class="calculator-sentence" for="{every}"></output>',
+            f"<figcaption>{escape(self.caption)}</figcaption></figure>",
+            f'<output data-says="{escape(self.sentence)}"></output>',
             "</form></div>",
+            f"<style>\n{(files(__package__) / 'pictures.css').read_text('utf-8')}</style>",
             f"<script>\n{self.script()}\n</script>",
         )
         return "\n".join(parts)
 
     def script(self) -> str:
-        """Return the script that makes the picture interactive, including its data."""
-        spec = {
-            "id": self.id,
-            "inputs": [asdict(each) for each in self.inputs],
-            "results": [],
-            "sentence": self.sentence,
-            "figure": {"title": self.title},
-            "missing": {},
-            "data": self.data(),
-        }
-        text = json.dumps(spec, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+        """Return the script that gives the functions and the data of the picture to calculators.js."""
+        data = json.dumps(self.data(), ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
         code = (files(__package__) / f"{self.id}.js").read_text("utf-8")
-        return f"(() => {{\n{code}\ngpbnbCalculators.add({text}, compute, draw);\n}})();"
+        return (
+            f"(() => {{\n{code}\n(window.gpbnbPictures ??= {{}}).{self.id} = {{ compute, draw, data: {data} }};\n}})();"
+        )
 
     def still_address(self) -> str:
         """Return the still figure as an address that holds it."""

@@ -12,14 +12,13 @@ from matplotlib.figure import Figure
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
-from gpbnb.report.calculators.page import Input
 from gpbnb.report.display import style
 from gpbnb.report.gravity_probe_b import figures, year
 from gpbnb.report.gravity_probe_b.model import YEAR as STEPS
 from gpbnb.report.gravity_probe_b.summary import DRIFT
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.pictures.operations import STEP
-from gpbnb.report.pictures.picture import Picture, short_number
+from gpbnb.report.pictures.picture import Input, Picture, short_number
 from gpbnb.report.rolling import theory
 
 TOLERANCE = 1

@@ -1,0 +1,316 @@
+"""The calculators in a real browser: their formulas against the package, and what their forms say and show."""
+
+from __future__ import annotations
+
+import json
+import math
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pages import browser as tools
+
+from gpbnb.arithmetic.bounds import gamma
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.report.integration import theory as integration
+from gpbnb.report.kalman import report_bounds
+from gpbnb.report.measurement import YEAR
+from gpbnb.report.rolling import theory as rolling
+
+BOOK = Path(__file__).resolve().parents[1] / "book"
+CELLS = json.loads((BOOK / "calculators.ipynb").read_text(encoding="utf-8"))["cells"]
+FORMS = [text for cell in CELLS if (text := "".join(cell["source"])).startswith("<form")]
+TRIALS = 500
+U = 2.0**-53
+DAY = 86400
+
+pytestmark = pytest.mark.skipif(
+    tools.sync_playwright is None or tools.chromium() is None, reason="no Chromium, or the group `pages` is missing"
+)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with tools.sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=tools.chromium(), args=tools.FLAGS)
+        yield launched
+        launched.close()
+
+
+@pytest.fixture
+def page(browser):
+    """The forms of the page, as a reader finds them."""
+    opened = browser.new_page()
+    opened.set_content("\n".join(FORMS))
+    opened.add_script_tag(path=BOOK / "_static" / "calculators.js")
+    yield opened
+    opened.close()
+
+
+# -- formulas --------------------------------------------------------------------------------------
+
+
+def number_format(given):
+    return FloatFormat(given["b"], given["t"], Rounding.CHOP if given["chop"] else Rounding.NEAREST)
+
+
+def rounding_reference(given):
+    """Values, and by how much float64 may differ: 5 roundings, of which γ enlarges those of nβ by 1/(1 - nβ)."""
+    beta, n = number_format(given).unit_roundoff, given["n"]
+    always = gamma(n, beta) if n * beta < 1 else math.nan
+    exact = {"beta": beta, "sharper": beta / (1 + beta), "total": n * beta, "gamma": always}
+    return {name: (value, 10 * U * float(value)) for name, value in exact.items() if name != "gamma"} | {
+        "gamma": (always, 10 * U * float(always) / float(1 - n * beta))
+    }
+
+
+def kalman_reference(given):
+    """Values, and by how much float64 may differ: at most 20 operations for a coefficient, without cancellation."""
+    k, n, m = (given[name] for name in "knm")
+    x, u, f, goal = (Fraction(given[name]) for name in ("x", "u", "f", "goal"))
+    memory = Fraction(-math.expm1(k * math.log(f)) / (1 - float(f))) if 0 < f < 1 else Fraction(k if f else 1)
+    counts = [report_bounds.coefficients(k, n, m, **faults) for faults in report_bounds.CORRECTIONS.values()]
+    pairs = [(Fraction(a), Fraction(b)) for a, b in counts]
+    pairs.append((pairs[-1][0], min(pairs[-1][1], 2 * pairs[-1][0] * memory)))
+    fmt, found = number_format(given), {"memory": (memory, 10 * U * float(memory))}
+    for i, (a, b) in enumerate(pairs, 1):
+        size = a * x + b * u
+        digits = report_bounds.precision_for_coefficient(size, goal, fmt.base, fmt.rounding)
+        # A tie within 1e-14 of the goal, 30 times what rounding of the size can do, may go either way.
+        near = (FloatFormat(fmt.base, digits + more, fmt.rounding).unit_roundoff for more in (-1, 0) if digits + more)
+        tie = any(abs(float(size * beta / goal) - 1) < 1e-14 for beta in near)
+        exact = {f"a{i}": a, f"b{i}": b, f"bound{i}": size * fmt.unit_roundoff}
+        found |= {name: (value, 30 * U * float(value)) for name, value in exact.items()}
+        found[f"digits{i}"] = (digits, float(tie))
+    return found
+
+
+def deroll_reference(given):
+    """Values, and by how much float64 may differ: 5 roundings of the phase, and what the fit makes of them."""
+    seconds = given["duration"] * DAY
+    error = rolling.worst_rate_error(given["period"], number_format(given))
+    phase = float(error) * seconds
+    lost = rolling.off_tuned_loss(float(error), seconds)
+    found = {
+        name: (value, 10 * U * float(value))
+        for name, value in {
+            "rate": rolling.roll_rate(given["period"]),
+            "error": error,
+            "beat": 2 * math.pi / float(error) / YEAR,
+            "phase": phase,
+        }.items()
+    }
+    found["lost"] = (lost, 20 * U * (lost + phase * abs(math.sin(phase))) + (20 * U * phase) ** 2)
+    # The chapter adds 400 terms, of sizes that add up to at most 3/2 min(phase, 1); the drift changes by at most
+    # 9/8 of a change of the phase, and where the formula subtracts, its terms are below 14 in size.
+    across = rolling.off_tuned_drift(given["drift"], float(error), seconds)
+    allowed = 804 * 1.5 * min(phase, 1) + 12 * phase + (100 if phase > 2 else 0)
+    found["across"] = (across, U * given["drift"] * allowed)
+    return found
+
+
+def integration_reference(given):
+    """Values, and by how much float64 may differ: 15 roundings in the browser, and as many in the chapter."""
+    sigma, omega, rate = (given[name] for name in ("sigma", "omega", "rate"))
+    found = {
+        "mu": omega / rate,
+        "walk": float(integration.walk_factor(omega / rate)),
+        "exact": integration.random_walk(sigma, omega, rate),
+        "printed": integration.printed_random_walk(sigma, omega, rate),
+        "ratio": float(integration.approximation_ratio(omega / rate)),
+    }
+    return {name: (value, 30 * U * value) for name, value in found.items()}
+
+
+REFERENCES = {
+    "rounding": rounding_reference,
+    "kalman": kalman_reference,
+    "deroll": deroll_reference,
+    "integration": integration_reference,
+}
+
+
+SLIDERS = {"k", "n", "m", "x", "u", "goal"}
+"""Inputs whose whole range the package takes too long for."""
+
+
+def random_inputs(fields, rng):
+    """Numbers over all that each field accepts, or over its slider."""
+    given = {}
+    for name, field in fields.items():
+        if not field:
+            given[name] = int(rng.integers(2))
+            continue
+        low, high = map(float, field["slider"].split() if name in SLIDERS else (field["least"], field["most"]))
+        log = "log" in field
+        value = math.exp(rng.uniform(math.log(low), math.log(high))) if log else rng.uniform(low, high)
+        if name == "b" and rng.random() < 0.7:
+            value = rng.choice([2, 10, 16])
+        if name == "f" and rng.random() < 0.5:
+            value = 1 - 10 ** rng.uniform(-9, -1)
+        given[name] = round(float(value)) if "whole" in field else float(value)
+    return given
+
+
+def fields_of(page, name):
+    """The data of each input of a form, empty for a choice."""
+    return page.evaluate(
+        "name => Object.fromEntries([...document.querySelectorAll(`#calculator-${name} [name]`)]"
+        ".map(each => [each.name, {...each.dataset}]))",
+        name,
+    )
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_random_inputs_agree_with_the_package(page, name):
+    rng = np.random.default_rng(sum(map(ord, name)))
+    fields, inputs = fields_of(page, name), []
+    while len(inputs) < TRIALS:
+        given = random_inputs(fields, rng)
+        if name == "deroll":
+            error = rolling.worst_rate_error(given["period"], number_format(given))
+            place = math.log(2 * math.pi / given["period"]) / math.log(given["b"])
+            # The chapter's sum is for phases of some hundred radians; near a power of the base, e may be either.
+            if error * given["duration"] * DAY > 100 or abs(place - round(place)) < 1e-12:
+                continue
+        inputs.append(given)
+    results = page.evaluate("([name, inputs]) => inputs.map(gpbnbCalculators.formulas[name])", [name, inputs])
+    wrong, relative = [], []
+    for given, found in zip(inputs, results, strict=True):
+        for key, (value, allowed) in REFERENCES[name](given).items():
+            if isinstance(value, float) and math.isnan(value):
+                assert found[key] is None or math.isnan(found[key])
+                continue
+            if not abs(found[key] - float(value)) <= allowed + U * abs(float(value)):
+                wrong.append((key, given, found[key], float(value)))
+            relative.append(allowed / (abs(float(value)) or 1))
+    assert wrong == []
+    assert np.median(relative) < 1e-13  # no tolerance is so wide that a lost digit would pass
+
+
+def test_the_walk_keeps_its_digits_where_its_formula_cancels(page):
+    small = [10.0**-k for k in range(1, 13)]
+    walks = page.evaluate(
+        "all => all.map(m => gpbnbCalculators.formulas.integration({sigma: 1, omega: m, rate: 1}).walk)", small
+    )
+    assert walks == pytest.approx([mu / 6 - mu**3 / 360 + mu**5 / 15120 for mu in small], rel=1e-11)
+    assert walks[3:] == pytest.approx([mu / 6 for mu in small[3:]], rel=1e-9)
+    # Both sides of the place where the script changes its formula.
+    below, above = page.evaluate(
+        "all => all.map(m => gpbnbCalculators.formulas.integration({sigma: 1, omega: m, rate: 1}).walk)",
+        [4.0, math.nextafter(4, 5)],
+    )
+    assert below == pytest.approx(above, rel=1e-15)
+
+
+@pytest.mark.parametrize(("base", "precision"), [(2, 1), (2, 3), (3, 2), (10, 1), (10, 2)])
+def test_chopping_never_reaches_the_sharper_bound_but_comes_near(base, precision):
+    beta, low = Fraction(1, base ** (precision - 1)), base ** (precision - 1)
+    worst = max((x - int(x)) / x for x in (Fraction(i, 500) for i in range(500 * low, 500 * base * low)))
+    assert Fraction(9, 10) * beta / (1 + beta) < worst < beta / (1 + beta)
+
+
+@pytest.mark.parametrize(("k", "n", "m"), [(1, 1, 1), (3, 2, 1), (40, 4, 3)])
+def test_forgotten_inputs_are_bounded_term_by_term(k, n, m):
+    """The sum of (a_0 + a_i) f^(k-i), each a_i counted step by step, is not above the coefficient of the last line."""
+    more = report_bounds.covariance_count(n, m)
+    loops = [report_bounds.transition_count(n, m) + j * more for j in range(k)]
+    counts = [sum(loops[i:]) + report_bounds.input_count(n, m) + (i - 1) * more for i in range(1, k + 1)]
+    for f in (0.0, 0.3, 0.97, 1.0):
+        given = {"k": k, "n": n, "m": m, "x": 1, "u": 1, "f": f, "b": 10, "t": 9, "chop": 0, "goal": 1}
+        last = float(kalman_reference(given)["b5"][0])
+        total = sum((sum(loops) + a) * f ** (k - i) for i, a in enumerate(counts, 1))
+        assert total <= last * (1 + 1e-12)
+        assert last <= 2.5 * total
+
+
+# -- forms -----------------------------------------------------------------------------------------
+
+
+def field(page, form, name, part=""):
+    return page.locator(f"#calculator-{form}-{name}{part}")
+
+
+def cell(page, form, name):
+    return page.locator(f'#calculator-{form} [data-name="{name}"]').inner_text()
+
+
+def test_each_form_opens_with_its_numbers_computed(page):
+    assert len(FORMS) == len(REFERENCES)
+    for name in REFERENCES:
+        form = page.locator(f"#calculator-{name}")
+        assert form.is_visible()
+        cells = form.locator("[data-name]").all_inner_texts()
+        assert all(cells)
+        assert "—" not in cells
+        assert "{" not in form.locator("output").inner_text()
+    assert cell(page, "kalman", "digits1") == "16"
+    assert cell(page, "kalman", "digits4") == "22"
+    assert cell(page, "deroll", "rate") == "0.01047"
+
+
+@pytest.mark.parametrize(
+    ("name", "typed", "message"),
+    [
+        ("t", "", "Got nothing; needed a whole number from 1 to 90."),
+        ("t", "x", "Got “x”; needed a whole number from 1 to 90, such as 10, 0.5 or 1e-3."),
+        ("t", "1,5", "Got “1,5”; needed a whole number from 1 to 90, with a point as decimal mark and no separators."),
+        ("t", "0", "Got 0; needed a whole number from 1 to 90."),
+        ("t", "2.5", "Got 2.5; needed a whole number from 1 to 90; round it."),
+        ("n", "1e13", "Got 1e13; needed a whole number from 1 to 1e12."),
+        ("n", "9" * 100_000, f"Got {'9' * 23}…; needed a whole number from 1 to 1e12."),
+    ],
+)
+def test_no_result_stands_beside_an_invalid_field(page, name, typed, message):
+    results = page.locator("#calculator-rounding [data-name]")
+    output = page.locator("#calculator-rounding output")
+    before = results.all_inner_texts(), output.inner_text()
+    first = field(page, "rounding", name).input_value()
+    field(page, "rounding", name).fill(typed)
+    assert field(page, "rounding", name, "-error").inner_text() == message
+    assert field(page, "rounding", name).get_attribute("aria-invalid") == "true"
+    assert results.all_inner_texts() == ["—"] * 4
+    assert before[1] not in output.inner_text()
+    page.wait_for_function("document.querySelector('#calculator-rounding output').textContent.startsWith('Nothing')")
+    field(page, "rounding", name).fill(first)
+    assert field(page, "rounding", name).get_attribute("aria-invalid") is None
+    assert results.all_inner_texts() == before[0]
+
+
+def test_a_message_names_the_cure(page):
+    field(page, "kalman", "f").fill("1.1")
+    assert "grows as its power k − 1" in field(page, "kalman", "f", "-error").inner_text()
+    field(page, "rounding", "t").fill("1")
+    assert cell(page, "rounding", "gamma") == "none: nβ is 500; needed less than 1; use more digits or fewer operations"
+
+
+def test_sliders_choices_and_examples_fill_the_form(page):
+    field(page, "rounding", "t", "-slider").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    assert field(page, "rounding", "t").input_value() == "12"
+    assert cell(page, "rounding", "beta") == "5.000\u00a0×\u00a010⁻¹²"
+    field(page, "rounding", "n", "-slider").focus()
+    page.keyboard.press("ArrowRight")
+    assert field(page, "rounding", "n").input_value() == "1020"  # a hundredth of a decade
+    field(page, "rounding", "chop").select_option("chopped")
+    assert cell(page, "rounding", "beta") == "1.000\u00a0×\u00a010⁻¹¹"
+    page.get_by_role("button", name="IEEE double").first.click()
+    assert field(page, "rounding", "b").input_value() == "2"
+    assert cell(page, "rounding", "beta") == "1.110\u00a0×\u00a010⁻¹⁶"
+    field(page, "deroll", "drift").fill("\u22121")  # the minus sign of a typesetter
+    assert field(page, "deroll", "drift", "-error").inner_text().startswith("Got -1; needed a number from 1e-9 to 1e9")
+
+
+def test_each_control_has_a_name(page):
+    for name in REFERENCES:
+        form = page.locator(f"#calculator-{name}")
+        labels = [text.split("\n")[0].strip() for text in form.locator("label").all_inner_texts()]
+        for label in labels:
+            if label.startswith("Rounding ") or label == "Rounding":
+                assert form.get_by_role("combobox", name="Rounding").count() == 1
+            else:
+                assert form.get_by_role("textbox", name=label, exact=True).count() == 1
+                assert form.get_by_role("slider", name=f"{label}, slider", exact=True).count() == 1
