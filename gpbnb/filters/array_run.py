@@ -39,7 +39,7 @@ from gpbnb.filters.kalman_step import (
     predicted_in,
     second_gain,
 )
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.opening import double_doubles_of, opening
 
 ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
@@ -358,4 +358,5 @@ def block_algebra(formats: Sequence[FloatFormat], stored: BlockStorage) -> Block
 
 
 def _algebra(fmt: FloatFormat) -> Algebra:
-    return Algebra(cache(lambda n: fmt.array(np.eye(n, dtype=int))), operator.matmul)
+    identity_in(fmt, 1)
+    return Algebra(cache(lambda n: identity_in(fmt, n)), operator.matmul)

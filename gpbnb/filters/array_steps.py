@@ -28,7 +28,10 @@ ONE_FORMAT = BlockStorage()
 
 
 def predict_ud(Phi: Matrix, U: Matrix, UQ: Matrix) -> tuple[Matrix, bool]:
-    """Predict UD factors by Thornton's modified weighted Gram-Schmidt; the diagonals hold the variances."""
+    """Predict UD factors by Thornton's modified weighted Gram-Schmidt; the diagonals hold D, which may have zeros.
+
+    Also return whether no entry of D is negative, and the variance of each state positive.
+    """
     n = len(U)
     W = np.concatenate([Phi @ _unit(U), _unit(UQ)], axis=1)
     D = np.concatenate([np.diagonal(U), np.diagonal(UQ)])
@@ -37,13 +40,27 @@ def predict_ud(Phi: Matrix, U: Matrix, UQ: Matrix) -> tuple[Matrix, bool]:
         c = D * W[j]
         d = (W[j] * c).sum()
         found[j][j] = d
-        definite = definite and bool(d > 0)
+        definite = definite and not bool(d < 0)
         if j:
             s = if_nonzero(d, _share(W[:j], c, d), U[:j, j] * 0)
             W = np.concatenate([W[:j] - s[:, None] * W[j], W[j:]])
             for i in range(j):
                 found[i][j] = s[i]
+    for i in range(n):
+        definite = bool(_one_of_variance(found, i) > 0) and definite
     return _matrix(found), definite
+
+
+def _one_of_variance(factors: list[list[Matrix]], i: int) -> Any:
+    """Return an entry of D that adds to the variance of state i, or zero if none does."""
+    found = factors[i][i]
+    for u, d in ((factors[i][j], factors[j][j]) for j in range(i + 1, len(factors))):
+        found = _chosen(found, found, _chosen(u, d, found))
+    return found
+
+
+def _chosen(x: Any, a: Any, b: Any) -> Any:
+    return if_nonzero(x, lambda: [a], [b])[0]
 
 
 def _share(W: Matrix, c: Matrix, d: Matrix) -> Callable[[], Matrix]:
@@ -88,7 +105,7 @@ def observe_ud(
     g = np.diagonal(seen) * f
     taken, moved = stored.gain(g), stored.covariance(f)
     factors, gain = _entries(U), [stored.gain(h[0] * 0) for _ in range(n)]
-    a, definite = r, True
+    a, observed, definite = r, h[0] * 0, True
     for j in range(n):
         before, a = a, a + f[j] * g[j]
         if a == 0:
@@ -96,8 +113,8 @@ def observe_ud(
         definite = definite and bool(a > 0)
         column = [factors[k][j] for k in range(j + 1)]
         known = [stored.covariance(each) for each in gain[:j]]
-        change = _updated(column, known, moved[j], stored.covariance(before), stored.covariance(a))
-        updated = if_nonzero(g[j], change, column)
+        change = _updated(column, known, moved[j], stored.covariance(before), stored.covariance(a), observed)
+        updated, observed = if_nonzero(g[j], change, column), _chosen(g[j], g[j], observed)
         for k in range(j):
             gain[k] = gain[k] + taken[j] * stored.gain(column[k])
         for k in range(j + 1):
@@ -108,32 +125,36 @@ def observe_ud(
     return x + stored.state(K) * y, _matrix(factors), K, definite
 
 
-def _updated(column: list[Matrix], gain: list[Matrix], f: Matrix, before: Matrix, a: Matrix) -> Callable[[], Any]:
-    """Return a function that updates a column of U, whose last entry is a variance."""
+def _updated(
+    column: list[Matrix], gain: list[Matrix], f: Matrix, before: Matrix, a: Matrix, observed: Any
+) -> Callable[[], Any]:
+    """Return a function that updates a column of U, whose last entry is a variance.
 
-    def updated() -> list[Matrix]:
-        variance, factor = column[-1] * before / a, -(f / before)
-        return [*(u + factor * c for u, c in zip(column, gain, strict=False)), variance]
+    Entries above it change only if `observed`, an entry of an earlier column, is not zero; otherwise the gain is zero.
+    """
 
-    return updated
+    def moved() -> list[Matrix]:
+        factor = -(f / before)
+        return [u + factor * c for u, c in zip(column, gain, strict=False)]
+
+    return lambda: [*if_nonzero(observed, moved, column[:-1]), column[-1] * before / a]
 
 
 def predict_root(Phi: Matrix, S: Matrix, SQ: Matrix) -> tuple[Matrix, bool]:
     """Return the upper triangular root of the predicted covariance, by modified Gram-Schmidt on (Phi S, SQ)."""
     n = len(S)
     W = np.concatenate([Phi @ S, SQ], axis=1)
-    found, definite = _entries(S * 0), True
+    found = _entries(S * 0)
     for j in range(n - 1, -1, -1):
         size = (W[j] * W[j]).sum().sqrt()
         found[j][j] = size
-        definite = definite and bool(size > 0)
         if j and size != 0:
             direction = W[j] / size
             s = (W[:j] * direction).sum(1)
             W = np.concatenate([W[:j] - s[:, None] * direction, W[j:]])
             for i in range(j):
                 found[i][j] = s[i]
-    return _matrix(found), definite
+    return _matrix(found), all(any(bool(each != 0) for each in row) for row in found)
 
 
 def observe_potter(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tuple[Matrix, Matrix, Matrix, bool]:

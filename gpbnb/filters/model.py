@@ -488,6 +488,22 @@ def _arrays_once(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[str
     return model.arrays(replace(fmt))  # a format of its own, for which no search refuses conversions
 
 
+def identity_in(fmt: FloatFormat | FixedFormat, n: int) -> FloatArray:
+    """Return the identity matrix (n, n), which every form needs.
+
+    Raises
+    ------
+    ValueError : the format does not hold the number 1.
+    """
+    if fmt.limits is not None and not fmt.smallest <= 1 <= fmt.largest:
+        cure = "at least 1 integer bit and 0 fraction bits or more" if isinstance(fmt, FixedFormat) else "a wider range"
+        raise ValueError(
+            f"got {format_text(fmt)}, which does not hold the number 1; needed a format that does, because every step "
+            f"computes with an identity matrix; use {cure}"
+        )
+    return fmt.array(np.eye(n, dtype=int))
+
+
 def stored_measurements(z: Any, fmt: FloatFormat | FixedFormat | BlockFormats) -> FloatArray:
     """Round measurements into a format.
 

@@ -35,7 +35,6 @@ from gpbnb.filters.program import (
     DIVISOR,
     EQUAL,
     FLOOR,
-    IN_RANGE,
     LESS,
     MODULO,
     MULTIPLY,
@@ -48,7 +47,6 @@ from gpbnb.filters.program import (
     Builder,
     Program,
     entries,
-    values_of,
 )
 from gpbnb.filters.tracing import without_exact
 
@@ -221,8 +219,6 @@ def _joined(part: Any) -> Any:
 _NAMES = {code: name for name, code in CODES.items()}
 _OF_TWO = {"add": ADD, "subtract": SUBTRACT, "multiply": PRODUCT, "divide": DIVIDE}
 _CALLS = {"fmod": MODULO, "floor": FLOOR, "ceil": CEILING, "trunc": TRUNCATE, "rint": NEAREST}
-_NEVER_FAIL = frozenset((CONSTANT, CHOOSE, LESS, EQUAL, AT_LEAST, AT_MOST, MODULO))
-
 _LESS, _SAME, _GREATER = 1, 2, 4
 _ALL = _LESS + _SAME + _GREATER
 
@@ -263,7 +259,6 @@ class _Listing:
             at = call.at
         self._operations(rows[at:])
         outputs, count = [self._value(place) for place in returned], len(self.coefficients)
-        self._keep_what_may_fail(outputs)
         n, _, p = self._sizes
         names = ["zero", *(f"c{i}" for i in range(1, count))]
         return self._build.finish(outputs, count, p, [*entries("x", n), *entries("y", p)], names)
@@ -300,17 +295,6 @@ class _Listing:
                 self._values[out] = self._of_two(code, *places)
             else:
                 self._values[out] = self._build.append(code, 0, self._value(places[0]))
-
-    def _keep_what_may_fail(self, outputs: Sequence[int]) -> None:
-        """Check each value that nothing uses, because its overflow ends a run of the step."""
-        build = self._build
-        used = {*outputs, *(value for value, _ in build.checks)}
-        for value, (code, a, b), guard in reversed(build.listed()):
-            if value not in used and code not in _NEVER_FAIL:
-                build.checks.append((value, IN_RANGE))
-                used.add(value)
-            if value in used:
-                used |= {*values_of(code, a, b), guard}
 
     # -- numbers -------------------------------------------------------------------------------------------
 

@@ -85,14 +85,19 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
 
     def factored(letter: str, packed: NDArray[Any], factors: NDArray[Any]) -> bool:
         """Compute factors, of raised variances if those stored are indefinite; whether any are definite."""
-        if factor_each(tag, packed, factors):
+
+        def sound(given: NDArray[Any]) -> bool:
+            definite, signs = bool(factor_each(tag, given, factors)), factors[..., 0] if factors.ndim > 3 else factors
+            return definite and (letter != "R" or bool(np.all(np.diagonal(signs, axis1=1, axis2=2) > 0)))
+
+        if sound(packed):
             return True
         if model.repair is False:
             return False
         matrices = getattr(stored, letter)
         found = raised_until(
             matrices.reshape(-1, *matrices.shape[-2:]),
-            lambda higher: bool(factor_each(tag, as_packed(fmt, higher), factors)),
+            lambda higher: sound(as_packed(fmt, higher)),
             least_shift(fmt),
             LARGEST_STORED_SHIFT,
         )
@@ -100,20 +105,21 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
             raised.append(Repair(letter, 0, 0.0, found[1], fmt))
         return found is not None
 
+    lost = ""
     try:
-        definite = True
         if form is Form.HUNG_SECOND_GAIN:
-            definite = bool(invert_each(tag, R, RI))
+            lost = "" if invert_each(tag, R, RI) else "R"
         elif form is Form.UD:
             given = ("Q", Q, UQ), ("R", R, UR), ("P0", P0[np.newaxis], U0[np.newaxis])
-            definite = all(factored(*each) for each in given)
+            lost = next((letter for letter, *arrays in given if not factored(letter, *arrays)), "")
     except ZeroDivisionError:
-        definite = False
-    if not definite:
+        lost = "R"
+    if lost:
         words, unit = ("double-double", "bits") if fmt is None else (format_text(fmt), digit_unit(fmt.base))
+        kind = "positive definite" if lost == "R" else "positive semidefinite"
         raise ValueError(
-            f"got {model.name} in {words}; needed covariances that stay definite when their factors are computed in "
-            f"this format; use more {unit}, or add a little to the diagonals of Q and P0"
+            f"got {model.name} in {words}, in which {lost} does not stay {kind} when its factors or inverse are "
+            f"computed; needed a covariance that does; use more {unit}, or add a little to the diagonal of {lost}"
         )
     return Opening(Phi, H, Q, R, x0, P0, UQ, UR, U0, RI, tuple(raised), (*stored.repairs, *raised))
 

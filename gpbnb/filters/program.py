@@ -57,6 +57,10 @@ negative, and is not, is the sign of a covariance that is no longer definite. IN
 whose overflow ends the run nevertheless."""
 
 
+NEVER_OVERFLOW = frozenset((AT_LEAST, AT_MOST, CONSTANT, CHOOSE, LESS, EQUAL, MODULO))
+"""Codes of operations whose result is in range if their values are."""
+
+
 def values_of(code: int, a: int, b: int) -> tuple[int, ...]:
     """Return the values among the two operands of an operation; the others are coefficients."""
     if code in _ON_TWO_VALUES:

@@ -36,9 +36,9 @@ from gpbnb.filters.kernels.step import (
     advance,
     advance_ud,
 )
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import compiled_form
-from gpbnb.filters.opening import Opening, as_packed, opening, step_arrays, widened_array
+from gpbnb.filters.opening import Opening, as_packed, opening, packed_array, step_arrays, widened_array
 from gpbnb.filters.reference import precise_steps
 from gpbnb.filters.replayed import advance_by_replay, replay_pays
 
@@ -142,7 +142,7 @@ class Run:
         )
         self.notes = np.zeros(4, dtype=np.int64)
         increment = as_packed(self.fmt, model.Phi - np.eye(n, dtype=int)) if compensated else None
-        self.matrices = step_arrays(start, as_packed(self.fmt and self.fmt.strict, np.eye(n)), increment)
+        self.matrices = step_arrays(start, self._identity(), increment)
         self._step_tag: Tag = Free(self.tag) if isinstance(self.tag, Hardware32 | Hardware64) else self.tag
         self._stepped = self._as_stepped(self.matrices)
         #: Why the run stopped, if it did.
@@ -175,6 +175,10 @@ class Run:
                 f"got the {self.form} form and {records} records; needed at least one record, and for many no "
                 "bound, no checkpoints, and a form whose gain does not depend on the measurements: any but UD"
             )
+
+    def _identity(self) -> NDArray[Any]:
+        n = self.model.n
+        return as_packed(None, np.eye(n)) if self.fmt is None else packed_array(identity_in(self.fmt, n))
 
     def _in_blocks(self, start: Opening, formats: BlockFormats) -> Opening:
         """Return a start whose state and covariance are rounded into the formats of their blocks."""

@@ -44,7 +44,7 @@ from gpbnb.filters.array_steps import observe_carlson, observed, predict_root, r
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel, corrected, gain, predicted, updated
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import form_named
 
 SMOOTHER_FORMS = (Form.INNOVATION, Form.JOSEPH, ArrayForm.CARLSON)
@@ -267,7 +267,7 @@ class FixedIntervalSmoother:
         stored = self.model.definite_in(fmt).arrays(fmt)
         parts = [list(stored[letter]) for letter in ("Phi", "H", "Q", "R")]
         models = [StepModel(*(_member(each, k) for each in parts)) for k in range(len(self.z))]
-        algebra = Algebra(cache(lambda n: fmt.array(np.eye(n, dtype=int))), operator.matmul)
+        algebra = Algebra(cache(lambda n: identity_in(fmt, n)), operator.matmul)
         x, z = stored["x0"][:, None], list(fmt.array(self.z)[:, :, None])
         return smooth_covariances(algebra, form_named(self.form), models, x, stored["P0"], z)
 
@@ -280,7 +280,7 @@ class FixedIntervalSmoother:
         S = root_of_factors(fmt.store(upper_factors(model.P0)))
         parts = (Phi, H, SQ, UR)
         models = [RootModel(*(_member(each, k) for each in parts)) for k in range(len(self.z))]
-        identity = fmt.array(np.eye(model.n, dtype=int))
+        identity = identity_in(fmt, model.n)
         return smooth_roots(models, fmt.store(model.x0), S, list(fmt.array(self.z)), identity)
 
 

@@ -24,7 +24,9 @@ from gpbnb.filters.program import (
     CONSTANT,
     DIVIDE,
     DIVISOR,
+    IN_RANGE,
     MULTIPLY,
+    NEVER_OVERFLOW,
     NOT_NEGATIVE,
     POSITIVE,
     PRODUCT,
@@ -108,11 +110,12 @@ class Traced:
 
     def if_nonzero(self, changed: Callable[[], Any], unchanged: Any) -> Any:
         """Record what changes if this number is not zero, and the choice; see ``array_steps.if_nonzero``."""
-        build = self.trace.build
-        build.guard = self._loaded()
+        build, guard = self.trace.build, self._loaded()
+        outer = build.guard
+        build.guard = guard if outer < 0 else build.append(CHOOSE, guard, self.trace.loaded(self.trace.number(0)))
         both = zip(np.ravel(changed()), np.ravel(unchanged), strict=True)
         found = [self.trace.operation(CHOOSE, *pair) for pair in both]
-        build.guard = -1
+        build.guard = outer
         return np.array(found, dtype=object)
 
 
@@ -231,9 +234,10 @@ def kalman_program(n: int, m: int, form: Form) -> Program:
 
 
 def without_exact(program: Program, coefficients: NDArray[Any]) -> Program:
-    """Leave out operations that are exact and change nothing, and those whose result is not used.
+    """Leave out operations that are exact and change nothing: a product with zero or one, and a sum with zero.
 
-    A product with zero or one, a sum with zero, and what only these use: no digit of a result changes.
+    No digit changes. A value that nothing uses any more remains, and is noted as one that must stay in range: its
+    overflow ends a run of the step.
 
     Parameters
     ----------
@@ -278,7 +282,7 @@ class _Shortening:
             return self._constant(value, self.ones)
 
         if code == CHOOSE:
-            return a if a == b else b if zero(guard) else itself
+            return a if a == b or (zero(a) and zero(b)) else b if zero(guard) else itself
         if code == MULTIPLY and (self.zeros[a] or zero(b)):
             self.operations[itself - self.first] = (CONSTANT, a if self.zeros[a] else self._coefficient(b), 0)
             self.guards[itself - self.first] = -1
@@ -299,6 +303,10 @@ class _Shortening:
     def _coefficient(self, value: int) -> int:
         return self.operations[value - self.first][1]
 
+    def _may_overflow(self, o: int) -> bool:
+        runs = self.guards[o] < 0 or not self._constant(self.guards[o], self.zeros)
+        return runs and self.same[self.first + o] == self.first + o and self.operations[o][0] not in NEVER_OVERFLOW
+
     def finish(self) -> Program:
         """Return the program; its states, inputs and coefficients keep their numbers."""
         program, first = self.program, self.first
@@ -306,6 +314,9 @@ class _Shortening:
         checks = [(self.same[value], kind) for value, kind in program.checks]
         used = {*outputs, *(value for value, _ in checks)}
         for o in range(len(self.operations) - 1, -1, -1):
+            if first + o not in used and self._may_overflow(o):
+                checks.append((first + o, IN_RANGE))
+                used.add(first + o)
             if first + o in used:
                 used |= {*values_of(*self.operations[o])} | ({self.guards[o]} - {-1})
         kept = [o for o in range(len(self.operations)) if first + o in used]

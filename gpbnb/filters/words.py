@@ -36,6 +36,7 @@ from gpbnb.filters.program import (
     DIVIDE,
     DIVISOR,
     MULTIPLY,
+    NOT_NEGATIVE,
     POSITIVE,
     PRODUCT,
     SUBTRACT,
@@ -581,7 +582,7 @@ def run_checked(program: Program, fmt: FixedFormat, coefficients: NDArray[Any], 
     operations = list(zip(program.operations.tolist(), guards, strict=True))
     cycle = [[int(each / fmt.unit) for each in row] for row in coefficients]
     divisors = [value for value, kind in program.checks if kind == DIVISOR]
-    signs = [(value, int(kind == POSITIVE)) for value, kind in program.checks if kind != DIVISOR]
+    signs = [(value, int(kind == POSITIVE)) for value, kind in program.checks if kind in (POSITIVE, NOT_NEGATIVE)]
     states, state, indefinite = list[list[int]](), [int(each) for each in x], None
     for k, row in enumerate(z.tolist()):
         values = [*state, *map(int, row)]

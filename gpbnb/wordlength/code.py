@@ -31,7 +31,7 @@ from gpbnb.bounds.words import WordGuarantee
 from gpbnb.caching import replace_file
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, Form
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
@@ -410,16 +410,15 @@ def model_coefficients(run: Run) -> NDArray[Any]:
     """Return the coefficients of each step of a cycle, (p, c), ordered as the program of a step expects."""
     given = run.matrices
     Q, R = (run.UQ, run.UR) if run.form is Form.UD else (given.Q, given.R)
-    one = np.asarray(run.exactly(given.identity), dtype=object)[0, 0]
-    return _coefficients([run.exactly(each) for each in (given.Phi, given.H, Q, R)], one)
+    return _coefficients([run.exactly(each) for each in (given.Phi, given.H, Q, R)])
 
 
-def _coefficients(members: Sequence[NDArray[Any]], one: Fraction) -> NDArray[Any]:
+def _coefficients(members: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """Return the coefficients of each step of a cycle from Phi, H, Q and R, each with a cycle of its own."""
     period = lcm(*(len(each) for each in members))
     rows = [np.concatenate([each[k % len(each)].ravel() for each in members]) for k in range(period)]
     constants = np.full((period, 1), Fraction(0), dtype=object)
-    return np.concatenate([np.array(rows, dtype=object), constants, constants + one], axis=1)
+    return np.concatenate([np.array(rows, dtype=object), constants, constants + 1], axis=1)
 
 
 def _in_loops(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -433,7 +432,7 @@ def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[An
 
     Raises
     ------
-    ValueError : the UD form.
+    ValueError : the UD form; a format without the number 1.
     """
     if form is Form.UD:
         raise ValueError(
@@ -441,8 +440,9 @@ def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[An
             "wrap around: compiled loops compute the factors of its covariances"
         )
     model.refuse_inputs("generated code")
+    identity_in(fmt, 1)
     arrays = {letter: each.to_fractions() for letter, each in model.definite_in(fmt).arrays(fmt).items()}
-    stored = _coefficients([arrays[letter] for letter in ("Phi", "H", "Q", "R")], fmt.round(1))
+    stored = _coefficients([arrays[letter] for letter in ("Phi", "H", "Q", "R")])
     return stored, np.concatenate([arrays["x0"], arrays["P0"].ravel()])
 
 

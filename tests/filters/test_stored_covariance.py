@@ -99,7 +99,7 @@ def test_without_repair_an_indefinite_covariance_is_refused():
     assert model.definite_in(fmt) is model
     with pytest.raises(ValueError, match="needed a positive semidefinite matrix"):
         model.rounded(fmt)
-    with pytest.raises(ValueError, match="needed covariances that stay definite"):
+    with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
         Run(model, fmt, Form.UD, ())
 
 
@@ -188,6 +188,19 @@ def test_a_predicted_root_with_a_zero_on_the_diagonal_is_not_definite():
     assert not definite
     assert (root @ root.T).tolist() == (S @ S.T).tolist()
     assert predict_root(fmt.array([[1, 0], [0, 1]]), fmt.array([[2, 1], [0, 1]]), zero)[1]
+
+
+ALIKE = LinearModel(np.eye(2), [[1, 0]], np.zeros((2, 2)), [[1]], [0, 0], [[1, 1], [1, 1]], "two states that are one")
+
+
+@pytest.mark.parametrize("form", ["innovation", "UD", "Potter", "Carlson"])
+def test_a_covariance_of_rank_one_has_positive_variances_in_every_form(form):
+    """Factors and square roots have a zero on their diagonal, which is not the variance of a state."""
+    z = np.linspace(-1, 1, 20).reshape(-1, 1)
+    found = emulate(ALIKE, z, FloatFormat(2, 24), form)
+    assert (found.indefinite, found.stopped) == (None, None)
+    assert np.abs(found.state).max() < 2.0**-20  # 20 steps, each with a few roundings of numbers below 1
+    assert 5 <= required_precision(ALIKE, 20, 0.01, z=z, form=form).precision <= 9
 
 
 @pytest.mark.parametrize("zero", [0, 1])

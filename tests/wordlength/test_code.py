@@ -309,6 +309,81 @@ def test_what_is_chosen_by_a_zero_is_chosen_in_the_code():
     assert {each.case.label: each.faults for each in found} == {case.label: () for case in cases}
 
 
+def sparse(seed):
+    """A small model with many zeros, which covariances may have in their factors, too."""
+    rng = np.random.default_rng(seed)
+    n, m = rng.integers(1, 4), rng.integers(1, 3)
+
+    def drawn(*shape):
+        return np.where(rng.random(shape) < 0.55, 0, rng.choice([0.125, 0.5, 1.0, -0.5, 1.5], shape))
+
+    def covariance(root, diagonal=0.0):
+        return np.tril(root) @ np.tril(root).T + np.diag(np.full(len(root), diagonal))
+
+    covariances = covariance(drawn(n, n)), covariance(drawn(m, m), rng.choice([1 / 64, 0.25, 1.0]))
+    return LinearModel(drawn(n, n), drawn(m, n), *covariances, drawn(n), covariance(drawn(n, n)), f"sparse {seed}")
+
+
+@needs_compiler
+def test_what_zeros_leave_without_use_ends_the_code_as_the_emulation():
+    """An inverse that a zero row of H multiplies may overflow; a factor that multiplies a zero gain is not computed."""
+    formats = BINARY32, FixedFormat(2, 13, "even"), FixedFormat(3, 6, "even", "saturate")
+    cases = [
+        Case("", f"{seed}, {form}, {fmt}", sparse(seed), fmt, form)
+        for seed in range(40, 52)
+        for form in Form
+        for fmt in formats
+        if fits(sparse(seed), fmt, form)
+    ]
+    assert len(cases) > 100
+    found = compare(cases, 12, settings_of(installed()[:1], sanitize=False)[:1])
+    assert {each.case.label: each.faults for each in found} == {case.label: () for case in cases}
+
+
+def fits(model, fmt, form):
+    """Whether a format holds the model, and definite factors of its covariances."""
+    try:
+        return bool(prepared(model, fmt, form))
+    except (ValueError, OverflowError):
+        return False
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("fmt", "gain", "u"),
+    [
+        (BINARY32, "1e30", 1e10),
+        (FixedFormat(3, 8), "6", 3),
+        (WordFormats(FixedFormat(3, 8), 8, FixedFormat(4, 12)), "6", 3),
+    ],
+    ids=["binary32", "fixed point", "words"],
+)
+def test_an_overflow_before_a_section_of_zeros_ends_the_code(fmt, gain, u, tmp_path):
+    system = LinearSystem.from_sections([[gain, gain, 0, 1, 0, 0], [0, 0, 0, 1, "0.5", 0]], "direct form I")
+    write_code(system, fmt, None, tmp_path, inputs=np.full((3, 1), u))
+    assert [line.split()[0] for line in (tmp_path / "filter_vectors.txt").read_text().splitlines()] == ["-2"]
+    assert built(tmp_path)[0] == 0
+
+
+@pytest.mark.parametrize("form", Form, ids=str)
+@pytest.mark.parametrize("fmt", [FixedFormat(17, -1), FixedFormat(0, 15, "even", "saturate"), FixedFormat(0, 60)])
+def test_a_format_without_the_number_one_is_refused(fmt, form, tmp_path):
+    whole, even = fmt.fraction_bits > 0, np.array([[2]])
+    model = LinearModel(*(np.array([["0.5"]]) if whole else even for _ in range(4)), [0], [["0.5"]] if whole else even)
+    with pytest.raises(ValueError, match=r"which does not hold the number 1; needed .* at least 1 integer bit|UD form"):
+        write_code(model, fmt, form, tmp_path)
+
+
+def test_the_ud_form_divides_by_no_factor_of_r_that_is_zero(tmp_path):
+    R = [["5/2048", "-13/4096"], ["-13/4096", "17/4096"]]
+    model = LinearModel([["0.9"]], [["1"], ["0.5"]], [["0.5"]], R, [0], [["1"]])
+    run = Run(model, FixedFormat(4, 12), Form.UD, ())
+    assert [each.letter for each in run.repairs] == ["R"]
+    assert (run.exactly(run.UR)[0].diagonal() > 0).all()
+    with pytest.raises(ValueError, match="in which R does not stay positive definite when its factors"):
+        write_code(replace(model, H=[["1"]], R=[["0.01"]]), FixedFormat(6, 4), Form.UD, tmp_path)
+
+
 @needs_compiler
 def test_a_zero_pivot_stops_the_code_in_the_step_that_stops_the_emulation(tmp_path):
     fmt = FixedFormat(4, 11, "down", "saturate")

@@ -140,7 +140,10 @@ _PREDICTED, _OF_INNOVATION, _INVERSE, _GAIN, _COVARIANCE, _ESTIMATE, _FACTORS = 
 
 @borrowing
 def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: Any) -> Any:
-    """Thornton's modified weighted Gram-Schmidt: overwrite U with the factors of Phi U D U' Phi' + UQ DQ UQ'."""
+    """Thornton's modified weighted Gram-Schmidt: overwrite U with the factors of Phi U D U' Phi' + UQ DQ UQ'.
+
+    Returns whether no entry of D is negative, and the variance of each state positive.
+    """
     n = U.shape[0]
     definite = True
     for i in range(n):
@@ -162,7 +165,7 @@ def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: 
                 d = add(fmt, d, multiply(fmt, w, c))
         store(fmt, U, (j, j), d)
         sign = compare(fmt, d, zero(fmt))
-        definite = definite and sign > 0
+        definite = definite and sign >= 0
         for i in range(j):
             put(fmt, U, (j, i), zero(fmt))
             s = zero(fmt)
@@ -179,6 +182,12 @@ def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: 
                     if not is_zero(fmt, w):
                         w = multiply(fmt, s, w)
                         store(fmt, W, (i, k), subtract(fmt, load(fmt, W, (i, k)), w))
+    for i in range(n):
+        varies = False
+        for j in range(i, n):
+            adds = i == j or not is_zero(fmt, load(fmt, U, (i, j)))
+            varies = varies or (adds and not is_zero(fmt, load(fmt, U, (j, j))))
+        definite = definite and varies
     return definite
 
 
@@ -207,7 +216,7 @@ def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any
         put(innovation, F, (j, 0), s)
         d = number_taken(fmt, innovation, load(innovation, U, (j, j)))
         store(innovation, G, (j, 0), multiply(innovation, d, s))
-    a = r
+    a, observed = r, False
     for j in range(n):
         f, g = load(innovation, F, (j, 0)), load(innovation, G, (j, 0))
         before = a
@@ -221,7 +230,10 @@ def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any
             whole, part = number_taken(fmt, covariance, a), number_taken(fmt, covariance, before)
             d = multiply(covariance, load(covariance, U, (j, j)), part)
             store(covariance, U, (j, j), divide(covariance, d, whole))
-            factor = negative(covariance, divide(covariance, number_taken(fmt, covariance, f), part))
+            factor = zero(covariance)
+            if observed:
+                factor = negative(covariance, divide(covariance, number_taken(fmt, covariance, f), part))
+            observed = True
             for k in range(j):
                 u, c = load(covariance, U, (k, j)), load(gain, K, (k, i))
                 if not is_zero(gain, c):
