@@ -43,6 +43,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sys.argv = [given.command, *given.arguments]
     try:
         runpy.run_module(f"gpbnb.{given.command}", run_name="__main__", alter_sys=False)
+    except KeyboardInterrupt:
+        print(f"python -m gpbnb {given.command}: interrupted", file=sys.stderr)
+        return 130
     except ImportError as error:
         if "gpbnb[report]" not in str(error):
             raise

@@ -74,6 +74,15 @@ _AT_ONCE = 64
 BUDGET = 3e8
 """Approximate number of multiplications for the steps before the gain settles, a few seconds."""
 
+MOST_LAGS = 2**20
+"""Largest number of steps over which the errors of a filter add up in a bound that holds for ever."""
+
+PER_BUDGET = 3
+"""Largest number of multiplications that derive limits on states from those on measurements, per unit of a budget."""
+
+MOST_LIMITS = 2**16
+"""Largest number of states, and of measurements, that have limits."""
+
 
 @dataclass(frozen=True, eq=False)
 class Guarantee:
@@ -149,7 +158,7 @@ def limits(
         are finite.
     """
     found = []
-    n, m = whole_number("states", n), whole_number("measurements", m)
+    n, m = (whole_number(name, size, most=MOST_LIMITS) for name, size in (("states", n), ("measurements", m)))
     for name, each, size in (("state", state, n), ("innovation", innovation, m), ("measurement", measurement, m)):
         try:
             given = all_above(each)
@@ -208,6 +217,23 @@ def check_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] =
             )
 
 
+def check_within(within: Any, basis: str) -> None:
+    """Reject limits for an answer that does not use them, or limits that are none.
+
+    Raises
+    ------
+    TypeError : `within` is not a result of :func:`limits`.
+    ValueError : limits with the basis "emulation" or "bound".
+    """
+    if within is not None and not isinstance(within, FilterLimits):
+        raise TypeError(f"got within={within!r}; needed the result of limits(...)")
+    if within is not None and basis in ("emulation", "bound"):
+        raise ValueError(
+            f'got limits and basis "{basis}", which takes the measurements as they are; needed no limits; leave out '
+            'within=, or ask with basis "guarantee" or "probable"'
+        )
+
+
 def guarantee(
     model: LinearModel,
     fmt: FloatFormat | FixedFormat,
@@ -232,13 +258,15 @@ def guarantee(
         states.
     horizon : the number of steps that the bound covers if no bound holds for ever.
     budget : approximate number of multiplications to spend on the steps before the gain settles. For a filter that
-        settles slowly, a larger budget gives a smaller bound.
+        settles slowly, a larger budget gives a smaller bound. Limits on the measurements alone may take
+        :data:`PER_BUDGET` times as many, and are refused if they need more.
 
     Raises
     ------
     TypeError : `within` is not a result of :func:`limits`, or `fmt` is not a format.
     ValueError : the format has no compiled loops, or rounds stochastically; a covariance is not definite when the
-        format stores it; limits for another filter; a first estimate beyond its limit.
+        format stores it; limits for another filter; a first estimate beyond its limit; limits on the measurements that
+        need more than the budget.
     """
     if not isinstance(model, LinearModel):
         raise TypeError(
@@ -275,9 +303,15 @@ def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000, b
     steps = min(horizon, given.steps) if not given.settled else horizon
     period = given.steps - given.first
     most = _enough_lags(radius, period) if for_ever else steps
+    if for_ever and most > MOST_LAGS:
+        why = (
+            f"an error decays too slowly for a bound for ever, by a factor of {radius:.9g} a step: it adds up over "
+            f"{most:,} steps, more than {MOST_LAGS:,}; ask for a number of steps"
+        )
+        for_ever, most = False, steps
     b, known, caps = np.zeros(n), within, None
     if not np.isfinite(within.state).all() or not np.isfinite(within.innovation).all():
-        known = _from_measurements(given, within, most, for_ever, steps)
+        known = _from_measurements(given, within, most, for_ever, steps, budget)
         caps = _caps(given, known, most) if for_ever and given.first == 0 else None
     for _ in range(40):
         found = _disturbances(given, known, b, caps)
@@ -459,7 +493,9 @@ def _sums(
     return np.full((1, n), math.inf), np.full((1, n, 4), math.inf), lags
 
 
-def _from_measurements(given: Schedule, within: FilterLimits, most: int, for_ever: bool, steps: int) -> FilterLimits:
+def _from_measurements(
+    given: Schedule, within: FilterLimits, most: int, for_ever: bool, steps: int, budget: float
+) -> FilterLimits:
     r"""Derive limits on state and innovation of the exact filter from those on the measurements.
 
     The exact filter obeys :math:`x_k = \hat F x_{k-1} + \hat K z_k - \Delta F x_{k-1} - (\hat K - K)\nu_k`, where
@@ -474,6 +510,14 @@ def _from_measurements(given: Schedule, within: FilterLimits, most: int, for_eve
     tiny = _product_share(n)
     HPhi = np.ascontiguousarray(given.HPhi[..., 0])
     early = steps if not for_ever else given.first + most if given.first or x0.any() else 0
+    work = float(early + given.steps) * most * n * (n + G.shape[2])
+    if work > PER_BUDGET * budget:
+        raise ValueError(
+            f"got limits on the measurements alone, and a filter that settles in {given.first:,} steps and whose "
+            f"errors add up over {most:,}: limits on its states follow from about {work:.1g} multiplications; needed "
+            f"at most {PER_BUDGET * budget:.1g}; give limits on the states and innovations, or budget="
+            f"{work / PER_BUDGET:.1g} of guarantee(...)"
+        )
     for _ in range(60):
         if not all(np.isfinite(each).all() for each in (X, V, given.dK)):
             break

@@ -11,6 +11,7 @@ from gpbnb.filters.structures import (
     CASCADES,
     STRUCTURES,
     USUAL,
+    check_of_cascade,
     expanded,
     sections_of,
     structure_named,
@@ -40,7 +41,7 @@ class FilterDesign:
     b, a : coefficients of the transfer function, as in :meth:`gpbnb.filters.system.LinearSystem.from_coefficients`.
     sos : (sections, 6), in place of these.
     pairing, order : how the sections of a cascade are paired and ordered; by default as given for sections, else
-        "nearest" and "up".
+        "nearest" and "up". They and `scale` are refused where no structure is a cascade.
     scale : whether to scale the sections, as in :meth:`gpbnb.filters.system.LinearSystem.from_sections`.
     name : name of the filter in tables and reports.
     input_names, output_names : lists with one name each, perhaps with a unit, as of
@@ -91,7 +92,12 @@ class FilterDesign:
         ------
         ValueError : the structure is unknown, or this filter does not have it.
         """
-        found = self._system(structure_named(self.usual if structure is None else structure))
+        chosen = structure_named(self.usual if structure is None else structure)
+        check_of_cascade(chosen, pairing=self.pairing, order=self.order, scale=self.scale or None)
+        return self._built(chosen)
+
+    def _built(self, structure: str) -> LinearSystem:
+        found = self._system(structure)
         inputs, outputs = (checked_names(f"{kind}_names", getattr(self, f"{kind}_names"), 1) for kind in _NAMED)
         return replace(found, input_names=inputs, output_names=outputs) if inputs or outputs else found
 
@@ -99,12 +105,11 @@ class FilterDesign:
         if self.sos is None:
             b, a = self.b, (1,) if self.a is None else self.a
             if not (self.scale and found in CASCADES):
-                pairing, order = self.pairing or "nearest", "up" if self.order is None else self.order
+                pairing, order = (self.pairing, self.order) if found in CASCADES else (None, None)
                 return LinearSystem.from_coefficients(b, a, found, pairing, order, self.name)
             raise ValueError("got scale for b and a; needed sections in sos, which it scales")
         if found in CASCADES:
-            pairing, order = self.pairing or "given", "given" if self.order is None else self.order
-            return LinearSystem.from_sections(self.sos, found, pairing, order, self.scale, self.name)
+            return LinearSystem.from_sections(self.sos, found, self.pairing, self.order, self.scale, self.name)
         b, a = expanded(sections_of(self.sos))
         return LinearSystem.from_coefficients(b, a, found, name=self.name)
 
@@ -146,9 +151,11 @@ class FilterDesign:
     def _tried(self, structures: Sequence[str] | str) -> Structures:
         names = STRUCTURES if structures == "all" else [structures] if isinstance(structures, str) else structures
         found, why = dict[str, LinearSystem](), dict[str, str]()
-        for name in map(structure_named, names):
+        chosen = [structure_named(name) for name in names]
+        build = self._built if any(name in CASCADES for name in chosen) else self.system
+        for name in chosen:
             try:
-                found[name] = self.system(name)
+                found[name] = build(name)
             except ValueError as error:
                 why[name] = str(error)
         return Structures(found, why)

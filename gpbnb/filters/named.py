@@ -54,8 +54,8 @@ def compiled_form(form: AnyForm | str) -> Form:
     return found
 
 
-def whole_number(name: str, value: Any, least: int = 1) -> int:
-    """Return a whole number that is not below `least`; True and False are not numbers.
+def whole_number(name: str, value: Any, least: int = 1, most: int | None = None) -> int:
+    """Return a whole number from `least` to `most`; True and False are not numbers.
 
     Raises
     ------
@@ -67,9 +67,10 @@ def whole_number(name: str, value: Any, least: int = 1) -> int:
         except TypeError:
             pass
         else:
-            if number >= least:
+            if number >= least and (most is None or number <= most):
                 return number
-    raise ValueError(f"got {value!r} {name}; needed a whole number, at least {least}")
+    limit = "" if most is None else f" and at most {most:,}"
+    raise ValueError(f"got {value!r} {name}; needed a whole number, at least {least}{limit}")
 
 
 def checked_name(name: Any) -> str:

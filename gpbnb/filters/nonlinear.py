@@ -52,6 +52,9 @@ class SigmaPoints(NamedTuple):
 
 
 USUAL_POINTS = SigmaPoints()
+
+MOST_ITERATIONS = 1000
+"""Largest number of iterations of an update."""
 """Sigma points that are spread as far as the estimate is uncertain."""
 
 
@@ -193,7 +196,7 @@ class NonlinearModel:
             "angles": _angles(angles, noise),
             "residual": residual,
             "normalize": normalize,
-            "iterations": whole_number("iterations", iterations),
+            "iterations": whole_number("iterations", iterations, most=MOST_ITERATIONS),
             "method": method,
             "points": _points(points),
             "steps": noise.steps,

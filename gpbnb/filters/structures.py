@@ -197,6 +197,21 @@ _DOUBLINGS = 64
 """After so many doublings, a sum over 2**64 steps would have converged for any eigenvalue below 1 in float64."""
 
 
+def check_of_cascade(structure: str, **options: Any) -> None:
+    """Reject options, each None if not given, that only a cascade has.
+
+    Raises
+    ------
+    ValueError : one of them is given for another structure.
+    """
+    given = [name for name, value in options.items() if value is not None]
+    if given and structure not in CASCADES:
+        raise ValueError(
+            f"got {' and '.join(given)} for {structure!r}; needed a cascade, whose sections have them; use structure "
+            f"'cascade of {USUAL}', or leave out {' and '.join(given)}"
+        )
+
+
 def structure_named(name: Any, among: Sequence[str] = WITH_FIR) -> str:
     """Return the name of a structure as this module writes it; case and spaces do not matter.
 

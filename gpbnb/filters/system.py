@@ -38,6 +38,7 @@ from gpbnb.filters.structures import (
     Structure,
     balanced,
     cascade,
+    check_of_cascade,
     companion,
     controller_structure,
     expanded,
@@ -290,8 +291,8 @@ class LinearSystem:
         b: Any,
         a: Any = (1,),
         structure: str = "direct form II transposed",
-        pairing: str = "nearest",
-        order: Any = "up",
+        pairing: str | None = None,
+        order: Any = None,
         name: str | None = None,
     ) -> LinearSystem:
         r"""Return a digital filter in a given structure from the coefficients of its transfer function.
@@ -302,14 +303,14 @@ class LinearSystem:
         ----------
         b, a : b0 … bM and a0 … aN, as in ``scipy.signal``; both are divided by a0 first, exactly.
         structure : one of :data:`gpbnb.filters.structures.STRUCTURES`, or "FIR" for a filter without feedback.
-        pairing, order : how the sections of a cascade are paired and ordered; see
-            :func:`gpbnb.filters.sections.factored`.
+        pairing, order : how the sections of a cascade are paired and ordered, by default "nearest" and "up"; see
+            :func:`gpbnb.filters.sections.factored`. Only a cascade has them.
         name : name in tables and reports; by default the structure.
 
         Raises
         ------
         ValueError : there are no coefficients; ``a[0] = 0``; no coefficient belongs to a delayed input or output; the
-            structure is unknown, or the filter cannot be built in it.
+            structure is unknown, or the filter cannot be built in it; a pairing or order for another than a cascade.
         TypeError : entries that are not numbers.
 
         Examples
@@ -322,8 +323,10 @@ class LinearSystem:
         """
         top, bottom = transfer_function(b, a)
         found = structure_named(structure)
+        check_of_cascade(found, pairing=pairing, order=order)
         if found in CASCADES:
-            made = cascade(factored(top, bottom, pairing, order), found.removeprefix("cascade of "))
+            sections = factored(top, bottom, pairing or "nearest", "up" if order is None else order)
+            made = cascade(sections, found.removeprefix("cascade of "))
         elif found in DIRECT:
             made = cascade([(top, bottom)], found)
         elif found == "lattice":
@@ -342,8 +345,8 @@ class LinearSystem:
         cls,
         sos: Any,
         structure: str = "direct form II transposed",
-        pairing: str = "given",
-        order: Any = "given",
+        pairing: str | None = None,
+        order: Any = None,
         scale: bool = False,
         name: str | None = None,
     ) -> LinearSystem:
@@ -356,14 +359,14 @@ class LinearSystem:
             a whole. For the whole filter in a direct form, multiply the sections, as ``scipy.signal.sos2tf`` does, and
             use :meth:`from_coefficients`.
         pairing, order : see :func:`gpbnb.filters.sections.repaired`; by default the sections stay as given.
-        scale : whether to multiply sections by powers of two, so that the numbers passed between sections stay within 1
-            for inputs within 1; see :func:`gpbnb.filters.sections.scaled`.
+        scale : whether to multiply the sections of a cascade by powers of two, so that the numbers passed between them
+            stay within 1 for inputs within 1; see :func:`gpbnb.filters.sections.scaled`.
         name : name in tables and reports; by default the structure.
 
         Raises
         ------
-        ValueError : a wrong shape, ``a0 = 0``, or an unknown structure, pairing or order; the message names the
-            section.
+        ValueError : a wrong shape, ``a0 = 0``, or an unknown structure, pairing or order, where the message names the
+            section; a pairing, an order or scale for another than a cascade.
         TypeError : entries that are not numbers.
 
         Examples
@@ -377,9 +380,10 @@ class LinearSystem:
         found = structure_named(structure)
         form = found.removeprefix("cascade of ")
         if form not in DIRECT:
+            check_of_cascade(found, pairing=pairing, order=order, scale=scale or None)
             b, a = expanded(sections)
             return cls.from_coefficients(b, a, found, name=name)
-        sections = repaired(sections, pairing, order)
+        sections = repaired(sections, pairing or "given", "given" if order is None else order)
         if scale:
             sections = scaled(sections, form)
         return cls.from_filter(_named(cascade(sections, form), f"cascade of {form}" if name is None else name))

@@ -9,9 +9,20 @@ from collections.abc import Sequence
 from gpbnb.caching import replace_file
 from gpbnb.wordlength.options import printable, read
 
+INTERRUPTED = 130
+"""Exit status of an interrupted command, as shells have it."""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
+    try:
+        return _run(arguments)
+    except KeyboardInterrupt:
+        print("python -m gpbnb.wordlength: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     program = "python -m gpbnb.wordlength"
     command = printable(shlex.join([*program.split(), *map(str, sys.argv[1:] if arguments is None else arguments)]))
     try:

@@ -45,6 +45,15 @@ class BlockRequirement:
     tried: tuple[tuple[BlockFormats, float], ...]
 
     @property
+    def met(self) -> bool:
+        """Whether some formats meet the tolerance."""
+        return self.formats is not None
+
+    def __bool__(self) -> bool:
+        """Whether some formats meet the tolerance, as :attr:`met`."""
+        return self.met
+
+    @property
     def limiting(self) -> tuple[str, ...]:
         """The blocks that need the most digits when lowered alone."""
         most = max((digits for digits in self.alone.values() if digits is not None), default=None)
@@ -173,6 +182,15 @@ class WordRequirement:
     words: WordFormats | MaybeNone
     ratio: float
     data: FixedAnswer
+
+    @property
+    def met(self) -> bool:
+        """Whether the formats meet the tolerance."""
+        return self.words is not None
+
+    def __bool__(self) -> bool:
+        """Whether the formats meet the tolerance, as :attr:`met`."""
+        return self.met
 
     def __str__(self) -> str:
         if self.words is None:

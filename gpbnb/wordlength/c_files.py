@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,6 +50,34 @@ class Vectors(NamedTuple):
     status: NDArray[np.int64]
 
 
+WRITTEN = "Written by gpbnb."
+"""What the files say; other files of their names are not replaced."""
+
+
+def refuse_others(folder: Path, name: str) -> None:
+    """Reject a folder in which files of the names of a filter's code were not written by gpbnb.
+
+    Raises
+    ------
+    ValueError : there is such a file.
+    """
+    test = f"test_{name}.c"
+    marked = {each: each for each in (f"{name}.h", f"{name}.c", test, "Makefile")} | {f"{name}_vectors.txt": test}
+    others = [each for each, marks in marked.items() if (folder / each).exists() and not _is_written(folder / marks)]
+    if others:
+        raise ValueError(
+            f"got the folder {folder}, in which {' and '.join(others)} {'were' if len(others) > 1 else 'was'} not "
+            "written by gpbnb; needed a folder without files of these names; name another one"
+        )
+
+
+def _is_written(path: Path) -> bool:
+    try:
+        return WRITTEN.encode() in path.read_bytes()
+    except OSError:
+        return False
+
+
 def written_files(
     step: CodeStep, arithmetic: CodeNumbers, name: str, described: Described, vectors: Vectors
 ) -> dict[str, str]:
@@ -84,7 +113,7 @@ def _header(source: CodeSource, described: Described) -> str:
     )
     what = dict.fromkeys(each for each in (described.title, described.structure) if each)
     program, statuses = source.step.program, source.statuses
-    paragraphs = _comment(f"{', '.join(what)}, in {described.fmt}. Written by gpbnb.", flags, described.bound)
+    paragraphs = _comment(f"{', '.join(what)}, in {described.fmt}. {WRITTEN}", flags, described.bound)
     values = ",\n".join(f"    {status.name} = {status.value}" for status in statuses)
     meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in statuses)
     takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
@@ -135,7 +164,7 @@ def _source(source: CodeSource, described: Described) -> str:
     includes = _KEPT.format(guard=f"{source.name.upper()}_FAST_MATH") if described.floating else ""
     helpers = source.arithmetic.helpers(function)
     parts = [f'#include "{source.name}.h"', includes, constants, helpers, source.start(), function]
-    return "\n".join(f"{part.rstrip()}\n" for part in parts if part)
+    return f"/* {WRITTEN} */\n" + "\n".join(f"{part.rstrip()}\n" for part in parts if part)
 
 
 def _test(source: CodeSource, described: Described) -> str:
@@ -152,7 +181,7 @@ def _test(source: CodeSource, described: Described) -> str:
         include = "#include <inttypes.h>\n"
     output = f"    {number} output[{program.p}] = {{0}};\n" if program.p else ""
     passed = ", output" if program.p else ""
-    return f"""/* Compare {name}.c with the test vectors of its emulation, bit for bit. */
+    return f"""/* Compare {name}.c with the test vectors of its emulation, bit for bit. {WRITTEN} */
 {include}#include <stdio.h>
 
 #include "{name}.h"
@@ -222,7 +251,8 @@ def _vectors(source: CodeSource, vectors: Vectors) -> str:
 
 
 def _makefile(name: str) -> str:
-    return f"""CC = cc
+    return f"""# {WRITTEN}
+CC = cc
 CFLAGS = {FLAGS} -O2
 LDLIBS = -lm
 

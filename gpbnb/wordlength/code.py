@@ -41,8 +41,9 @@ from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.tracing import kalman_program, without_exact
 from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_checked, run_words
-from gpbnb.wordlength.c_files import Described, Vectors, written_files
+from gpbnb.wordlength.c_files import Described, Vectors, refuse_others, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeStep, checked_identifier, word_arithmetic
+from gpbnb.wordlength.system import largest_inputs
 
 VECTORS = 100
 """Steps of the test vectors."""
@@ -99,7 +100,7 @@ def write_code(
     form_or_structure : for a design, its structure; for a Kalman filter, a form with compiled loops, or "constant
         gain"; None for a linear system, which already has a structure, for a nonlinear system, or for the default.
         The UD form accepts no words of more than 52 bits and no words that wrap around.
-    folder : folder for the files, which is created if necessary.
+    folder : folder for the files, which is created if necessary. Files that gpbnb has written are replaced, others not.
     name : name of the files, and prefix of every name that the header declares.
     inputs : (steps, m), inputs or measurements of the test vectors; by default 100 steps of noise, or of simulated
         measurements.
@@ -115,8 +116,9 @@ def write_code(
     ------
     TypeError : `given` or `fmt` is of another type.
     ValueError : a format without a type in C99; a structure or form that the filter does not have; a model with known
-        inputs; a step with a function, such as np.sin, that C's library does not round as the emulation does; inputs
-        that do not fit; a name that is not an identifier in C.
+        inputs; limits for another filter; a step with a function, such as np.sin, that C's library does not round as
+        the emulation does; inputs that do not fit; a name that is not an identifier in C; a file of another origin in
+        the way.
     OverflowError : a coefficient or an initial state is beyond the range of the format.
     OSError : a file cannot be written.
 
@@ -130,6 +132,8 @@ def write_code(
     filter.h filter.c test_filter.c filter_vectors.txt Makefile
     """
     checked_identifier(name)
+    target = Path(folder)
+    refuse_others(target, name)
     found = prepared(given, fmt, form_or_structure)
     vectors = found.emulate(found.inputs(VECTORS) if inputs is None else inputs)
     bound = found.bound(within) if within is not None else ""
@@ -142,7 +146,6 @@ def write_code(
         not isinstance(given, NonlinearSystem),
     )
     files = written_files(found.step, found.arithmetic, name, described, vectors)
-    target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
     for file, text in files.items():
         replace_file(target / file, text.encode())
@@ -251,14 +254,15 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
         return _float_vectors(system, u, fmt) if isinstance(fmt, FloatFormat) else _word_vectors(system, u, _words(fmt))
 
     def bound(within: FilterLimits) -> str:
+        most = largest_inputs(system, within)
         try:
             if isinstance(fmt, FloatFormat):
-                found = output_errors(system, fmt, within.measurement)
+                found = output_errors(system, fmt, most)
             else:
-                found = WordGuarantee(system, within.measurement).errors(_words(fmt))
+                found = WordGuarantee(system, most).errors(_words(fmt))
         except (ValueError, OverflowError) as error:
             return f"No bound: {error}"
-        largest = ", ".join(f"{each:.6g}" for each in np.ravel(within.measurement).tolist())
+        largest = ", ".join(f"{each:.6g}" for each in most.tolist())
         errors = ", ".join(f"{each:.3g}" for each in found.tolist())
         return (
             f"For inputs of at most {largest} in size, each output stays within {errors} of that of the exact filter, "
@@ -383,8 +387,8 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: Form | str) -> Prepared:
     arithmetic = word_arithmetic(step, _words(fmt)) if isinstance(fmt, FixedFormat) else CodeFloats(kind)
 
     def bound(within: FilterLimits) -> str:
+        check_limits(within, model.n, model.m, model.x0)
         try:
-            check_limits(within, model.n, model.m, model.x0)
             found = guarantee(model, fmt, within, chosen)
         except (ValueError, OverflowError) as error:
             return f"No bound: {error}"

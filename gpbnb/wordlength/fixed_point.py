@@ -205,8 +205,8 @@ def required_fraction_bits(
     z: Any,
     tolerance: Sequence[float] | float,
     basis: Basis = "emulation",
-    rounding: Rounding | str = Rounding.NEAREST,
-    coefficient_bits: int = COEFFICIENT_BITS,
+    rounding: Rounding | str | None = None,
+    coefficient_bits: int | None = None,
     wide: bool = False,
     like: FixedFormat | WordFormats | None = None,
     form: AnyForm | str = Form.INNOVATION,
@@ -231,10 +231,11 @@ def required_fraction_bits(
     basis : "emulation" of these measurements; or "guarantee", for a system for all inputs that are never larger than
         the largest of `z`, with a proof that nothing overflows, and for a scaled filter for all measurements that do
         not overflow. For a linear Kalman filter, call :func:`gpbnb.bounds.guarantee.guarantee` instead.
-    rounding : rounding of each operation.
-    coefficient_bits : significant bits of each coefficient; each coefficient has its own binary point.
+    rounding : rounding of each operation, by default "nearest".
+    coefficient_bits : significant bits of each coefficient, which has its own binary point; by default 15.
     wide : whether sums of products are kept exactly and rounded once.
-    like : formats for a system or a function, in place of `rounding`, `coefficient_bits` and `wide`. They set the
+    like : formats for a system or a function, in place of `rounding`, `coefficient_bits` and `wide`, which are then
+        refused. They set the
         integer bits, the rounding and the overflow. The search changes the fraction bits of the data, and those of the
         sums by the same number. Coefficients change with the data if they have the format of the data; otherwise they
         keep their own format. A function or a Kalman filter requires a `FixedFormat`.
@@ -258,7 +259,11 @@ def required_fraction_bits(
     """
     if basis not in ("emulation", "guarantee"):
         raise ValueError(f'got basis {basis!r}; needed "emulation" or "guarantee"')
-    rounding, form = rounding_named(rounding), form_named(form)
+    options = {"rounding": rounding, "coefficient_bits": coefficient_bits, "wide": wide or None}
+    if like is not None and (names := [name for name, value in options.items() if value is not None]):
+        raise ValueError(f"got {' and '.join(names)} beside like; needed like alone: its formats set them")
+    rounding, form = rounding_named(Rounding.NEAREST if rounding is None else rounding), form_named(form)
+    coefficient_bits = COEFFICIENT_BITS if coefficient_bits is None else coefficient_bits
     if form is not Form.INNOVATION and not isinstance(given, LinearModel | NonlinearModel):
         raise ValueError(f"got the {form} form; needed none: only a LinearModel or a NonlinearModel has forms")
     strategy: _Strategy

@@ -11,7 +11,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text, rounding_text
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.bounds.envelope import FilterLimits
-from gpbnb.bounds.guarantee import check_limits
+from gpbnb.bounds.guarantee import check_limits, check_within
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form, form_named
@@ -96,6 +96,7 @@ def judge(
     ------
     ValueError : for a reason given there; a format without compiled loops.
     """
+    check_within(within, basis)
     fmt.check_compiled()
     kind = cast(FloatFormat, fmt)  # strategies take fixed point, too, where there are loops for it
     asked = Asked(steps, basis, kind, None, False)

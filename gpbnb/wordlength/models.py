@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import tomllib
+import unicodedata
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
@@ -105,6 +106,12 @@ def read_model(
     if isinstance(source, (str, Path, Mapping)):
         return _from_mapping(*_read(source), u, structure)
     library, kind = type(source).__module__.partition(".")[0], type(source).__name__
+    of_filter = isinstance(source, (LinearModel, LinearSystem)) or (library == "filterpy" and kind in FILTERS)
+    if structure is not None and of_filter:
+        raise ValueError(
+            f"got structure {structure!r} for a {kind}, which is computed as it is; needed none; give b and a, or sos, "
+            "of a digital filter"
+        )
     if library == "filterpy" and kind in FILTERS:
         return _from_filterpy(source, u)
     if u is not None:
@@ -279,9 +286,16 @@ def model_or_function(
     return given if callable(given) and library not in SYSTEMS else read_model(cast(ModelSource, given))
 
 
+MOST_BYTES = 2**28
+"""Largest size of a file that is read; a device may have no end."""
+
+
 def _text(path: Path) -> str:
     """Read a file in UTF-8, with or without a byte-order mark."""
-    content = path.read_bytes()
+    with path.open("rb") as file:
+        content = file.read(MOST_BYTES + 1)
+    if len(content) > MOST_BYTES:
+        raise ValueError(f"{path.name}: got more than {MOST_BYTES:,} bytes; needed a shorter file")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -407,9 +421,15 @@ def _check_separator(cells: list[str]) -> None:
 def _is_header(cells: list[str]) -> bool:
     """Whether a row names its columns: no cell begins as a number does, and one is not a word for a missing number."""
     named = [cell.lower() for cell in cells if cell]
-    if not all(cell[0] not in "0123456789+-." and cell not in _WORDS for cell in named):
+    if any(_begins_as_number(cell) or cell in _WORDS for cell in named):
         return False
     return any(cell not in _MISSING for cell in named)
+
+
+def _begins_as_number(cell: str) -> bool:
+    """Whether a cell begins with a sign, a dash or a point of any script, or has a digit before its first letter."""
+    first = next((c for c in cell if c.isalnum()), "")
+    return first.isnumeric() or cell[0] in "+.\N{MINUS SIGN}" or unicodedata.category(cell[0]) == "Pd"
 
 
 _WORDS = ("nan", "inf")

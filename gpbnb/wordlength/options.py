@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import tempfile
 from collections.abc import Callable, Sequence
@@ -45,8 +46,18 @@ measurements.
 The file may name states, measurements, inputs and outputs, each with its unit: states = ["tilt (°)", "rate (°/s)"].
 The bases guarantee and probable hold for ever and need limits: --state and --innovation, or --measurement. A system
 needs --measurement.
-Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong.
+Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong, 130 if it is
+interrupted.
 """
+
+
+class _Once(argparse.Action):
+    """Store the value of an option, and refuse a second one."""
+
+    def __call__(self, parser: Any, namespace: argparse.Namespace, values: Any, option_string: Any = None) -> None:
+        if getattr(namespace, self.dest) is not None:
+            raise argparse.ArgumentError(self, "given twice; needed once")
+        setattr(namespace, self.dest, values)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -57,6 +68,7 @@ def parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    made.register("action", None, _Once)  # for the options that are stored
     made.add_argument("--version", action="version", version=f"gpbnb {gpbnb.__version__}")
     made.add_argument("model", type=Path, help="TOML file")
     made.add_argument(
@@ -269,6 +281,11 @@ def check_files(report: Path | None, sources: Sequence[Path], certificate: Path 
             what = "is a folder" if path.is_dir() else "is a device or pipe"
         if what:
             raise ValueError(f"got {option}, but {path} {what}; needed a file in a folder; create it first")
+    if report and (beside := report.with_suffix(".json")).exists() and beside not in sources and not _is_report(beside):
+        raise ValueError(
+            f"got --report {report}, beside which JSON is written, and {beside}, which is no report of this command; "
+            "needed another name"
+        )
     files = [*sources, *(path for _, path in written)]
     for place, path in enumerate(files):
         for other in files[:place]:
@@ -282,6 +299,14 @@ def check_files(report: Path | None, sources: Sequence[Path], certificate: Path 
                 f"got {option}, but its folder cannot be written to: {os.strerror(error.errno or 0)}; needed "
                 "a folder that you can write to, on a disk with space"
             ) from None
+
+
+def _is_report(path: Path) -> bool:
+    try:
+        found = json.loads(path.read_bytes())
+    except (ValueError, OSError):
+        return False
+    return isinstance(found, dict) and {"answers", "limiting"} <= found.keys()
 
 
 def _numbers(text: str) -> float | list[float]:

@@ -21,7 +21,7 @@ from gpbnb.arithmetic.rounding import Rounding, digits_text, rounding_named
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search, largest_by_default, largest_compiled
 from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.gains import check_deterministic
-from gpbnb.bounds.guarantee import Guarantee, check_limits, guarantee
+from gpbnb.bounds.guarantee import Guarantee, check_limits, check_within, guarantee
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_run import ArrayRun
@@ -108,8 +108,8 @@ def required_precision(
         deviations of the error that independent roundings would cause. The last two do not depend on `z`; for them,
         the search checks only the precisions next to the answer, and then that of binary32 or binary64. Both assume
         sums from left to right without fused multiply-add, and refuse stochastic rounding of a Kalman filter.
-    within : limits on the filter without rounding, for "guarantee" and "probable"; see
-        :func:`gpbnb.bounds.guarantee.limits`.
+    within : limits on the filter without rounding, for "guarantee" and "probable" only; see
+        :func:`gpbnb.bounds.guarantee.limits`. A linear system has limits on its inputs, `measurement`.
     emin, emax, subnormal : range of the formats, as in a :class:`gpbnb.arithmetic.formats.FloatFormat`; by default
         unlimited. A format in which a number overflows does not meet the tolerance; the answer names the quantity and
         the step.
@@ -127,15 +127,14 @@ def required_precision(
     ValueError : a tolerance that is not positive; an unknown basis, form or rounding; a base without compiled loops;
         for a model, a `largest` beyond the precision of the compiled loops; more or fewer measurements than steps; a
         model with known inputs, or an ``ArrayForm``, together with a basis that does not cover it; limits for another
-        filter; a first estimate beyond its limit; stochastic rounding with a basis that holds for ever.
+        filter, or for a basis that does not use them; a first estimate beyond its limit; stochastic rounding with a
+        basis that holds for ever.
     TypeError : an unknown kind of model, or limits that are not a result of :func:`~gpbnb.bounds.guarantee.limits`.
     OverflowError : an output of a linear system, or its reference, leaves the range of float64; the entries of a model
         are too large or too small for compiled loops.
     ArithmeticError : the filter is degenerate even without rounding; see :func:`gpbnb.filters.run.reference`.
     """
     form, like = form_named(form), format_like(base, rounding_named(rounding), emin, emax, subnormal)
-    if within is not None and not isinstance(within, FilterLimits):
-        raise TypeError(f"got within={within!r}; needed the result of limits(...)")
     model = model_or_function(model)
     if not isinstance(model, LinearModel | NonlinearModel) and form is not Form.INNOVATION:
         raise ValueError(f"got the {form} form; needed none: only a LinearModel or a NonlinearModel has forms")
@@ -144,6 +143,8 @@ def required_precision(
         if within is not None:
             raise ValueError("got limits for a function; needed none: they are for models")
         return required_recursion_precision(model, asked, tolerance, z)
+    if not isinstance(model, NonlinearModel):
+        check_within(within, basis)
     asked = asked._replace(largest=_checked_largest(model, largest, like))
     if isinstance(model, LinearSystem):
         return required_system_precision(model, asked, tolerance, z, within)

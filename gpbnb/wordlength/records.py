@@ -27,6 +27,9 @@ from gpbnb.sweeps import Column, Sweep
 from gpbnb.wordlength.precision import survey_formats
 from gpbnb.wordlength.requirement import Basis, checked_tolerance
 
+MOST_RECORDS = 1_000_000
+"""Largest number of records to simulate."""
+
 
 class RecordCell(NamedTuple):
     """One record of a survey; a digest of everything that the result depends on identifies the survey."""
@@ -103,7 +106,8 @@ def survey_records(
     Parameters
     ----------
     records : (records, steps, m), or a list of records (steps, m) of any lengths, with NaN where a measurement is
-        missing. A whole number requests that many simulated records of `steps` steps each, with the seeds 0, 1, ….
+        missing. A whole number requests that many simulated records of `steps` steps each, with the seeds 0, 1, …;
+        at most :data:`MOST_RECORDS`.
     tolerance, form, basis : as for :func:`gpbnb.wordlength.precision.required_precision`; basis "emulation" or "bound".
     formats : formats of any base, rounding and range; for a linear model, with compiled loops.
     executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
@@ -180,7 +184,7 @@ def survey_records(
 def _data(model: AnyModel, records: Any, steps: int | None) -> tuple[Any, ...]:
     """Return the measurements of each record."""
     if isinstance(records, (int, np.integer)):
-        count = whole_number("records", records)
+        count = whole_number("records", records, most=MOST_RECORDS)
         if steps is None:
             raise ValueError(f"got {count} records to simulate without steps; needed steps=, how many each has")
         length = whole_number("steps", steps)

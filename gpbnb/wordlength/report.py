@@ -227,8 +227,11 @@ class Question:
         if self.fixed and isinstance(part.model, LinearSystem):
             basis = cast(FixedBasis, part.basis)
             return required_fraction_bits(part.model, z, self.tolerance, basis, self.rounding, self.coefficient_bits)
+        within = self.within if part.basis in ("guarantee", "probable") else None
+        if within is not None and isinstance(part.model, LinearSystem) and np.isinf(within.state).all():
+            within = within._replace(state=np.full(part.model.n, np.inf))  # structures differ in their states
         if self.fmt is not None:
-            return judge(part.model, self.fmt, self.count, self.tolerance, part.form, part.basis, z, self.within)
+            return judge(part.model, self.fmt, self.count, self.tolerance, part.form, part.basis, z, within)
         return required_precision(
             part.model,
             self.count,
@@ -238,7 +241,7 @@ class Question:
             part.form,
             part.basis,
             z,
-            within=self.within,
+            within=within,
             progress=progress,
             emin=self.emin,
             emax=self.emax,

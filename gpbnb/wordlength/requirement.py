@@ -63,6 +63,10 @@ class WordlengthAnswer(ABC):
         """Whether the format meets the tolerance."""
         return self.fmt is not None
 
+    def __bool__(self) -> bool:
+        """Whether the format meets the tolerance, as :attr:`met`."""
+        return self.met
+
     @property
     def digits(self) -> int | None:
         """Digits of the format, as `tried` counts them; None without a format."""

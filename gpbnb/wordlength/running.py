@@ -27,6 +27,7 @@ from gpbnb.filters.simulation import simulated_inputs, simulated_measurements
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.blocks import required_word_formats
+from gpbnb.wordlength.c_files import refuse_others
 from gpbnb.wordlength.code import VECTORS, AnyFormat, write_code
 from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
 from gpbnb.wordlength.fixed_point import Basis as FixedBasis
@@ -80,6 +81,8 @@ def read_files(options: argparse.Namespace) -> CommandInput:
     ValueError, ArithmeticError : a file or an option does not fit the others.
     OSError : a file cannot be read.
     """
+    if options.code:
+        refuse_others(options.code, "filter")
     source, own = _filter(options)
     bases: Sequence[Basis] = options.basis or ("emulation", "guarantee" if options.fixed else "bound")
     return CommandInput(options, source, own, bases, *_inputs(options, source.model, bases, own))
@@ -301,8 +304,10 @@ def _type_within_tolerance(
     steps = given.steps or (DEFAULT_STEPS if z is None else len(z))
     if z is None and isinstance(model, LinearModel):
         z = simulated_measurements(model, steps)
+    basis = asked.bases[0]
+    used = within if basis in ("guarantee", "probable") else None
     for fmt in (BINARY32, BINARY64):
-        if judge(model, fmt, steps, given.tolerance, _form(given), asked.bases[0], z, within).met:
+        if judge(model, fmt, steps, given.tolerance, _form(given), basis, z, used).met:
             return fmt
     raise ValueError(
         f"got --code {given.code}, and neither binary32 nor binary64 meets the tolerance; needed a larger tolerance, "

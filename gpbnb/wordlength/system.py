@@ -20,6 +20,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search
 from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.bounds.guarantee import check_limits
 from gpbnb.bounds.probable import probable_error
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.named import named
@@ -51,7 +52,7 @@ def required_system_precision(
         takes three standard deviations of the rounding error in place of its bound.
     tolerance : largest error of each output, in its unit; one number, or (p,).
     u : (steps, m), inputs.
-    within : result of :func:`gpbnb.bounds.guarantee.limits`; only the limit on the measurement is used.
+    within : result of :func:`gpbnb.bounds.guarantee.limits`, which limits the measurement only.
 
     Raises
     ------
@@ -123,12 +124,7 @@ def system_strategy(
     if basis in ("guarantee", "probable"):
         if within is None:
             raise ValueError(f'got basis "{basis}" without limits; needed within=limits(..., measurement=...)')
-        largest = within.measurement
-        if largest.shape != (system.m,):
-            raise ValueError(
-                f"got limits of shape {largest.shape} on the measurement; needed ({system.m},), one for each input: "
-                f"write limits({system.n}, {system.m}, measurement=...)"
-            )
+        largest = largest_inputs(system, within)
     if basis == "emulation":
         return EmulatedSystem(system, u, system.outputs(u), tolerances)
     if any(system.x0):
@@ -137,6 +133,23 @@ def system_strategy(
         return ProbableSystem(system, largest, tolerances)
     keeps = system.as_filter().program.is_linear and system.unstable()
     return BoundedSystem(system, largest, tolerances, asked.steps if keeps else None)
+
+
+def largest_inputs(system: LinearSystem, within: FilterLimits) -> NDArray[np.float64]:
+    """Return the limits on the inputs of a system, (m,).
+
+    Raises
+    ------
+    TypeError : `within` is not a result of :func:`gpbnb.bounds.guarantee.limits`.
+    ValueError : limits for another number of states or inputs, or limits on the states or innovations.
+    """
+    check_limits(within, system.n, system.m)
+    if np.isfinite(within.state).any() or np.isfinite(within.innovation).any():
+        raise ValueError(
+            f"got limits on states or innovations for {system.name}; needed limits on its inputs alone: write "
+            f"limits({system.n}, {system.m}, measurement=...)"
+        )
+    return within.measurement
 
 
 _FORGOTTEN = 0.01

@@ -139,9 +139,26 @@ def test_limits_that_were_not_checked_are(asked: Asked) -> None:
 
 def test_limits_of_a_system_have_one_entry_for_each_input() -> None:
     system = LinearSystem([["0.5"]], [["0.5", "0.25"]])
-    with pytest.raises(ValueError, match=r"shape \(1,\) on the measurement; needed \(2,\)"):
+    with pytest.raises(ValueError, match=r"shape \(1,\) on the .*; needed \(2,\): this filter has 1 states and 2"):
         required_precision(system, 10, 0.1, basis="guarantee", within=limits(1, 1, measurement=3))
     assert required_precision(system, 10, 0.1, basis="guarantee", within=limits(1, 2, measurement=3)).fmt
+
+
+@pytest.mark.parametrize("basis", ["bound", "guarantee"])
+@pytest.mark.parametrize("A", [[["0.5", "0"], ["0.1", "1"]], [["0.96", "0.28"], ["-0.28", "0.96"]]])
+def test_errors_that_never_decay_have_a_bound_for_the_steps_asked_for(A: Any, basis: Any) -> None:
+    """The largest pole may be 1 - 1e-16 in float64, from which a sum over all time would take 2e16 terms."""
+    system = LinearSystem(A, [[1], [0]], [[1, 0]])
+    given: dict[str, Any] = {"z": np.ones((100, 1))} if basis == "bound" else {"within": limits(2, 1, measurement=1)}
+    assert 5 < required_precision(system, 100, 0.01, basis=basis, **given).precision < 24
+
+
+def test_limits_on_measurements_of_a_filter_that_settles_slowly_are_refused_within_the_budget() -> None:
+    q = Fraction(1, 1_000_000)
+    Q = [[q / 300, q / 20], [q / 20, q]]
+    model = LinearModel([["1", "0.1"], ["0", "1"]], [[1, 0]], Q, [[4]], [0, 0], [[100, 0], [0, 100]])
+    with pytest.raises(ValueError, match=r"a filter that settles in .* steps .* give limits on the states and innov"):
+        guarantee(model, FloatFormat(2, 24), limits(2, 1, measurement=1000), budget=1e6)
 
 
 @pytest.mark.parametrize("size", [2.0**-451, 2.0**451])
@@ -249,7 +266,7 @@ def test_inputs_that_underflow_count_among_the_errors_of_storing(basis: Any) -> 
     """A delay line: 6e-5 is below the least normal number and stored as 0, whatever the precision."""
     delay = LinearSystem([[0]], [[1]], [[1]])
     ranged: dict[str, Any] = {"emin": -14, "emax": 15, "subnormal": False}
-    u, within = np.full((5, 1), 0.05), limits(1, 1, measurement=0.05)
+    u, within = np.full((5, 1), 0.05), limits(1, 1, measurement=0.05) if basis == "guarantee" else None
     lost = np.full((3, 1), 6e-5)
     for rounding in ("nearest", "chop", "up", "stochastic"):
         asked = {"z": u, "basis": basis, "within": within, "rounding": rounding} | ranged

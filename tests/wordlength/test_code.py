@@ -32,6 +32,7 @@ from gpbnb import (
 )
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.design import FilterDesign
+from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
 from gpbnb.filters.simulation import simulated_measurements
@@ -510,9 +511,9 @@ def test_a_name_cannot_end_a_comment(tmp_path):
         (models()["one state"], FixedFormat(8, 55), "UD", "the UD form in 64 bits with 55 after the point"),
         (models()["one state"], FixedFormat(8, 23, "even", "wrap"), "UD", "that do not wrap around"),
         (
-            LinearModel([[2]], [[2]], [[4]], [[8]], [0], [[4]]),
+            NonlinearSystem(lambda fmt, x, u: (x[0] / u[0], x[0]), [2], 1),
             FixedFormat(64, -1, "up", "saturate"),
-            "Joseph",
+            None,
             "got divisors of 64 bits",
         ),
         (models()["one state"], FixedFormat(8, 56), "Joseph", "got data of 65 bits; needed at most 64"),

@@ -195,14 +195,16 @@ def test_a_guarantee_comes_with_a_certificate(files, tmp_path, form, capsys):
 def test_a_certificate_that_cannot_be_written_is_refused(files, tmp_path, capsys):
     folder = files[0]
     (folder / "model.toml").write_text(MODEL.replace("R = [[4]]", "R = [[0.01]]"), encoding="utf-8")
-    given = [str(folder / "model.toml"), "--tolerance", "0.01,inf", "--certificate", str(tmp_path / "certificate.json")]
-    sizes = ["--state", "1e4,50", "--innovation", "30"]
-    assert main(given) == 2
-    assert "needed --basis guarantee" in capsys.readouterr().err
-    assert main([*given, "--basis", "guarantee", *sizes, "--tolerance", "1e-30"]) == 2
-    assert "got no precision with a guarantee" in capsys.readouterr().err
-    assert main([*given, "--basis", "guarantee", *sizes, "--certificate", str(folder / "model.toml")]) == 2
-    assert "which are one file" in capsys.readouterr().err
+
+    def refused(tolerance, certificate, *more):
+        given = [str(folder / "model.toml"), "--tolerance", tolerance, "--certificate", str(certificate)]
+        assert main([*given, *more]) == 2
+        return capsys.readouterr().err
+
+    path, basis = tmp_path / "certificate.json", ["--basis", "guarantee", "--state", "1e4,50", "--innovation", "30"]
+    assert "needed --basis guarantee" in refused("0.01,inf", path)
+    assert "got no precision with a guarantee" in refused("1e-30", path, *basis)
+    assert "which are one file" in refused("0.01,inf", folder / "model.toml", *basis)
 
 
 def test_a_digital_filter_comes_with_a_certificate_and_code_of_the_file_as_it_was_read(tmp_path, capsys, monkeypatch):

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,14 +17,18 @@ from gpbnb import (
     FloatFormat,
     LinearModel,
     LinearSystem,
+    NonlinearModel,
     emulate,
     guarantee,
     limit_cycles,
     limits,
     read_model,
+    required_block_precisions,
     required_fraction_bits,
     required_precision,
+    required_word_formats,
     survey_records,
+    write_code,
 )
 from gpbnb.names import format_parts
 from gpbnb.wordlength.__main__ import main
@@ -30,6 +37,7 @@ from gpbnb.wordlength.models import read_measurements
 
 WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
 SYSTEM = LinearSystem([["0.9"]], [["0.1"]])
+WITHIN = limits(1, 1, measurement=0.001)
 TOML = "Phi=[[1,1],[0,1]]\nH=[[1,0]]\nQ=[[1,0],[0,1]]\nR=[[1]]\nx0=[0,0]\nP0=[[1,0],[0,1]]\n"
 
 
@@ -60,6 +68,12 @@ def test_a_file_is_read(text, rows, tmp_path):
         # taken for a header, a missing first measurement would move all others by a step
         ("N/A\n1\n", "z.csv, line 1: got 'N/A'; needed a number such as .*; write nan, or leave the cell empty, where"),
         ("None,null\n1,2\n", "z.csv, line 1: got 'None'; needed a number"),
+        # a minus sign or a dash of spreadsheets, an amount, and digits of another script
+        ("\u22121\n\u22122\n3\n", "z.csv, line 1: got '\u22121'; needed a number"),
+        ("\u2013\n3\n", "z.csv, line 1: got '\u2013'; needed a number"),
+        ("(1)\n3\n", r"z.csv, line 1: got '\(1\)'; needed a number"),
+        ("$5\n3\n", r"z.csv, line 1: got '\$5'; needed a number"),
+        ("\u0663\n3\n", "z.csv, line 1: got '\u0663'; needed a number"),
         ("1\nNA\n", "z.csv, line 2: got 'NA'; needed a number such as .*; write nan, or leave"),
     ],
 )
@@ -197,12 +211,101 @@ def test_a_digital_filter_has_named_inputs_and_outputs():
         (lambda: required_precision(WALK, 5, [1, 2]), r"^got tolerance \[1, 2\] of shape \(2,\); needed"),
         (lambda: required_precision(lambda: 1, 5, 1), "got a function that does not take .*fmt.*: .*; needed f.fmt."),
         (lambda: required_precision(lambda f, z: 1, 5, 1), "got a function that does not take .*; needed f.fmt.* z="),
+        # options that would change nothing
+        *(
+            (
+                partial(answer, 5, 1, z=np.ones((5, 1)), basis=basis, within=WITHIN),
+                f'got limits and basis "{basis}", wh',
+            )
+            for model in (WALK, SYSTEM)
+            for answer in (partial(required_precision, model), partial(judge, model, BINARY32))
+            for basis in ("emulation", "bound")
+        ),
+        (
+            lambda: required_precision(SYSTEM, 5, 1, basis="guarantee", within=limits(5, 1, measurement=1)),
+            r"got limits of shape \(5,\) on the state; needed \(1,\)",
+        ),
+        (
+            lambda: required_precision(SYSTEM, 5, 1, basis="guarantee", within=limits(1, 1, state=1, measurement=1)),
+            r"got limits on states or innovations for .*; needed limits on its inputs alone: write limits\(1, 1, meas",
+        ),
+        (
+            lambda: read_model({"b": [1], "a": [1, "0.5"], "scale": True}),
+            "got scale for 'direct form II transposed'; n",
+        ),
+        (lambda: LinearSystem.from_coefficients([1], [1, "0.5"], order=[0]), "got order for 'direct form II transpo"),
+        (
+            lambda: LinearSystem.from_sections([[1, 0, 0, 1, "0.5", 0]], "lattice", "given", scale=True),
+            "got pairing and scale for 'lattice'; needed a cascade",
+        ),
+        (lambda: read_model(WALK, structure="cascade"), "got structure 'cascade' for a LinearModel, which is computed"),
+        (lambda: read_model(SYSTEM, structure="cascade"), "got structure 'cascade' for a LinearSystem, which is comp"),
+        (
+            lambda: required_fraction_bits(SYSTEM, [[1]], 1, rounding="chop", wide=True, like=FixedFormat(2, 5)),
+            "got rounding and wide beside like; needed like alone: its formats set them",
+        ),
+        (
+            lambda: required_fraction_bits(SYSTEM, [[1]], 1, coefficient_bits=9, like=FixedFormat(2, 5)),
+            "got coefficient_bits beside like; needed like alone",
+        ),
+        # questions that would take days
+        (lambda: survey_records(WALK, 10**12, 1, [BINARY16], steps=5), "000 records; needed .* at most 1,000,000"),
+        (lambda: limits(10**9, 1, 1, 1), "got 1000000000 states; needed .* at most 65,536"),
+        (
+            lambda: NonlinearModel(abs, None, abs, None, [[1]], [[1]], [1], [[1]], iterations=10**9),
+            "got 1000000000 iterations; needed .* at most 1,000",
+        ),
+        (lambda: read_measurements("/dev/zero"), "zero: got more than 268,435,456 bytes; needed a shorter file"),
         (lambda: FloatFormat(2, 8, emin=-5, emax=5, subnormal="no"), "subnormal: got 'no'; needed True or False"),
     ],
 )
 def test_a_call_is_refused(call, message):
     with pytest.raises((ValueError, TypeError), match=message):
         call()
+
+
+def test_an_answer_is_true_if_it_meets_the_tolerance():
+    z = np.ones((5, 1))
+    for tolerance, met in ((0.01, True), (1e-40, False)):
+        answers = [
+            required_precision(WALK, 5, tolerance, z=z),
+            judge(WALK, BINARY32, 5, tolerance, z=z),
+            required_fraction_bits(SYSTEM, z, tolerance),
+            required_block_precisions(WALK, 5, tolerance, z=z),
+            required_word_formats(SYSTEM, z, tolerance),
+        ]
+        assert [(bool(each), each.met) for each in answers] == [(met, met)] * 5
+
+
+def test_the_header_of_written_code_holds_no_refusal(tmp_path):
+    with pytest.raises(ValueError, match=r"got limits of shape \(3,\) on the state; needed \(1,\)"):
+        write_code(WALK, BINARY32, None, tmp_path, within=limits(3, 1, measurement=1))
+    with pytest.raises(ValueError, match=r"got limits of shape \(3,\) on the state; needed \(1,\)"):
+        write_code(SYSTEM, BINARY32, None, tmp_path, within=limits(3, 1, measurement=1))
+
+
+@pytest.mark.parametrize("name", ["filter.h", "filter.c", "test_filter.c", "filter_vectors.txt", "Makefile"])
+def test_written_code_replaces_only_files_that_gpbnb_has_written(name, tmp_path):
+    for _ in range(2):
+        paths = write_code(SYSTEM, BINARY32, None, tmp_path)
+    assert all(path.is_file() for path in paths)
+    for path in paths:
+        path.unlink()
+    (tmp_path / name).write_text("my own\n")
+    with pytest.raises(ValueError, match=f"in which {name} was not written by gpbnb; needed a folder without files"):
+        write_code(SYSTEM, BINARY32, None, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "my own\n"
+
+
+@pytest.mark.parametrize("command", ["gpbnb.wordlength", "gpbnb wordlength"])
+def test_an_interrupted_command_ends_in_a_line(command, folder, monkeypatch):
+    program = "import runpy, sys; from gpbnb.wordlength import options\n"
+    program += "def read(arguments): raise KeyboardInterrupt\noptions.read = read\n"
+    program += "sys.argv[1:] = sys.argv[1].split()\nrunpy.run_module(sys.argv.pop(1), run_name='__main__')"
+    found = subprocess.run([sys.executable, "-c", program, command], capture_output=True, text=True, check=False)
+    assert (found.returncode, found.stdout) == (130, "")
+    assert found.stderr == "python -m gpbnb.wordlength: interrupted\n"
 
 
 def test_an_error_of_the_function_itself_stays():

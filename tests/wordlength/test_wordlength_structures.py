@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.design import SIDE_BY_SIDE, FilterDesign
 from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, run_words
+from gpbnb.wordlength import models
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.fixed_point import required_fraction_bits, with_fraction_bits
 from gpbnb.wordlength.models import DESIGN, read_filter, read_model
@@ -125,13 +125,13 @@ def test_structures_that_a_filter_lacks_are_named_with_the_reason(filters, capsy
 
 
 def test_the_command_reads_its_file_once(filters, monkeypatch):
-    read, plain = list[str](), Path.read_bytes
+    read, plain = list[str](), models._text
 
     def noted(path):
         read.append(path.name)
         return plain(path)
 
-    monkeypatch.setattr(Path, "read_bytes", noted)
+    monkeypatch.setattr(models, "_text", noted)
     main([str(filters / "sections.toml"), "--tolerance", "0.01", "--simulate", "step", "--steps", "20"])
     assert read.count("sections.toml") == 1
 
