@@ -1,12 +1,12 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help address book test certificates proof test-pages test-portable verify-sweeps notebooks findings lint format exactness bench mutants environment screenshots pdf serve clean
+.PHONY: help address book test certificates proof test-pages test-portable verify-sweeps notebooks findings lint format exactness bench environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
 HTML := _build/html
-UV_COMPILE := uv --no-config pip compile pyproject.toml --extra report --universal --python-version 3.11 --fork-strategy fewest \
-	--only-binary :all: --generate-hashes --no-emit-index-url --custom-compile-command "make environment" --quiet
+UV_COMPILE := -m uv --no-config pip compile --universal --python-version 3.11 --fork-strategy fewest --only-binary :all: \
+	--generate-hashes --no-emit-index-url --custom-compile-command "make environment" --quiet
 
 # Outputs are stored without times, versions and the moments at which a text was flushed, which differ between runs.
 EXECUTE := --log-level=WARN --to notebook --execute --inplace --ExecutePreprocessor.record_timing=False \
@@ -53,6 +53,11 @@ help: ## list the targets
 	@scripts/make-venv.sh
 	@printf '%s\n' '$(HERE)' > $@
 
+# What few targets need is installed when one of them first asks for it. pychop, a peer in benchmarks, has no wheel.
+.venv/with-%: environment-%.txt .venv/made-for
+	$(PY) -m pip install --quiet --no-deps --require-hashes --no-build-isolation -r $<
+	@touch $@
+
 # Any page may show a number of any other, which Sphinx does not follow: all pages are built anew, in seconds.
 book: .venv/made-for ## build the HTML book from the notebooks and their stored outputs
 	@rm -rf $(HTML) _build/.doctrees _build/jupyter_execute
@@ -71,7 +76,7 @@ proof: ## check proof/guarantee.v, the theorem behind a certificate; needs Coq (
 	@mkdir -p .cache/proof
 	cp proof/guarantee.v .cache/proof/ && cd .cache/proof && coqc guarantee.v
 
-test-pages: .venv/made-for ## the built book in a real Chromium without a network
+test-pages: .venv/with-pages ## the built book in a real Chromium without a network
 	@test -f $(HTML)/index.html || $(MAKE) book
 	@$(PY) -m tests.pages.browser
 	$(PY) -m pytest tests/pages
@@ -88,13 +93,13 @@ notebooks: .venv/made-for ## execute the notebooks in place; NOTEBOOKS="book/kal
 findings: .venv/made-for ## run every check of the ledger and store the findings
 	$(PY) -c "from gpbnb.report.ledger import stored; stored.write_findings()"
 
-lint: .venv/made-for ## ruff and mypy, and warnings of replaced words
+lint: .venv/with-dev ## ruff and mypy, and warnings of replaced words
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) scripts/vocabulary.py
 	$(PY) -m mypy
 
-format: .venv/made-for ## let ruff lay out the code and mend what it can
+format: .venv/with-dev ## let ruff lay out the code and mend what it can
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
@@ -107,36 +112,26 @@ exactness: .venv/made-for ## billions of operations compared with independent ar
 	$(PY) -m benchmarks.nonlinear
 	$(PY) -m benchmarks.code
 
-# pychop has no wheel.
-bench: .venv/made-for ## timings against peers, side by side, the short formats against gfloat, and guarantees
-	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r benchmarks/environment.txt
+bench: .venv/with-bench ## timings against peers, side by side, the short formats against gfloat, and guarantees
 	$(PY) -m benchmarks
 	$(PY) -m benchmarks.year
 	$(PY) -m benchmarks.formats
 	$(PY) -m benchmarks.guarantee
 
-# yattag, which cosmic-ray uses, has no wheel.
-mutants: .venv/made-for ## seed faults and list those that no test catches; FILES="gpbnb/report/budget/theory.py" or SINCE=HEAD~3 picks files, OPTIONS=--measure finds the tests of each line first
-	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r tests/mutants/environment.txt
-	$(PY) -m tests.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(OPTIONS)
-
 address: .venv/made-for ## write the address of the project, set in pyproject.toml, into README, citation and guide
 	$(PY) scripts/address.py
 
-# filterpy has no wheel; scripts/make-venv.sh builds it.
-environment: .venv/made-for ## compile every environment.txt from pyproject.toml; UPGRADE=1 takes newer versions
-	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group book --group test --group pages --group dev \
-		--no-binary filterpy --output-file environment.txt
-	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group bench --no-binary pychop \
-		--constraints environment.txt --output-file benchmarks/environment.txt
-	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group mutants --no-binary yattag \
-		--constraints environment.txt --output-file tests/mutants/environment.txt
+environment: .venv/with-dev ## compile the lists of pinned packages from pyproject.toml; UPGRADE=1 takes newer versions
+	$(PY) $(UV_COMPILE) $(if $(UPGRADE),--upgrade) pyproject.toml --extra report --group book --group test \
+		--output-file environment.txt
+	for group in dev pages bench; do $(PY) $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group $$group --no-binary pychop \
+		--constraints environment.txt --output-file environment-$$group.txt || exit 1; done
 
-screenshots: .venv/made-for ## pictures of every page: light, dark, phone
+screenshots: .venv/with-pages ## pictures of every page: light, dark, phone
 	@test -f $(HTML)/index.html || $(MAKE) book
 	$(PY) -m tests.pages.screenshots
 
-pdf: .venv/made-for ## the whole book as one PDF, printed by Chromium
+pdf: .venv/with-pages ## the whole book as one PDF, printed by Chromium
 	@rm -rf _build/singlehtml
 	.venv/bin/jupyter-book build . -W -n --keep-going --builder custom --custom-builder singlehtml
 	$(PY) -m tests.pages.pdf

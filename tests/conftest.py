@@ -20,10 +20,10 @@ def ax(request):
 
     figure, axes = style.figure()
     yield axes[0]
-    if request.node.get_closest_marker("mpl_image_compare"):
+    if expected := TITLE_AND_AXES.get(f"{request.path.parent.name} {request.node.name}"):
         (panel,) = figure.axes
         found = panel.get_title(loc="left") or panel.get_title(), panel.get_xlabel(), panel.get_ylabel()
-        assert found == TITLE_AND_AXES.get(f"{request.path.parent.name} {request.node.name}", ("", "", ""))
+        assert found == expected
     figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
     panel = figure.axes[0]
     if panel.axison and panel.xaxis.label.get_fontsize() == style.TEXT:  # not after `clear`, which loses the style

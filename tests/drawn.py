@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import pytest
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
@@ -33,14 +32,6 @@ def colour(artist: Artist) -> str:
     """As written in gpbnb.report.display.style."""
     return to_hex(artist.get_color()).upper()
 
-
-#: Compares the figure that a test returns with its picture in the folder baseline. The style is matplotlib's own, with
-#: the fonts that it brings, whatever the machine has. The tolerance is the root mean square of the differences, of 255:
-#: other releases of matplotlib move the edges of letters and stay below 2; a label that is exchanged is above.
-#: ``python -m pytest tests/TOPIC/test_TOPIC_drawn.py --mpl-generate-path=tests/TOPIC/baseline`` draws them anew.
-pictured = pytest.mark.mpl_image_compare(
-    style="default", backend="agg", tolerance=2, savefig_kwargs={"dpi": 50, "facecolor": "white"}, deterministic=True
-)
 
 # The colours of the book, written out: observed errors, valid bounds, refuted formulas, references, other series.
 BLUE, GREEN, ORANGE, GREY, BLACK = "#0072B2", "#007D5F", "#C44E00", "#6B6B6B", "#000000"

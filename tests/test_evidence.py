@@ -44,12 +44,6 @@ def test_builds_of_generated_code_are_counted(tmp_path):
         evidence.compiled(file)
 
 
-def test_faults_that_change_no_result_do_not_count(tmp_path):
-    file = tmp_path / "modules.csv"
-    file.write_text("module,mutants,caught,equivalent,survived\na,10,7,2,1\nb,5,5,0,0\n")
-    assert evidence.faults(file) == Checked(13, 1)
-
-
 def test_a_run_beyond_its_bound_is_wrong(monkeypatch):
     row = evidence.survey.load()[0]
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""Expected title and axis labels of every figure that is compared with a stored picture.
+"""Expected title and axis labels of figures.
 
 Each key is a folder and a test; each value is the title, the horizontal and the vertical axis label.
 """

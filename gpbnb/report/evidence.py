@@ -66,14 +66,6 @@ def compiled(file: Path) -> Checked:
     return Checked(agree + wrong, wrong)
 
 
-def faults(file: Path) -> Checked:
-    """Count seeded faults that change a result, and those that no test catches, from the record of ``make mutants``."""
-    with file.open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    judged = sum(int(row["mutants"]) - int(row["equivalent"]) for row in rows)
-    return Checked(judged, judged - sum(int(row["caught"]) for row in rows))
-
-
 def attacks() -> Checked:
     """Count emulated runs against guarantees, and those that exceed their bound."""
     kalman, linear = filters.load(), survey.load()

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from drawn import BLACK, BLUE, GREEN, GREY, NAVY, PINK, PURPLE, at, look, named, near, pictured
+from drawn import BLACK, BLUE, GREEN, GREY, NAVY, PINK, PURPLE, at, look, named, near
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 
@@ -15,7 +15,6 @@ from gpbnb.report.budget.experiment import Draws
 from gpbnb.report.budget.theory import Budget, ErrorForm, Kind, Source
 
 
-@pictured
 def test_budget_curve(ax):
     goal, larger, linear, printed, *_ = figures.budget_curve((44, 0.15), (2.0, 3.0), ax, most=25)
     n = range(1, 26)
@@ -31,7 +30,6 @@ def test_budget_curve(ax):
     assert near(names.pop("all of the same sign,\ntotal 2 mas/yr"), GREY, (9, 2 / 9))
     assert near(names.pop("printed example"), BLACK, (44, 0.15))
     assert not names
-    return ax.figure
 
 
 def budget():
@@ -44,7 +42,6 @@ def budget():
     )
 
 
-@pictured
 def test_shares(ax):
     artists = figures.shares(budget(), ax)
     bars = artists[:4]
@@ -59,10 +56,8 @@ def test_shares(ax):
         assert near(names.pop(text), BLACK, (bar.get_width(), i))
         assert to_hex(bar.get_facecolor()).upper() == paint[text.split(", ")[1]]
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_distribution(ax):
     draws = Draws(budget(), np.array([-3.0, -1.0, 0.0, 0.0, 0.5, 2.0]))
     artists = figures.distribution(draws, ax)
@@ -94,4 +89,3 @@ def test_distribution(ax):
     assert not names
     assert ax.get_ylim() == pytest.approx((0, 1.42 * top))  # above the highest line, at 1.3
     assert ax.get_xlim() == pytest.approx((-10.2, 10.2))  # beyond the widest lines, at 10
-    return ax.figure

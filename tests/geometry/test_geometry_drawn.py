@@ -21,7 +21,6 @@ from drawn import (
     look,
     named,
     near,
-    pictured,
     points_of,
 )
 from matplotlib.colors import to_hex
@@ -58,7 +57,6 @@ def texts(artists):
     return {each.get_text(): each for each in artists if hasattr(each, "get_text")}
 
 
-@pictured
 def test_triads(solid):
     matrices = {
         "a": np.eye(3),
@@ -78,10 +76,8 @@ def test_triads(solid):
             assert np.allclose(text.get_position_3d(), end * 1.1)
             assert paint == to_hex(text.get_color()).upper() == colours[name]
     assert "absolute, intermediate, roll" in words
-    return solid.figure
 
 
-@pictured
 def test_colours_and_names_of_all_frames(solid):
     artists = figures.triads(dict.fromkeys("trg", np.eye(3)), solid)
     assert [paint for _, _, paint in arrows(artists)[::3]] == [PINK, NAVY, VIOLET]
@@ -91,7 +87,6 @@ def test_colours_and_names_of_all_frames(solid):
     assert np.allclose(np.hypot(x, y), 0.55)
     assert np.allclose(z, 0)
     assert to_hex(ring.get_color()).upper() == NAVY
-    return solid.figure
 
 
 #: Figure IV-2 of hung1984: the angle between two frames.
@@ -114,7 +109,6 @@ FRAMES = {
 }
 
 
-@pictured
 def test_chain(ax):
     artists = figures.chain(ax)
     links = [each for each in artists if isinstance(each, Annotation)]
@@ -145,7 +139,6 @@ def test_chain(ax):
             assert text.get_position()[1] > (one[1] + other[1]) / 2
     assert [found[ends].arrowprops["ls"] for ends in LINKS if ends != ("g", "r")] == ["-"] * 6
     assert len(words) == len(FRAMES) + len(LINKS)
-    return ax.figure
 
 
 def gap(point, start, end):
@@ -156,7 +149,6 @@ def gap(point, start, end):
 
 
 @pytest.mark.parametrize("printed", [False, True], ids=["derived", "printed"])
-@pictured
 def test_deroll_of_a_roll(ax, printed):
     phase = np.linspace(0, 2 * np.pi, 5)
     true = np.array([-15.0, -8.0])  # −α3 and α2, arcseconds
@@ -179,10 +171,8 @@ def test_deroll_of_a_roll(ax, printed):
     assert ax.get_ylim() == pytest.approx((-1.2 * 17, 1.35 * 17))  # of the first reading, 17 arcseconds long
     equation = "(8)" if printed else "(5)"
     assert ax.get_title(loc="left") == rf"equation {equation}: circles $\hat\alpha_3$, squares $\hat\alpha_2$"
-    return ax.figure
 
 
-@pictured
 def test_losses(ax):
     sizes = np.array([10.0, 100.0]) * ARCSEC
     curves = {
@@ -209,10 +199,8 @@ def test_losses(ax):
     assert (set(tolerance.get_ydata()), look(tolerance)[:2]) == ({1}, (GREY, ":"))
     assert near(names.pop("tolerance, 1 mas"), GREY, (5, 1))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_first_rolls(ax):
     seconds = np.arange(6.0)
     rolled = SimpleNamespace(
@@ -236,11 +224,9 @@ def test_first_rolls(ax):
     assert near(names.pop("mean over\na roll"), BLUE, (1, 40))
     assert near(names.pop("no roll"), PINK, (1, 65))
     assert not names
-    return ax.figure
 
 
 @pytest.mark.parametrize("component", [0, 1], ids=["second", "third"])
-@pictured
 def test_year_errors(ax, component):
     time = np.linspace(0.02, 0.98, 25)
     results = {}
@@ -263,10 +249,8 @@ def test_year_errors(ax, component):
         assert near(names.pop(f"case {i}"), paint, (1, expected[-1]))
     assert not names
     assert set(ax.lines[-1].get_ydata()) == {0}
-    return ax.figure
 
 
-@pictured
 def test_precessions(solid):
     declination = 0.29
     artists = figures.precessions(solid, declination)
@@ -299,4 +283,3 @@ def test_precessions(solid):
     assert np.allclose(np.hypot(x, z), 1)
     assert np.allclose(y, 0)
     assert "polar orbit" in words
-    return solid.figure

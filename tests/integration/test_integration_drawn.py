@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn import BLUE, GREEN, GREY, ORANGE, PINK, VIOLET, at, labelled, look, named, near, pictured, points_of
+from drawn import BLUE, GREEN, GREY, ORANGE, PINK, VIOLET, at, labelled, look, named, near, points_of
 from matplotlib.colors import to_hex
 from matplotlib.patches import ArrowStyle, Circle, FancyArrowPatch, Rectangle
 from matplotlib.text import Text
@@ -55,7 +55,6 @@ PATHS = {
 }
 
 
-@pictured
 def test_block_diagram(ax):
     artists = figures.block_diagram(ax)
     texts = {
@@ -102,7 +101,6 @@ def test_block_diagram(ax):
     assert [sign for _, sign in near_second] == ["+", "−"]
     assert near_second[0][0] < second[1] < near_second[1][0]
     assert len(signs) == 3
-    return ax.figure
 
 
 def inside(box, place):
@@ -142,7 +140,6 @@ def beside(place, start, end):
 # -- curves ---------------------------------------------------------------------------------------
 
 
-@pictured
 def test_accuracy(ax):
     mu = np.array([1e-9, 1e-2, 1.0, 5.0, 10.0])
     results = {
@@ -161,10 +158,8 @@ def test_accuracy(ax):
     assert near(names.pop("stable"), GREEN, (1e-2, 0.7))
     assert near(names.pop("no digit correct"), GREY, (10, top))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_approximations(ax):
     figures.approximations(3, ax)
     found, names = curves(ax), named(ax)
@@ -189,10 +184,8 @@ def test_approximations(ax):
     assert (found[r"$\mu=2\pi$"].get_xdata()[0], look(found[r"$\mu=2\pi$"])[:2]) == (2 * np.pi, (GREY, ":"))
     assert near(names.pop(r"$2\pi$"), GREY, (2 * np.pi, 2e-6))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_powers(ax):
     figures.powers(ax)
     found = curves(ax)
@@ -213,13 +206,11 @@ def test_powers(ax):
         ("power of the iteration rate", (0.012, -1.0), GREEN),
         ("abstract", (100, -1.0), ORANGE),
     ]
-    return ax.figure
 
 
 SWEPT = WalkSweep(np.array([0.3, 1.0, 20.0]), 1000, 800, np.array([0.051, 0.17, 0.95]))
 
 
-@pictured
 def test_random_walk(ax):
     figures.random_walk(SWEPT, ax)
     found, names = curves(ax), named(ax)
@@ -239,10 +230,8 @@ def test_random_walk(ax):
     assert near(names.pop("(39)"), ORANGE, (x[-1] / 4, math.sqrt(x[-1] / 24)))
     assert near(names.pop("simulation"), BLUE, (10 * x[0], math.sqrt(10 * x[0] / 6)))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_deviations(ax):
     figures.deviations(SWEPT, ax)
     found, names = curves(ax), named(ax)
@@ -266,10 +255,8 @@ def test_deviations(ax):
     assert near(names.pop("dots: from (35)"), BLUE, (edge, -2))
     assert near(names.pop("squares: from (39)"), ORANGE, (edge, -2))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_build_up(ax):
     mu, n = 0.2, (1, 10, 100)
     process = theory.first_order(3.0, 0.4)
@@ -296,10 +283,8 @@ def test_build_up(ax):
     }
     assert labelled(ax) == {"trapezoidal": (BLUE, "", "o"), "rectangular": (PINK, "", "s")}
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_rules_first_order(ax):
     figures.rules_first_order(("trapezoidal", "Simpson"), ax)
     found, names = curves(ax), named(ax)
@@ -317,10 +302,8 @@ def test_rules_first_order(ax):
     assert near(names.pop("Simpson"), PINK, (1, found["Simpson"].get_ydata()[-1]))
     assert near(names.pop("scaled samples"), GREY, (1, found["scaled samples (lower bound)"].get_ydata()[-1]))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_rules_resonant(ax):
     figures.rules_resonant(("trapezoidal", "Simpson"), 0.05, ax)
     found = curves(ax)
@@ -334,7 +317,6 @@ def test_rules_resonant(ax):
         assert found[name].get_ydata()[77] == pytest.approx(expected)
         assert look(found[name])[:2] == (paint, "-")
     assert found["trapezoidal"].get_ydata()[77] != found["Simpson"].get_ydata()[77]
-    return ax.figure
 
 
 FORMATS = (FloatFormat(2, 11), FloatFormat(2, 20, CHOP))
@@ -349,7 +331,6 @@ def swept():
     return experiment.RateSweep(64.0, 2.0, 20, FORMATS, rates, *errors)
 
 
-@pictured
 def test_errors_over_rate(ax, swept):
     figures.errors_over_rate(swept, ax)
     found, names = curves(ax), named(ax)
@@ -375,10 +356,8 @@ def test_errors_over_rate(ax, swept):
     assert near(names.pop("11 bits"), FEW, (1, 0.01))
     assert near(names.pop("20 bits, chopped"), MANY, (1, 100))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_names_that_would_collide_move_apart(ax, swept):
     close = np.array([9.0, 3.0, 1.05])
     figures.errors_over_rate(replace(swept, rounding=np.stack([close, close * 1.05])), ax)
@@ -389,10 +368,8 @@ def test_names_that_would_collide_move_apart(ax, swept):
     assert middle.y1 < high.y1
     assert not low.overlaps(middle)
     assert not middle.overlaps(high)
-    return ax.figure
 
 
-@pictured
 def test_totals(ax, swept):
     figures.totals(replace(swept, rates=np.array([1000.0, 2000.0, 4000.0])), ax)
     found, names = curves(ax), named(ax)
@@ -412,13 +389,11 @@ def test_totals(ax, swept):
     assert near(names.pop("11 bits"), FEW, (1, 7))
     assert near(names.pop("20 bits, chopped"), MANY, (1, 11))
     assert not names
-    return ax.figure
 
 
 DURATIONS = {"1 minute": 60.0, "1 hour": 3600.0, "1 day": 86400.0}
 
 
-@pictured
 def test_best_rates(ax):
     figures.best_rates(628.0, DURATIONS, [20, 24, 30], ax)
     names = named(ax)
@@ -431,10 +406,8 @@ def test_best_rates(ax):
         assert nearest.get_label() == text
         assert names[text][0] == paint
         assert names[text][1] == (1, nearest.get_ydata()[2])
-    return ax.figure
 
 
-@pictured
 def test_needed_bits(ax):
     figures.needed_bits(628.0, DURATIONS, [100.0, 1000.0], ax)
     names = named(ax)
@@ -447,4 +420,3 @@ def test_needed_bits(ax):
         assert nearest.get_label() == text
         assert names[text][0] == paint
         assert names[text][1] == (1, nearest.get_ydata()[1])
-    return ax.figure

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, at, labelled, look, named, near, pictured
+from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, at, labelled, look, named, near
 from matplotlib.colors import to_hex
 from matplotlib.patches import ArrowStyle, FancyArrowPatch
 
@@ -56,7 +56,6 @@ RESULTS = {
 }
 
 
-@pictured
 def test_flow_chart(ax):
     artists = figures.flow_chart(ax)
     boxes = {text.get_position(): text for text in artists if hasattr(text, "get_text")}
@@ -80,14 +79,12 @@ def test_flow_chart(ax):
     # The computation runs downwards on the left, the errors on the right.
     assert all(x > 0.5 for (x, _), text in boxes.items() if text.get_text() in ERRORS)
     assert all(boxes_y(boxes, start) >= boxes_y(boxes, end) - 0.02 for start, end in ARROWS)
-    return ax.figure
 
 
 def boxes_y(boxes, words):
     return next(y for (_, y), text in boxes.items() if text.get_text() == words)
 
 
-@pictured
 def test_table1(ax):
     def column(kind, *values):
         return PrintedColumn(kind, Wordlength("t = places", Rounding.NEAREST), "", "column sum", False, values)
@@ -111,10 +108,8 @@ def test_table1(ax):
     assert near(names.pop("error as\nprinted"), BLACK, (right, 7.782e-5))
     assert not names
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["3", "5", "8"]
-    return ax.figure
 
 
-@pictured
 def test_violations(ax):
     rows = [
         {"family": family, "format": "all", "bound": bound, "regular": "40", "violations_regular": str(4 * k + i)}
@@ -130,7 +125,6 @@ def test_violations(ax):
     assert [marker for _, _, marker in labelled(ax).values()] == ["o", "o", "s", "s"]
     assert [handle.get_markerfacecolor() for handle in ax.get_legend().legend_handles] == [ORANGE, "none"] * 2
     assert ax.yaxis_inverted()
-    return ax.figure
 
 
 class Matrix(NamedTuple):
@@ -146,7 +140,6 @@ def trial(n, condition, error, **bounds):
     return InverseTrial("random", matrix, None, True, condition, Fraction(error), bounds)
 
 
-@pictured
 def test_ratios_against_size(ax):
     trials = [
         trial(2, 3.0, "1/8", loose=4.0, tight=0.5),
@@ -166,10 +159,8 @@ def test_ratios_against_size(ax):
     assert near(names.pop("tight"), GREEN, (1, 3))
     assert near(names.pop("error"), BLUE, (1, 1))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_ratios_against_condition(ax):
     trials = [
         trial(3, 90.0, "1/8", loose=4.0, middle=3.0, tight=0.5),
@@ -190,4 +181,3 @@ def test_ratios_against_condition(ax):
     assert near(names.pop("error"), BLUE, (10, 1))
     assert not names
     assert np.isclose(ax.get_ylim()[0], 0.4)
-    return ax.figure

@@ -22,7 +22,6 @@ from drawn import (
     look,
     named,
     near,
-    pictured,
 )
 from matplotlib.colors import to_hex
 
@@ -65,7 +64,6 @@ def digits(precision, chopped=False):
     ],
     ids=["drift", "rate", "gain", "covariance"],
 )
-@pictured
 def test_years(ax, quantity, values, words):
     runs = [
         run(24, NEAREST, Form.HUNG, 1.0),
@@ -95,10 +93,8 @@ def test_years(ax, quantity, values, words):
         assert near(names.pop(curve.get_label()), paint, (1, curve.get_ydata()[-1]))
     assert near(names.pop("tolerance"), GREY, (1, 0.3))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_years_with_limits(ax):
     one = run(24, NEAREST, Form.HUNG, 1.0)
     limits = [
@@ -119,10 +115,8 @@ def test_years_with_limits(ax):
     assert near(names.pop("printed"), ORANGE, (1, 4))
     assert near(names.pop("level"), ORANGE, (1, 0.5))
     assert set(names) == {"24 bits"}
-    return ax.figure
 
 
-@pictured
 def test_bound_by_digits(ax):
     (printed,) = figures.bound_by_digits(ax, {}, ls="--")
     assert look(printed)[:2] == (ORANGE, "--")
@@ -136,7 +130,6 @@ def test_bound_by_digits(ax):
     assert slope == pytest.approx(-1, abs=1e-9)
     heights = figures.bound_by_steps([10, 1000], FloatFormat(2, 24), {})
     assert heights == [figures.report_bounds.gravity_probe_b_bound(Fraction(1, 2**24), k) for k in (10, 1000)]
-    return ax.figure
 
 
 ANSWERS = {
@@ -162,7 +155,6 @@ def answers():
 
 
 @pytest.mark.parametrize("others", [False, True], ids=["front", "others"])
-@pictured
 def test_digits_needed(ax, others):
     gravity_probe_b_figures.digits_needed(answers(), ax, others)
     lines = {line.get_label(): line for line in ax.lines if not line.get_label().startswith("_")}
@@ -212,10 +204,8 @@ def test_digits_needed(ax, others):
     ax.figure.canvas.draw()
     low, high = ax.get_xlim()
     assert bits.get_xlim() == pytest.approx((1 + (low - 1) * math.log2(10), 1 + (high - 1) * math.log2(10)))
-    return ax.figure
 
 
-@pictured
 def test_contraction(ax):
     state = np.array([[9.0, -1.0], [9.0, 0.0], [9.0, 3.0]])
     bound = np.array([[8.0, 2.0], [8.0, 4.0], [8.0, 6.0]])
@@ -229,10 +219,8 @@ def test_contraction(ax):
         ("contraction bound", GREEN, (100, 6)),
         ("observed", BLUE, (100, 3)),
     ]
-    return ax.figure
 
 
-@pictured
 def test_violations(ax):
     def summary(form, trials, *violated):
         names = dict(zip(("violations_105", "violations_108", "violations_125"), violated, strict=True))
@@ -252,10 +240,8 @@ def test_violations(ax):
         for text, handle in zip(ax.get_legend().get_texts(), ax.get_legend().legend_handles, strict=True)
     }
     assert shown == {"(105)": BLUE, "(108)": PURPLE, "(125)": PINK}
-    return ax.figure
 
 
-@pictured
 def test_shares(ax):
     def share(states, precision, errors):
         return Share("", states, "", FloatFormat(2, precision), np.array(errors), 0, 0.0, 0.0, 0.0)
@@ -283,10 +269,8 @@ def test_shares(ax):
     ax.clear()
     gravity_probe_b_figures.shares([found[0]._replace(fmt=FloatFormat(10, 8))], ax)
     assert ax.get_xlabel() == "decimal digits"
-    return ax.figure
 
 
-@pictured
 def test_guarantee(ax):
     found = SimpleNamespace(history=np.array([[9.0, 1.0], [9.0, 2.0]]), bound=np.array([9.0, 3.0]))
     chosen, random = np.array([[5.0, -0.5], [5.0, 1.5], [5.0, 2.5]]), np.array([[4.0, 0.1], [4.0, -0.2], [4.0, 0.3]])
@@ -304,4 +288,3 @@ def test_guarantee(ax):
     paints = [to_hex(band.get_facecolor()[0]).upper() for band in (adversary, noise)]
     assert (look(bound)[0], paints) == (GREEN, [BLUE, PINK])
     assert ax.get_ylim() == pytest.approx((3e-3, 150))
-    return ax.figure

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 import pytest
-from drawn import BLUE, GREEN, GREY, ORANGE, PURPLE, at, legend_of, look, named, near, pictured, points_of, spans_of
+from drawn import BLUE, GREEN, GREY, ORANGE, PURPLE, at, legend_of, look, named, near, points_of, spans_of
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.display.style import bits_colour
@@ -53,7 +53,6 @@ def found():
     )
 
 
-@pictured
 def test_density(ax):
     spectrum = Spectrum(np.array([1e-3, 1e-2, 1e-1]), np.array([7.0, 5.0, 3.0]), np.array([4.0, 16.0, 25.0]))
     measured, line = figures.density(spectrum, 0.02, Slope(-1.2345, 0.0678, 2.0), ax)
@@ -65,10 +64,8 @@ def test_density(ax):
     assert text == "$A/f$; measured slope −1.234 ± 0.068"  # the value and its standard error, in this order
     assert near(beside, GREEN, (1e-2, 2.0))
     assert (measured.get_label(), line.get_label()) == ("measured", "$A/f$")
-    return ax.figure
 
 
-@pictured
 def test_residual(ax):
     spectrum = Spectrum(np.array([1e-3, 1e-2, 4e-2]), np.array([70.0, 5.0, 3.0]), np.array([4.0, 16.0, 25.0]))
     measured, one = figures.residual(spectrum, 0.02, 10.0, ax)
@@ -78,10 +75,8 @@ def test_residual(ax):
     assert spans_of(measured) == pytest.approx([1, 0.5, 0.4])
     assert (look(measured)[0], look(one)[0], set(one.get_ydata())) == (BLUE, GREEN, {1})
     assert [measured.get_label(), one.get_label()] == ["measured", "expected for the samples"]
-    return ax.figure
 
 
-@pictured
 def test_before_rolling(ax, found):
     noise, drift, noise_line, drift_line, printed = figures.before_rolling(found, ax)
     assert (look(noise), points_of(noise)[1]) == ((BLUE, "", "o"), (2e-4, 5e6))
@@ -102,10 +97,8 @@ def test_before_rolling(ax, found):
     assert near(names.pop("drift"), PURPLE, (middle, float(drift_line.get_ydata()[150])))
     assert near(names.pop(r"drift as printed, $k^2/\omega^4$"), ORANGE, points_of(printed)[-1])
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_after_rolling(ax, found):
     noise, drift, noise_line, left, right = figures.after_rolling(found, ax)
     assert (look(noise), points_of(noise)[2]) == ((BLUE, "", "o"), (2e-2, 5e4))
@@ -123,10 +116,8 @@ def test_after_rolling(ax, found):
     assert near(names.pop("noise"), BLUE, (float(f[100]), flicker(500.0, f[100], 8.0)))
     assert near(names.pop("drift, rolled"), PURPLE, (1 / 80, float(found.line_signal.max())))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_around_roll(ax, found):
     noise, drift, noise_line, drift_line = figures.around_roll(found, ax)
     assert (look(noise), look(drift)) == ((BLUE, "", "o"), (PURPLE, "", "s"))
@@ -141,10 +132,8 @@ def test_around_roll(ax, found):
     assert near(names.pop("drift, rolled"), PURPLE, (0, float(found.line_signal.max())))
     assert near(names.pop("noise"), BLUE, (0, float(found.line_noise.mean())))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_at_base(ax, found):
     noise, drift, noise_line, drift_line = figures.at_base(found, ax)
     assert (look(noise), points_of(noise)) == ((BLUE, "", "o"), [(1, 3e4), (2, 4e4), (3, 5e4)])
@@ -157,10 +146,8 @@ def test_at_base(ax, found):
     assert near(names.pop("drift, derolled"), PURPLE, (1, 9e9))
     assert near(names.pop("noise, derolled"), BLUE, (3, 3e4))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_trace(ax):
     pair, clean = np.array([1 + 5j, 2 + 6j]), np.array([1.5 + 5.5j, 2.5 + 6.5j])
     x, x_line, y, y_line = figures.trace(np.array([0.0, 3.0]), pair, clean, "(5)", ax)
@@ -170,10 +157,8 @@ def test_trace(ax):
     assert {look(line) for line in (x_line, y_line)} == {(GREEN, "-", "")}
     ax.clear()
     assert len(figures.trace(np.array([0.0, 3.0]), pair, None, "(5)", ax)) == 2
-    return ax.figure
 
 
-@pictured
 def test_drift_errors(ax):
     errors = np.stack([np.full((3, 2), size) for size in (9.0, 0.5, 0.25)])
     study = experiment.DriftStudy((None, 60.0, 240.0), 500.0, 4_000_000, 8.0, errors)
@@ -205,10 +190,8 @@ def test_drift_errors(ax):
     assert near(names.pop("frame dragging itself, 40 mas a year"), GREY, (60, 40))
     assert near(names.pop(r"not rolled: simulated (dotted), and $\sqrt{8A}/T$"), GREEN, (60, rest))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_bandwidths(ax):
     squares = np.array([[1.0, 3.0], [4.0, 6.0], [9.0, 11.0], [16.0, 20.0]])
     study = experiment.FilterStudy(
@@ -254,10 +237,8 @@ def test_bandwidths(ax):
     assert near(names.pop("theory"), GREEN, points_of(both)[30])
     assert legend_of(ax) == ["single pole", "moving average"]
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_resets(ax):
     errors = np.array([[1.0, -2.0, 2.0], [3.0, 3.0, -3.0]])
     points, line, never, free = figures.resets([6000.0, 60000.0], errors, 6600.0, 1e-22, 7.0, ax)
@@ -280,10 +261,8 @@ def test_resets(ax):
     assert near(names.pop("simulated"), BLUE, (6000, math.sqrt(3)))
     assert near(names.pop("never reset: simulated (dotted) and theory"), GREEN, (4000, min(7.0, without)))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_rotations(ax):
     def result(digits, size, bound):
         step = np.array([1, 1000, 100_000])
@@ -307,10 +286,8 @@ def test_rotations(ax):
     assert near(names.pop("9 decimal digits"), many, (1, 1e5 * mas * 3e-9))
     assert near(names.pop("1 mas"), GREY, (1, 1))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_phase_costs(ax):
     angle, found = np.radians([0.01, 1.0]), np.array([[3.0, -5.0], [-7.0, 11.0]])
     geodetic, theory_x, frame, theory_y, one = figures.phase_costs(angle, found, (6600.0, 40.0), ax)
@@ -333,4 +310,3 @@ def test_phase_costs(ax):
     assert near(names.pop("frame\ndragging"), PURPLE, (1, abs(expected[-1].imag)))
     assert near(names.pop("1 mas a year"), GREY, (1, 1))
     assert not names
-    return ax.figure

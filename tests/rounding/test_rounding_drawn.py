@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from drawn import BLUE, GREEN, GREY, ORANGE, PINK, PURPLE, at, look, named, near, pictured
+from drawn import BLUE, GREEN, GREY, ORANGE, PINK, PURPLE, at, look, named, near
 from matplotlib.colors import to_hex
 
 from gpbnb.arithmetic.formats import FloatFormat
@@ -22,7 +22,6 @@ NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 @pytest.mark.parametrize(
     ("rounding", "beta", "equation"), [(NEAREST, 0.05, "nearest"), (CHOP, 0.1, "chop")], ids=["nearest", "chop"]
 )
-@pictured
 def test_sawtooth(ax, rounding, beta, equation):
     result = SimpleNamespace(
         fmt=FloatFormat(10, 2, rounding), x=np.array([1.0, 5.0, 100.0]), error=np.array([0.01, 0.02, 0.0])
@@ -39,14 +38,12 @@ def test_sawtooth(ax, rounding, beta, equation):
     ((text, place),) = named(ax).items()
     assert text == r"bound $\beta$"
     assert near(place, GREEN, (10, beta))
-    return ax.figure
 
 
 def trial(fmt, n, ratio):
     return SimpleNamespace(fmt=fmt, inputs=[range(n)], ratio={"one": ratio, "two": 99.0}.__getitem__)
 
 
-@pictured
 def test_worst_ratios(ax):
     formats = [FloatFormat(10, 1), FloatFormat(2, 4), FloatFormat(2, 9)]
     curves = [[trial(fmt, n, 0.1 * n + i) for n in (2, 5)] for i, fmt in enumerate(formats)]
@@ -61,10 +58,8 @@ def test_worst_ratios(ax):
     assert (set(bound.get_ydata()), look(bound)[:2]) == ({1}, (ORANGE, "--"))
     assert near(names.pop("bound (20)"), ORANGE, (1, 1))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_growth(ax):
     lengths = (2, 8, 32)
 
@@ -96,10 +91,8 @@ def test_growth(ax):
     assert near(names.pop(r"$\sqrt{n}$ law"), ORANGE, (8, values[1]))
     assert not names
     assert [bound.get_label(), law.get_label()] == ["bound $n-1$", r"$\sqrt{n}$ law"]
-    return ax.figure
 
 
-@pictured
 def test_cancellation(ax):
     def one(left, right, product, error, printed, true):
         inputs = [np.array([[Fraction(left)]]), np.array([[Fraction(right)]])]
@@ -123,10 +116,8 @@ def test_cancellation(ax):
     assert near(names.pop("(31) as\nprinted"), ORANGE, (1, 0.1))
     assert near(names.pop("error"), BLUE, (1, (1 / 20 + 3 / 6) / 2))
     assert not names
-    return ax.figure
 
 
-@pictured
 def test_pessimism(ax):
     def group(*ratios):
         return [SimpleNamespace(ratio={"one": ratio, "two": 9.0}.__getitem__) for ratio in ratios]
@@ -147,4 +138,3 @@ def test_pessimism(ax):
     assert near(names.pop("the strict bound"), GREEN, (1.5, 1))
     assert not names
     assert math.isclose(ax.get_ylim()[1], 6)
-    return ax.figure

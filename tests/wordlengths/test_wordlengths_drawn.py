@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, at, labelled, legend_of, look, named, near, pictured
+from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, at, labelled, legend_of, look, named, near
 from matplotlib.colors import to_hex
 
 from gpbnb.arithmetic.formats import FloatFormat
@@ -39,7 +39,6 @@ def test_formats_at_the_ends_of_an_axis_have_their_lines(ax):
     assert set(standards_of(ax, True)) == {"binary16", "binary32"}
 
 
-@pictured
 def test_growth(ax):
     points = {"UD": [(10, 9), (1000, 24)], "Joseph": [(10, 11), (1000, 53)]}
     lines = {"bound": [(10, 20), (1000, 60)], "(125), corrected": [(10, 30), (1000, 50)], "law": [(10, 1), (100, 2)]}
@@ -62,10 +61,8 @@ def test_growth(ax):
     assert set(names) == set(STANDARD)
     assert {name: look(line) for name, line in found.items()} == expected
     assert standards_of(ax, False) == STANDARD
-    return ax.figure
 
 
-@pictured
 def test_overview(ax):
     found = {
         "tilt": {"emulation": 17, "bound": 32, "theory": 15, "printed": 40, "corrected": 44},
@@ -93,10 +90,8 @@ def test_overview(ax):
     assert [list(line.get_xdata()) for line in spans] == [[15, 44], [12, 18], [5, 5]]
     assert [list(line.get_ydata()) for line in spans] == [[0, 0], [1, 1], [2, 2]]
     assert standards_of(ax, True) == {name: STANDARD[name] for name in ("binary16", "binary32")}
-    return ax.figure
 
 
-@pictured
 def test_changes(ax):
     inf = math.inf
     figures.changes(
@@ -111,10 +106,8 @@ def test_changes(ax):
     assert (set(one.get_xdata()), look(one)[:2]) == ({1}, (GREY, "-"))
     assert [tick.get_text() for tick in ax.get_yticklabels()] == ["as it is", "scaled", "shifted"]
     assert ax.yaxis_inverted()
-    return ax.figure
 
 
-@pictured
 def test_bands(ax):
     records = np.arange(1.0, 12.0)
     found = {"UD": [(11, 10 * records), (12, records)], "Joseph": [(13, records / 10)]}
@@ -145,4 +138,3 @@ def test_bands(ax):
     (text,) = ax.texts
     assert (text.get_text(), text.xy) == ("tolerance", (1, 1))
     assert to_hex(text.get_color()).upper() == GREY
-    return ax.figure
