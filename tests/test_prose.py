@@ -59,9 +59,9 @@ REASONS = {"printed", "given", "exact", "formats", "names", "cited"}
 #: Sentences of the README, which cannot glue: what it says, and the number in the book, rounded to so many places.
 README = {
     "below 31 arcseconds,": ("rolling", "rolling_limit", 31, 0),
-    "one that varies below 20.8,": ("rolling", "rolling_varying", 20.8, 1),
+    "any error below 20.8 arcseconds": ("rolling", "rolling_varying", 20.8, 1),
     "in 0.7 % of single steps": ("kalman", "random_125", 0.7, 1),
-    "eight equations on the way": ("integration", "slipped", 8, 0),
+    "seven equations on the way": ("integration", "slipped", 7, 0),
     "for all 100,126 random inverses for which it exists": ("inversion", "inv_given", 100_126, 0),
 }
 

@@ -114,7 +114,7 @@ CLAIMS = {
     ),
     "hung1984.II.s12.example-9-digits": Claim(
         "A year of Gravity Probe B needs 9 digits, by the first term of (125)",
-        "With nine digits the filter misses the report's own criterion, which allows an error as large as the drift.",
+        "Nine digits keep the error far below the drift, the report's criterion, but not because (125) bounds the error.",
     ),
     "hung1984.II.s12.example-17-digits": Claim(
         "A year of Gravity Probe B needs 17 digits, by the second term of (125)",

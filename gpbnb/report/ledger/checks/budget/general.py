@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from datetime import date, datetime, timedelta
-from functools import reduce
-from operator import mul
 
-from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.linalg import dot
 from gpbnb.report.budget import theory
 from gpbnb.report.ledger.checks import rolling
 from gpbnb.report.ledger.checks.budget.registry import CHECKS
 from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
-from gpbnb.report.ledger.html import chapter
 from gpbnb.report.ledger.statements import Statement, load_statements, quote, statement
 from gpbnb.report.measurement import ARCSEC, MAS
 
@@ -29,64 +23,6 @@ def contents(printed: Statement) -> Finding:
         f"the chapters are {', '.join(dict.fromkeys(entry.chapter for entry in entries if entry.chapter != '-'))}",
         "the scan has no page numbers and no distribution list",
     )
-
-
-@CHECKS.add("hung1984.I.two-tasks")
-def two_tasks(printed: Statement) -> Finding:
-    fixed, spoiled, left = revised_sum(), revised_product(), revised_chain()
-    made = fixed and not spoiled and not left
-    return compare(
-        printed.claims("the corrections", {"have been made": made, "have not all been made": not made}),
-        "bound (18) of 1982, which the two-digit sum 5.6 + 5.9 − 11 violates, is "
-        f"{'corrected' if fixed else 'not corrected'}; equation (20), right in 1982, is "
-        f"{'made wrong' if spoiled else 'kept'}; bound (31), wrong in 1982, is "
-        f"{'kept' if left else 'corrected'}",
-        otherwise_note=(
-            "not all errors are corrected: bound (31) is still wrong, and the main result depends on it; "
-            f"see the {chapter('rounding')}"
-        ),
-        root="product-error-relative-to-product",
-    )
-
-
-def revised_sum() -> bool:
-    """Whether a sum that exceeds (18) of 1982 obeys (18) of 1984."""
-    fmt = FloatFormat(10, 2)
-    x = fmt.array(["5.6", "5.9", "-11"])
-    beta, terms = fmt.unit_roundoff, x.to_fractions()
-    true = sum(terms)
-    error = abs(((x[0] + x[1]) + x[2]).to_fractions() - true)
-    of_1982 = 2 * beta * abs(true)
-    of_1984 = beta * (2 * abs(true) + abs(terms[2]))
-    return bool(of_1982 < error <= of_1984)
-
-
-def revised_product() -> bool:
-    """Whether (20) of 1984, n + m + 1, but not (20) of 1982, differs from the number of roundings in a quotient."""
-    n, m = 3, 2
-    count = (reduce(mul, [Roundings()] * n) / reduce(mul, [Roundings()] * m)).count
-    return count == n + m - 1 and count != n + m + 1
-
-
-@dataclass(frozen=True)
-class Roundings:
-    """A placeholder for any number that counts the products and quotients that led to it."""
-
-    count: int = 0
-
-    def __mul__(self, other: Roundings) -> Roundings:
-        return Roundings(self.count + other.count + 1)
-
-    __truediv__ = __mul__
-
-
-def revised_chain() -> bool:
-    """Whether a cancelling product of a row and a column of two exceeds (31), which is the same in both reports."""
-    fmt = FloatFormat(10, 4)
-    row, column = fmt.array(["1.001", "-1.002"]), fmt.array(["1.001", "1"])
-    true = sum(row.to_fractions() * column.to_fractions())
-    error = abs(dot(row, column).to_fractions() - true)
-    return bool(error > 2 * fmt.unit_roundoff * abs(true))
 
 
 @CHECKS.add("hung1984.I.1-f-study")

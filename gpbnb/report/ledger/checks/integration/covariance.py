@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from itertools import product
 
@@ -26,6 +27,7 @@ from gpbnb.report.ledger.checks.integration.cases import (
 )
 from gpbnb.report.ledger.checks.integration.registry import CHECKS, MAIN, eq
 from gpbnb.report.ledger.finding import Finding, Verdict, compare
+from gpbnb.report.ledger.formula import Relation
 from gpbnb.report.ledger.statements import Statement, statement
 
 CLOSE = 1e-10
@@ -154,6 +156,22 @@ def p32(printed: Statement) -> Finding:
     )
 
 
+@CHECKS.add(MAIN + "sanalysis.substitution-32")
+def substituted(printed: Statement) -> Finding:
+    before, step = Relation("P_32[n-1]"), statement(MAIN + "eq18-p32").relation()
+    change = statement(MAIN + "eq32").relation()
+    found = []
+    for case in cases():
+        names = steady(case)
+        found.append(vanishes(step.value(names) - before.value(names) - change.value(names)))
+    return compare(
+        printed.claims("result", {"(32)": all(found), "a result other than (32)": not all(found)}),
+        f"the change of $P_{{32}}$ by (18) as printed agrees with (32) in {sum(found)} of {len(found)} cases",
+        Verdict.MISPRINT,
+        otherwise_note="the last term of the second equation of (18) lacks the factor $\\frac12$, which (32) has",
+    )
+
+
 # -- the continuous covariances, (19)-(23) --------------------------------------------------------
 
 
@@ -204,6 +222,19 @@ def covariance_equation(printed: Statement) -> Finding:
     )
 
 
+@CHECKS.add(MAIN + "sanalysis.substitution-21")
+def expanded(printed: Statement) -> Finding:
+    cited = [statement(MAIN + f"eq{number}") for number in re.findall(r"\((\d+)\)", printed.says("equations"))]
+    given = {part.sides[0].text: part.sides[-1].text for each in cited for part in each.parts if part.equates}
+    missing = [name for name in ("P", "A_underline", "N_p") if not given.get(name, "").startswith("[[")]
+    return compare(
+        not missing,
+        "(19) contains $P$, $A$ and $N_p$; (20) gives the entries of $P$ and $N_p$, and (4) those of $A$",
+        Verdict.MISPRINT,
+        otherwise_note="(4) is meant: (3) names the matrix $A$ but does not give its entries",
+    )
+
+
 @CHECKS.add(*eq("21"))
 def covariance_components(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(_from_any(case))) for case in cases())
@@ -212,7 +243,7 @@ def covariance_components(printed: Statement) -> Finding:
         agrees,
         "$\\dot P_{12}=P_{11}-\\omega_{bw}P_{12}$; the others as printed",
         Verdict.MISPRINT if same_letter else Verdict.WRONG,
-        otherwise_note="the subscript has capitals only here; $A$ is the matrix of (4), not of (3)",
+        otherwise_note="the subscript has capitals only here",
     )
 
 

@@ -138,12 +138,12 @@ def bounded(
         False,
         f"the printed terms {'follow' if follows else 'do not follow'} from the report's own algebra; in four "
         f"digits, the error of an example filter is {allows}",
-        otherwise_note=f"{note}{'' if follows else otherwise}{_right_form(printed)}",
+        otherwise_note=f"{note}{'' if follows else otherwise}{right_form(printed)}",
         root=root,
     )
 
 
-def _right_form(printed: Statement) -> str:
+def right_form(printed: Statement) -> str:
     """Say what the right statement is, if there is one."""
     correction = load_corrections().get(printed.id)
     corrected = correction and correction.applied(printed)

@@ -68,7 +68,7 @@ def prediction(printed: Statement) -> Finding:
     return compare(
         holds_exactly(printed),
         r"the covariance of $\Phi_{k-1}x_{k-1}+w_{k-1}$ contains $Q_{k-1}$",
-        Verdict.INCONSISTENT,
+        Verdict.MISPRINT,
         otherwise_note="(100) prints $Q_k$; (102), which repeats it, has $Q_{k-1}$ in both reports; where the scan of "
         "hung1982 is not legible, we take the index from hung1984",
     )

@@ -11,7 +11,7 @@ import sympy as sp
 
 from gpbnb.report.kalman import derivation, exact_step, report_bounds, smallest
 from gpbnb.report.ledger.checks.kalman import algebra, worst_case
-from gpbnb.report.ledger.checks.kalman.judging import bounded
+from gpbnb.report.ledger.checks.kalman.judging import bounded, judge, right_form
 from gpbnb.report.ledger.checks.kalman.registry import CHECKS, FOUR
 from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.registry import both
@@ -48,7 +48,7 @@ def dropped_error() -> tuple[float, float]:
 
 
 def _prediction(printed: Statement, note: str, root: str) -> Finding:
-    instances = (*worst_case.one_step(), *worst_case.tight_prediction())
+    instances = (*worst_case.second_prediction(), *worst_case.tight_prediction())
     return bounded(printed, instances, algebra.prediction(), note, root)
 
 
@@ -192,11 +192,11 @@ def rounded_state(printed: Statement) -> Finding:
 def defined_again(printed: Statement) -> Finding:
     loop, entered = (derivation.transition_error().coeff(derivation.FK), derivation.input_error().coeff(derivation.U))
     return compare(
-        algebra.holds(printed, algebra.loop()),
+        judge(printed, (*worst_case.one_step(), *worst_case.tight_loop())).right,
         f"(112) and (113) give the counts ${sp.latex(loop)}$ and ${sp.latex(entered)}$",
         Verdict.INCONSISTENT,
         otherwise_note="the symbols of (112) and (113) are redefined and now include the roundings of $\\hat F x$ "
-        "and of the sum",
+        f"and of the sum; with neither meaning does a count bound the error{right_form(printed)}",
         root=TWICE,
     )
 

@@ -97,7 +97,12 @@ def tilde(error: Any) -> FirstOrder:
 def at(index: int, value: Any, others: dict[int, Any] | None = None) -> Callable[[Any], FirstOrder]:
     """Return a letter that has a value only at some indices."""
     known = {index: value} | (others or {})
-    return lambda i: FirstOrder(exact(known[int(i)]))
+
+    def letter(i: Any) -> FirstOrder:
+        value = known[int(i)]
+        return value if isinstance(value, FirstOrder) else FirstOrder(exact(value))
+
+    return letter
 
 
 def letters(n: int, m: int) -> Names:
@@ -225,13 +230,32 @@ def _tight(n: int, m: int, **names: Any) -> Instance:
 
 
 @cache
+def second_prediction() -> tuple[Instance, ...]:
+    """Return the prediction in the second step of each case, which starts from a covariance with an error."""
+    found = []
+    for case in cases():
+        true, *others = _steps(case)
+        value = case.Phi @ true.P @ case.Phi.T + case.Q
+        for (algebra, number, emulated), errors in zip(KINDS, others, strict=True):
+            P = take(algebra, number, case, number(case.x[:, None]), number(case.P)).P
+            computed: Any = predicted(algebra, number(case.Phi), P, number(case.Q))
+            error = abs(computed - value) / FOUR.unit_roundoff if emulated else largest(computed)
+            names = letters(len(case.Phi), len(case.H)) | {
+                "phi": at(2, case.Phi), "P": at(2, true.P), "P_tilde": at(2, tilde(errors["P"])), "Q": at(2, case.Q),
+                "P_kp": FirstOrder(value), "P_hat_kp": hat(value, error), "P_tilde_kp": tilde(error),
+            }  # fmt: skip
+            found.append(Instance(names, emulated=emulated))
+    return tuple(found)
+
+
+@cache
 def tight_prediction() -> tuple[Instance, ...]:
-    """Return positive matrices for (102) and (103)."""
+    """Return positive matrices for (102) and (103), with errors of P_{k-1} of any size."""
     found = []
     for n, m in SIZES:
-        Phi, half, Q = _positive(1, n, n), _positive(2, n, n), _positive(3, n, n)
+        Phi, half, Q, of_covariance = _positive(1, n, n), _positive(2, n, n), _positive(3, n, n), _positive(19, n, n)
         P = half + half.T
-        error = largest(predicted(_TRACKED, tracked(Phi), tracked(P), tracked(Q)))
+        error = largest(predicted(_TRACKED, tracked(Phi), tracked(P, of_covariance), tracked(Q)))
         value = Phi @ P @ Phi.T + Q
         found.append(
             _tight(
@@ -239,6 +263,7 @@ def tight_prediction() -> tuple[Instance, ...]:
                 m,
                 phi=at(2, Phi),
                 P=at(2, P),
+                P_tilde=at(2, tilde(of_covariance)),
                 Q=at(2, Q),
                 P_kp=FirstOrder(value),
                 P_hat_kp=hat(value, error),

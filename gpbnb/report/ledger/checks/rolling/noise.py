@@ -47,10 +47,10 @@ def ramp_density(printed: Statement) -> Finding:
         printed.equates and bool(np.all(abs(np.array(densities) / record - 1) < 0.01)),
         "for a record of a year, from 10 to 100 cycles a year, the density varies with frequency to "
         f"the power {slopes[0]:.2f}, not {slopes[1]:.2f}: $2k^2T/\\omega^2$",
+        Verdict.MISPRINT,
         otherwise_note="$k^2/\\omega^4$ is the squared magnitude of a transform, not a power density, and describes "
         "an endless ramp; a record of finite length ends with a jump, so its spectrum falls much "
-        "more slowly",
-        root="ramp-density-from-endless-ramp",
+        "more slowly. Nothing later in the report uses this density",
     )
 
 
