@@ -24,7 +24,8 @@ FINDINGS = (
     answer(True, "$|x|$", "here"),
 )
 STATEMENTS = load_statements()
-TWO_TASKS = next(each for each in STATEMENTS if each.id == "hung1984.I.two-tasks")  # has a correction, legible
+# It has a correction and is legible.
+LEGIBLE = next(each for each in STATEMENTS if each.id == "hung1984.II.s4.example-13-parameters")
 CORRECTIONS = load_corrections()
 ROWS = tuple(Row(statement, FINDINGS[place % len(FINDINGS)]) for place, statement in enumerate(STATEMENTS))
 EVERY_PAGE = "".join(ledger.ledger_page(ROWS, each).html for each in ledger.PAGES)
@@ -178,7 +179,7 @@ def test_root_errors_begin_with_the_one_that_spoils_most():
     ids=lambda each: each.verdict.value if isinstance(each, Finding) else None,
 )
 def test_what_most_readers_skip_is_collapsed(finding, shown, collapsed):
-    before, _, after = ledger.ledger_page([Row(TWO_TASKS, finding)], ledger.PAGES[0]).html.partition("<details>")
+    before, _, after = ledger.ledger_page([Row(LEGIBLE, finding)], ledger.PAGES[0]).html.partition("<details>")
     assert [re.findall(r'<p class="(\w+)">', text) for text in (before, after)] == [shown, collapsed]
 
 

@@ -114,7 +114,7 @@ CLAIMS = {
     ),
     "hung1984.II.s12.example-9-digits": Claim(
         "A year of Gravity Probe B needs 9 digits, by the first term of (125)",
-        "Nine digits keep the error far below the drift, the report's criterion, but not because (125) bounds the error.",
+        "Nine digits keep the error far below the drift, the report's criterion, but (125) does not bound the error.",
     ),
     "hung1984.II.s12.example-17-digits": Claim(
         "A year of Gravity Probe B needs 17 digits, by the second term of (125)",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace as changed
 
 import faults
@@ -34,21 +33,6 @@ def test_every_equation_has_a_form():
     assert [entry.id for entry in ENTRIES if entry.kind == "equation" and not entry.form] == []
 
 
-def test_verdicts(rows):
-    """The present state: to be changed knowingly."""
-    assert Counter(row.outcome for row in rows) == {
-        "verified": 32,
-        "given": 11,
-        "misprint": 3,
-        "inconsistent": 7,
-        "unverifiable": 3,
-        "answered": 2,
-    }
-    found = faults.by_verdict(rows)
-    assert found[Verdict.GIVEN] >= {"hung1982.IV.eq10", "hung1982.IV.eq11", "hung1982.IV.roll-frame"}
-    assert found[Verdict.MISPRINT] == {f"hung1982.IV.{place}" for place in ("eq8", "eq9", "intermediate-frame")}
-
-
 def test_findings_have_their_notes_and_numbers(rows):
     faults.check_texts(rows)
     found = {row.statement.id.removeprefix("hung1982."): row.finding for row in rows}
@@ -61,8 +45,7 @@ def test_findings_have_their_notes_and_numbers(rows):
     # (5, 3) + (-2, 4); √(9² + 5²); 5 + 4; the declination of Rigel
     assert "is (3, 7) arcseconds" in found["IV.thetas-drift"].recomputed
     assert "turns by 10.3 arcseconds" in found["IV.intermediate-frame"].recomputed
-    assert "by 9 arcseconds relative to the intermediate frame and by 5" in found["IV.phi-frame"].recomputed
-    assert "roll axis are 60 arcseconds apart" in found["IV.alphas-boresight"].recomputed
+    assert "they are 60 arcseconds apart" in found["IV.alphas-boresight"].recomputed
     rigel = "8.2 degrees with the Earth's axis, which is the declination of the star"
     assert rigel in found["I.approximately-parallel"].recomputed
     assert r"\theta_3\cos2" in found["IV.eq9"].recomputed
@@ -138,7 +121,6 @@ AGREE = [
     ("IV.deltas-zero", frames, "gyro_to_readout", lambda phase: np.zeros(3)),
     ("IV.all-small", frames, "gyro_to_readout", lambda phase: np.zeros(3)),
     ("IV.readout-normal", frames, "spin_in_readout", lambda *angles: np.array([0.0, 0.0, 1.0])),
-    ("IV.alphas-boresight", frames, "boresight_offset", lambda beta: 0.0),
     ("IV.absolute-frame", theory, "aberration", lambda altitude: (0.0, 0.0)),
     ("IV.intermediate-frame", frames, "boresight_offset", lambda beta: 0.0),
     ("IV.thetas-drift", frames, "theta_of", lambda phi, alpha: phi),
@@ -150,15 +132,6 @@ def test_what_disagrees_could_agree(rows, patch, key, target, attribute, value):
     assert faults.finding(rows, f"hung1982.{key}").agrees is False
     patch.setattr(target, attribute, value)
     assert run(key).agrees is True
-
-
-def test_both_parts_of_the_statement_on_phi_count(patch):
-    assert run("IV.phi-frame").agrees is False
-    true = angles.rotation
-    patch.setattr(angles, "theta_of", lambda phi, alpha: phi)
-    assert run("IV.phi-frame").agrees is False
-    patch.setattr(angles, "rotation", lambda given: true(given).T)
-    assert run("IV.phi-frame").agrees is True
 
 
 @pytest.mark.parametrize(

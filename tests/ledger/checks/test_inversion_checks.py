@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from dataclasses import replace
 from fractions import Fraction
 from statistics import median
@@ -67,33 +66,6 @@ def test_only_what_the_scan_has_lost_has_no_form(rows):
     told = {"hung1984.II.s10.claim-two-steps", "hung1982.III.s10.claim-two-steps"}  # plans, in words
     lost = {row.statement.id for row in rows if not row.statement.form} - told
     assert lost == {row.statement.id for row in rows if row.finding.verdict is Verdict.UNVERIFIABLE}
-
-
-def test_verdicts_by_document(rows):
-    """The present state: to be changed knowingly."""
-    counts = {
-        document: Counter(row.outcome for row in rows if row.statement.document == document)
-        for document in ("hung1984", "hung1982")
-    }
-    assert counts["hung1984"] == {
-        "given": 21,
-        "verified": 71,
-        "misprint": 19,
-        "wrong": 11,
-        "ocr": 1,
-        "unverifiable": 1,
-        "not reproduced": 7,
-    }
-    assert counts["hung1982"] == {
-        "verified": 71,
-        "given": 21,
-        "misprint": 9,
-        "ocr": 1,
-        "wrong": 14,
-        "unverifiable": 4,
-        "inconsistent": 1,
-        "not reproduced": 4,
-    }
 
 
 def test_which_are_wrong_and_why(rows):

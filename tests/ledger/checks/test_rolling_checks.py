@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import Counter
 from dataclasses import replace as changed
 from types import SimpleNamespace
 
@@ -44,56 +43,8 @@ def test_the_short_record_has_the_signal_to_noise_ratio_of_a_year(monkeypatch):
     assert material.spectra.__wrapped__() == pytest.approx(theory.DRIFTS[1] * experiment.YEAR)
 
 
-def test_verdicts(rows):
-    """The present state: to be changed knowingly."""
-    assert Counter(row.outcome for row in rows) == {
-        "verified": 38,
-        "given": 9,
-        "misprint": 6,
-        "ocr": 1,
-        "wrong": 2,
-        "unverifiable": 10,
-        "answered": 2,
-    }
-
-
-def test_which_are_not_right_as_printed(rows):
-    found = faults.by_verdict(rows)
-    assert found[Verdict.WRONG] == ids("s3.no-direct-error", "s5.ramp-psd")
-    assert found[Verdict.OCR] == ids("s2.1-over-t")
-    assert found[Verdict.MISPRINT] == ids(
-        "eq3",
-        "s3.cos-5-deg",
-        "s4.sample-1-s-to-0",
-        "s4.sample-2-delta-omega",
-        "s4.sample-2-period",
-        "s5.ramp-transform",
-    )
-    assert found[Verdict.ANSWERED] == ids("s2.error-sources-4-and-5", "s5.optimum-bandwidth")
-    assert found[Verdict.UNVERIFIABLE] == ids(
-        "s1.before-noise",
-        "s1.hard-to-extract",
-        "s1.figure-iii-1-a",
-        "s1.figure-iii-1-b",
-        "s1.figure-iii-2",
-        "s3.synchronisation-claim",
-        "s4.monitored",
-        "s5.figure-iii-3-a",
-        "s5.figure-iii-3-b",
-        "s6.references",
-    )
-
-
 def test_no_finding_is_without_a_note_where_it_differs(rows):
     faults.check_texts(rows)
-
-
-def test_each_wrong_entry_names_its_root(rows):
-    roots = {row.statement.id: row.finding.root for row in rows if row.finding.verdict is Verdict.WRONG}
-    assert roots == {
-        registry.entry("s3.no-direct-error"): "roll-errors-in-one-dimension",
-        registry.entry("s5.ramp-psd"): "ramp-density-from-endless-ramp",
-    }
 
 
 def test_findings_quote_the_computed_results(rows):

@@ -50,33 +50,6 @@ def test_every_entry_of_the_sections_has_a_check_here_and_none_is_elsewhere():
     assert all(int(entry.section.split(".")[0]) > 9 for entry in later if entry.id not in PRINTED)
 
 
-def test_verdicts_by_document(rows):
-    """The present state: to be changed knowingly."""
-    counts = {
-        document: Counter(row.outcome for row in rows if row.statement.document == document)
-        for document in ("hung1984", "hung1982")
-    }
-    assert counts["hung1984"] == {
-        "verified": 53,
-        "misprint": 9,
-        "wrong": 7,
-        "inconsistent": 1,
-        "ocr": 1,
-        "unverifiable": 4,
-        "given": 17,
-        "answered": 1,
-    }
-    assert counts["hung1982"] == {
-        "verified": 44,
-        "misprint": 10,
-        "wrong": 9,
-        "ocr": 2,
-        "unverifiable": 3,
-        "given": 18,
-        "answered": 1,
-    }
-
-
 def test_which_are_not_right_as_printed(rows):
     found = {verdict: {row.statement.id for row in rows if row.finding.verdict is verdict} for verdict in Verdict}
     implied = {"s9-2.claim-28-implies", "s9-2.p-2-line", "s9-2.p-3-line"}

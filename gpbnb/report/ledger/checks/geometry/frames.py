@@ -141,9 +141,11 @@ def readout_normal(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.IV.alphas-boresight")
 def boresight(printed: Statement) -> Finding:
+    alpha, phi = np.array([0.0, -2.0, 4.0]) * ARCSEC, np.array([0.0, 5.0, 3.0]) * ARCSEC
+    axes = {"telescope's boresight": alpha, "the gyro's spin axis": alpha + phi}  # where β, γ and δ are zero
     ideal, off = (boresight_offset(np.array([0.0, beta, 0.0])) for beta in (0.0, MINUTE))
     return compare(
-        ideal < 1e-9 if printed.says("axis") in ("telescope's boresight", "the roll axis") else ideal > 1e-9,
+        ideal == 0 and boresight_offset(axes[printed.says("axis")]) == boresight_offset(alpha),
         "in the ideal case, with $\\beta=0$, the boresight and the roll axis coincide; with $\\beta_2$ of 60 "
         f"arcseconds, they are {off / ARCSEC:.0f} arcseconds apart",
         note="by the definition of the intermediate frame, α is the deviation of the roll axis; it is the deviation "
