@@ -193,7 +193,7 @@ def cases() -> Iterator[Case]:
     for label, model in models().items():
         for i, form in enumerate(each for each in Form if each is not Form.UD):
             # Python's integers emulate words that are long or wrap around.
-            for kind, fmt in [*fixed(2, (16,), ("wrap",)), *fixed(8, (64,), first=i)]:
+            for kind, fmt in [*fixed(3, (16,), ("wrap",)), *fixed(8, (64,), first=i)]:
                 yield Case(kind, f"{label}, {form}", model, fmt, form)
 
 

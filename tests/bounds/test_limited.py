@@ -56,11 +56,11 @@ def test_an_integral_without_limits_or_leak_has_no_bound_for_ever():
     found = required_precision(system, 10, 0.01, z=e, basis="bound")
     assert found.ends
     assert str(found).endswith("proved for this run of 10 steps")
-    found = required_precision(system, 10, 0.01, basis="probable", within=limits(2, 1, measurement=1))
+    found = required_precision(system, 10, 0.01, basis="probable", within=limits(1, 1, measurement=1))
     assert 'which limits its values, and basis "probable"; needed "bound"' in str(found)
 
 
 def test_a_guarantee_takes_its_limits_from_the_question():
     system = LinearSystem.pid("0.8", "0.1", leak="0.9", limits=(-1, 1))
-    found = required_precision(system, 10, 0.01, basis="guarantee", within=limits(2, 1, measurement=1))
+    found = required_precision(system, 10, 0.01, basis="guarantee", within=limits(1, 1, measurement=1))
     assert found.tried == required_precision(system, 10, 0.01, z=np.ones((10, 1)), basis="bound").tried

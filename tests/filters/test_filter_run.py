@@ -207,7 +207,7 @@ def test_what_a_run_refuses():
     # In two digits 1.04 * 1.07 > 1.05**2 becomes 1.0 * 1.1 < 1.1**2.
     near = [["1.04", "1.05"], ["1.05", "1.07"]]
     close = LinearModel(np.eye(2), [[1, 0]], np.eye(2), [[1]], [0, 0], near, repair=False)
-    with pytest.raises(ValueError, match="needed covariances that stay definite"):
+    with pytest.raises(ValueError, match="in which P0 does not stay positive semidefinite"):
         Run(close, FloatFormat(10, 2), Form.UD, (1,))
     assert Run(close, FloatFormat(10, 3), Form.UD, (1,)).steps == 0
     with pytest.raises(ValueError, match="needed equal steps"):

@@ -239,7 +239,7 @@ def test_traced_operations_have_the_digits_of_the_compiled_step(form, fmt):
 def test_long_words_have_the_digits_of_the_compiled_step_and_of_fractions(rounding, form):
     for model in models().values():
         z = np.random.default_rng(4).uniform(-1, 1, (6, model.m))
-        short, narrow = FixedFormat(8, 20, rounding, "saturate"), FixedFormat(2, 13, rounding, "wrap")
+        short, narrow = FixedFormat(8, 20, rounding, "saturate"), FixedFormat(3, 12, rounding, "wrap")
         for fmt in (short, FixedFormat(8, 55, rounding), narrow):
             program = kalman_program(model.n, model.m, form)
             coefficients, x = _in_long_words(model, fmt, form)
