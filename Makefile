@@ -1,6 +1,6 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help address book test certificates proof test-pages test-portable verify-sweeps notebooks findings lint format exactness bench environment screenshots pdf serve clean
+.PHONY: help book test certificates proof test-pages test-portable verify-sweeps notebooks findings lint format exactness bench environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
@@ -117,9 +117,6 @@ bench: .venv/with-bench ## timings against peers, side by side, the short format
 	$(PY) -m benchmarks.year
 	$(PY) -m benchmarks.formats
 	$(PY) -m benchmarks.guarantee
-
-address: .venv/made-for ## write the address of the project, set in pyproject.toml, into README, citation and guide
-	$(PY) scripts/address.py
 
 environment: .venv/with-dev ## compile the lists of pinned packages from pyproject.toml; UPGRADE=1 takes newer versions
 	$(PY) $(UV_COMPILE) $(if $(UPGRADE),--upgrade) pyproject.toml --extra report --group book --group test \

@@ -9,11 +9,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 from docutils import nodes
 from docutils.utils import new_document
-from PIL import Image
 from sphinx.application import Sphinx
 from sphinx.errors import ConfigError
 from sphinx.util.docutils import docutils_namespace
@@ -195,47 +193,6 @@ def test_mathjax_is_left_out_where_a_page_has_no_formula(equations, kept):
     weight.leave_out_mathjax(made, "book/a", "page.html", context, None)
     assert len(context["script_files"]) == kept
     assert scripts[2] in context["script_files"]
-
-
-STYLES = """@import "a;b{c";
-.used { color: red } /* .used{ */ .unused, .used > p:not(.unused) { content: "}" } .unused{}
-:is(.used, .unused), .w-50\\% { margin: 0 } a[href=".x"] {b:c}
-@media print { .unused { d: e } .used { f: g } } @media screen { .unused { h: i } }
-@font-face { font-family: "x" }"""
-
-
-def test_rules_stay_that_fit_a_class_of_a_page_or_no_class():
-    kept = [
-        '@import "a;b{c";',
-        ".used{ color: red }",
-        ' .used > p:not(.unused){ content: "}" }',
-        ":is(.used, .unused){ margin: 0 }",
-        'a[href=".x"]{b:c}',
-        "@media print{.used{ f: g }}",
-        '@font-face{ font-family: "x" }',
-    ]
-    assert weight.applying(STYLES, {"used"}) == "".join(kept)
-
-
-def test_braces_that_do_not_match_are_refused():
-    with pytest.raises(ValueError, match="balanced"):
-        weight.applying("a { b: c", set())
-
-
-def test_a_picture_keeps_its_colours_in_a_palette(tmp_path):
-    picture = tmp_path / "figure.png"
-    given = Image.new("RGBA", (300, 200), (0, 0, 0, 0))
-    for k, colour in enumerate([(0, 114, 178, 255), (213, 94, 0, 255), (0, 158, 115, 128)]):
-        given.paste(colour, (100 * k, 50, 100 * k + 60, 150))
-    given.save(picture)
-    weight.write_palette(picture)
-    with Image.open(picture) as made:
-        assert made.mode == "P"
-        after = np.asarray(made.convert("RGBA"), dtype=int)
-    assert np.abs(after - np.asarray(given, dtype=int)).max() <= 4  # a level of 64, of which the octree takes the mean
-    size = picture.stat().st_size
-    weight.write_palette(picture)
-    assert picture.stat().st_size == size
 
 
 # -- the ledger's rows as labels, its formulas and links -----------------------------------------------
