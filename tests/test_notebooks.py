@@ -13,7 +13,10 @@ import pytest
 
 BOOK = Path(__file__).resolve().parents[1] / "book"
 PATHS = sorted(BOOK.glob("*.ipynb"))
-MOST_LINES = 12
+MOST_LINES = 30
+MOST_LINES_OF_A_FUNCTION = 17
+OPEN = ("integration", "rounding")
+"""Chapters whose cells do the work in sight."""
 ABSOLUTE = re.compile(r"(?<![\w.:/<])/(home|root|Users|work|tmp|usr|opt|var|private|mnt|srv)/|\b[A-Z]:\\\\")
 MOST_DIGITS = 6
 # A number in a text, not part of a name, an address or a fraction.
@@ -56,17 +59,39 @@ def test_no_cell_failed_or_warned(path):
 
 
 @each_notebook
-def test_cells_are_short_and_define_only_arguments(path):
+def test_cells_and_functions_are_short(path):
     for cell in code_cells(path):
         source = "".join(cell["source"])
         assert len([line for line in source.splitlines() if line.strip()]) <= MOST_LINES, source
-        nodes = list(ast.walk(ast.parse(source)))
-        definitions = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-        defined = {node.name for node in nodes if isinstance(node, definitions)}
-        passed = {
-            each.id for node in nodes if isinstance(node, ast.Call) for each in node.args if isinstance(each, ast.Name)
-        }
-        assert defined <= passed, source
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+                assert node.end_lineno - node.lineno < MOST_LINES_OF_A_FUNCTION, source
+
+
+def visible(cell: dict) -> bool:
+    return not tags(cell) & {"remove-cell", "remove-input", "hide-input", "hide-cell"}
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_an_open_chapter_shows_its_code_and_all_that_the_code_uses(name):
+    cells = code_cells(BOOK / f"{name}.ipynb")
+    lines = {shown: sum(len(c["source"]) for c in cells if visible(c) is shown) for shown in (True, False)}
+    assert lines[True] >= lines[False]
+    known, missing = set(dir(builtins)), []
+    for cell in cells:
+        if visible(cell):
+            read, defined = names("".join(cell["source"]))
+            missing += sorted(read - defined - known)
+            known |= defined
+    assert missing == []
+
+
+@pytest.mark.parametrize("name", OPEN)
+def test_an_open_chapter_glues_nothing_into_its_text_and_ends_with_exercises(name):
+    cells = json.loads((BOOK / f"{name}.ipynb").read_text(encoding="utf-8"))["cells"]
+    text = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    assert "{glue:" not in text
+    assert "## Exercises" in text
 
 
 @each_notebook

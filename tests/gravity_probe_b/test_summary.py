@@ -10,7 +10,9 @@ import pytest
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.report.gravity_probe_b import summary
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.forms import Form
+from gpbnb.report.gravity_probe_b import answers, summary, year
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -24,9 +26,12 @@ def glued(page, key):
 
 
 def test_the_answers_are_those_that_the_chapters_derive():
-    printed, formula, one, simple, real, flown, proved, single, double = summary.find()
+    printed, allowed, formula, one, simple, real, flown, proved, single, double = summary.find()
     assert printed.decimal == (glued("year", "digits_first"), glued("year", "digits_second")) == (9, 17)
     assert formula.decimal == (glued("kalman", "goal_first"), glued("kalman", "goal_second"))
+    cases = {year.YearCase(year.MODELS[0], 2, t, Rounding.NEAREST, Form.HUNG): t for t in range(14, 54)}
+    errors = {cases[run.case]: answers.largest(run) for run in year.load() if run.case in cases}
+    assert errors[allowed.bits] <= summary.DRIFT < errors[allowed.bits - 1]
     assert one.bits == glued("year", "bits_observed")
     assert (simple.bits, simple.deviation) == (glued("mission", "mission_bits"), glued("mission", "mission_deviation"))
     assert (real.bits, real.deviation) == (glued("mission", "real_absolute"), glued("mission", "real_deviation"))
