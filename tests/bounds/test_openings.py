@@ -274,7 +274,7 @@ def test_bounds_in_blocks_and_companions_are_for_the_run_of_the_model_as_given(m
 
 def test_a_covariance_that_must_not_be_raised_has_neither_run_nor_guarantee() -> None:
     model = raised_while_factored(repair=False)
-    with pytest.raises(ValueError, match="needed covariances that stay definite"):
+    with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
         Run(model, NINE, Form.UD, ())
     with pytest.raises(ValueError, match="needed covariances that stay definite"):
         guarantee(model, NINE, WITHIN, Form.UD)
