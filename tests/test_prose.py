@@ -38,6 +38,7 @@ NOT_PROSE = re.compile(
     "|".join(
         (
             r"^```\{glossary\}$|```.*?```|^```$",  # code and figures, but not the glossary
+            r"<form.*?</form>",  # fields of calculators
             r"^:{3,}.*?$|^:\w+:.*?$",  # directives and their options
             r"<form.*?</form>|</?[a-z][^>]*>",  # HTML
             r"\$\$.*?\$\$|\$[^$]*\$",  # math
