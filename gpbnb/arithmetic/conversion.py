@@ -95,12 +95,7 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
 
 
 def _of_mpmath_or_flint(value: Any) -> tuple[int, int, int] | None:
-    """Read a number of mpmath (``man_exp``) or python-flint (``man_exp()``, ``p`` and ``q``); None for other types.
-
-    Raises
-    ------
-    ValueError : NaN, infinity, or a ball with a radius above zero.
-    """
+    """Read a number of mpmath (``man_exp``) or python-flint (``man_exp()``, ``p`` and ``q``); None for other types."""
     home = type(value).__module__.partition(".")[0]
     if home not in ("mpmath", "flint"):
         return None

@@ -16,10 +16,6 @@ def interval(within: int, records: int, confidence: float = CONFIDENCE) -> tuple
 
     Each limit is one-sided. With n successes in n trials, the lower limit is :math:`(1-c)^{1/n}` for a confidence c.
 
-    Raises
-    ------
-    ValueError : counts or confidence out of range.
-
     Examples
     --------
     >>> [round(each, 4) for each in interval(100, 100)]
@@ -52,10 +48,6 @@ def quantile_limit(errors: NDArray[np.float64], probability: float = 0.99, confi
     """Return an upper limit of a quantile for errors with normally distributed logarithms, by Owen 1968.
 
     The limit is infinite with fewer than two records, or if an error is infinite.
-
-    Raises
-    ------
-    ValueError : an error is zero or negative.
     """
     if not (errors > 0).all():
         raise ValueError("got an error that is not positive; needed errors above 0, whose logarithms exist")

@@ -26,10 +26,6 @@ def operations(file: Path) -> Checked:
     ----------
     file : a table as CSV with the columns `compared` and `different`, or as Markdown with the columns `all` and
         `different`.
-
-    Raises
-    ------
-    ValueError : the table has other columns.
     """
     if file.suffix == ".md":
         rows, compared = _rows(file), "all"
@@ -54,10 +50,6 @@ def compiled(file: Path) -> Checked:
     Parameters
     ----------
     file : the table that ``make exactness`` stores, with the columns `builds` and `different`.
-
-    Raises
-    ------
-    ValueError : the table has other columns.
     """
     rows = _rows(file)
     if not rows or not {"builds", "different"} <= rows[0].keys():

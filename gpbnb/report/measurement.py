@@ -99,10 +99,6 @@ def rotation(angles: ArrayLike, sequence: Sequence[int] = SEQUENCE) -> Floats:
     Returns
     -------
     C : (..., 3, 3), orthogonal.
-
-    Raises
-    ------
-    ValueError : the last axis is not of length 3, an angle is not finite, or `sequence` is not a permutation.
     """
     each = _angles("angles", angles, 3)
     if sorted(sequence) != [1, 2, 3]:
@@ -145,10 +141,6 @@ def angles_of(matrix: ArrayLike) -> Floats:
     Returns
     -------
     angles : (..., 3), in radians.
-
-    Raises
-    ------
-    ValueError : `matrix` is not a rotation.
     """
     C = np.asarray(matrix, dtype=np.float64)
     if C.shape[-2:] != (3, 3):
@@ -328,10 +320,6 @@ def measurement_matrix(
     H : (..., 2, n). Readings and angles share one unit, which is free in all columns but those of ``scale``,
         ``beta1`` and ``gamma1``. These are in radians per unit (scale) or per radian, from the nominal angles.
 
-    Raises
-    ------
-    ValueError : an unknown or repeated state, an unknown signal, or angles that are not finite or of the wrong shape.
-
     References
     ----------
     hung1982, ch. IV, eqs. (1)-(7); bias and scale factor from the classification of ch. II.
@@ -371,10 +359,6 @@ def measurement_rows(
     Returns
     -------
     H : (..., 2, n), an array of floats if floats are given, otherwise of objects.
-
-    Raises
-    ------
-    ValueError : an unknown or repeated state, an unknown signal, or nominal angles of the wrong shape.
     """
     unknown = [name for name in states if name not in STATES]
     if unknown or not states or len(set(states)) != len(states):

@@ -197,12 +197,7 @@ def _word(fmt: FixedFormat) -> str:
 
 
 def _type_of(fmt: Any) -> str:
-    """Return the type of a floating-point format in C.
-
-    Raises
-    ------
-    ValueError : it has none.
-    """
+    """Return the type of a floating-point format in C."""
     if fmt == BINARY32:
         return "float"
     if fmt == BINARY64:
@@ -432,12 +427,7 @@ def _in_loops(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[Any], N
 
 
 def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the same in words that are too long for compiled loops, or that wrap around.
-
-    Raises
-    ------
-    ValueError : the UD form; a format without the number 1.
-    """
+    """Return the same in words that are too long for compiled loops, or that wrap around."""
     if form is Form.UD:
         raise ValueError(
             f"got the UD form in {_word(fmt)}; needed another form, or words of at most 52 bits that do not "

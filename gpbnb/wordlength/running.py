@@ -125,12 +125,7 @@ def answer(asked: CommandInput, command: str, tell: Callable[[str], Any]) -> Rep
 
 
 def _filter(given: argparse.Namespace) -> tuple[FilterSource, LinearModel | LinearSystem]:
-    """Return the filter of a command line, with a constant gain as a linear system; and the model in its file.
-
-    Raises
-    ------
-    ValueError : a constant gain for a linear system, or for a filter whose gain does not settle.
-    """
+    """Return the filter of a command line, with a constant gain as a linear system; and the model in its file."""
     read = read_filter(given.model, read_measurements(given.inputs) if given.inputs else None)
     if given.form != CONSTANT_GAIN:
         return read, read.model

@@ -31,12 +31,7 @@ class Draws:
 
 
 def draw(budget: Budget, trials: int, rng: np.random.Generator) -> Draws:
-    """Draw total errors: for each group, a normal random number times the signed sum of its residuals.
-
-    Raises
-    ------
-    ValueError : the budget has no source, or fewer than one trial is asked for.
-    """
+    """Draw total errors: for each group, a normal random number times the signed sum of its residuals."""
     if not budget.sources or trials < 1:
         raise ValueError(f"got {len(budget.sources)} sources and {trials} trials; needed at least one of each")
     sums = [math.fsum(source.residual for source in group) for group in budget.groups()]

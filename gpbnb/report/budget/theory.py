@@ -72,10 +72,6 @@ class Source:
     roll, orbit, filter : fraction of the error that remains after each method, from 0 to 1; 1 if it is not used.
     group : sources of the same group are fully correlated and add up with their signs; empty for an independent one.
     note : free text.
-
-    Raises
-    ------
-    ValueError : the name is blank, the error is not finite, or a factor is outside 0 to 1.
     """
 
     name: str
@@ -121,12 +117,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Budget:
-    """A list of error sources.
-
-    Raises
-    ------
-    ValueError : two sources have the same name.
-    """
+    """A list of error sources."""
 
     sources: tuple[Source, ...]
 
@@ -282,11 +273,6 @@ def read(path: str | Path | Traversable) -> ReadBudget:
     The first line names the columns: ``name, kind, form, error_mas`` and any of ``roll, orbit, filter, group, note``,
     in any order. An empty factor means that the method is not used. An invalid row is rejected with its line number;
     the other rows are still read.
-
-    Raises
-    ------
-    OSError : the file cannot be read.
-    ValueError : the file is not UTF-8, or its first line lacks a column, repeats one, or names an unknown one.
     """
     file = Path(path) if isinstance(path, str) else path
     try:

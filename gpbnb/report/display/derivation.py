@@ -87,12 +87,7 @@ class Derivation:
         return "\n".join(f"{_mark(step)} {step}" for step in self.steps)
 
     def _repr_markdown_(self) -> str:
-        """Return a collapsed list of the steps.
-
-        Raises
-        ------
-        ValueError : a step does not hold.
-        """
+        """Return a collapsed list of the steps."""
         failed = [step.name for step in self.steps if not step.holds]
         if failed:
             raise ValueError(f"SymPy does not confirm {len(failed)} of {len(self.steps)} steps: {'; '.join(failed)}")

@@ -157,12 +157,7 @@ def figure(columns: int = 1, height: float = 3.6, rows: int = 1, share: str = ""
 
 
 def colours(count: int, palette: Sequence[str] = COLOURS) -> Sequence[str]:
-    """Return a colour for each of `count` curves.
-
-    Raises
-    ------
-    ValueError : more curves than colours.
-    """
+    """Return a colour for each of `count` curves."""
     if count > len(palette):
         raise ValueError(f"got {count} curves; needed at most {len(palette)}, or colours repeat; draw two figures")
     return palette[:count]

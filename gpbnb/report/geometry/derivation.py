@@ -65,12 +65,7 @@ def printed_small(angles: Sequence[sp.Expr]) -> sp.Matrix:
 
 
 def up_to(order: int, expression: sp.Expr, small: Iterable[sp.Symbol]) -> sp.Expr:
-    """Expand `expression` and keep products of at most `order` of the `small` symbols.
-
-    Raises
-    ------
-    PolynomialError : the expression is not a polynomial in the symbols and in their sines and cosines.
-    """
+    """Expand `expression` and keep products of at most `order` of the `small` symbols."""
     small = tuple(small)
     polynomial = expression.replace(
         lambda part: isinstance(part, sp.sin | sp.cos) and part.args[0] in small,

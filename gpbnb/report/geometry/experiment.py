@@ -91,10 +91,6 @@ def year(
     roll_period : seconds, a multiple of 0.1; None for a spacecraft that stays at phase 0.
     step : seconds between samples, a multiple of 0.1; at least three samples per roll.
     progress : show a progress bar.
-
-    Raises
-    ------
-    ValueError : a period or step is not positive, or fewer than three samples fill whole rolls.
     """
     return _year(case, roll_period, step, progress)
 
@@ -171,10 +167,6 @@ def parts(case: Misalignments, years: float = 1.0, samples: int = 24) -> dict[st
     case : the angles.
     years : time since the start at which angles and drift are evaluated.
     samples : number per roll, at least 3.
-
-    Raises
-    ------
-    ValueError : `samples` is below 3.
     """
     if samples < 3:
         raise ValueError(f"got {samples} samples in a roll; needed 3 or more")

@@ -82,10 +82,6 @@ class Misalignments:
     alpha, beta, gamma : pointing, and misalignments of telescope and readout, at the start; radians.
     alpha_rate, beta_rate, gamma_rate : rates of change of these angles; radians per year.
     drift : rates of φ2 and φ3; radians per year. The z axis lies in the plane of the orbit, so φ2 is geodetic.
-
-    Raises
-    ------
-    ValueError : a number is missing or not finite.
     """
 
     alpha: Triple = ZERO

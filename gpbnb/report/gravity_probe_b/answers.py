@@ -59,10 +59,6 @@ def find_answers(tolerance: float = 1.0) -> Answers:
     Parameters
     ----------
     tolerance : largest error of drift angles and rates in the year; mas and mas/yr, above 0.
-
-    Raises
-    ------
-    ValueError : no emulated year meets the tolerance, with one of the roundings.
     """
     runs = tuple(run for run in year.load() if run.case.model == year.MODELS[0])
     observed = {}
@@ -126,10 +122,6 @@ def median_precision(found: Sequence[Share], tolerance: float = 1.0) -> float:
     Between a format whose median exceeds the tolerance and the next, the logarithm of the error is interpolated.
     If all medians lie on one side of the tolerance, the estimate starts from the nearest on a logarithmic scale, and
     assumes that each further digit divides the error by the base.
-
-    Raises
-    ------
-    ValueError : no formats.
     """
     if not found:
         raise ValueError("got no formats; needed at least one")
@@ -197,10 +189,6 @@ def single_record(runs: Sequence[year.Year], precision: int = 24) -> tuple[Moved
     ----------
     runs : years from :mod:`gpbnb.report.gravity_probe_b.year`.
     precision : precision in bits; each bit is assumed to halve the error.
-
-    Raises
-    ------
-    KeyError : a year that is needed was not run.
     """
     by_case = {run.case: run for run in runs}
     usual = year.YearCase(year.MODELS[0], 2, precision, Rounding.NEAREST, Form.HUNG)

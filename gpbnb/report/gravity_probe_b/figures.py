@@ -64,10 +64,6 @@ def years(
     quantity : "drift" or "rate", the larger of two errors; "gain" or "covariance", norms.
     tolerance : tolerance to draw as a line, in the unit of the quantity.
     limits : at most two that fail, and any number that hold.
-
-    Raises
-    ------
-    ValueError : another quantity, or the reference among the runs.
     """
     if quantity not in _QUANTITIES:
         raise ValueError(f"got quantity {quantity!r}; needed one of {', '.join(_QUANTITIES)}")

@@ -99,12 +99,6 @@ def bounds_in_blocks(
     Yields
     ------
     done, bounds : after each block.
-
-    Raises
-    ------
-    ArithmeticError : a bound exceeds the assumed error; the filter stopped or a covariance became indefinite.
-    ValueError : stochastic rounding; a model with known inputs, or of fewer steps; limits or assumed errors for another
-        filter; no limits on state and innovation; a first estimate beyond its limit.
     """
     check_deterministic(fmt)
     model.refuse_inputs("bounds in blocks")

@@ -317,10 +317,6 @@ def needed(found: Sequence[Share], probability: float = 0.99, tolerance: float =
     Parameters
     ----------
     found : shares for formats of one base, rounding, form and choice of states.
-
-    Raises
-    ------
-    ValueError : no formats, or formats of several kinds.
     """
     kinds = {(each.setting, each.states, each.form, each.fmt.base, each.fmt.rounding) for each in found}
     if len(kinds) != 1:

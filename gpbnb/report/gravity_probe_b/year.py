@@ -515,10 +515,6 @@ class YearSweep(Sweep[YearCase]):
         Parameters
         ----------
         steps : number of steps; fewer for a trial.
-
-        Raises
-        ------
-        ValueError : several processes or a choice of cases, which the shared references do not allow.
         """
         if executor is not None or only:
             raise ValueError(

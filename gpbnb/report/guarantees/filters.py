@@ -115,12 +115,7 @@ COLUMNS = (
 
 
 def errors(drawn: Drawn, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
-    """Return errors of a user's run, (steps, n), while the exact filter is within its limits, and whether it stopped.
-
-    Raises
-    ------
-    ArithmeticError : a measurement is beyond the range of the format, or the exact filter needs too many digits.
-    """
+    """Return errors of a user's run, (steps, n), until the exact filter leaves its limits, and whether it stopped."""
     run = Run(drawn.model, drawn.fmt, drawn.form, ())
     stored = run.exactly(run.pack_measurements(z))[:, :, 0]
     true = reference_states(drawn.stored, stored)

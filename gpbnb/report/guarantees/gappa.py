@@ -86,13 +86,7 @@ def _binary(x: Fraction) -> str:
 
 
 def gappa(text: str) -> list[float]:
-    """Return the bounds that Gappa finds.
-
-    Raises
-    ------
-    FileNotFoundError : Gappa is not installed.
-    RuntimeError : Gappa finds no bound.
-    """
+    """Return the bounds that Gappa finds."""
     if shutil.which("gappa") is None:
         raise FileNotFoundError("got no program gappa; needed Gappa 1.4, for example from Debian's package gappa")
     done = subprocess.run(["gappa"], input=text, capture_output=True, text=True, check=False)

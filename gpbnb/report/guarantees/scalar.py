@@ -103,12 +103,7 @@ def exact_gains(stored: LinearModel) -> Iterator[tuple[float, float]]:
 
 
 def worst_error(given: ScalarFilter) -> Worst | None:
-    """Find the largest error over all measurement sequences; None if gains or errors do not settle.
-
-    Raises
-    ------
-    OverflowError : an estimate leaves the range of the format.
-    """
+    """Find the largest error over all measurement sequences; None if gains or errors do not settle."""
     fmt = given.fmt
     run = Run(given.model, fmt, given.form, range(1, LONGEST + 1))
     run.take(np.zeros((LONGEST, 1)))
@@ -154,12 +149,7 @@ def worst_error(given: ScalarFilter) -> Worst | None:
 def following(
     given: ScalarFilter, stored: LinearModel, gain: float, s: NDArray[np.float64], z: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """Return the index of the next estimate for each estimate and measurement, as the emulated operations give it.
-
-    Raises
-    ------
-    OverflowError : an operation leaves the range. Estimates near its end have no row of their own, but -1.
-    """
+    """Return the index of the next estimate for each estimate and measurement, as the emulated operations give it."""
     fmt = given.fmt
     Phi, H, K, x, column = (fmt.array(each) for each in (stored.Phi[0, 0, 0], stored.H[0, 0, 0], gain, s, z))
     reach = np.abs(s) <= float(np.abs(s).max()) / 8

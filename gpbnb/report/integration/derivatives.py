@@ -45,10 +45,6 @@ class DerivativeRule:
     Parameters
     ----------
     weights : :math:`w_0, w_1, \dots`; w_0 is 1/2, so that a constant is integrated correctly.
-
-    Raises
-    ------
-    ValueError : w_0 is not 1/2.
     """
 
     name: str
@@ -81,10 +77,6 @@ def hermite(derivatives: int) -> DerivativeRule:
     .. math:: w_j = \binom l{j+1}\frac{(2l-j-1)!}{(2l)!}, \qquad l = \text{derivatives} + 1
 
     With none it is the trapezoidal rule; with two, T/2, T²/10, T³/120.
-
-    Raises
-    ------
-    ValueError : `derivatives` is not 0 to 8.
     """
     if not 0 <= derivatives <= 8:
         raise ValueError(f"got {derivatives} derivatives; needed 0 to 8")
@@ -111,10 +103,6 @@ def derivative_walk_rate(process: Process, f_c: float, rule: DerivativeRule) -> 
     Returns
     -------
     rate : in the unit of the input squared, times seconds.
-
-    Raises
-    ------
-    ValueError : the input does not have the derivatives.
     """
     _check(process, rule)
     f_c = positive_number("f_c", f_c)
@@ -127,10 +115,6 @@ def derivative_rule_variance(process: Process, f_c: float, rule: DerivativeRule,
     Returns
     -------
     variance : (n + 1,), in the unit of the input times seconds, squared.
-
-    Raises
-    ------
-    ValueError : the input does not have the derivatives.
     """
     _check(process, rule)
     step, m, period = exact_step(process, f_c), len(process.drift), 1 / f_c
@@ -164,10 +148,6 @@ def fast_sampling_ratio(weights: Sequence[Fraction], count: int) -> Fraction:
     ----------
     weights : total weights of the input, its second, fourth … derivative, as :meth:`DerivativeRule.even` returns them.
     count : m, the number of lags through which the input has passed.
-
-    Raises
-    ------
-    ValueError : the input does not have the derivatives.
     """
     if 2 * (len(weights) - 1) >= count:
         raise ValueError(f"got {count} lags; needed more than {2 * (len(weights) - 1)}, one more than derivatives")
@@ -184,12 +164,7 @@ def fast_sampling_ratio(weights: Sequence[Fraction], count: int) -> Fraction:
 
 
 def largest_useful_mu(rule: DerivativeRule, count: int) -> float:
-    """Return the ratio of bandwidth to rate, rad, above which a rule is worse than the trapezoidal one for some lags.
-
-    Raises
-    ------
-    ValueError : the rule is not better for fast sampling, or the input does not have the derivatives.
-    """
+    """Return the ratio of bandwidth to rate, rad, above which a rule is worse than the trapezoidal one."""
     if not fast_sampling_ratio(rule.even(), count) < 1:
         raise ValueError(f"got the rule {rule.name!r}; needed one that is better for fast sampling after {count} lags")
 
@@ -212,10 +187,6 @@ def tolerable_derivative_error(process: Process, f_c: float, rule: DerivativeRul
     Returns
     -------
     share : s relative to the rms of the second derivative; dimensionless.
-
-    Raises
-    ------
-    ValueError : the rule has another number of derivatives, or is not better than the trapezoidal one.
     """
     if rule.derivatives not in (2, 3):
         raise ValueError(f"got {rule.derivatives} derivatives; needed 2 or 3, so that the second alone counts")

@@ -169,10 +169,6 @@ def chunks(
     Yields
     ------
     chunk : the cycles 1, 2, … in order.
-
-    Raises
-    ------
-    ValueError : fewer than 1 cycle, path or sample of memory.
     """
     if min(cycles, paths, memory) < 1:
         raise ValueError(f"got {cycles} cycles, {paths} paths, a memory of {memory}; needed at least 1 of each")
@@ -350,10 +346,6 @@ class Integrator:
     fmt : format with compiled loops: base 2, 10 or 16.
     period : T, s; T/2 is rounded to the format.
     paths : number of integrals that run in parallel.
-
-    Raises
-    ------
-    ValueError : the format has no compiled loops.
     """
 
     def __init__(self, fmt: FloatFormat, period: float, paths: int) -> None:

@@ -118,12 +118,7 @@ def summed(term: Callable[[Floats], Floats], most: int = 2**14) -> float:
 
 
 def lags(sigma_x: float, omega_bw: float, count: int) -> Lags:
-    """Return white noise after `count` equal first-order filters; `omega_bw` in rad/s. One filter is the input of (1).
-
-    Raises
-    ------
-    ValueError : a number is not positive, or `count` is not 1 to 9.
-    """
+    """Return white noise after `count` equal first-order filters, `omega_bw` in rad/s; one gives the input of (1)."""
     sigma_x, omega_bw = positive_number("sigma_x", sigma_x), positive_number("omega_bw", omega_bw)
     if not 1 <= count <= 9:
         raise ValueError(f"got {count} lags; needed 1 to 9")
@@ -241,11 +236,6 @@ class Rule:
     Parameters
     ----------
     weights : a tuple of w for each step of a period; empty if the rule adds nothing at that step.
-
-    Raises
-    ------
-    ValueError : the rule has no step, or its weights do not sum to the number of steps, so that a constant would be
-        integrated incorrectly.
     """
 
     name: str

@@ -93,11 +93,6 @@ def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt
     Parameters
     ----------
     duration : s; at least two cycles.
-
-    Raises
-    ------
-    ValueError : an argument is not positive and finite, `duration` is shorter than two cycles, or the format rounds
-        neither to nearest with ties away from zero nor by chopping.
     """
     if fmt.rounding not in Rounding.documented():
         raise ValueError(
@@ -159,10 +154,6 @@ def best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
     Parameters
     ----------
     omega_bw : rad/s. `duration` : s, of many correlation times 1/omega_bw.
-
-    Raises
-    ------
-    ValueError : at every rate the total error exceeds half of the rms of the integral; use more digits.
     """
     guess = independent_best_rate(omega_bw, duration, fmt)
 
@@ -189,13 +180,7 @@ def needed_precision(
     rounding: Rounding | str = Rounding.NEAREST,
     share: float = 0.1,
 ) -> int:
-    """Return the fewest digits for which the rounding error is at most `share` of the discretization error.
-
-    Raises
-    ------
-    ValueError : `share` is not positive, or :func:`two_errors` rejects an argument.
-    TypeError : a base or rounding that a ``FloatFormat`` rejects.
-    """
+    """Return the fewest digits for which the rounding error is at most `share` of the discretization error."""
     share, like = positive_number("share", share), FloatFormat(base, 2, rounding_named(rounding))
 
     def enough(fmt: FloatFormat) -> bool:

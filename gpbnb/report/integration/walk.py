@@ -39,10 +39,6 @@ def langevin(x: ArrayLike) -> Floats:
     Returns
     -------
     value : of the shape of `x`, between 0 and 1.
-
-    Raises
-    ------
-    ValueError : an entry is not positive or not finite.
     """
     x = positive_array("x", x)
     low = np.minimum(x, 2.0)
@@ -96,10 +92,6 @@ def random_walk(sigma_x: float, omega_bw: float, f_c: float) -> float:
     -------
     sigma_e_rw : in u s per √s.
 
-    Raises
-    ------
-    ValueError : an argument is not positive and finite, or their ratio leaves the range of float64.
-
     References
     ----------
     savage2016, (35).
@@ -120,12 +112,7 @@ def approximation_ratio(mu: ArrayLike) -> Floats:
 
 
 def validity(excess: float) -> float:
-    r"""Return the largest :math:`\mu` for which (39) is too large by at most `excess`, such as 0.01 for one percent.
-
-    Raises
-    ------
-    ValueError : `excess` is outside [1e-9, 1e3].
-    """
+    r"""Return the largest :math:`\mu` for which (39) is too large by at most `excess`, such as 0.01 for one percent."""
     if not 1e-9 <= excess <= 1e3:
         raise ValueError(f"got excess = {excess}; needed 1e-9 to 1e3, such as 0.01 for one percent")
 
@@ -157,10 +144,6 @@ def required_rate(sigma_x: float, omega_bw: float, limit: float) -> float:
     ----------
     sigma_x : in a unit u; `omega_bw` in rad/s.
     limit : in u s per √s.
-
-    Raises
-    ------
-    ValueError : an argument is not positive and finite.
     """
     sigma_x, omega_bw, limit = (
         positive_number(name, value) for name, value in (("sigma_x", sigma_x), ("omega_bw", omega_bw), ("limit", limit))
@@ -278,10 +261,6 @@ def settling_cycles(mu: float, share: float, rectangle: bool = False) -> float:
 
     For the trapezoidal rule :math:`L(1-\varphi^n)/2n \le` share, for the rectangular ones
     :math:`(1/L-L)(1-\varphi^n)/2n \le` share.
-
-    Raises
-    ------
-    ValueError : `share` is not positive.
     """
     rate = float(walk_factor(float(positive_array("mu", mu))))
     if not 0 < share < math.inf:

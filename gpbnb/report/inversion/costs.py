@@ -100,10 +100,6 @@ def prices(
     Returns
     -------
     prices : one for each bound, those from the residual first.
-
-    Raises
-    ------
-    ValueError : the residual of one of the inverses is not below 1.
     """
     fmt = fmt or FloatFormat(2, 24)
     names = [name for name, _, _ in KNOWN.values()]

@@ -51,10 +51,6 @@ class Wordlength:
     kind : "t = places", as in the significand .ddd of (1); "t = places + 1", as in d.ddd, or more; "fixed point", every
         number rounded to that many decimals.
     rounding : to nearest or chopped.
-
-    Raises
-    ------
-    ValueError : another kind.
     """
 
     kind: str

@@ -67,10 +67,6 @@ def possible(
     ----------
     printed : an error norm as text; by default that of Table 1.
     reference : whose inverse defines the error, the matrix as "given" or as "stored" in the wordlength.
-
-    Raises
-    ------
-    ValueError : `norm` is not one of :data:`SEARCHED`, or `reference` has another value.
     """
     if norm not in SEARCHED:
         raise ValueError(f"norm: got {norm!r}; needed one of {', '.join(SEARCHED)}")

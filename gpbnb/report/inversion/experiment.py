@@ -83,10 +83,6 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
     ----------
     a : (n, n).
     names : names of bounds from :data:`PRINTED`, as text, and :data:`BETTER`; all by default.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError : the matrix is singular, or elimination in the format finds it singular.
     """
     inverse = true_inverse(a)
     wanted = ALL_BOUNDS if names is None else tuple(names)
@@ -422,10 +418,6 @@ def worst(bound: str, sweep: str = "variants") -> InverseTrial:
     Parameters
     ----------
     bound : a bound of the sweep, as text.
-
-    Raises
-    ------
-    ValueError : the sweep does not have the bound.
     """
     rows = [row for row in frozen(sweep).select(bound=bound) if row["format"] != "all" and row["smallest_regular"]]
     if not rows:
@@ -461,12 +453,7 @@ class Frozen:
 
 @cache
 def frozen(sweep: str) -> Frozen:
-    """Read the stored result of a sweep, "variants" or "random".
-
-    Raises
-    ------
-    ValueError : there is no such sweep.
-    """
+    """Read the stored result of a sweep, "variants" or "random"."""
     if sweep not in SWEEPS:
         raise ValueError(f"got sweep {sweep!r}; needed one of {', '.join(SWEEPS)}")
     table = stored_sweep(sweep).load()

@@ -117,12 +117,7 @@ def table1(bounds: Sequence[PrintedColumn], errors: Sequence[PrintedColumn], ax:
 
 
 def violations(result: Frozen, bounds: Sequence[str], ax: Axes) -> list[Artist]:
-    """Draw, for each family of regular matrices, the share whose error exceeds a printed bound.
-
-    Raises
-    ------
-    ValueError : more than four bounds, which would look alike.
-    """
+    """Draw, for each family of regular matrices, the share whose error exceeds a printed bound."""
     markers = (("o", REFUTED), ("o", "none"), ("s", REFUTED), ("s", "none"))
     if len(bounds) > len(markers):
         raise ValueError(

@@ -53,12 +53,6 @@ def triangularize(a: FloatArray, pivot: bool = False) -> Triangularization:
     ----------
     a : (n, n).
     pivot : whether to use partial pivoting, which section 10 mentions and section 11 omits.
-
-    Raises
-    ------
-    TypeError : not a FloatArray.
-    ValueError : `a` is not a square matrix.
-    numpy.linalg.LinAlgError : a pivot is zero.
     """
     from gpbnb.arithmetic import linalg
 
@@ -163,10 +157,6 @@ class Reading:
     form : one of :data:`FORMS`.
     triangular : whether the inverse in (94) is that of A_T, to which ΔA and Δb belong; otherwise that of A.
     norm : one of :data:`NORMS`; the report uses "column sum", (22).
-
-    Raises
-    ------
-    ValueError : `form` or `norm` has another value.
     """
 
     signed: bool = True
@@ -294,10 +284,6 @@ def run(a: FloatArray, pivot: bool = False, reading: Reading | None = None) -> P
     Returns
     -------
     outcome : the bound is a Fraction, or a float for the Frobenius and spectral norms.
-
-    Raises
-    ------
-    TypeError, ValueError, numpy.linalg.LinAlgError : as :func:`triangularize`.
 
     References
     ----------

@@ -75,12 +75,7 @@ def printed_first_relative_bound(inverse: Any, residual: Any, change: Any = None
 
 
 def residual_bound(x: Any, residual: Any, norm: Norm = column_sum) -> Any:
-    r"""Bound of ‖E‖ from the computed inverse alone, :math:`\|X\|\|R\|/(1-\|R\|)`; to every order.
-
-    Raises
-    ------
-    ValueError : ‖R‖ ≥ 1; such an X does not even prove that A has an inverse.
-    """
+    r"""Bound of ‖E‖ from the computed inverse alone, :math:`\|X\|\|R\|/(1-\|R\|)`; to every order."""
     size = norm(_matrix(residual, "residual"))
     return norm(_matrix(x, "x")) * size / _rest(size, "‖R‖", "a better inverse, computed with more digits")
 
@@ -250,12 +245,7 @@ def bound(reduction: Reduction, beta: Any, norm: Norm = column_sum) -> Any:
 
 
 def strict_bound(reduction: Reduction, beta: Any, norm: Norm = column_sum) -> Any:
-    r"""Bound of :func:`bound` to every order: with strict entries, divided by :math:`1 - \|E\|`.
-
-    Raises
-    ------
-    ValueError : ‖E‖ ≥ 1, so no bound exists; more digits are needed.
-    """
+    r"""Bound of :func:`bound` to every order: with strict entries, divided by :math:`1 - \|E\|`."""
     size = norm(bracket_bounds(reduction, strict_perturbation_bounds(reduction, beta)))
     return norm(_checked(reduction).solution) * size / _rest(size, "‖E‖", "more digits")
 

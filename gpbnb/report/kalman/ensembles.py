@@ -85,10 +85,6 @@ def random_model(rng: np.random.Generator, kind: str) -> tuple[LinearModel, floa
         integrators, of which only the closed loop is stable; "one sign" has positive numbers and measurements, so that
         chopping errors always have the same sign; "far scales" is stable, with units of the states up to eight powers
         of ten apart and a precise first measurement, so that covariances cancel.
-
-    Raises
-    ------
-    ValueError : another kind.
     """
     if kind not in KINDS:
         raise ValueError(f"got kind {kind!r}; needed one of {', '.join(KINDS)}")

@@ -37,10 +37,6 @@ def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> Exac
     ----------
     Phi (n, n), H (m, n), Q (n, n), R (m, m) : the model. x (n,), P (n, n) : values before the step.
     z (m,) : measurement.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError : :math:`HP_pH^T + R` is singular.
     """
     Phi, H, Q, R, x, P, z = map(exact, (Phi, H, Q, R, x, P, z))
     V = predicted(EXACT, Phi, P, Q)

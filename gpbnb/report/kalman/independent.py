@@ -42,10 +42,6 @@ def stored_shares(bound: str, form: Form) -> ModelShare:
     Parameters
     ----------
     bound : "105", "108" or "125".
-
-    Raises
-    ------
-    ValueError : another bound.
     """
     if bound not in ("105", "108", "125"):
         raise ValueError(f"got bound {bound!r}; needed 105, 108 or 125")

@@ -56,10 +56,6 @@ def terms(model: LinearModel, true: Checkpoints) -> Terms:
     Parameters
     ----------
     true : estimates and gains of each step, from the first step on.
-
-    Raises
-    ------
-    ValueError : steps are missing, or there are none.
     """
     if not true.steps or true.steps != tuple(range(1, len(true.steps) + 1)):
         raise ValueError(f"got the steps {true.steps[:4]} …; needed 1, 2, 3, …; take range(1, {len(true.steps) + 1})")

@@ -94,10 +94,6 @@ def coefficients(
     carried : whether the errors of P from earlier steps propagate into P, K and F, as all other errors do in the
         report's own algebra; this adds 3n + m + 2 roundings at each step.
 
-    Raises
-    ------
-    ValueError : k, n or m below 1.
-
     References
     ----------
     hung1984, ch. II, (112)-(125).
@@ -132,10 +128,6 @@ def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fr
     ----------
     transitions : F_1 … F_k of (109).
     inputs : u_1 … u_k of (110).
-
-    Raises
-    ------
-    ValueError : no steps, or different numbers of transitions and inputs.
     """
     if not transitions or len(transitions) != len(inputs):
         raise ValueError(
@@ -165,10 +157,6 @@ def precision_for_coefficient(
     coefficient : the factor of β.
     tolerance : the allowed error, in the same units.
     base, rounding : base and rounding of the format.
-
-    Raises
-    ------
-    ValueError : coefficient or tolerance not positive.
 
     References
     ----------

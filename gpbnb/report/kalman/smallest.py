@@ -134,10 +134,6 @@ def random_steps(fmt: FloatFormat, steps: int, rng: np.random.Generator) -> Rand
     """Take one step with each operation rounded, as :func:`rounded_step`, for random filters with one state.
 
     The exact step is computed in float64, so the format must be much coarser.
-
-    Raises
-    ------
-    ValueError : the unit roundoff is below 2**-30.
     """
     if fmt.unit_roundoff < Fraction(1, 2**30):
         raise ValueError(f"got {fmt}; needed a unit roundoff of at least 2**-30, so that float64 can serve as exact")

@@ -35,10 +35,6 @@ class Processor:
     fused : whether products are added by fused multiply-add.
     compensated : whether the program updates the estimate by Kahan's compensated summation.
     order : of the additions in matrix products.
-
-    Raises
-    ------
-    TypeError : a name that is not text.
     """
 
     name: str

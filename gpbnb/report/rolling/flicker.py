@@ -37,10 +37,6 @@ def exponentials(accuracy: float = ACCURACY, longest: int = LONGEST) -> tuple[ND
     Returns
     -------
     poles, weights : (m,) each; m grows as the product of the logarithms of `longest` and 1/`accuracy`.
-
-    Raises
-    ------
-    ValueError : a parameter is out of its range.
     """
     if not 1e-12 <= accuracy <= 0.1:
         raise ValueError(f"got an accuracy of {accuracy}; needed 1e-12 to 0.1")
@@ -98,10 +94,6 @@ def flicker(
     Yields
     ------
     noise : (at most `block`, channels); the unit is that of √A.
-
-    Raises
-    ------
-    ValueError : a level that is negative or not finite, no samples or channels, more than `LONGEST` samples.
     """
     if not 0 <= level < math.inf:
         raise ValueError(f"got a noise level of {level}; needed a finite number of at least 0")

@@ -114,10 +114,6 @@ def recursion(
     fmt : a format in base 2, 10 or 16 with a precision that has compiled loops.
     period, interval : roll period and time between samples, s.
     steps : samples at which errors are evaluated, ascending.
-
-    Raises
-    ------
-    ValueError : a format without compiled loops; steps that do not ascend.
     """
     marks = np.asarray(steps, dtype=np.int64)
     if marks.ndim != 1 or not len(marks) or marks[0] < 0 or np.any(np.diff(marks) <= 0):
@@ -156,10 +152,6 @@ def digits_needed_observed(
     """Find the smallest precision with which a year's deroll of a drift stays within `error` mas.
 
     :func:`gpbnb.arithmetic.search.smallest_precision` searches up to the precision that the bound proves to be enough.
-
-    Raises
-    ------
-    ValueError : the precision that is proved to be enough cannot be emulated, and none below it is enough.
     """
     return _digits_needed_observed(method, base, drift, period, tuple(map(int, steps)), error)
 

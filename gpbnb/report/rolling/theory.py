@@ -393,10 +393,6 @@ def image_in_fit(drift: float, period: float, samples: int, interval: float = IN
     .. math:: \frac{12k}{n(n^2-1)}\Bigl[\frac{n}{2\sin^2(\omega_r\Delta t)} - \frac{n(n+1)}{4}\Bigr]
 
     for a ramp at twice its derolled strength, so that its slope is k.
-
-    Raises
-    ------
-    ValueError : the record is not a whole number of turns.
     """
     turns = samples * interval / period
     if samples < 2 or abs(turns - round(turns)) > 1e-9 * turns:

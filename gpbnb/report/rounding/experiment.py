@@ -204,10 +204,6 @@ def random_numbers(
         "far exponents" draws either sign and exponents over a range of twice the precision;
         "cancelling" draws mixed signs and replaces the last number along the last axis by minus the rounded
         sum of the others.
-
-    Raises
-    ------
-    ValueError : another kind, or more than 18 decimal digits of precision.
     """
     if kind not in KINDS:
         raise ValueError(f"got kind {kind!r}; needed one of {', '.join(KINDS)}")
@@ -366,10 +362,6 @@ def worst_product(fmt: FloatFormat, factors: int) -> Trial:
     Parameters
     ----------
     factors : n, at least 2.
-
-    Raises
-    ------
-    ValueError : fewer than 2 factors, or a format with more than 1000 significands.
     """
     if factors < 2:
         raise ValueError(f"got {factors} factors; needed at least 2")
@@ -401,10 +393,6 @@ def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: 
     exponents : those of the last digit of a term; more exponents take more time.
     products : whether each term is the rounded product of two numbers, so that the sum is an inner
         product.
-
-    Raises
-    ------
-    ValueError : fewer than 2 terms; no exponents.
     """
     if terms < 2 or not len(exponents):
         raise ValueError(f"got {terms} terms, {len(exponents)} exponents; needed at least 2 terms and 1 exponent")
@@ -435,10 +423,6 @@ def tie_sum(fmt: FloatFormat, terms: int) -> Trial:
 
     From 5 terms on, the error exceeds the bound of hung1984, ch. II, (18), in every precision, as long as
     (3n - 8)β < 4. Where the sum is nearly zero, it does so by a factor of nearly 2.
-
-    Raises
-    ------
-    ValueError : an odd base, in which β has no finite expansion; chopping; fewer than 2 terms.
     """
     if fmt.base % 2 or fmt.rounding is not Rounding.NEAREST or terms < 2:
         raise ValueError(f"got {fmt}, {terms} terms; needed an even base, NEAREST, at least 2 terms")

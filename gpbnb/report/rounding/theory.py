@@ -131,10 +131,6 @@ def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> f
     If rounding errors are independent with mean zero, the bound fails at most with the probability `failure`.
     Each of the n terms, with at most n - 1 roundings, gets an equal share of this probability.
 
-    Raises
-    ------
-    ValueError : no term; or for a reason given in :func:`gpbnb.arithmetic.bounds.gamma_probabilistic`.
-
     References
     ----------
     Higham & Mary 2019, for inner products.
@@ -201,10 +197,6 @@ def relative_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
 
     The quotient is the condition number of the inner product. It states by how much a relative change of the entries
     of one vector may be amplified in the result.
-
-    Raises
-    ------
-    ZeroDivisionError : the inner product is zero, so it has no relative error.
     """
     value = abs(_total(_products(a, b)))
     if value == 0:
@@ -285,12 +277,7 @@ def product(matrices: Sequence[Any]) -> NDArray[Any]:
 
 
 def interfaces(matrices: Sequence[Any]) -> list[int]:
-    """Interface dimensions d_1 ... d_{N-1} of a product of N matrices; hung1984, ch. II, (29).
-
-    Raises
-    ------
-    ValueError : no matrix, an argument that is not a matrix, or rows that do not fit the columns of the factor before.
-    """
+    """Interface dimensions d_1 ... d_{N-1} of a product of N matrices; hung1984, ch. II, (29)."""
     shapes = [np.shape(matrix) for matrix in matrices]
     fit = all(len(shape) == 2 for shape in shapes) and all(p[1] == q[0] for p, q in pairwise(shapes))
     if not shapes or not fit:

@@ -86,10 +86,6 @@ def overview(found: Mapping[str, Mapping[str, int]], ax: Axes) -> list[Artist]:
     Parameters
     ----------
     found : bits by problem, then by kind of answer, one of :data:`KINDS`.
-
-    Raises
-    ------
-    ValueError : another kind.
     """
     unknown = {kind for each in found.values() for kind in each} - set(KINDS)
     if unknown:

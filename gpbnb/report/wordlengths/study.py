@@ -65,10 +65,6 @@ def required_precision_by_steps(
     Parameters
     ----------
     options : form, basis, base and rounding for that function.
-
-    Raises
-    ------
-    ValueError : a number of steps is below 1 or exceeds the measurements; or for a reason given in that function.
     """
     if not all(1 <= k <= len(z) for k in steps):
         raise ValueError(f"got steps {list(steps)} and {len(z)} measurements; needed from 1 to {len(z)} steps")
@@ -85,12 +81,7 @@ def _first(model: LinearModel, steps: int) -> LinearModel:
 
 
 def precision_by_step(runs: Sequence[Year], tolerance: float) -> tuple[tuple[int, int], ...]:
-    """For each step, find the fewest digits that keep drift (mas) and rate (mas/yr) within `tolerance` up to this step.
-
-    Raises
-    ------
-    ValueError : runs of several bases, roundings or forms, whose digits are not comparable.
-    """
+    """For each step, find the fewest digits that keep drift (mas) and rate (mas/yr) within `tolerance` so far."""
     kinds = {(run.case.model, run.case.base, run.case.rounding, run.case.form) for run in runs}
     if len(kinds) != 1:
         raise ValueError(f"got runs of {len(kinds)} kinds; needed runs of one model, base, rounding and form")
@@ -156,10 +147,6 @@ def update_stagnation(
     ----------
     state : index of the state.
     last : number of steps at the end that are examined one by one.
-
-    Raises
-    ------
-    ValueError : no such state, or not more measurements than the steps to be examined.
     """
     _check_state(model, state)
     if not 0 < last < len(z):
@@ -180,10 +167,6 @@ def bits_hiding_process_noise(model: LinearModel, z: NDArray[Any], state: int) -
     r"""Return :math:`\log_2 P_{ii}/Q_{ii}` after the last step; with roughly fewer bits, adding Q has no effect.
 
     The value is infinite if the state has no process noise.
-
-    Raises
-    ------
-    ValueError : no such state.
     """
     _check_state(model, state)
     checkpoints, noise = reference(model, z, (len(z),)), float(model.Q[0, state, state])
@@ -243,11 +226,6 @@ def inverse_precision(
     ----------
     matrix : (n, n), exact, symmetric positive definite.
     tolerance : largest error of the inverse, relative to it in norm; above 0.
-
-    Raises
-    ------
-    ValueError : a matrix that is not symmetric, or without a positive diagonal; a tolerance that is not above 0.
-    numpy.linalg.LinAlgError : a singular matrix.
     """
     matrix = exact(matrix)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
@@ -278,10 +256,6 @@ def rescaled(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
     Parameters
     ----------
     sizes : (n,), exact, old unit / new unit for each state.
-
-    Raises
-    ------
-    ValueError : `sizes` does not have one positive number for each state.
     """
     given = exact(sizes)
     if given.shape != (model.n,) or not (given > 0).all():

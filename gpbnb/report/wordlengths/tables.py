@@ -21,12 +21,7 @@ def bits(answer: Requirement) -> str:
 
 
 def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
-    """Compare answers, with one row for each name and one column for each question.
-
-    Raises
-    ------
-    ValueError : rows that do not answer the same questions.
-    """
+    """Compare answers, with one row for each name and one column for each question."""
     questions = {tuple(question for question, _ in line) for line in found.values()}
     if len(questions) != 1:
         raise ValueError(
