@@ -48,23 +48,13 @@ def kinds(bases: Sequence[int]) -> Iterator[tuple[str, Callable[[], object]]]:
     from gpbnb.arithmetic.formats import FloatFormat
     from gpbnb.bounds.guarantee import limits
     from gpbnb.filters.model import LinearModel
-    from gpbnb.filters.replayed import only_compiled
     from gpbnb.filters.system import LinearSystem
     from gpbnb.wordlength.judging import judge
     from gpbnb.wordlength.precision import required_precision
 
-    def both(run: Callable[[], object]) -> object:
-        """Run as after a first question, and as a run of many steps."""
-        run()
-        with only_compiled():
-            return run()
-
     model = LinearModel([[1, "0.1"], [0, "0.9"]], [[1, 0]], [["0.01", 0], [0, "0.01"]], [[1]], [0, 0], [[1, 0], [0, 1]])
     system, z, within = LinearSystem([["0.9"]], [["0.1"]]), [[1], [2], [1]], limits(2, 1, 10, 10)
-    yield (
-        "simulated measurements and the reference",
-        partial(both, partial(required_precision, model, 3, 1, largest=12)),
-    )
+    yield "simulated measurements and the reference", partial(required_precision, model, 3, 1, largest=12)
     yield "bounds of a linear system", partial(required_precision, system, 3, 1, basis="bound", z=z, largest=24)
     for base in bases:
         digits = 8 if base == 2 else 4
@@ -75,10 +65,10 @@ def kinds(bases: Sequence[int]) -> Iterator[tuple[str, Callable[[], object]]]:
             yield f"{name}: linear system", partial(judge, system, fmt, 3, 1, z=z)
             for form in ("innovation", "UD"):
                 for basis in ("emulation", "bound"):
-                    yield f"{name}: {form}, {basis}", partial(both, partial(judge, model, fmt, 3, 1, form, basis, z))
+                    yield f"{name}: {form}, {basis}", partial(judge, model, fmt, 3, 1, form, basis, z)
             yield f"{name}: guarantee", partial(judge, model, fmt, 3, 1, "innovation", "guarantee", None, within)
     yield "fixed point: linear system", partial(judge, system, FixedFormat(6, 9), 3, 1, z=z)
-    yield "fixed point: Kalman filter", partial(both, partial(judge, model, FixedFormat(6, 9), 3, 1, z=z))
+    yield "fixed point: Kalman filter", partial(judge, model, FixedFormat(6, 9), 3, 1, z=z)
 
 
 if __name__ == "__main__":

@@ -130,7 +130,8 @@ def matmul(
 def _sum_of_products(rows: FloatArray, columns: FloatArray, order: Order, fused: bool, block: int) -> FloatArray:
     size = math.prod(np.broadcast_shapes(rows.shape[:-2], columns.shape[:-2])) * rows.shape[-2] * columns.shape[-1]
     # Random roundings come in the order of the loops below.
-    if rows.shape[-1] * size <= _MOST_PRODUCTS and order != "left" and rows.format.rounding is not Rounding.STOCHASTIC:
+    ordered = rows.backend.records or rows.format.rounding is not Rounding.STOCHASTIC
+    if rows.shape[-1] * size <= _MOST_PRODUCTS and order != "left" and ordered:
         axes = max(rows.ndim, columns.ndim)
         left, right = (x.reshape((1,) * (axes - x.ndim) + x.shape) for x in (rows, columns))
         left = left[..., np.newaxis].moved(lambda a: np.moveaxis(a, -2, 0))

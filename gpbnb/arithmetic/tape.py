@@ -10,27 +10,20 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from functools import cache, partial
+from functools import partial
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic import machine
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.exact import ExactKernel
+from gpbnb.arithmetic.machine import CODES
 
 Places = NDArray[np.int64]
 """Numbers or truth values of a tape, of any shape."""
-
-# fmt: off
-CODES = {
-    name: code for code, name in enumerate(
-        ("add", "subtract", "multiply", "divide", "sqrt", "negative", "absolute", "choose", "compare", "combine")
-    )
-}
-# fmt: on
-"""Codes of operations, as in :mod:`gpbnb.arithmetic.kernels.replay`."""
 
 MOST_OPERATIONS = 1 << 22
 """Longest tape. Arrays of so many entries run fast without one."""
@@ -38,9 +31,13 @@ MOST_OPERATIONS = 1 << 22
 FEW_OPERATIONS = 5_000
 """Shortest tape that runs in compiled code; for fewer operations, integers of Python are fast and need no loading."""
 
-_DIVIDE, _SQRT, _CHOOSE, _COMPARE, _COMBINE = (
-    CODES[name] for name in ("divide", "sqrt", "choose", "compare", "combine")
+_DIVIDE, _SQRT, _CHOOSE, _COMPARE, _COMBINE, _NONZERO = (
+    CODES[name] for name in ("divide", "sqrt", "choose", "compare", "combine", "nonzero")
 )
+
+
+_SHORTENED = ("add", "subtract", "multiply", "divide")
+_WHOLE = (int, np.int64)
 
 
 class UntraceableError(Exception):
@@ -100,8 +97,10 @@ class Tape:
     inputs : number of numbers that each run takes; their places are 1 and following.
     """
 
-    def __init__(self, inputs: int) -> None:
+    def __init__(self, inputs: int, one: bool = False) -> None:
         self.inputs = inputs
+        #: The place of the number one if every format has it, else -1.
+        self.one = -1
         #: The reason why the function cannot be repeated; empty if it can.
         self.refusal = ""
         self._instructions = array("i")
@@ -109,6 +108,17 @@ class Tape:
         self._calls: list[Call] = []
         self._constants = (Constants(False), Constants(True))
         self._known: dict[Any, int] = {}
+        #: Whether a number that several formats have is stored alike in all of them.
+        self.alike = True
+        #: Whether fused multiply-adds are operations, and not calls of a function.
+        self.fuses = False
+        self._segments_begin: list[tuple[int, int]] = []
+        self._checked = set[int]()
+        self._guarded = False
+        #: First operations of each quantity, and its name.
+        self.labels: list[tuple[int, str]] = []
+        if one:
+            self.one = self.constant(1, exactly=False)
 
     def refuse(self, reason: str) -> NoReturn:
         """Stop recording, also if the function handles the error.
@@ -129,6 +139,8 @@ class Tape:
 
     def constant(self, number: Any, exactly: bool) -> int:
         """Return the place of a constant; equal constants of one type share a place."""
+        if type(number) in _WHOLE and (number == 0 or (number == 1 and self.one > 0)):
+            return self.one if number else 0
         key: tuple[Any, ...] = (type(number), number, exactly)
         try:
             place = self._known.get(key)
@@ -141,17 +153,88 @@ class Tape:
             self._constants[exactly].numbers.append(number)
         return place
 
-    def record(self, name: str, *operands: Any) -> Places:
+    def record(self, name: str, *operands: Any, fmt: int = 0) -> Places:
         """Record an operation on places of one shape, entry by entry, and return the places of its results.
 
-        A third operand, a choice or a table, may be an int.
+        Products with zero and one and sums with zero are exact, and left out.
+
+        Parameters
+        ----------
+        operands : a third one, a choice or a table, may be an int.
+        fmt : number of the format in which the results are rounded.
         """
+        if name == "round":
+            (a,) = operands
+            left = (a != 0) & ((a != self.one) | (not self.alike))
+            found = np.where(left, 0, a)
+            if left.any():
+                found[left] = self._append(name, (a[left],), fmt)
+            return found
+        if name not in _SHORTENED:
+            return self._append(name, operands, fmt)
+        a, b = operands
+        if a.size == 1:
+            same = self._same(name, a.item(), b.item())
+            return self._append(name, operands, fmt) if same < 0 else np.full(a.shape, same)
+        found = np.full(a.shape, -1)
+        if name == "divide":
+            for each in np.unique(b[(a == 0)]).tolist():
+                self.check(each)
+            found[a == 0] = 0
+        elif name != "subtract":
+            found = np.where(a == 0, b if name == "add" else 0, found)
+        if name in ("multiply", "divide"):
+            found = np.where((b == self.one) & (found < 0), a, found)
+        if name == "multiply":
+            found = np.where(a == self.one, b, np.where(b == 0, 0, found))
+        elif name != "divide":
+            found = np.where(b == 0, a, found)
+        left = found < 0
+        if left.all():
+            return self._append(name, operands, fmt)
+        found[left] = self._append(name, (a[left], b[left]), fmt)
+        return found
+
+    def _same(self, name: str, a: int, b: int) -> int:
+        """Return the place of the number that an exact operation gives back, or -1."""
+        if name == "divide":
+            if a == 0:
+                self.check(b)
+            return 0 if a == 0 else a if b == self.one else -1
+        if name == "multiply":
+            return 0 if a == 0 or b == 0 else b if a == self.one else a if b == self.one else -1
+        return a if b == 0 else b if a == 0 and name == "add" else -1
+
+    def check(self, place: int) -> None:
+        """Stop each run in which a number is zero that will be a divisor."""
+        if place not in self._checked and place != self.one:
+            self._append("nonzero", (np.array(place),), 0)
+            if not self._guarded:
+                self._checked.add(place)
+
+    def only_if(self, truth: Places, changed: Callable[[], Any]) -> Any:
+        """Record operations that a run leaves out unless a truth value holds; another part must choose by it, too."""
+        at = len(self._instructions)
+        self._append("skip", (truth, np.array(0)), 0)
+        before, self._guarded = self._guarded, True
+        found = changed()
+        self._guarded = before
+        self._instructions[at + 2] = (len(self._instructions) - at) // 5 - 1
+        return found
+
+    def about(self, quantity: str) -> None:
+        """Name the quantity that the next operations compute."""
+        self.labels.append((len(self._instructions) // 5, quantity))
+
+    def _append(self, name: str, operands: Sequence[Any], fmt: int) -> Places:
         first = operands[0]
         code = CODES[name]
-        truth = code >= _COMPARE
+        truth = name in ("compare", "combine")
         size, begin = first.size, self._truths if truth else self._values
         if len(self._instructions) + 5 * size > 5 * MOST_OPERATIONS:
             self.refuse(f"it takes more than {MOST_OPERATIONS} operations")
+        if size and (not self._segments_begin or self._segments_begin[-1][1] != fmt):
+            self._segments_begin.append((len(self._instructions) // 5, fmt))
         if size == 1:
             row = [code, 0, 0, 0, begin]
             for column, each in enumerate(operands, start=1):
@@ -165,9 +248,22 @@ class Tape:
             self._instructions.frombytes(rows.tobytes())
         if truth:
             self._truths += size
-        else:
+        elif name not in ("nonzero", "skip"):
             self._values += size
         return np.arange(begin, begin + size).reshape(first.shape) if first.ndim else np.array(begin)
+
+    @property
+    def formats(self) -> NDArray[np.int64]:
+        """Return the number of the format of each operation."""
+        found = np.zeros(len(self._instructions) // 5, np.int64)
+        for begin, fmt in self._segments_begin:
+            found[begin:] = fmt
+        return found
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Return the numbers of places of numbers and of truth values."""
+        return self._values, self._truths
 
     def call(self, function: Callable[..., FloatArray], *operands: Places) -> Places:
         """Record the call of a function that takes one entry of each operand after the other."""
@@ -180,6 +276,11 @@ class Tape:
     def calls(self) -> Sequence[Call]:
         """The calls of functions, in their order."""
         return tuple(self._calls)
+
+    @property
+    def all_constants(self) -> tuple[Constants, Constants]:
+        """The constants that a format may round, and those that it must hold."""
+        return self._constants
 
     def constants_in(self, fmt: Any) -> dict[int, Fraction]:
         """Return the constants as a format stores them, by their places.
@@ -237,25 +338,28 @@ class Tape:
     ) -> FloatArray | None:
         """Run in compiled code; None if a number leaves the range of the backend, or has no value."""
         first = given[0]
+        kind, formats = machine.tables([first.format])
         packed = [backend.pack(each.components) for each in given]
-        values = np.zeros((self._values, *packed[0].shape[1:]), packed[0].dtype)
+        alone = packed[0].ndim > 1
+        values = np.zeros((self._values, *(1,) * alone, *packed[0].shape[1:]), packed[0].dtype)
         for place, each in zip(places, packed, strict=True):
-            values[place] = each
-        truths, instructions = np.zeros(self._truths, np.uint8), self.instructions
+            values[place] = each[:, np.newaxis] if alone else each
+        truths, instructions = np.zeros((self._truths, *(1,) * alone), np.uint8), self.instructions
         truths[1] = 1
-        try:
-            for begin, end, call in self._segments():
-                if _replay()(backend.tag, instructions, begin, end, values, truths) < end:
+        for begin, end, call in self._segments():
+            rows = instructions[begin:end]
+            if machine.evaluate(
+                kind, formats, machine.code_of(rows, np.zeros(len(rows), np.int64)), values, truths
+            ) < len(rows):
+                return None
+            if call is not None:
+                taken = [first.from_packed(_alone(values[each], alone), first.format) for each in call.operands]
+                made = call.function(*taken)
+                if made.backend is not backend:
                     return None
-                if call is not None:
-                    taken = [first.from_packed(values[each], first.format) for each in call.operands]
-                    made = call.function(*taken)
-                    if made.backend is not backend:
-                        return None
-                    values[call.results] = backend.pack(made.components)
-        except (OverflowError, ZeroDivisionError):
-            return None
-        return first.from_packed(values[results], first.format)
+                found = backend.pack(made.components)
+                values[call.results] = found[:, np.newaxis] if alone else found
+        return first.from_packed(_alone(values[results], alone), first.format)
 
     def _exact(self, given: Sequence[FloatArray], places: Sequence[Places], results: Places) -> FloatArray:
         """Run with integers of Python, which hold the numbers of every format."""
@@ -288,9 +392,12 @@ def _run_exactly(
     of_one: list[Callable[..., tuple[int, int]]] = [kernel.sqrt, kernel.negative, kernel.absolute]
     compare = kernel.compare
     for code, a, b, c, out in rows:
-        if code <= _DIVIDE:
-            if code == _DIVIDE and m[b] == 0:
+        if code <= _DIVIDE or code == _NONZERO:
+            divisor = {_DIVIDE: b, _NONZERO: a}.get(code)
+            if divisor is not None and m[divisor] == 0:
                 raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+            if code == _NONZERO:
+                continue
             m[out], e[out] = of_two[code](m[a], e[a], m[b], e[b])
         elif code == _CHOOSE:
             chosen = b if truths[a] else c
@@ -305,9 +412,6 @@ def _run_exactly(
             m[out], e[out] = of_one[code - _SQRT](m[a], e[a])
 
 
-@cache
-def _replay() -> Callable[..., int]:
-    # Imported here because numba takes a second to import.
-    from gpbnb.arithmetic.kernels.replay import replay
-
-    return replay
+def _alone(values: NDArray[Any], alone: bool) -> NDArray[Any]:
+    """Take the only lane of numbers that stand in lanes."""
+    return values[..., 0, :] if alone else values

@@ -198,9 +198,9 @@ class TracedFormat:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def __init__(self, tape: Tape) -> None:
-        #: The tape on which operations are recorded.
-        self.tape = tape
+    def __init__(self, tape: Tape, number: int = 0) -> None:
+        #: The tape on which operations are recorded, and the number of this format on it.
+        self.tape, self.number = tape, number
         self._recording = _Recording(tape)
         #: What functions of ``np.linalg`` do.
         self.algebra = linalg.NUMPY
@@ -226,7 +226,15 @@ class TracedFormat:
     def constant(self, values: Any, exactly: bool) -> TracedArray:
         """Return constants, which must be exact in every format if `exactly` is set."""
         if isinstance(values, TracedArray):
-            return values
+            other: Any = values.format
+            if other is self or other.tape is not self.tape:
+                return values
+            return self.made(self.tape.record("round", values.components[0], fmt=self.number))
+        if self.number:
+            return self.made(self.tape.record("round", self._constant(values, exactly).components[0], fmt=self.number))
+        return self._constant(values, exactly)
+
+    def _constant(self, values: Any, exactly: bool) -> TracedArray:
         if type(values) in _PLAIN:
             return self.made(np.array(self.tape.constant(values, exactly)))
         if isinstance(values, (FloatArray, TracedTruth)):
@@ -293,16 +301,19 @@ class TracedArray(FloatArray):
     def multiply_add(self, factor: Any, addend: Any) -> TracedArray:
         """Record a fused multiply-add."""
         arrays = np.broadcast_arrays(*(each.components[0] for each in (self, *map(self.operand, (factor, addend)))))
+        if self.tape.fuses:
+            fused: TracedArray = self.format.made(self.tape.record("fused", *arrays, fmt=self.format.number))
+            return fused
         return self._called(FloatArray.multiply_add, [self.format.made(each) for each in arrays])
 
     def _binary(self, name: str, left: Any, right: Any) -> TracedArray:
         made: TracedArray = self.format.made(
-            self.tape.record(name, *_matched(name, self.operand(left), self.operand(right)))
+            self.tape.record(name, *_matched(name, self.operand(left), self.operand(right)), fmt=self.format.number)
         )
         return made
 
     def _unary(self, name: str) -> TracedArray:
-        made: TracedArray = self.format.made(self.tape.record(name, self.components[0]))
+        made: TracedArray = self.format.made(self.tape.record(name, self.components[0], fmt=self.format.number))
         return made
 
     def _compare(self, other: Any, holds: Callable[[Any], Any]) -> TracedTruth:
@@ -317,6 +328,20 @@ class TracedArray(FloatArray):
 
     def __bool__(self) -> bool:
         self.tape.refuse("it branches on a number")
+
+    def if_nonzero(self, changed: Callable[[], Any], unchanged: Any) -> Any:
+        """Record what changes if this number is not zero, and the choice; see ``array_steps.if_nonzero``."""
+        if not self.components[0].any():
+            return unchanged
+        nonzero = self != 0
+        found = self.tape.only_if(nonzero.components[0], changed)
+        if isinstance(found, list):
+            return [np.where(nonzero, a, b) for a, b in zip(found, unchanged, strict=True)]
+        return np.where(nonzero, found, unchanged)
+
+    def check_nonzero(self) -> None:
+        """Record that this number must not be zero."""
+        self.tape.check(int(self.components[0]))
 
 
 def _matched(name: str, a: Any, b: Any) -> Sequence[Places]:
@@ -409,7 +434,8 @@ class TracedTruth(ComponentArray):
         places: Sequence[Places] = [self.components[0], *(array.operand(each).components[0] for each in (a, b))]
         if not places[0].shape == places[1].shape == places[2].shape:
             places = np.broadcast_arrays(*places)
-        return self.format.made(self.format.tape.record("choose", *places))
+        made: TracedArray = array.format.made(self.format.tape.record("choose", *places, fmt=array.format.number))
+        return made
 
     def _refuse(self, *given: Any) -> NoReturn:
         self.format.tape.refuse("it branches on a comparison, or counts or converts it")

@@ -240,7 +240,7 @@ class ArrayRun(SteppedRun):
     def _covariance_step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
         algebra, model = self._blocks.state, StepModel(*(self._at(letter, k) for letter in ("Phi", "H", "Q", "R")))
         V = predicted_in(self._blocks, model.Phi, self.P, model.Q)
-        K, P, pivots = measured_in(self._blocks, self.form, model.H, model.R, V)
+        K, P, _, definite = measured_in(self._blocks, self.form, model.H, model.R, V)
         if self.form is Form.HUNG_SECOND_GAIN:
             K = second_gain(algebra, model.H, model.R, P)
         if self.form in HUNG_FORMS:
@@ -250,7 +250,7 @@ class ArrayRun(SteppedRun):
         else:
             self.x = corrected(algebra, model.H, K, self._predicted_state(k, model.Phi), z)
         self.P = P
-        return K, all(bool(each > 0) for each in pivots) and bool(np.all(np.diagonal(P) > 0))
+        return K, bool(definite)
 
     def _predicted_state(self, k: int, Phi: FloatArray) -> FloatArray:
         return self._with_inputs(k, Phi @ self.x)
@@ -273,7 +273,7 @@ class ArrayRun(SteppedRun):
         P, definite = PREDICT[self.form](Phi, self.P, self._at("UQ", k))
         found = array_steps.observed(OBSERVE[self.form], H, UR, z, self._predicted_state(k, Phi), P)
         self.x, self.P = found.x, found.P
-        return found.gains, definite and found.definite
+        return found.gains, bool(definite & found.definite)
 
     # -- what it needs ----------------------------------------------------------------------------------
 

@@ -1,17 +1,22 @@
 """One step with factors or square roots of the covariance, over arrays of numbers of any kind; roots need ``sqrt``.
 
-The compiled loops of ``gpbnb.filters.kernels.step`` do the operations of the UD form in the same order, so that every
-digit is the same. :mod:`gpbnb.filters.kalman_step` has the forms that compute the covariance itself.
+:mod:`gpbnb.filters.recording` runs them on arrays that record their operations. :mod:`gpbnb.filters.kalman_step` has
+the forms that compute the covariance itself.
 """
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gpbnb.arithmetic.algebra import Matrix, as_computed
+
+Times = Callable[[Matrix, Matrix], Matrix]
+"""A product of matrices."""
 
 
 class BlockStorage(NamedTuple):
@@ -27,27 +32,28 @@ ONE_FORMAT = BlockStorage()
 """All blocks compute with the same numbers."""
 
 
-def predict_ud(Phi: Matrix, U: Matrix, UQ: Matrix) -> tuple[Matrix, bool]:
+def predict_ud(Phi: Matrix, U: Matrix, UQ: Matrix, times: Times = operator.matmul) -> tuple[Matrix, Any]:
     """Predict UD factors by Thornton's modified weighted Gram-Schmidt; the diagonals hold D, which may have zeros.
 
     Also return whether no entry of D is negative, and the variance of each state positive.
     """
     n = len(U)
-    W = np.concatenate([Phi @ _unit(U), _unit(UQ)], axis=1)
+    W = np.concatenate([times(Phi, _unit(U)), _unit(UQ)], axis=1)
     D = np.concatenate([np.diagonal(U), np.diagonal(UQ)])
-    found, definite = _entries(U * 0), True
+    found: list[list[Matrix]] = _entries(U * 0)
+    definite: Any = True
     for j in range(n - 1, -1, -1):
         c = D * W[j]
         d = (W[j] * c).sum()
         found[j][j] = d
-        definite = definite and not bool(d < 0)
+        definite = definite & np.logical_not(d < 0)
         if j:
             s = if_nonzero(d, _share(W[:j], c, d), U[:j, j] * 0)
             W = np.concatenate([W[:j] - s[:, None] * W[j], W[j:]])
             for i in range(j):
                 found[i][j] = s[i]
     for i in range(n):
-        definite = bool(_one_of_variance(found, i) > 0) and definite
+        definite = definite & (_one_of_variance(found, i) > 0)
     return _matrix(found), definite
 
 
@@ -75,6 +81,14 @@ def if_nonzero(x: Any, changed: Callable[[], Any], unchanged: Any) -> Any:
     if hasattr(type(x), "if_nonzero"):  # arrays would look for names that are spelled alike
         return x.if_nonzero(changed, unchanged)
     return changed() if x != 0 else unchanged
+
+
+def check_nonzero(a: Any) -> None:
+    """Refuse a variance of the innovation that is zero; a number that records its operations records the check."""
+    if hasattr(type(a), "check_nonzero"):
+        a.check_nonzero()
+    elif a == 0:
+        raise ZeroDivisionError("a zero pivot in the innovation covariance")
 
 
 def observe_ud(
@@ -108,9 +122,8 @@ def observe_ud(
     a, observed, definite = r, h[0] * 0, True
     for j in range(n):
         before, a = a, a + f[j] * g[j]
-        if a == 0:
-            raise ZeroDivisionError("a zero pivot in the innovation covariance")
-        definite = definite and bool(a > 0)
+        check_nonzero(a)
+        definite = definite & (a > 0)
         column = [factors[k][j] for k in range(j + 1)]
         known = [stored.covariance(each) for each in gain[:j]]
         change = _updated(column, known, moved[j], stored.covariance(before), stored.covariance(a), observed)
@@ -119,7 +132,7 @@ def observe_ud(
             gain[k] = gain[k] + taken[j] * stored.gain(column[k])
         for k in range(j + 1):
             factors[k][j] = updated[k]
-        definite = definite and not bool(factors[j][j] < 0)
+        definite = definite & np.logical_not(factors[j][j] < 0)
         gain[j] = taken[j]
     K = _stacked(gain) / stored.gain(a)
     return x + stored.state(K) * y, _matrix(factors), K, definite
@@ -140,21 +153,28 @@ def _updated(
     return lambda: [*if_nonzero(observed, moved, column[:-1]), column[-1] * before / a]
 
 
-def predict_root(Phi: Matrix, S: Matrix, SQ: Matrix) -> tuple[Matrix, bool]:
+def predict_root(Phi: Matrix, S: Matrix, SQ: Matrix, times: Times = operator.matmul) -> tuple[Matrix, Any]:
     """Return the upper triangular root of the predicted covariance, by modified Gram-Schmidt on (Phi S, SQ)."""
     n = len(S)
-    W = np.concatenate([Phi @ S, SQ], axis=1)
+    W = np.concatenate([times(Phi, S), SQ], axis=1)
     found = _entries(S * 0)
     for j in range(n - 1, -1, -1):
         size = (W[j] * W[j]).sum().sqrt()
         found[j][j] = size
-        if j and size != 0:
-            direction = W[j] / size
-            s = (W[:j] * direction).sum(1)
-            W = np.concatenate([W[:j] - s[:, None] * direction, W[j:]])
+        if j:
+            s, above = if_nonzero(size, partial(_projected, W, j, size), [W[:j, 0] * 0, W[:j]])
+            W = np.concatenate([above, W[j:]])
             for i in range(j):
                 found[i][j] = s[i]
-    return _matrix(found), all(any(bool(each != 0) for each in row) for row in found)
+    root = _matrix(found)
+    return root, np.all(np.any(root != 0, axis=1))
+
+
+def _projected(W: Matrix, j: int, size: Matrix) -> list[Matrix]:
+    """Return the shares of the first rows in the direction of row j, and these rows without them."""
+    direction = W[j] / size
+    s = (W[:j] * direction).sum(1)
+    return [s, W[:j] - s[:, None] * direction]
 
 
 def observe_potter(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tuple[Matrix, Matrix, Matrix, bool]:
@@ -167,7 +187,7 @@ def observe_potter(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tup
     Sf = S @ f
     K = Sf / a
     S = S - (Sf / (a + (r * a).sqrt()))[:, None] * f
-    return x + K * (z - h @ x), S, K, bool(a > 0)
+    return x + K * (z - h @ x), S, K, a > 0
 
 
 def observe_carlson(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tuple[Matrix, Matrix, Matrix, bool]:
@@ -182,15 +202,15 @@ def observe_carlson(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tu
     a, k = r, x * 0
     columns: list[Matrix] = []
     for j in range(n):
-        before, column = a, S[:, j]
-        if f[j] != 0:
-            a = before + f[j] * f[j]
-            columns.append((before / a).sqrt() * column - f[j] / (before * a).sqrt() * k)
-            k = k + f[j] * column
-        else:
-            columns.append(column)
+        a, column, k = if_nonzero(f[j], partial(_carlson, a, f[j], S[:, j], k), [a, S[:, j], k])
+        columns.append(column)
     K = k / a
-    return x + K * (z - h @ x), _stacked(columns).T, K, bool(a > 0)
+    return x + K * (z - h @ x), _stacked(columns).T, K, a > 0
+
+
+def _carlson(before: Matrix, f: Matrix, column: Matrix, k: Matrix) -> list[Matrix]:
+    a = before + f * f
+    return [a, (before / a).sqrt() * column - f / (before * a).sqrt() * k, k + f * column]
 
 
 def decorrelated(UR: Matrix, a: Matrix) -> Matrix:
@@ -244,7 +264,7 @@ def observed(
     for i in range(len(UR)):
         x, P, K, positive = observe(rows[i], values[i], UR[i, i], x, P)
         gains.append(K)
-        definite = definite and positive
+        definite = definite & positive
     return FactoredStep(x, P, gains, definite)
 
 

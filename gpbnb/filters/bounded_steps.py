@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.compiling import is_compiled
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
+from gpbnb.arithmetic.machine import code_of, evaluate, packed_constants, tables
 from gpbnb.filters.contraction import (
     Contraction,
     Repeated,
@@ -24,10 +24,9 @@ from gpbnb.filters.contraction import (
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel
 from gpbnb.filters.kernels.bounded import represented, residuals, symmetric_parts, whole_gain
-from gpbnb.filters.kernels.step import NEXT_CHECKPOINT, advance
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.opening import as_packed, opening, step_arrays
-from gpbnb.filters.replayed import advance_by_replay, replay_pays
+from gpbnb.filters.opening import StepArrays, as_packed, opening, step_arrays
+from gpbnb.filters.recording import recorded_step, step_kind
 
 Array = NDArray[np.float64]
 
@@ -35,6 +34,7 @@ DECAYED = 2.0**-700
 """Size below which an entry of the estimate becomes zero where a step would leave the range of float64."""
 
 _UNIT = 2.0**-100  # of double-double
+_NUMBERS = 1 << 19  # that are computed at once
 
 
 class Bounds(NamedTuple):
@@ -82,6 +82,7 @@ class CarriedBound:
         self._plain = given["Phi"], given["H"], given["Q"], given["R"]
         start = opening(stored, None, Form.INNOVATION, DoubleDouble())
         self._exact = step_arrays(start, as_packed(None, np.eye(stored.n)))
+        self._repetition = _Repetition(self._exact)
         n, m, count = stored.n, stored.m, len(checkpoint_steps)
         #: Bounds at the checkpoint steps.
         self.saved = Bounds(*(np.full((count, *shape), np.inf) for shape in ((n,), (n, m), (n, n))))
@@ -123,7 +124,7 @@ class CarriedBound:
     def _take(self, first: int, taken: Taken, covariances: Array) -> int:
         """Take the bound over as many steps as can be repeated; return their number."""
         z, x, exact = taken.z, taken.x, self._exact
-        xe, Ke, Pe, Se = _repeated(exact, z, first, x, covariances)
+        xe, Ke, Pe, Se = self._repetition.take(z, first, x[:-1], covariances[:-1])
         steps, n, m = len(xe), x.shape[1], z.shape[1]
         if not steps:
             return 0
@@ -155,20 +156,55 @@ class CarriedBound:
         return steps
 
 
-def _repeated(exact: Any, z: Array, first: int, x: Array, P: Array) -> tuple[Any, ...]:
-    """Estimates, gains, covariances and innovation covariances of steps repeated in double-double, as far as that goes.
+class _Repetition:
+    """Steps in double-double, each from a given state, all at once: each is a lane of the machine."""
 
-    Each step begins where the run stood.
-    """
-    steps, n, m = len(z), x.shape[1], z.shape[1]
-    after = np.empty((steps, n, 1, 2)), np.empty((steps, n, m, 2)), np.empty((steps, n, n, 2))
-    S, notes, every = np.empty((steps, m, m, 2)), np.zeros(4, dtype=np.int64), np.arange(1, steps + 1) + first
-    tag, form, repeated, kept = DoubleDouble(), Form.INNOVATION, (x[:-1], P[:-1], S), (every, *after)
-    others = exact, z, first, x[0].copy(), P[0].copy(), repeated, kept, notes
-    loops = tag, int(form), *others
-    with contextlib.suppress(OverflowError, ZeroDivisionError):
-        pays = replay_pays(tag, form, exact, z, x[0], lambda: is_compiled(advance, *loops))
-        if not (pays and advance_by_replay(tag, form, *others)):
-            advance(*loops)
-    done = int(notes[NEXT_CHECKPOINT])
-    return tuple(each[:done] for each in (*after, S))
+    def __init__(self, exact: StepArrays) -> None:
+        self._model = {"Phi": exact.Phi, "H": exact.H, "Q": exact.Q, "R": exact.R}
+        self._step = recorded_step(step_kind(Form.INNOVATION, self._model, None))
+        gain, estimate = self._step.gain, self._step.estimate
+        rows = np.concatenate([gain.rows, estimate.rows])[np.argsort(np.concatenate([gain.at, estimate.at]))]
+        self._code = code_of(rows, np.zeros(len(rows), np.int64))
+        self._kind, self._formats = tables([None])
+
+    def take(self, z: Array, first: int, x: Array, P: Array) -> tuple[Array, ...]:
+        """Return estimates, gains, covariances and innovation covariances of steps, as far as they can be repeated."""
+        most = max(_NUMBERS // self._step.sizes[0], 1)
+        found = []
+        for begin in range(0, len(z), most):
+            steps = slice(begin, begin + most)
+            each = self._together(z[steps], first + begin, x[steps], P[steps])
+            if each is None:  # some of them, one by one
+                each = self._alone(z[steps], first + begin, x[steps], P[steps])
+            found.append(each)
+            if len(each[0]) < len(z[steps]):
+                break
+        return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
+
+    def _alone(self, z: Array, first: int, x: Array, P: Array) -> tuple[Array, ...]:
+        found = [tuple(each[:0] for each in self._together(z[:0], first, x[:0], P[:0]) or ())]
+        for k in range(len(z)):
+            each = self._together(z[k : k + 1], first + k, x[k : k + 1], P[k : k + 1])
+            if each is None:
+                break
+            found.append(each)
+        return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
+
+    def _together(self, z: Array, first: int, x: Array, P: Array) -> tuple[Array, ...] | None:
+        step, steps = self._step, len(z)
+        values, truths = np.zeros((step.sizes[0], steps, 2)), np.zeros((step.sizes[1], steps), np.uint8)
+        truths[1] = 1
+        for constants in filter(attrgetter("places"), step.constants):
+            values[constants.places] = packed_constants(None, constants)[:, np.newaxis]
+        every = first + np.arange(steps)
+        given = {"z": z, "x": x, "P": P} | {letter: each[every % len(each)] for letter, each in self._model.items()}
+        for letter, each in given.items():
+            places = step.places[letter].ravel()
+            values[places] = np.moveaxis(each.reshape(steps, len(places), 2), 0, 1)
+        if steps and evaluate(self._kind, self._formats, self._code, values, truths) < len(self._code.rows):
+            return None
+
+        def taken(places: NDArray[np.int64]) -> Array:
+            return np.ascontiguousarray(np.moveaxis(values[places], -2, 0))
+
+        return taken(step.after["x"][:, np.newaxis]), taken(step.K), taken(step.after["P"]), taken(step.S)

@@ -1,4 +1,4 @@
-r"""One step of a Kalman filter over numbers of any kind; the compiled steps give the same digits.
+r"""One step of a Kalman filter over numbers of any kind, also over numbers that record their operations.
 
 The order of operations is that of hung1984: predicted covariance (100), gain (99), covariance (101), then the estimate
 by the innovation (98) or by the closed loop (109)-(111). States and measurements are columns.
@@ -6,7 +6,10 @@ by the innovation (98) or by the closed loop (109)-(111). States and measurement
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from gpbnb.arithmetic.algebra import Algebra, Matrix
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
@@ -24,6 +27,10 @@ class StepModel(NamedTuple):
     H: Matrix
     Q: Matrix
     R: Matrix
+
+
+def unnamed(quantity: str) -> None:
+    """Take no note of the quantity that is computed next."""
 
 
 class Innovation(NamedTuple):
@@ -57,11 +64,12 @@ def predicted(algebra: Algebra, Phi: Matrix, P: Matrix, Q: Matrix) -> Matrix:
     return algebra.rounded(times(times(Phi, P), Phi.T) + Q)
 
 
-def innovation(algebra: Algebra, H: Matrix, R: Matrix, V: Matrix) -> Innovation:
+def innovation(algebra: Algebra, H: Matrix, R: Matrix, V: Matrix, about: Callable[[str], None] = unnamed) -> Innovation:
     """Return :math:`VH^T`, the innovation covariance :math:`H(VH^T) + R` and its inverse."""
     times = algebra.times
     VH = times(V, H.T)
     S = algebra.rounded(times(H, VH) + R)
+    about("its inverse")
     return Innovation(VH, S, *algebra.invert(S, algebra.identity(len(S))))
 
 
@@ -101,11 +109,15 @@ class BlockAlgebra(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """A gain (n, m), the covariance (n, n) after a measurement, and the pivots of the innovation covariance."""
+    """A gain (n, m), the covariance (n, n) after a measurement, the innovation covariance, and whether all is definite.
+
+    That is so if all variances, and all pivots of the innovation covariance, are positive.
+    """
 
     K: Matrix
     P: Matrix
-    pivots: list[Any]
+    S: Matrix
+    definite: Any
 
 
 def predicted_in(blocks: BlockAlgebra, Phi: Matrix, P: Matrix, Q: Matrix) -> Matrix:
@@ -114,16 +126,35 @@ def predicted_in(blocks: BlockAlgebra, Phi: Matrix, P: Matrix, Q: Matrix) -> Mat
     return predicted(blocks.covariance, taken(Phi), P, taken(Q))
 
 
-def measured_in(blocks: BlockAlgebra, form: AnyForm, H: Matrix, R: Matrix, V: Matrix) -> Measured:
-    """Return the gain, and the covariance after a measurement, each computed in its own block."""
+def measured_in(
+    blocks: BlockAlgebra,
+    form: AnyForm,
+    H: Matrix,
+    R: Matrix,
+    V: Matrix,
+    about: Callable[[str], None] = unnamed,
+) -> Measured:
+    """Return the gain, and the covariance after a measurement, each computed in its own block.
+
+    Parameters
+    ----------
+    about : takes the name of each quantity before it is computed.
+    """
     stored = blocks.stored
-    found = innovation(blocks.innovation, *map(stored.innovation, (H, R, V)))
-    K = blocks.gain.times(stored.gain(found.VH), stored.gain(found.inverse))
+    about("the innovation covariance")
+    own_H, own_R, own_V = map(stored.innovation, (H, R, V))
+    found = innovation(blocks.innovation, own_H, own_R, own_V, about)
+    about("the gain")
+    K = blocks.gain.times(stored.gain(found.inverse).T, stored.gain(found.VH).T).T
+    about("the covariance")
     own = StepModel(None, stored.covariance(H), None, stored.covariance(R))
     P = updated(blocks.covariance, form, own, V, stored.covariance(K))
     if form is ArrayForm.SYMMETRIZED:
         P = (P + P.T) / 2
-    return Measured(K, P, found.pivots)
+    definite = np.all(np.diagonal(P) > 0)
+    for pivot in found.pivots:
+        definite = definite & np.all(pivot > 0)
+    return Measured(K, P, found.covariance, definite)
 
 
 def corrected(algebra: Algebra, H: Matrix, K: Matrix, ahead: Matrix, z: Matrix) -> Matrix:

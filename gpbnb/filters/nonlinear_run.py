@@ -126,7 +126,7 @@ class NonlinearRun(SteppedRun):
                 y = y - H @ (ahead - x)
             x, P, K, positive = self._updated(k, self._seen(k, H), self._seen(k, y), _Ahead(ahead, predicted))
         self.x, self.P = x, P
-        return K, definite and positive
+        return K, bool(definite & positive)
 
     def _predicted(self, k: int, F: FloatArray) -> tuple[Any, bool]:
         Q, taken = self._member(self._Q, k), self._to.covariance
@@ -140,11 +140,10 @@ class NonlinearRun(SteppedRun):
         if self.form in FACTORED:  # what the measurements correct is zero before them
             observe = partial(observe_ud, stored=self._to) if self.form is Form.UD else OBSERVE[self.form]
             step = observed(observe, H, R, y, ahead.x * 0, ahead.P, self._to)
-            return ahead.x + step.x, step.P, (step.gains, H, R), step.definite
+            return ahead.x + step.x, step.P, (step.gains, H, R), bool(step.definite)
         found = measured_in(self._blocks, self.form, H, R, ahead.P)
         x = corrected_by(self._blocks.state, self._to.state(found.K), ahead.x, y)
-        positive = all(bool(each > 0) for each in found.pivots) and bool(np.all(np.diagonal(found.P) > 0))
-        return x, found.P, found.K, positive
+        return x, found.P, found.K, bool(found.definite)
 
     def _unscented(self, k: int, z: FloatArray, u: FloatArray | None) -> tuple[Any, bool]:
         model = self.model

@@ -19,8 +19,9 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.machine import CODES
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.tape import CODES, Call, Tape
+from gpbnb.arithmetic.tape import Call, Tape
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, whole_number
@@ -270,6 +271,8 @@ class _Listing:
                 self._truths[out] = self._order(a, b, c)
             elif name == "combine":
                 self._truths[out] = self._combination(self._truths[a], self._truths[b], c)
+            elif name == "nonzero":
+                self._check(a, DIVISOR)
             elif name == "choose":
                 self._values[out] = self._choice(self._truths[a], b, c)
             elif name == "sqrt":

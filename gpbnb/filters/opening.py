@@ -31,10 +31,36 @@ from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
+from gpbnb.filters.factoring import factors_of_each, inverses_of_each
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.records import pairs_as_double_doubles
-from gpbnb.filters.kernels.step import StepArrays, factor_each, invert_each
 from gpbnb.filters.model import LinearModel, remembered, stored_arrays
+
+#: Entries of a run's status: number of steps done, index of the next checkpoint, first step with a variance or pivot
+#: that is not positive, and step at which a number without a value ended the run.
+DONE, NEXT_CHECKPOINT, INDEFINITE, STOPPED = range(4)
+
+
+class StepArrays(NamedTuple):
+    """What a step of a filter uses, each with its own cycle of members, packed."""
+
+    #: (p, n, n) and its transposed members.
+    Phi: NDArray[Any]
+    PhiT: NDArray[Any]
+    #: (p, m, n) and its transposed members.
+    H: NDArray[Any]
+    HT: NDArray[Any]
+    #: (p, n, n) and (p, m, m).
+    Q: NDArray[Any]
+    R: NDArray[Any]
+    #: (p, m, m), inverses of R, for Hung's form with the second gain.
+    RI: NDArray[Any]
+    #: (n, n).
+    identity: NDArray[Any]
+    #: (p, n, n), Phi - I, for compensated summation of the estimate; otherwise (0, n, n).
+    increment: NDArray[Any]
+    #: (n, 1), rounding error of the estimate, from the previous step and for the next.
+    carried: NDArray[Any]
 
 
 class Opening(NamedTuple):
@@ -87,7 +113,7 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
         """Compute factors, of raised variances if those stored are indefinite; whether any are definite."""
 
         def sound(given: NDArray[Any]) -> bool:
-            definite, signs = bool(factor_each(tag, given, factors)), factors[..., 0] if factors.ndim > 3 else factors
+            definite, signs = factors_of_each(fmt, given, factors), factors[..., 0] if factors.ndim > 3 else factors
             return definite and (letter != "R" or bool(np.all(np.diagonal(signs, axis1=1, axis2=2) > 0)))
 
         if sound(packed):
@@ -108,7 +134,7 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
     lost = ""
     try:
         if form is Form.HUNG_SECOND_GAIN:
-            lost = "" if invert_each(tag, R, RI) else "R"
+            lost = "" if inverses_of_each(fmt, R, RI) else "R"
         elif form is Form.UD:
             given = ("Q", Q, UQ), ("R", R, UR), ("P0", P0[np.newaxis], U0[np.newaxis])
             lost = next((letter for letter, *arrays in given if not factored(letter, *arrays)), "")
@@ -145,7 +171,6 @@ def step_arrays(start: Opening, identity: NDArray[Any], increment: NDArray[Any] 
         identity,
         none if increment is None else increment,
         carried,
-        np.zeros(1, dtype=np.int64),
     )
 
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.kernels.compiling import is_compiled
-from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Free, Hardware32, Hardware64, Tag
+from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
+from gpbnb.arithmetic.machine import OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.rounding import Limits, Order
-from gpbnb.filters.blocks import BlockFormats
+from gpbnb.arithmetic.rounding import Limits, Order, Rounding
+from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import DECAYED, Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
@@ -25,22 +25,23 @@ from gpbnb.filters.factors import combined_gain, covariance_of_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.bounded import widen
 from gpbnb.filters.kernels.records import pairs_as_floats
-from gpbnb.filters.kernels.step import (
+from gpbnb.filters.model import LinearModel, identity_in
+from gpbnb.filters.named import compiled_form
+from gpbnb.filters.opening import (
     DONE,
     INDEFINITE,
     NEXT_CHECKPOINT,
-    QUANTITIES,
     STOPPED,
-    FactorArrays,
-    StepArrays,
-    advance,
-    advance_ud,
+    Opening,
+    as_packed,
+    opening,
+    packed_array,
+    step_arrays,
+    widened_array,
 )
-from gpbnb.filters.model import LinearModel, identity_in
-from gpbnb.filters.named import compiled_form
-from gpbnb.filters.opening import Opening, as_packed, opening, packed_array, step_arrays, widened_array
+from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
-from gpbnb.filters.replayed import advance_by_replay, replay_pays
+from gpbnb.filters.stepping import Stepper, Stop
 
 LEAST_SHARE = 2.0**-60
 """Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""
@@ -125,6 +126,7 @@ class Run:
         self.model, self.fmt, self.form = model, fmt, compiled_form(form)
         self.checkpoint_steps = _ascending(checkpoint_steps)
         self._check(sums, compensated, bounded, records)
+        self.sums = sums
         #: The arithmetic of the compiled loops.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(*sums)
         start = opening(model, fmt, self.form, self.tag)
@@ -143,8 +145,8 @@ class Run:
         self.notes = np.zeros(4, dtype=np.int64)
         increment = as_packed(self.fmt, model.Phi - np.eye(n, dtype=int)) if compensated else None
         self.matrices = step_arrays(start, self._identity(), increment)
-        self._step_tag: Tag = Free(self.tag) if isinstance(self.tag, Hardware32 | Hardware64) else self.tag
-        self._stepped = self._as_stepped(self.matrices)
+        self._compensation = np.zeros_like(self.x)
+        self._stepper: Stepper | None = None
         #: Why the run stopped, if it did.
         self.reason = ""
         self._carried: CarriedBound | None = None
@@ -227,13 +229,6 @@ class Run:
         """The step at which a division by zero, or a number beyond the range of the backend, ended the run."""
         return int(self.notes[STOPPED]) or None
 
-    def _as_stepped(self, matrices: StepArrays) -> StepArrays:
-        """The matrices as the compiled step takes them: those of the processor's binary32 as float32."""
-        if not isinstance(self.tag, Hardware32) or self.form is Form.UD:
-            return matrices
-        floats = [each.astype(np.float32) for each in matrices[:-1]]
-        return StepArrays._make([*floats, matrices.place])
-
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
         self.model.check_measurements(z, self.steps)
@@ -297,8 +292,7 @@ class Run:
         else:
             packed = as_packed(self.fmt, H)
         self.matrices = self.matrices._replace(H=packed, HT=np.ascontiguousarray(np.swapaxes(packed, 1, 2)))
-        new = self._as_stepped(self.matrices)
-        self._stepped = self._stepped._replace(H=new.H, HT=new.HT)
+        self._stepper = None
 
     def save_at(self, checkpoint_steps: NDArray[np.int64]) -> None:
         """Save the results of other steps, at most as many as before, in place of all results saved so far."""
@@ -362,35 +356,27 @@ class Run:
         kept : the checkpoint steps; arrays for estimates, gains and covariances, or factors, at them.
         notes : the status of the run, which is brought up to date.
         """
-        changed = self.x, self.P, self._stepped.carried, notes
-        while True:
-            before = [each.copy() for each in changed]
-            try:
-                self._advance(z, kept, notes)
-            except (OverflowError, ZeroDivisionError) as error:
-                place, done = int(self.matrices.place[0]), int(notes[DONE] - before[-1][DONE])
-                for each, old in zip(changed, before, strict=True):
-                    each[...] = old
-                self._advance(z[:done], kept, notes)  # up to the step that could not be taken
-                z = z[done:]
-                if isinstance(error, OverflowError) and self._drop_decayed():
-                    continue
-                notes[STOPPED] = notes[DONE] + 1
-                self.reason = f"{self._fault(error)} in {QUANTITIES[place]} at step {notes[STOPPED]}"
-                if self.form is Form.UD and isinstance(self.fmt, FixedFormat) and isinstance(error, OverflowError):
-                    self.reason += (
-                        "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
-                    )
-            else:
-                if notes[STOPPED]:
-                    self.reason = f"a zero pivot in the innovation covariance at step {notes[STOPPED]}"
-            return
-
-    def _advance(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
-        if self.form is Form.UD:
-            self._advance_factors(z, kept, notes)
-        else:
-            self._advance_covariances(z, kept, notes)
+        if self._stepper is None:
+            self._stepper = self._made_stepper()
+        steps, *arrays = kept
+        at = 0
+        while at < len(z) and not notes[STOPPED]:
+            first = int(notes[DONE])
+            found = self._stepper.take(first, z[at : at + self._stepper.longest], self.x, self._compensation, self.P)
+            done = len(found.x)
+            at += done
+            notes[DONE] = first + done
+            if not notes[INDEFINITE] and not found.definite.all():
+                notes[INDEFINITE] = first + 1 + int(np.argmin(found.definite))
+            begin = int(notes[NEXT_CHECKPOINT])
+            end = int(np.searchsorted(steps, first + done, side="right"))
+            rows = steps[begin:end] - first - 1
+            for array, each in zip(arrays, (found.x, found.K, found.P), strict=True):
+                array[begin:end] = each[rows]
+            notes[NEXT_CHECKPOINT] = end
+            if found.stop is not None and not (found.stop.fault.overflows and self._drop_decayed()):
+                notes[STOPPED] = first + done + 1
+                self.reason = self._reason(found.stop, first + done + 1)
 
     @property
     def _limits(self) -> Limits | None:
@@ -405,52 +391,51 @@ class Run:
         sizes = np.abs(self.x if self.x.ndim == 2 else self.x[..., 0])
         decayed = (sizes > 0) & (sizes < DECAYED)
         self.x[decayed] = 0.0
-        self._stepped.carried[decayed.any(axis=1)] = 0.0  # what compensated summation carries is smaller still
+        self._compensation[decayed] = 0.0  # what compensated summation carries is smaller still
         return bool(decayed.any())
 
-    def _fault(self, error: Exception) -> str:
+    def _fault(self, stop: Stop) -> str:
         """Return in words what ended the run; only a format with a range has an overflow."""
-        if isinstance(error, ZeroDivisionError):
-            return "a division by zero"
+        if not stop.fault.overflows:
+            return stop.fault.reason
         if self._limits is None:
             return "a number beyond the range of the compiled loops"
         if self.x.dtype != np.float64 and self._limits.subnormal:
             return "an overflow, or a subnormal number, which has no compiled loops in base 10,"
-        return "overflow"
+        return OVERFLOW
 
-    def _advance_factors(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
-        """Take steps of the UD form."""
-        each, x, U, done = self.matrices, self.x, self.P, int(notes[DONE])
-        factors = FactorArrays(each.Phi, each.H, each.HT, self.UQ, self.UR, each.place)
-        loops = self.tag, factors, z, done, x, U, kept, notes
-        asked = self.tag, self.form, each._replace(Q=self.UQ, R=self.UR)
-        if replay_pays(*asked, z, x, lambda: is_compiled(advance_ud, *loops)):
-            not_repeated = self.X[:0], self.C[:0], self.UR[:0]
-            if advance_by_replay(*asked, z, done, x, U, not_repeated, kept, notes):
-                return
-        advance_ud(*loops)
+    def _reason(self, stop: Stop, step: int) -> str:
+        if stop.fault.reason == ZERO_PIVOT or (stop.fault.reason == ZERO_DIVISOR and stop.quantity == "its inverse"):
+            return f"a zero pivot in the innovation covariance at step {step}"
+        reason = f"{self._fault(stop)} in {stop.quantity} at step {step}"
+        if self.form is Form.UD and isinstance(self.fmt, FixedFormat) and stop.fault.overflows:
+            reason += "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
+        return reason
 
-    def _advance_covariances(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
-        """Take steps of a form with covariances, on numbers of the type that its compiled step takes."""
-        (steps, *results), done = kept, int(notes[DONE])
-        given = [z, self.x, self.P, self.UR[:0], *results]
-        used = [each.astype(self._stepped.Phi.dtype, copy=False) for each in given]
+    def _made_stepper(self) -> Stepper:
+        """Record a step, and make it ready to run in the run's formats."""
+        each, upper = self.matrices, self.form is Form.UD
+        model = {"Phi": each.Phi, "H": each.H}
+        model |= {"UQ": self.UQ, "UR": self.UR} if upper else {"Q": each.Q, "R": each.R}
+        if self.form is Form.HUNG_SECOND_GAIN:
+            model["RI"] = each.RI
+        if len(each.increment):
+            model["increment"] = each.increment
+        formats, blocks, sums = self._formats()
+        kind = step_kind(self.form, model, formats[0], blocks, sums, bool(len(each.increment)))
+        cycle = int(np.lcm.reduce([len(table) for table in model.values()]))
+        repeats = self.fmt is None or self.fmt.rounding is not Rounding.STOCHASTIC
+        return Stepper(recorded_step(kind), formats, model, self.records, cycle if repeats else 0)
 
-        def arguments(arrays: list[NDArray[Any]]) -> tuple[Any, ...]:
-            z, x, P, none, *found = arrays
-            return z, done, x, P, (found[0][:0], found[2][:0], none), (steps, *found), notes
-
-        loops = self._step_tag, int(self.form), self._stepped, *arguments(used)
-        asked = self.tag, self.form, self.matrices
-        pays = replay_pays(*asked, z, self.x, lambda: is_compiled(advance, *loops))
-        if pays and advance_by_replay(*asked, *arguments(given)):
-            return
-        try:
-            advance(*loops)
-        finally:
-            for old, new in zip(given[1:], used[1:], strict=True):
-                if old is not new:
-                    old[...] = new
+    def _formats(self) -> tuple[list[Any], tuple[int, ...], tuple[Any, ...]]:
+        """Return all formats; the numbers of those of the blocks and of the model; how sums are computed."""
+        given, sums = self.block_formats, self.sums
+        kept_in = sums.fmt if given is None else given.sums
+        blocks = [self.fmt] * 5 if given is None else [*(getattr(given, name) for name in BLOCKS), self.fmt]
+        formats = list(dict.fromkeys([*blocks, *([] if kept_in is None else [kept_in])]))
+        number = -1 if kept_in is None else formats.index(kept_in)
+        numbers = tuple(formats.index(each) for each in blocks)
+        return formats, numbers, (sums.fused, sums.order, sums.block, number)
 
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Convert results of the compiled loops to exact Fractions."""

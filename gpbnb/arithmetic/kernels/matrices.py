@@ -19,16 +19,13 @@ from gpbnb.arithmetic.kernels.scalar import (
     can_be_freed,
     check,
     compare,
-    divide,
     first_product,
     freed,
     guard,
     load,
     multiply,
     multiply_add,
-    one,
     put,
-    store,
     subtract,
     zero,
 )
@@ -69,15 +66,6 @@ def transpose(fmt: Any, a: Any, c: Any) -> None:
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
             put(fmt, c, (j, i), load(fmt, a, (i, j)))
-
-
-@borrowing
-def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """c = a + b."""
-    for i in range(a.shape[0]):
-        for j in range(a.shape[1]):
-            put(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
-    guard(fmt, c)
 
 
 @borrowing
@@ -247,68 +235,3 @@ def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
             for i in range(a.shape[0]):
                 put(fmt, c, (i, j), zero(fmt))
     check(fmt, c)
-
-
-@borrowing
-def inverse(fmt: Any, a: Any, c: Any) -> Any:
-    """c = the inverse of a, by elimination without row exchanges, which a covariance does not need; overwrites a.
-
-    Returns 1 if all pivots are positive, -1 if one is negative, and 0 if one is zero; c is then invalid.
-    """
-    m = a.shape[0]
-    answer = 1
-    for i in range(m):
-        for j in range(m):
-            put(fmt, c, (i, j), one(fmt) if i == j else zero(fmt))
-    for k in range(m):
-        pivot = load(fmt, a, (k, k))
-        sign = compare(fmt, pivot, zero(fmt))
-        if sign == 0:
-            return 0
-        if sign < 0:
-            answer = -1
-        for i in range(k + 1, m):
-            factor = divide(fmt, load(fmt, a, (i, k)), pivot)
-            for j in range(k + 1, m):
-                store(fmt, a, (i, j), subtract(fmt, load(fmt, a, (i, j)), multiply(fmt, factor, load(fmt, a, (k, j)))))
-            for j in range(m):
-                store(fmt, c, (i, j), subtract(fmt, load(fmt, c, (i, j)), multiply(fmt, factor, load(fmt, c, (k, j)))))
-    for j in range(m):
-        for k in range(m - 1, -1, -1):
-            s = load(fmt, c, (k, j))
-            for i in range(k + 1, m):
-                s = subtract(fmt, s, multiply(fmt, load(fmt, a, (k, i)), load(fmt, c, (i, j))))
-            store(fmt, c, (k, j), divide(fmt, s, load(fmt, a, (k, k))))
-    return answer
-
-
-@borrowing
-def factor_ud(fmt: Any, a: Any, u: Any) -> Any:
-    """u = the factors of a covariance a = U D U', with D on the diagonal of u; overwrites a.
-
-    The unit diagonal of U is not stored. Returns False if an entry of D is negative, or if it is zero and an entry
-    above it is not.
-    """
-    n = a.shape[0]
-    definite = True
-    for j in range(n - 1, -1, -1):
-        d = load(fmt, a, (j, j))
-        sign = compare(fmt, d, zero(fmt))
-        if sign < 0:
-            definite = False
-        put(fmt, u, (j, j), d)
-        for i in range(j):
-            put(fmt, u, (j, i), zero(fmt))
-            x = load(fmt, a, (i, j))
-            if sign == 0:
-                if not is_zero(fmt, x):
-                    definite = False
-                put(fmt, u, (i, j), zero(fmt))
-            else:
-                store(fmt, u, (i, j), divide(fmt, x, d))
-        if sign != 0:
-            for i in range(j):
-                for k in range(i + 1):
-                    x = multiply(fmt, load(fmt, u, (k, j)), load(fmt, a, (i, j)))
-                    store(fmt, a, (k, i), subtract(fmt, load(fmt, a, (k, i)), x))
-    return definite

@@ -164,7 +164,7 @@ def _with_residuals(fit: Any, exact_product: int) -> dict[str, Any]:
 
     @inner(forceinline=True)
     def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-        w, rest, zero = _fused_sum(a, b, c)
+        w, rest, zero = fused_sum(a, b, c)
         return fit(fmt, w, rest, zero)
 
     return {
@@ -297,7 +297,7 @@ def _short(within: Any) -> dict[str, Any]:
 
 
 @inner(forceinline=True)
-def _fused_sum(a: Any, b: Any, c: Any) -> Any:
+def fused_sum(a: Any, b: Any, c: Any) -> Any:
     """a * b + c as its nearest float64 w and a residual with the correct sign, and whether the sum is exactly zero.
 
     The exact product is p + e, and p + c = s + r. The residuals e and r add up to v + lowest, and s and v to w + low.
@@ -316,7 +316,7 @@ def _fused_sum(a: Any, b: Any, c: Any) -> Any:
 
 @inner(forceinline=True)
 def _fused_of_53(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    w, rest, zero = _fused_sum(a, b, c)
+    w, rest, zero = fused_sum(a, b, c)
     # Where s + v is a tie, the residual `lowest` may make the other neighbour the nearest.
     near = fma(a, b, c)
     return _fit_53(fmt, near if w == w else w, rest if near == w else w - near, zero)

@@ -12,11 +12,10 @@ import numpy as np
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import doubledouble
-from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.arithmetic.kernels.matrices import copy, product
-from gpbnb.arithmetic.kernels.scalar import add, load, multiply, one, put, subtract, zero
+from gpbnb.arithmetic.kernels.compiling import borrowing, compiled
+from gpbnb.arithmetic.kernels.matrices import copy, is_zero, product
+from gpbnb.arithmetic.kernels.scalar import add, load, multiply, one, put, store, subtract, zero
 from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
-from gpbnb.filters.kernels.step import decorrelate
 
 _POWERS = np.array([10.0**k for k in range(23)])  # exact
 
@@ -87,6 +86,19 @@ def represented(factors: Any, covariances: Any) -> None:
         product(exactly, UD, U, covariances[k])
 
 
+@borrowing
+def _decorrelate(fmt: Any, UR: Any, a: Any, c: Any) -> None:
+    """c = the inverse of U times a, by back substitution, where R = U D U'."""
+    for j in range(a.shape[1]):
+        for i in range(a.shape[0] - 1, -1, -1):
+            s = load(fmt, a, (i, j))
+            for k in range(i + 1, a.shape[0]):
+                u = load(fmt, UR, (i, k))
+                if not is_zero(fmt, u):
+                    s = subtract(fmt, s, multiply(fmt, u, load(fmt, c, (k, j))))
+            store(fmt, c, (i, j), s)
+
+
 @compiled
 def whole_gain(K: Any, H: Any, UR: Any, c: Any) -> None:
     """c = the gain of a step in the UD form, combined from the gains of its single measurements."""
@@ -94,7 +106,7 @@ def whole_gain(K: Any, H: Any, UR: Any, c: Any) -> None:
     exactly = DoubleDouble()
     copy(exactly, K, c)
     HD = np.empty_like(H)
-    decorrelate(exactly, UR, H, HD)
+    _decorrelate(exactly, UR, H, HD)
     for i in range(m):
         for j in range(i):
             s = zero(exactly)

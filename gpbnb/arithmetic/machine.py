@@ -1,0 +1,222 @@
+"""Programs as the machine runs them: rows, destination formats, and the numbers they start from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.kernels import selection, tags
+from gpbnb.arithmetic.kernels.tags import AWAY, EVEN, ZERO
+
+# fmt: off
+CODES = {
+    name: code for code, name in enumerate(
+        (
+            "add", "subtract", "multiply", "divide", "sqrt", "negative", "absolute", "choose", "compare", "combine",
+            "round", "fused", "nonzero", "skip",
+        )
+    )
+}
+# fmt: on
+"""Codes of operations, as in :mod:`gpbnb.arithmetic.kernels.machine`."""
+
+_RANDOM = 6
+_LEAST = 2.0**-480
+"""Least size of numbers that the machine computes with quickly; products and quotients of two stay in float64."""
+
+
+def tables(formats: Sequence[Any]) -> tuple[Any, Any]:
+    """Return the kind of numbers of some formats of one base, None being double-double, and their columns."""
+    from gpbnb.arithmetic.kernels import machine
+
+    whole, numbers = np.zeros((len(formats), 16), np.int64), np.zeros((len(formats), 7))
+    random = np.zeros((len(formats), 2), np.uint64)
+    if formats[0] is None:
+        return tags.DoubleDouble(), machine.Formats(whole, numbers, random)
+    kinds = set()
+    for i, fmt in enumerate(formats):
+        tag = selection.tag_of(fmt.rules)
+        if tag is None:
+            tag = selection.wide_tag(fmt.rules)
+        if tag is None:
+            raise ValueError("no loops")
+        if isinstance(tag, tags.Limited) and isinstance(tag.mode, tags.Random):
+            random = fmt.backend.tag.mode.state.reshape(1, 2) if len(formats) == 1 else random
+        kinds.add(_row(fmt, tag, whole[i], numbers[i]))
+    (kind,) = kinds
+    made = {"masks": machine.Masks, "pairs": machine.InPairs, "words": machine.InTwoWords}[kind]()
+    return made, machine.Formats(whole, numbers, random)
+
+
+def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float64]) -> str:
+    if isinstance(tag, tags.Wide):
+        whole[:14] = (*tag[:7], *tag.lowest, *tag.largest, tag.saturates)
+        return "words"
+    if isinstance(tag, tags.PAIRS):
+        if isinstance(tag, tags.LimitedDecimal):
+            whole[:6] = tag.precision, tag.mode, tag.least, tag.largest, tag.flush, 0
+        else:
+            mode = AWAY if tag.nearest else ZERO
+            whole[:6] = tag.precision, mode, -(2**60), 2**60, 0, isinstance(tag, tags.ShortDecimal)
+        return "pairs"
+    if isinstance(tag, tags.Hardware32):
+        tag = selection.fusing_tag(fmt.rules)
+    bits = 4 if fmt.base == 16 else 1
+    if isinstance(tag, tags.Hardware64):
+        largest = float(np.finfo(float).max)
+        mode, precision, limits = EVEN, 53, (0.0, 0.0, 0.0, -largest, largest, math.nan, math.nan)
+        low, high = 5e-324, largest
+    elif isinstance(tag, tags.Binary | tags.Hexadecimal):
+        mode, precision, largest = AWAY if tag.nearest else ZERO, tag.precision, math.nextafter(2.0**1023, 0.0)
+        limits = 0.0, 2.0**-960, math.nan, -largest, largest, math.nan, math.nan
+        low, high = 2.0**-960, largest
+    else:
+        mode, precision, limits = _code(tag.mode), tag.precision, tag[4:]
+        low, high = max(tag.gradual, tag.least), min(tag.largest, -tag.lowest)
+        low = low or 2.0**-960
+    whole[:3], numbers[:] = (bits, precision, mode), limits
+    exact = mode == EVEN and precision == 53
+    fixed = fmt.rules.limits is not None and fmt.rules.limits.fixed
+    quick = bits == 1 and not fixed and mode in (AWAY, EVEN, ZERO, tags.UP, tags.DOWN) and (precision < 53 or exact)
+    short = exact or (mode in (AWAY, EVEN) and precision <= tags.SAFE_TWICE)
+    unit = 1 << (53 - precision)
+    half, even = unit >> 1, mode == EVEN and not exact
+    nearest = half - even if mode in (AWAY, EVEN) else 0
+    outward = unit - 1
+    below, above = (outward if mode == tags.DOWN else nearest), (outward if mode == tags.UP else nearest)
+    sticky = even or mode == tags.DOWN, even or mode == tags.UP
+    low, high = max(low, _LEAST), min(high, 1 / _LEAST)
+    bits_low, bits_high = np.array([low, high]).view(np.int64).tolist()
+    whole[3:13] = quick, short, unit, below, above, *sticky, even, bits_low, bits_high - bits_low
+    return "masks"
+
+
+def _code(mode: Any) -> int:
+    if isinstance(mode, tags.Random):
+        return _RANDOM
+    return mode.code if isinstance(mode, tags.Mode) else EVEN
+
+
+class Fault(NamedTuple):
+    """An operation without a result: its row, and what is wrong."""
+
+    row: int
+    reason: str
+
+    @property
+    def overflows(self) -> bool:
+        """Whether the result is beyond the range."""
+        return self.reason == OVERFLOW
+
+
+OVERFLOW = "overflow"
+ZERO_DIVISOR = "a division by zero"
+ZERO_PIVOT = "a zero pivot"
+NEGATIVE_ROOT = "the square root of a negative number"
+
+
+def fault_of(rows: NDArray[np.int64], values: NDArray[Any], row: int) -> Fault:
+    """Say why a row has no result, from the numbers of the machine."""
+    name = _NAMES[int(rows[row, 0])]
+    reason = {"divide": ZERO_DIVISOR, "nonzero": ZERO_PIVOT, "sqrt": NEGATIVE_ROOT}.get(name, OVERFLOW)
+    if name == "divide" and np.all(np.atleast_1d(values[rows[row, 2]]).reshape(-1, *values.shape[2:])[..., :1] != 0):
+        reason = OVERFLOW
+    return Fault(row, reason)
+
+
+def first_without_result(
+    kind: Any,
+    formats: Any,
+    rows: NDArray[np.int64],
+    numbers: NDArray[np.int64],
+    values: NDArray[Any],
+    truths: NDArray[np.uint8],
+) -> int:
+    """Return the first row that has no result, by halving: some row has none.
+
+    Parameters
+    ----------
+    numbers : (rows,), the number of the format of each.
+    """
+    good, bad = 0, len(rows)
+    while bad - good > 1:
+        middle = (good + bad) // 2
+        done = evaluate(kind, formats, code_of(rows[:middle], numbers[:middle]), values, truths)
+        good, bad = (middle, bad) if done == middle else (good, middle)
+    return good
+
+
+def packed_one(fmt: Any) -> Any:
+    """Return the number one as the machine takes it, None being double-double; None if a format does not have it."""
+    if fmt is None:
+        return np.array([1.0, 0.0])
+    try:
+        array = fmt.array(1)
+    except OverflowError:
+        return None
+    return array.backend.pack(array.components) if array.to_fractions() == 1 else None
+
+
+def packed_constants(fmt: Any, constants: Any) -> NDArray[Any]:
+    """Return the constants of a tape as the machine takes them."""
+    if fmt is None:
+        return np.array([[float(each), 0.0] for each in constants.numbers])
+    array = constants.rounded(fmt)
+    return np.asarray(array.backend.pack(array.components))
+
+
+def code_of(rows: NDArray[Any], formats: NDArray[np.int64]) -> Any:
+    """Return operations, and the number of the format of each, as the machine takes them."""
+    from gpbnb.arithmetic.kernels import machine
+
+    patterns = _patterns(rows)
+    skips = np.flatnonzero(rows[:, 0] == _SKIP)
+    edges = np.zeros(len(rows) + 1, np.bool_)
+    edges[1:-1] = (np.diff(rows[:, 0]) != 0) | (np.diff(formats) != 0) | (np.diff(patterns) != 0)
+    for each in (skips, skips + 1, skips + 1 + rows[skips, 2]):
+        edges[np.minimum(each, len(rows))] = True
+    edges[[0, -1]] = True
+    begins = np.flatnonzero(edges) if len(rows) else np.zeros(1, np.int64)
+    first = begins[:-1]
+    segments = np.stack([first, begins[1:], formats[first], np.maximum(patterns[first], 0) & 3], axis=1)
+    return machine.Code(np.ascontiguousarray(rows, np.uint32), segments.astype(np.int64))
+
+
+_FEWEST = 4
+"""Rows in a run from which on a loop over neighbours in memory pays."""
+
+
+def _patterns(rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return a number for each row: 0, or 4 times that of its run of neighbours in memory plus its pattern, 1 to 3."""
+    found = np.zeros(len(rows), np.int64)
+    if len(rows) < _FEWEST:
+        return found
+    code, a, b, _, out = np.diff(rows.astype(np.int64), axis=0).T
+    step = np.select([(a == 1) & (b == 1), (a == 0) & (b == 1), (a == 1) & (b == 0)], [1, 2, 3], 0)
+    step[(code != 0) | (out != 1) | (rows[1:, 0] > CODES["multiply"])] = 0
+    edges = np.flatnonzero(np.diff(step)) + 1
+    begins, ends = np.concatenate([[0], edges]), np.concatenate([edges, [len(step)]])
+    for number, (begin, end) in enumerate(zip(begins.tolist(), ends.tolist(), strict=True), start=1):
+        if step[begin] and end - begin + 1 >= _FEWEST and not found[begin]:
+            found[begin : end + 1] = 4 * number + step[begin]
+    return found
+
+
+_SKIP = CODES["skip"]
+
+
+def evaluate(kind: Any, formats: Any, code: Any, values: NDArray[Any], truths: NDArray[np.uint8]) -> int:
+    """Run operations once for each lane; return how many have results, 0 if the machine does not tell."""
+    from gpbnb.arithmetic.kernels import machine
+
+    try:
+        return int(machine.evaluate(kind, formats, code, values, truths))
+    except (OverflowError, ZeroDivisionError):
+        return 0
+
+
+_NAMES = {code: name for name, code in CODES.items()}

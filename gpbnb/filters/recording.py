@@ -1,0 +1,328 @@
+"""A step of a linear filter as a program, recorded once from the step as it is written for arrays.
+
+:mod:`gpbnb.filters.kalman_step` and :mod:`gpbnb.filters.array_steps` take arrays of any kind, also arrays that record
+their operations, see :mod:`gpbnb.arithmetic.traced`. What does not depend on the measurements, the covariance and the
+gain, stands in a program of its own, which runs once for all records and whose results may repeat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
+from gpbnb.arithmetic.machine import CODES, packed_one
+from gpbnb.arithmetic.tape import Constants, Tape
+from gpbnb.arithmetic.traced import TracedArray, TracedFormat, TracedTruth
+from gpbnb.filters.array_forms import AnyForm, ArrayForm
+from gpbnb.filters.array_steps import (
+    BlockStorage,
+    observe_carlson,
+    observe_potter,
+    observe_ud,
+    observed,
+    predict_root,
+    predict_ud,
+)
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import HUNG_FORMS, BlockAlgebra, corrected, measured_in, predicted_in
+
+_TRUTHS = (CODES["compare"], CODES["combine"])
+FACTORED: dict[AnyForm, tuple[Callable[..., Any], Callable[..., Any]]] = {
+    Form.UD: (predict_ud, observe_ud),
+    ArrayForm.POTTER: (predict_root, observe_potter),
+    ArrayForm.CARLSON: (predict_root, observe_carlson),
+}
+"""How a form with factors or roots predicts them, and updates them by one measurement."""
+
+
+class Known(NamedTuple):
+    """A matrix of the model: its letter and shape, and which entries are 0 or 1 in every step, by the bytes 0 and 1."""
+
+    letter: str
+    shape: tuple[int, ...]
+    entries: bytes
+
+
+class StepKind(NamedTuple):
+    """All that the operations of a step depend on.
+
+    Parameters
+    ----------
+    form, n, m : the form, and the numbers of states and measurements.
+    model : matrices of the model.
+    one : whether every format has the number one.
+    blocks : number of the format of state, gain, covariance, innovation covariance, and the model.
+    sums : fused, order and block of sums of products; then the number of the format that keeps them, or -1.
+    reference : whether numbers are pairs of float64, whose products depend on the order of their factors.
+    alike : whether a number that several formats have is stored alike in all of them.
+    """
+
+    form: AnyForm
+    n: int
+    m: int
+    model: tuple[Known, ...]
+    one: bool = True
+    blocks: tuple[int, ...] = (0, 0, 0, 0, 0)
+    sums: tuple[Any, ...] = (False, "left", 32, -1)
+    compensated: bool = False
+    reference: bool = False
+    alike: bool = True
+
+
+def step_kind(
+    form: AnyForm,
+    model: dict[str, NDArray[Any]],
+    fmt: Any,
+    blocks: tuple[int, ...] = (0, 0, 0, 0, 0),
+    sums: tuple[Any, ...] = (False, "left", 32, -1),
+    compensated: bool = False,
+) -> StepKind:
+    """Return the kind of the steps of a filter.
+
+    Parameters
+    ----------
+    model : its matrices by their letters, (p, rows, columns, ...) or (p, rows, ...), packed.
+    fmt : the first format; None is double-double.
+    """
+    one = packed_one(fmt)
+    m, n = model["H"].shape[1:3]
+    parts = model["H"].ndim - 3
+    known = []
+    for letter, table in model.items():
+        zeros, ones = (table == 0, np.zeros(table.shape, np.bool_)) if one is None else (table == 0, table == one)
+        if parts:
+            zeros, ones = zeros[..., 0], ones.all(axis=-1)
+        entries = np.where(zeros.all(axis=0), 0, np.where(ones.all(axis=0), 1, 2)).astype(np.uint8)
+        known.append(Known(letter, entries.shape, entries.tobytes()))
+    return StepKind(form, n, m, tuple(known), one is not None, blocks, sums, compensated, fmt is None, not parts)
+
+
+class ProgramPart(NamedTuple):
+    """One of the two programs of a step: its rows (o, 5), their formats (o,), and their numbers in the whole step."""
+
+    rows: NDArray[np.int64]
+    formats: NDArray[np.int64]
+    at: NDArray[np.int64]
+
+
+class RecordedStep(NamedTuple):
+    """A step of a filter as programs; places are those of one list of numbers.
+
+    Parameters
+    ----------
+    gain : the program of what does not depend on the measurements. estimate : that of the rest.
+    sizes : numbers of places, and of truth values.
+    places : places of the states, the measurements, and of each matrix of the model.
+    after : places of x, of the compensation if there is any, and of P after the step.
+    K, S : places of the gain (n, m), or of the gains of single measurements, and of the innovation covariance.
+    definite : truth value of the gain's program.
+    shared : places that the estimate's program takes from the gain's.
+    """
+
+    gain: ProgramPart
+    estimate: ProgramPart
+    sizes: tuple[int, int]
+    constants: tuple[Constants, Constants]
+    places: dict[str, NDArray[np.int64]]
+    after: dict[str, NDArray[np.int64]]
+    K: NDArray[np.int64]
+    S: NDArray[np.int64]
+    definite: int
+    shared: NDArray[np.int64]
+    labels: list[tuple[int, str]]
+
+    def quantity(self, part: ProgramPart, row: int) -> str:
+        """Name what a row of a program computes."""
+        found = ""
+        for begin, name in self.labels:
+            if begin <= part.at[row]:
+                found = name
+        return found
+
+
+@lru_cache(maxsize=64)
+def recorded_step(kind: StepKind) -> RecordedStep:
+    """Record a step of a filter."""
+    n, m = kind.n, kind.m
+    sizes = [("x", (n,)), ("P", (n, n)), ("carried", (n,)), ("z", (m,)), *((e.letter, e.shape) for e in kind.model)]
+    places, at = dict[str, NDArray[np.int64]](), 1
+    for letter, shape in sizes:
+        places[letter] = np.arange(at, at + int(np.prod(shape))).reshape(shape)
+        at += places[letter].size
+    tape = Tape(at - 1, one=kind.one)
+    tape.fuses, tape.alike = True, kind.alike
+    formats = [TracedFormat(tape, i) for i in range(max(*kind.blocks, kind.sums[-1]) + 1)]
+    state, gain, covariance, innovation, stored = (formats[i] for i in kind.blocks)
+    given = dict[str, Any]()
+    for known in kind.model:
+        exact = np.frombuffer(known.entries, np.uint8).reshape(known.shape)
+        seen = np.where(exact == 0, 0, np.where((exact == 1) & (tape.one > 0), tape.one, places[known.letter]))
+        given[known.letter] = stored.made(seen)
+    P = np.triu(places["P"]) if kind.form in (Form.UD, ArrayForm.CARLSON) else places["P"]
+    x, z, carried = (state.made(places[letter]) for letter in ("x", "z", "carried"))
+    algebra = [_algebra(each, formats, kind) for each in (state, gain, covariance, innovation)]
+    blocks = BlockAlgebra(
+        algebra[0],
+        algebra[1],
+        algebra[2],
+        algebra[3],
+        BlockStorage(state.array, gain.array, covariance.array, innovation.array),
+    )
+    found = _Step(kind, tape, blocks, given).taken(x, covariance.made(P), carried, z)
+    return _divided(kind, tape, places, found)
+
+
+def _algebra(fmt: TracedFormat, formats: Sequence[TracedFormat], kind: StepKind) -> Algebra:
+    fused, order, block, number = kind.sums
+    times: Callable[[Any, Any], Any] = partial(linalg.matmul, order=order, fused=fused, block=block)
+    if number >= 0:
+        sums = formats[number]
+
+        def times(a: Any, b: Any) -> Any:
+            return fmt.array(linalg.matmul(sums.array(a), sums.array(b), order, fused, block))
+
+    return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), times, inverse_in_order)
+
+
+class _Taken(NamedTuple):
+    x: TracedArray
+    carried: TracedArray
+    P: TracedArray
+    K: TracedArray
+    S: TracedArray | None
+    definite: Any
+
+
+class _Step:
+    """A step on arrays that record their operations."""
+
+    def __init__(self, kind: StepKind, tape: Tape, blocks: BlockAlgebra, given: dict[str, Any]) -> None:
+        self.kind, self.tape, self.blocks, self.given = kind, tape, blocks, given
+
+    def taken(self, x: TracedArray, P: TracedArray, carried: TracedArray, z: TracedArray) -> _Taken:
+        if "d" in self.given:
+            z = z - self.given["d"]
+        if self.kind.form in FACTORED:
+            return self._factored(x, P, carried, z)
+        return self._covariance(x, P, carried, z)
+
+    def _covariance(self, x: TracedArray, P: TracedArray, carried: TracedArray, z: TracedArray) -> _Taken:
+        blocks, given, form, about = self.blocks, self.given, self.kind.form, self.tape.about
+        stored = blocks.stored
+        about("the predicted covariance")
+        V = predicted_in(blocks, given["Phi"], P, given["Q"])
+        K, P, S, definite = measured_in(blocks, form, given["H"], given["R"], V, about)
+        H = given["H"]
+        if form is Form.HUNG_SECOND_GAIN:
+            about("the gain")
+            of_gain = blocks.gain.times(stored.gain(P), stored.gain(H).T)
+            K = blocks.gain.times(of_gain, stored.gain(given["RI"]))
+        own = stored.state(K)
+        about("the estimate")
+        if form in HUNG_FORMS and not self.kind.compensated:
+            W = blocks.covariance.identity(self.kind.n) - blocks.covariance.times(
+                stored.covariance(K), stored.covariance(H)
+            )
+            loop = blocks.state.times(stored.state(W), stored.state(given["Phi"]))
+            x = (blocks.state.times(loop, x[:, None]) + blocks.state.times(own, z[:, None]))[:, 0]
+        elif self.kind.compensated or form is ArrayForm.COMPENSATED:
+            x, carried = self._compensated(x, carried, own, z)
+        else:
+            x = corrected(blocks.state, stored.state(H), own, self._ahead(x)[:, None], z[:, None])[:, 0]
+        return _Taken(x, carried, P, K, S, definite)
+
+    def _ahead(self, x: Any) -> Any:
+        return self._with_inputs(self._times(self.blocks.stored.state(self.given["Phi"]), x))
+
+    def _times(self, a: Any, x: Any) -> Any:
+        return self.blocks.state.times(a, x[:, None])[:, 0]
+
+    def _with_inputs(self, x: Any) -> Any:
+        if "B" in self.given:
+            x = x + self._times(self.given["B"], self.given["u"])
+        return x + self.given["b"] if "b" in self.given else x
+
+    def _compensated(self, x: Any, carried: Any, K: Any, z: Any) -> tuple[Any, Any]:
+        change = self._with_inputs(self._times(self.given["increment"], x))
+        change = change + self._times(K, z - self._times(self.given["H"], x + change))
+        change = change - carried
+        after = x + change
+        return after, (after - x) - change
+
+    def _factored(self, x: TracedArray, P: TracedArray, carried: TracedArray, z: TracedArray) -> _Taken:
+        stored, given, about = self.blocks.stored, self.given, self.tape.about
+        predict, observe = FACTORED[self.kind.form]
+        about("the predicted covariance")
+        P, definite = predict(
+            stored.covariance(given["Phi"]), P, stored.covariance(given["UQ"]), self.blocks.covariance.times
+        )
+        about("the update of factors and estimate")
+        ahead = self._ahead(x)
+        if self.kind.form is Form.UD:
+            observe = partial(observe, stored=stored)
+        found = observed(observe, given["H"], given["UR"], z, ahead, P, stored)
+        K: Any = np.stack(found.gains, axis=1)
+        return _Taken(found.x, carried, found.P, K, None, definite & found.definite)
+
+
+def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], found: _Taken) -> RecordedStep:
+    """Divide the operations of a step into those of the gain and those of the estimate."""
+    rows, formats = tape.instructions.astype(np.int64), tape.formats
+    values, truths = tape.sizes
+    late = np.zeros(values, np.bool_)
+    for letter in ("x", "z", "carried", "u", "b", "d", "B"):
+        late[places.get(letter, [])] = True
+    late_truths, later = np.zeros(truths, np.bool_), np.zeros(len(rows), np.bool_)
+    for o, (code, a, b, c, out) in enumerate(rows.tolist()):
+        of = _operands(code, a, b, c)
+        if any(late[each] for each in of[0]) or any(late_truths[each] for each in of[1]):
+            later[o] = True
+            (late_truths if code in _TRUTHS else late)[out] = True
+    if kind.reference and kind.form not in FACTORED:
+        first = np.zeros(values, np.bool_)
+        first[np.concatenate([places["Phi"].ravel(), places["H"].ravel()])] = True
+        turned = (rows[:, 0] == CODES["multiply"]) & first[rows[:, 2]] & ~first[rows[:, 1]]
+        for (begin, name), (end, _) in zip(tape.labels, [*tape.labels[1:], (len(rows), "")], strict=True):
+            turned[begin:end] &= name != "the gain"
+        rows[turned, 1:3] = rows[turned, 2:0:-1]
+    x, carried, P, K = (each.components[0] for each in (found.x, found.carried, found.P, found.K))
+    S = np.zeros((0, kind.m), np.int64) if found.S is None else found.S.components[0]
+    made = np.zeros(values, np.bool_)  # by operations of the gain's program
+    mine = ~later & ~np.isin(rows[:, 0], (*_TRUTHS, CODES["nonzero"], CODES["skip"]))
+    made[rows[mine, 4]] = True
+    used = np.zeros(values, np.bool_)
+    for code, a, b, c, _ in rows[later].tolist():
+        for each in _operands(code, a, b, c)[0]:
+            used[each] = True
+    used[np.concatenate([x.ravel(), carried.ravel()])] = True
+    shared = np.flatnonzero(made & used)
+    early, rest = (ProgramPart(rows[chosen], formats[chosen], np.flatnonzero(chosen)) for chosen in (~later, later))
+    after = {"x": x, "carried": carried, "P": P}
+    definite = found.definite
+    truth = int(definite.components[0]) if isinstance(definite, TracedTruth) else 1
+    return RecordedStep(
+        early, rest, (values, truths), tape.all_constants, places, after, K, S, truth, shared, tape.labels
+    )
+
+
+def _operands(code: int, a: int, b: int, c: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the numbers and the truth values that an operation takes."""
+    name = _NAMES[code]
+    if name in ("add", "subtract", "multiply", "divide", "compare"):
+        return (a, b), ()
+    if name == "fused":
+        return (a, b, c), ()
+    if name == "choose":
+        return (b, c), (a,)
+    if name == "combine":
+        return (), (a, b)
+    return ((), (a,)) if name == "skip" else ((a,), ())
+
+
+_NAMES = {code: name for name, code in CODES.items()}

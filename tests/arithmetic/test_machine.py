@@ -1,0 +1,139 @@
+"""The machine: random programs have the digits of fractions that are rounded by a few lines of this file."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.machine import CODES, OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT, code_of, evaluate, fault_of, tables
+
+INPUTS, ROWS = 12, 150
+OPERATIONS = {
+    "add": lambda x, y: x + y,
+    "subtract": lambda x, y: x - y,
+    "multiply": lambda x, y: x * y,
+    "divide": lambda x, y: x / y,
+    "negative": lambda x, y: -x,
+    "absolute": lambda x, y: abs(x),
+}
+NAMES = (*OPERATIONS, "choose", "compare", "combine")
+FORMATS = [
+    *(FloatFormat(2, t, rounding) for t in (1, 11, 24, 26, 40, 52, 53) for rounding in ("nearest", "chop")),
+    *(FloatFormat(2, t, rounding) for t in (2, 24, 33, 53) for rounding in ("even", "up", "down")),
+    FloatFormat(2, 20, "odd"),
+    *(FloatFormat(16, t, rounding) for t in (1, 6, 13) for rounding in ("nearest", "chop", "even")),
+    *(FloatFormat(10, t, rounding) for t in (1, 8, 9, 18) for rounding in ("nearest", "chop")),
+    FloatFormat(10, 12, "even"),
+    FloatFormat(2, 11, "even", -14, 15),
+    FloatFormat(2, 24, "even", -126, 127),
+    FloatFormat(2, 64, "even"),
+    FloatFormat(10, 25),
+]
+
+
+def rounded(x, fmt):
+    """Round a fraction to the digits of a format, or of its subnormal numbers; nothing here is the package's."""
+    if x == 0:
+        return Fraction(0)
+    size, base = abs(x), Fraction(fmt.base)
+    e = 0
+    while base**e > size:
+        e -= 1
+    while base ** (e + 1) <= size:
+        e += 1
+    if fmt.emin is not None:
+        e = max(e, fmt.emin)
+    unit = base ** (e - fmt.precision + 1)
+    whole, rest = divmod(size / unit, 1)
+    away = {
+        "nearest": rest >= Fraction(1, 2),
+        "chop": False,
+        "even": rest > Fraction(1, 2) or (rest == Fraction(1, 2) and whole % 2 == 1),
+        "up": rest > 0 and x > 0,
+        "down": rest > 0 and x < 0,
+        "odd": rest > 0 and whole % 2 == 0,
+    }[fmt.rounding.value]
+    return (1 if x > 0 else -1) * (whole + away) * unit
+
+
+def drawn(rng, exact, fmt):
+    """Draw a program whose results stay within small powers of the base, and compute it with fractions."""
+    rows, truths = [], [False, True]
+    while len(rows) < ROWS:
+        name = str(rng.choice(NAMES))
+        a, b, c = rng.integers(0, len(exact), 3).tolist()
+        p, q = rng.integers(0, len(truths), 2).tolist()
+        x, y, z = exact[a], exact[b], exact[c]
+        if name == "compare":
+            orders = int(rng.integers(8))
+            rows.append((CODES[name], a, b, orders, len(truths)))
+            truths.append(bool(orders >> ((x > y) - (x < y) + 1) & 1))
+            continue
+        if name == "combine":
+            table = int(rng.integers(16))
+            rows.append((CODES[name], p, q, table, len(truths)))
+            truths.append(bool(table >> (2 * truths[p] + truths[q]) & 1))
+            continue
+        if name == "divide" and y == 0:
+            continue
+        if name == "choose":
+            row, result = (p, b, c), y if truths[p] else z
+        else:
+            row = a, b, 0
+            result = rounded(OPERATIONS[name](x, y), fmt)
+        if result and not Fraction(1, 200) < abs(result) < 200:
+            continue
+        rows.append((CODES[name], *row, len(exact)))
+        exact.append(result)
+    return np.array(rows, np.int64), truths
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_a_program_has_the_digits_of_fractions(fmt):
+    rng = np.random.default_rng([fmt.base, fmt.precision])
+    given = [rounded(Fraction(int(each), 24), fmt) for each in rng.integers(-400, 400, INPUTS)]
+    exact = [Fraction(0), *given]
+    rows, expected = drawn(rng, exact, fmt)
+    kind, formats = tables([fmt])
+    packed = fmt.backend.pack(fmt.array(exact[: 1 + INPUTS]).components)
+    alone = packed.ndim == 1
+    for lanes in (1, 5):
+        shape = () if alone and lanes == 1 else (lanes, *packed.shape[1:])
+        values, truths = np.zeros((len(exact), *shape), packed.dtype), np.zeros((len(expected), *shape[:1]), np.uint8)
+        values[: len(packed)] = packed if not shape else packed[:, np.newaxis]
+        truths[1] = 1
+        assert evaluate(kind, formats, code_of(rows, np.zeros(ROWS, np.int64)), values, truths) == ROWS
+        for lane in range(lanes):
+            numbers = values if not shape else values[:, lane]
+            found = fmt.backend.to_exact(fmt.backend.unpack(numbers))
+            assert [fmt.kernel.to_fraction(*each) for each in zip(*found, strict=True)] == exact
+            assert (truths if not shape else truths[:, lane]).astype(bool).tolist() == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "reason"),
+    [("multiply", (1, 1), OVERFLOW), ("divide", (1, 0), ZERO_DIVISOR), ("nonzero", (0, 0), ZERO_PIVOT)],
+)
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 11, "even", -14, 15), FloatFormat(2, 24)], ids=str)
+def test_the_first_row_without_a_result_is_named(fmt, name, row, reason):
+    large = Fraction(60000) if fmt.emax is not None else Fraction(2) ** 800
+    values, truths = np.array([0.0, float(large), 1.0, 0.0, 0.0]), np.array([0, 1], np.uint8)
+    rows = np.array([(CODES["add"], 2, 2, 0, 3), (CODES[name], *row, 0, 4)], np.int64)
+    kind, formats = tables([fmt])
+    done = evaluate(kind, formats, code_of(rows, np.zeros(2, np.int64)), values, truths)
+    fault = fault_of(rows, values, done)
+    assert (fault.row, fault.reason) == (1, reason)
+    assert values[3] == 2
+
+
+def test_rows_are_left_out_where_a_truth_value_does_not_hold():
+    skip, divide, add = (CODES[name] for name in ("skip", "divide", "add"))
+    kind, formats = tables([FloatFormat(2, 24)])
+    for truth, done, found in ((0, 4, [0, 0, 6]), (1, 1, None)):
+        values, truths = np.array([0.0, 3.0, 0.0, 0.0, 0.0]), np.array([0, 1], np.uint8)
+        rows = np.array([(skip, truth, 2, 0, 9), (divide, 1, 0, 0, 2), (add, 1, 1, 0, 3), (add, 1, 1, 0, 4)], np.int64)
+        assert evaluate(kind, formats, code_of(rows, np.zeros(4, np.int64)), values, truths) == done
+        assert found is None or values[2:].tolist() == found
