@@ -276,8 +276,8 @@ def test_a_covariance_that_must_not_be_raised_has_neither_run_nor_guarantee() ->
     model = raised_while_factored(repair=False)
     with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
         Run(model, NINE, Form.UD, ())
-    with pytest.raises(ValueError, match="needed covariances that stay definite"):
+    with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
         guarantee(model, NINE, WITHIN, Form.UD)
-    with pytest.raises(ValueError, match="needed covariances that stay definite"):
+    with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
         next(bounds_in_blocks(model, NINE, [WITHIN], [[1, 1, 1]], 10, Form.UD))
     assert guarantee(model, NINE, WITHIN, Form.INNOVATION).for_ever
