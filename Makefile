@@ -1,6 +1,6 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help book test certificates proof test-pages test-portable verify-sweeps notebooks findings lint format exactness bench environment screenshots pdf serve clean
+.PHONY: help book test certificates attack proof test-pages test-portable verify-sweeps notebooks findings lint format exactness bench environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
@@ -71,6 +71,9 @@ test: .venv/made-for ## unit and property tests, the examples in docstrings, and
 
 certificates: .venv/made-for ## write a certificate of every guarantee in the book and check it; WORDS="tracker Nile" picks filters
 	$(PY) -m gpbnb.report.guarantees.certificates $(WORDS)
+
+attack: .venv/made-for ## attack guarantees of random filters with 20,000 runs, which takes most of an hour
+	$(PY) -m gpbnb.report.guarantees.attack
 
 proof: ## check proof/guarantee.v, the theorem behind a certificate; needs Coq (apt-get install coq)
 	@mkdir -p .cache/proof

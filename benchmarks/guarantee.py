@@ -66,9 +66,7 @@ class Measured(NamedTuple):
 
     name: str
     repeat: int | None
-    enclosed: int | None
     period: int | None
-    lags: int
     bound: float
     seconds: float
     megabytes: float
@@ -83,7 +81,7 @@ def measure(case: Case) -> Measured:
     if not found.for_ever:
         raise RuntimeError(f"{given.name}: {found.why}")
     held, at = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6, found.schedule
-    return Measured(given.name, at.repeat, at.enclosed, at.period, found.lags, float(found.bound.max()), seconds, held)
+    return Measured(given.name, at.repeat, at.period, float(found.bound.max()), seconds, held)
 
 
 def in_a_process(case: Case) -> Measured:
@@ -113,14 +111,13 @@ def main() -> int:
         print(json.dumps(measure(CASES[int(sys.argv[1])])))
         return 0
     header = (
-        "filter", "form", "repeats from step", "enclosed from step", "period", "steps back", "largest bound", "seconds",
-        "MB", "to be reached", "reached",
+        "filter", "form", "repeats from step", "period", "largest bound", "seconds", "MB", "to be reached", "reached",
     )  # fmt: skip
     body = []
     for case in CASES:
         in_a_process(case)
         found = in_a_process(case)
-        steps = (str(each or "") for each in (found.repeat, found.enclosed, found.period, found.lags))
+        steps = (str(each or "") for each in (found.repeat, found.period))
         numbers = f"{found.bound:.3g}", f"{found.seconds:.2f}", f"{found.megabytes:.0f}"
         body.append((found.name, str(case.form), *steps, *numbers, allowed(case), reached(case, found)))
         print(*body[-1], flush=True)

@@ -138,7 +138,7 @@ Hypothesis recursion : forall k i, (i < n)%nat -> e (S k) i == sum n (fun r => F
 
 Definition residual (C : nat -> vector) (k l : nat) : vector := fun r => through (C l) (F (k - l)) r - C (S l) r.
 
-(* The telescoping sum of envelope.py and of the chapter on the guarantee. *)
+(* The telescoping sum of check.py and of the chapter on the guarantee. *)
 
 Theorem telescope (C : nat -> vector) (k L : nat) : (L <= k)%nat ->
   dot (C O) (e k) ==

@@ -143,6 +143,8 @@ class Search(Generic[Kind]):
     largest : highest precision to try; by default the largest with compiled loops, see :func:`largest_compiled`.
         Precisions without compiled loops are tried only if none below qualifies.
     least : lowest precision to try.
+    proof : function that returns the outcome that is proved in a format, where `error` is a guess. It is asked of the
+        answer alone; if it proves no answer, the search goes on above it.
 
     Raises
     ------
@@ -158,10 +160,11 @@ class Search(Generic[Kind]):
         bounds: bool = False,
         largest: int | None = None,
         least: int = 2,
+        proof: Callable[[Kind], Outcome] | None = None,
     ) -> None:
         self._ratios, self._why = dict[int, float](), dict[int, str]()
-        #: What the search asks of a format.
-        self.error: Callable[[Kind], Outcome] = error
+        #: What the search says of a format, proved if it can be.
+        self.error: Callable[[Kind], Outcome] = error if proof is None else proof
         self._like: Kind = like
         self._given = largest is not None
         #: Precisions above the answer for which there is no bound.
@@ -184,6 +187,11 @@ class Search(Generic[Kind]):
 
         for top in sorted({min(fast, self.largest), self.largest}):
             answer = self._answer(meets, least, top, checks, bounds)
+            while answer is not None and proof is not None:
+                self._ratios[answer], self._why[answer] = proof(_with_digits(like, answer))
+                if self._ratios[answer] <= 1:
+                    break
+                answer = self._answer(meets, least, top, checks, bounds)
             if answer is not None and (answer < top or top == self.largest):
                 self.fmt = _with_digits(like, answer)
                 return

@@ -19,9 +19,10 @@ from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
 from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
-from gpbnb.bounds.envelope import FilterLimits, units
 from gpbnb.bounds.gains import Schedule
-from gpbnb.bounds.guarantee import Guarantee, closed_loops, unit_disturbances
+from gpbnb.bounds.guarantee import Guarantee, closed_loops
+from gpbnb.bounds.guess import FilterLimits, linear_steps
+from gpbnb.bounds.units import largest_errors, units
 from gpbnb.filters.kernels.bounded import widened
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.program import MULTIPLY, SUBTRACT, effects, execute
@@ -282,8 +283,6 @@ def attack(
 ) -> Attack:
     """Attack a guarantee with measurements chosen step by step, within its limits.
 
-    A gain that never repeats is replaced by a gain that the guarantee covers and that repeats in every cycle.
-
     Parameters
     ----------
     steps : length of each run; the attack maximizes the error after the last step.
@@ -339,11 +338,11 @@ def ceiling(found: Guarantee, z: NDArray[np.float64], state: int) -> float:
     """
     given, program = found.schedule, found.schedule.program
     first, steps = program.n + program.m, len(z)
-    parts, table = unit_disturbances(given), units(given.fmt)
+    parts, table = linear_steps(given, np.arange(given.steps)), units(given.fmt)
     rows, known = responses(given, parts.F, state, steps), 0.0
     values, x = np.empty(first + len(program.operations)), given.x0.astype(np.float64)
     effect, sizes = np.empty((len(values), program.n)), np.empty((len(values), program.n))
-    powers, total = {0.0, *table.exact[:, 0].tolist()}, 0.0
+    powers, total = {0.0, *table.exact.tolist()}, 0.0
     for k in range(steps):
         at = k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
         coefficients = np.ascontiguousarray(given.coefficients[at, :, 0])
@@ -355,9 +354,9 @@ def ceiling(found: Guarantee, z: NDArray[np.float64], state: int) -> float:
                 exact = abs(coefficients[a]) in powers
             else:
                 values[first + o] = values[a] - values[b] if code == SUBTRACT else values[a] + values[b]
-                exact = values[a] == 0 or values[b] == 0 or table.sums_exact
+                exact = values[a] == 0 or values[b] == 0 or abs(values[first + o]) <= table.aligned
             if not exact and values[first + o]:
-                errors[o] = table.errors[np.searchsorted(table.powers, abs(values[first + o]))]
+                errors[o] = largest_errors(given.fmt, np.abs(values[first + o]))
         effects(program.operations, program.outputs, coefficients, first, effect, sizes)
         total += float(np.abs(effect[first:] @ rows[k]) @ errors)
         innovation = z[k] - given.HPhi[at, :, :, 0] @ x

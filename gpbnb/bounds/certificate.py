@@ -1,34 +1,36 @@
-"""Write a guarantee as a certificate, which :mod:`gpbnb.bounds.check` verifies without the rest of this package.
+"""Write a guess as a certificate, which :mod:`gpbnb.bounds.check` proves or rejects without the rest of this package.
 
-A certificate asks a question (filter, format, form, limits) and claims an answer: the bound, the step from which and
-the period with which the gain repeats, and the number of earlier steps in the condition of
-:mod:`gpbnb.bounds.envelope`. The checker computes the rows of this condition itself. Further numbers only help it: an
-interval that the exact covariance does not leave, and how many steps of errors to keep apart. The checker rounds
-outwards, so the bound claimed exceeds that of the guarantee by a millionth. If a filter takes thousands of steps to
-settle, it exceeds it by a thousandth, so that fewer of them suffice.
+A certificate asks a question (filter, format, form, limits) and claims an answer: the bound and, for a Kalman filter,
+the step from which and the period with which the gain repeats. Further numbers only help the checker: an interval that
+the exact covariance does not leave, how many earlier steps to follow one by one, and how many of them to keep apart.
 """
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.bounds import above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.gains import Schedule
+from gpbnb.bounds.guess import FilterLimits, Guess, lags_of, radius_of
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, matrices
 from gpbnb.filters.system import LinearFilter
+from gpbnb.filters.words import WordFormats, integer_program
 
-KIND = "rounding guarantee 1"
+KIND = "rounding guarantee 2"
 ORDER = "each product and sum rounded once, sums from left to right"
 FORMS = {
     Form.HUNG: "hung",
@@ -38,121 +40,139 @@ FORMS = {
     Form.UD: "ud",
 }
 _KINDS = {MULTIPLY: "multiply", ADD: "add", SUBTRACT: "subtract"}
+RAISED = (1.0, 1.001, 1.003, 1.01, 1.03, 1.1)
+"""Factors of a guess that are tried, until the checker proves one."""
+SLOW = (1.01, 1.7)
+"""The same, where an ellipsoid contains old errors, which loses sharpness if two modes are slow."""
 _NEGLIGIBLE = 2.0**-26
-_NEARER = 16.0
 _WHOLE = 700
 """If errors are negligible after this many steps, the checker keeps them apart until then."""
+_WHOLE_WORK = 20_000_000
 
 
-class _Care(NamedTuple):
-    """How much a claim exceeds the guarantee, and what is left of a mode that has decayed."""
+class Proof(NamedTuple):
+    """What was proved: a bound, and its certificate; or why nothing was."""
 
-    excess: float
-    left: float
-
-
-_USUAL, _SLOW, _MANY = _Care(2.0**-20, 1e-2), _Care(2.0**-10, 1e-3), 5_000
+    bound: NDArray[np.float64]
+    text: str
+    why: str = ""
 
 
-def written(
-    given: Schedule,
-    asked: FilterLimits,
-    known: FilterLimits,
-    bound: NDArray[np.float64],
+def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
+    """Ask the checker for a guess, and for somewhat larger ones if it rejects that."""
+    why, content = "", json.loads(written(guess))
+    for factor in SLOW if content.get("keep", math.inf) < content["back"] else RAISED:
+        text = written(guess._replace(bound=guess.bound * factor))
+        try:
+            prove(json.loads(text))
+        except NotProvedError as error:
+            why = f"not proved: {error}"
+        except NotImplementedError as error:
+            return Proof(guess.bound, "", f"not covered: {error}")
+        else:
+            return Proof(np.array([above(Fraction(each)) for each in json.loads(text)["bound"]]), text)
+    return Proof(guess.bound, "", why)
+
+
+def _head(name: str, bound: Any, steps: int | None, back: int) -> dict[str, Any]:
+    return {"certificate": KIND, "name": name, "order": ORDER, "bound": texts(bound), "steps": steps, "back": back}
+
+
+def of_operations(
+    made: LinearFilter,
+    fmt: FloatFormat | FixedFormat | WordFormats,
+    measurement: Any,
+    guess: Guess,
     steps: int | None,
-    F: NDArray[np.float64],
+    exact: str = "as stored",
 ) -> str:
-    """Return a guarantee as JSON.
+    """Return the certificate of a filter with fixed coefficients as JSON.
 
     Parameters
     ----------
-    given : the filter's coefficients.
-    asked : limits as given.
-    known : those that follow from them.
-    bound : (n,), bound of the errors.
-    steps : number of steps for which it holds, None for ever.
-    F : (steps, n, n), closed loops.
+    measurement : (m,), limits on the inputs as given.
+    exact : what its states are compared with, "as stored" or "as given".
 
     Raises
     ------
-    ValueError : there is no bound, or nothing to write a certificate from.
+    ValueError : a filter that limits its values.
     """
-    if given.origin is None or not np.isfinite(bound).all():
-        raise ValueError(
-            f"got a guarantee {bound} without {'a filter' if given.origin is None else 'a bound'}; needed both"
-        )
-    if given.enclosed is not None:
-        raise ValueError("got a gain that never repeats; needed one that repeats: certificates do not cover others")
-    first, period = given.first, given.steps - given.first
-    care = _SLOW if first > _MANY else _USUAL
-    claimed = _claimed(bound, care)
-    back = _back(F[first:], claimed, known.state) if steps is None else 0
+    program = made.program
+    if not {*program.operations[:, 0].tolist()} <= {*_KINDS}:
+        raise ValueError(f"got {made.name}, which limits its values; needed products, sums and differences only")
+    drawn = not isinstance(fmt, WordFormats) and fmt.rounding is Rounding.STOCHASTIC
+    stored = integer_program(made, fmt).coefficients if isinstance(fmt, WordFormats) else made.stored(fmt)
+    A, B = matrices(program, stored if exact == "as stored" else made.coefficients)
+    radius = radius_of(matrices(program, stored)[0].astype(np.float64))
     content = {
-        "certificate": KIND,
-        "name": given.origin.name,
-        "filter": _filter(given),
-        "format": _format(given.fmt),
-        "order": ORDER,
-        "limits": {name: _texts(each) for name, each in asked._asdict().items()},
-        "derived": {
-            "state": _texts(_claimed(known.state, care)),
-            "innovation": _texts(_claimed(known.innovation, care)),
+        "filter": {
+            "kind": "linear",
+            "states": program.n,
+            "inputs": program.m,
+            "operations": [[_KINDS[code], a, b] for code, a, b in program.operations.tolist()],
+            "wide": program.wide.tolist(),
+            "outputs": program.outputs.tolist(),
+            "coefficients": texts(made.coefficients),
+            "stored": texts(stored) if drawn else [],
+            "exact": exact,
+            "A": texts(A),
+            "B": texts(B),
         },
-        "bound": _texts(claimed),
-        "steps": steps,
+        "format": _words(fmt) if isinstance(fmt, WordFormats) else _format(fmt),
+        "limits": {"measurement": texts(measurement)},
+        "derived": {"state": texts(guess.state)},
+    }
+    return _text(_head(made.name, guess.bound, steps, lags_of(radius, steps, program.n)) | content)
+
+
+def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | None, F: NDArray[np.float64]) -> str:
+    """Return the certificate of a Kalman filter as JSON.
+
+    Parameters
+    ----------
+    given : its coefficients.
+    asked : limits as given.
+    F : (steps, n, n), closed loops.
+    """
+    model = given.origin
+    if not isinstance(model, LinearModel) or given.form is None:
+        raise ValueError("got a schedule without a Kalman filter; needed both the model and its form")
+    first, period = given.first, given.steps - given.first
+    bound, state = guess.bound, guess.state
+    innovation = guess.innovation
+    width, more = (None, 0) if steps is not None else _width(given, innovation, bound)
+    back = 0 if steps is not None else _back(F[first:], bound, state)
+    content = {
+        "filter": {
+            "kind": "kalman",
+            "form": FORMS[given.form],
+            "repair": model.repair is not False,
+            "repaired": [str(each) for each in model.repairs],
+        }
+        | {letter: texts(getattr(model, letter)) for letter in ("Phi", "H", "Q", "R", "x0", "P0")},
+        "format": _format(given.fmt),
+        "limits": {name: texts(each) for name, each in asked._asdict().items()},
+        "derived": {"state": texts(state), "innovation": texts(innovation)},
         "repeat": given.repeat or 0,
         "period": max(period, 1),
-        "first": first + (_extra(F[first:]) if steps is None and given.form is not None else 0),
-        "keep": _keep(F[first:], back, care) if steps is None else steps,
-        "back": back,
-        "width": _texts(_width(given, known.innovation)) if steps is None and given.form is not None else [],
+        "first": first + more,
+        "keep": steps if steps is not None else _keep(F[first:], back, first),
+        "width": [] if width is None else texts(width),
     }
+    return _text(_head(model.name, bound, steps, back) | content)
+
+
+def _text(content: dict[str, Any]) -> str:
     return json.dumps(content, indent=None, separators=(", ", ": "))
 
 
-def _claimed(bound: NDArray[np.float64], care: _Care) -> NDArray[np.float64]:
-    """Return larger bounds, and tiny ones for zero, so that the checker may round outwards, too."""
-    least = float(bound[bound > 0].min(initial=1.0))
-    return np.asarray(np.maximum(bound * (1 + care.excess), 2.0**-40 * least))
-
-
-def _texts(values: Any) -> Any:
+def texts(values: Any) -> Any:
     """Return exact numbers as text in nested lists, None for infinity."""
     if isinstance(values, np.ndarray):
         values = values.tolist()
     if isinstance(values, (list, tuple)):
-        return [_texts(each) for each in values]
+        return [texts(each) for each in values]
     return None if isinstance(values, float) and math.isinf(values) else str(Fraction(values))
-
-
-def _filter(given: Schedule) -> dict[str, Any]:
-    made = given.origin
-    if isinstance(made, LinearModel):
-        if given.form is None:
-            raise ValueError("got a Kalman filter without a form")
-        model = {letter: _texts(getattr(made, letter)) for letter in ("Phi", "H", "Q", "R", "x0", "P0")}
-        repaired = [str(each) for each in made.repairs]
-        return {
-            "kind": "kalman",
-            "form": FORMS[given.form],
-            "repair": made.repair is not False,
-            "repaired": repaired,
-        } | model
-    assert isinstance(made, LinearFilter)
-    program = made.program
-    if not {*program.operations[:, 0].tolist()} <= {*_KINDS}:
-        raise ValueError(f"got {made.name}, which limits its values; needed products, sums and differences only")
-    A, B = matrices(program, made.stored(given.fmt))
-    return {
-        "kind": "linear",
-        "states": program.n,
-        "inputs": program.m,
-        "operations": [[_KINDS[code], a, b] for code, a, b in program.operations.tolist()],
-        "outputs": program.outputs.tolist(),
-        "coefficients": _texts(made.coefficients),
-        "A": _texts(A),
-        "B": _texts(B),
-    }
 
 
 def _format(fmt: FloatFormat | FixedFormat) -> dict[str, Any]:
@@ -161,6 +181,13 @@ def _format(fmt: FloatFormat | FixedFormat) -> dict[str, Any]:
         return found | {"fraction_bits": fmt.fraction_bits, "overflow": fmt.overflow}
     largest = None if fmt.given_largest is None else str(fmt.given_largest)
     return found | {"emin": fmt.emin, "emax": fmt.emax, "subnormal": fmt.subnormal, "largest": largest}
+
+
+def _words(words: WordFormats) -> dict[str, Any]:
+    kept = words.data if words.coefficients is None else words.coefficients
+    kept = FloatFormat(2, kept) if isinstance(kept, int) else kept
+    formats = {"data": words.data, "sums": words.accumulator, "coefficients": kept}
+    return {name: _format(fmt) for name, fmt in formats.items()}
 
 
 def _back(F: NDArray[np.float64], *sizes: NDArray[np.float64]) -> int:
@@ -175,32 +202,27 @@ def _back(F: NDArray[np.float64], *sizes: NDArray[np.float64]) -> int:
     return max(most, 1)
 
 
-def _extra(F: NDArray[np.float64]) -> int:
-    """Return a number of steps, whole periods, after which the exact covariance is far nearer to its limit."""
-    rate = -2 * math.log(max(float(np.abs(eigenvalues(_product(F))).max()), 1e-9))
-    return math.ceil(math.log(_NEARER) / rate) * len(F)
-
-
-def _keep(F: NDArray[np.float64], back: int, care: _Care) -> int:
+def _keep(F: NDArray[np.float64], back: int, first: int) -> int:
     """Return the number of last steps whose errors the checker keeps apart; an ellipsoid contains all older ones.
 
-    It contains them without much loss if they are negligible, or once the fast modes of the filter have decayed.
+    It contains them without much loss if they are negligible, or once all modes but the slowest one have decayed.
     """
-    if back <= _WHOLE:
+    if back <= _WHOLE or min(back, first) * first <= _WHOLE_WORK:
         return back
     modes = np.sort(np.abs(eigenvalues(_product(F)))) ** (1 / len(F))
-    fast = modes[modes < modes[-1] ** 2]
-    return 4 + math.ceil(math.log(care.left) / math.log(max(float(fast.max(initial=0.0)), 1e-9)))
+    fast = float(modes[modes < modes[-1] ** 2].max(initial=0.0))
+    return 4 + math.ceil(math.log(1e-3) / math.log(max(fast, 1e-9)))
 
 
-def _width(given: Schedule, innovation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the width of an interval of covariances that the exact filter does not leave.
+def _width(
+    given: Schedule, innovation: NDArray[np.float64], bound: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], int]:
+    """Return the width of an interval of covariances that the exact filter does not leave, and after how many steps.
 
-    It has a shape that each period shrinks. The limits of the gain that follow from it are about those with which the
-    guarantee computes.
+    It has a shape that each period shrinks. The errors of the gain that follow from it are far below those of a step.
     """
     assert isinstance(given.origin, LinearModel)
-    stored, K, dK = given.origin.rounded(given.fmt), given.exact[given.first :, ..., 0], given.dK[given.first :]
+    stored, K = given.origin.rounded(given.fmt), given.exact[given.first :, ..., 0]
     phases = np.arange(given.first, given.steps)
     cycles = (stored.Phi, stored.H, stored.Q, stored.R)
     Phi, H, Q, R = (np.array([each[k % len(each)] for k in phases]).astype(np.float64) for each in cycles)
@@ -209,17 +231,29 @@ def _width(given: Schedule, innovation: NDArray[np.float64]) -> NDArray[np.float
     added = np.zeros((stored.n, stored.n))
     for a, more in zip(A, noise, strict=True):
         added = a @ added @ a.T + more
-    P = _limit(_product(A), added)
-    W = _limit(_product(A), np.diag(np.diag(P)))
-    D, least = W, math.inf
+    whole = _product(A)
+    P = _limit(whole, added)
+    W = _limit(whole, np.diag(np.maximum(np.diag(P), 1e-30 * max(np.diag(P).max(), 1e-300))))
+    D, share = W, 2.0**-20
     for k, a in enumerate(A):
         V, far = Phi[k] @ P @ Phi[k].T + Q[k], H[k] @ Phi[k]
         inverse = np.sqrt(np.diag(np.linalg.inv(H[k] @ V @ H[k].T + R[k])))
         by = (np.sqrt(np.diag(far @ D @ far.T)) @ inverse) * (inverse @ innovation)
         D, P = a @ D @ a.T, a @ P @ a.T + noise[k]
-        far_off = by * np.sqrt(np.diag(D))
-        least = min(least, float(np.min((dK[k] @ innovation)[far_off > 0] / far_off[far_off > 0], initial=math.inf)))
-    return np.asarray(W * min(max(least, 2.0**-60), 2.0**-20))
+        off = by * np.sqrt(np.diag(D))
+        # what a step may add to the bound, so that all steps together add a millionth
+        step = 1e-6 * bound * (1 - min(radius_of(whole) ** (1 / len(A)), 1 - 1e-6))
+        share = min(share, float(np.min(step[off > 0] / off[off > 0], initial=math.inf)))
+    share = max(share, 2.0**-70)
+    rate = max(radius_of(whole), 1e-9) ** 2
+    begun = stored.n * float(np.max(np.abs(_difference(given, P)) / np.sqrt(np.outer(np.diag(W), np.diag(W)))))
+    periods = max(math.ceil(math.log(max(begun, 1e-300) / (0.1 * share)) / -math.log(rate)), 1)
+    return np.asarray(W * share), (1 + periods) * len(A)  # from the end of the schedule
+
+
+def _difference(given: Schedule, P: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance of the exact covariance at the end of the schedule from its limit."""
+    return given.covariance[..., 0] - P + given.covariance[..., 1]
 
 
 def _limit(F: NDArray[np.float64], added: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -40,8 +40,15 @@ the file: filter, format, form, limits. It verifies the answer: the bound b, and
     base (in a format with a range: with 0 and +-1) and sums with zero are exact. So are sums whose last place is that
     of the smallest numbers: all those of fixed point, which is a format with a single exponent.
 
-    Not covered: stochastic rounding; known inputs; gains that never repeat; limited values; fused operations; other
-    orders of sums. For fixed coefficients, the file also states x' = Ax + Bz, which the operations must compute.
+    (6) For fixed coefficients, the file states x' = Ax + Bz, which the operations must compute with coefficients as
+    stored or as given. In the second case errors also obey e' = F'e + (F' - A)x + (K' - B)z + K'(z' - z), with z' the
+    stored input. A vector y' = Fy + w is followed for L steps by (2): |y_k - P y_(k-L)| <= T for a P near F^L.
+    If that holds for P and T after L steps, |y_k - P^2 y_(k-2L)| <= T + |P| T after 2L. So |y| <= T + |P| Y after i + L
+    steps if |y| <= Y after i, for any number of steps; and for all steps once P is small. A rounding in words is half a
+    unit of the data or the sums, or a whole one, if it drops a bit; limits of none are for inputs without an overflow.
+
+    Not covered: a covariance rounded at random; known inputs; gains that never repeat; limited values; fused
+    operations; other orders of sums.
 """
 
 from __future__ import annotations
@@ -62,30 +69,33 @@ from typing import Any
 # What a file looks like: a tuple lists words, a list holds any number of entries, and a set stands for one or none.
 KNOWN, VECTOR, CYCLE = [{Fraction}], [Fraction], [[[Fraction]]]
 LIMITS = {"state": KNOWN, "innovation": KNOWN}
-RULES = {"base": int, "precision": int, "rounding": ("nearest", "even", "chop", "up", "down", "odd")}
+RULES = {"base": int, "precision": int, "rounding": ("nearest", "even", "chop", "up", "down", "odd", "stochastic")}
 FIXED = RULES | {"fraction_bits": int, "overflow": ("raise", "saturate", "wrap")}
 FLOAT = RULES | {"emin": {int}, "emax": {int}, "subnormal": bool, "largest": {Fraction}}
 FORMS = ("innovation", "joseph", "hung", "hung second gain", "ud")
 MODEL = {"Phi": CYCLE, "H": CYCLE, "Q": CYCLE, "R": CYCLE, "x0": VECTOR, "P0": [VECTOR]}
-RECURSION = {"coefficients": VECTOR, "A": [VECTOR], "B": [VECTOR]}
+OPERATIONS = {"operations": [list], "wide": [bool], "outputs": [int], "coefficients": VECTOR, "stored": VECTOR}
+RECURSION = {"exact": ("as given", "as stored"), "A": [VECTOR], "B": [VECTOR]}
 FILTERS = {
     "kalman": {"kind": str, "form": FORMS, "repair": bool, "repaired": [str]} | MODEL,
-    "linear": {"kind": str, "states": int, "inputs": int, "operations": [list], "outputs": [int]} | RECURSION,
+    "linear": {"kind": str, "states": int, "inputs": int} | OPERATIONS | RECURSION,
 }
-COUNTS = {"repeat": int, "period": int, "first": int, "back": int, "keep": int}
-FILE = COUNTS | {
-    "certificate": ("rounding guarantee 1",),
+FILE = {
+    "certificate": ("rounding guarantee 2",),
     "name": str,
     "order": ("each product and sum rounded once, sums from left to right",),
-    "limits": LIMITS | {"measurement": KNOWN},
-    "derived": LIMITS,
     "bound": VECTOR,
     "steps": {int},
-    "width": [VECTOR],
+    "back": int,
+}
+COUNTS = {"repeat": int, "period": int, "first": int, "keep": int}
+FILES = {
+    "kalman": FILE | COUNTS | {"limits": LIMITS | {"measurement": KNOWN}, "derived": LIMITS, "width": [VECTOR]},
+    "linear": FILE | {"limits": {"measurement": KNOWN}, "derived": {"state": VECTOR}},
 }
 NUMBER = re.compile(r"-?[0-9]{1,4000}([./][0-9]{1,4000})?", re.ASCII)
 MULTIPLY, ADD, SUBTRACT = "multiply", "add", "subtract"
-BLOCK = 8  # steps that are taken together, for speed
+BLOCK, PEAK = 8, 128  # steps that are taken together, for speed; bits of the shares in (6)
 
 
 class NotProvedError(Exception):
@@ -116,6 +126,10 @@ def read(given: Any, schema: Any, name: str = "") -> Any:
     return [read(x, schema[0], name) for x in given] if rows else schema(given)
 
 
+def format_schema(given: Any) -> Any:
+    return FIXED if "overflow" in given else FLOAT
+
+
 def up(n: int, d: int) -> int:
     return -(-n // d)
 
@@ -127,6 +141,10 @@ def each(f: Any, *a: Any) -> Any:
 def size(a: Any, b: Any) -> Any:
     """The largest size of a row's first entries times numbers of at most these sizes."""
     return sum(map(mul, map(abs, a), b))
+
+
+def scaled(columns: Any, sizes: Any) -> Any:
+    return [[x * s for x in g] for g, s in zip(columns, sizes, strict=True)]
 
 
 def turned(a: Any) -> Any:
@@ -157,7 +175,8 @@ class Arithmetic:
     def __init__(self, given: Any, scale: int) -> None:
         b, t = self.base, self.digits = given["base"], given["precision"]
         need(b > 1 and t > 0, "a base or a precision that is none")
-        self.unit, self.low, self.rounding = b**scale, b ** (t - 1), given["rounding"]
+        self.unit, self.low, self.rounding, self.scale = b**scale, b ** (t - 1), given["rounding"], scale
+        self.wraps = given.get("overflow") == "wrap"
         powers = self.powers = [b**k for k in range(2 * scale + t + 2)]
         self.tops, self.exact = [b**t * p for p in powers], set(powers)
         self.nearest, self.fixed = self.rounding in ("nearest", "even"), "overflow" in given
@@ -205,7 +224,7 @@ class Arithmetic:
                 beyond = 2 * (rest * d + r) - p * d
                 m += beyond > 0 or (beyond == 0 and (self.rounding == "nearest" or m & 1))
             elif self.rounding != "chop":
-                m += {"up": n > 0, "down": n < 0, "odd": not m & 1}[self.rounding]
+                m += {"up": n > 0, "down": n < 0, "odd": not m & 1, "stochastic": True}[self.rounding]
         need(m * p <= self.largest, "a computed number exceeds the largest of the format")
         return 0 if m * p < self.normal else m * p if n > 0 else -m * p
 
@@ -283,14 +302,14 @@ class RoundedStep(ExactArithmetic):
     Inputs are the error of the last estimate, the innovation, and the state of the exact filter.
     """
 
-    def __init__(self, a: Arithmetic, depth: int, ends: Any, caps: Any, *sizes: Any) -> None:
-        self.a, self.unit, self.one, self.ends, self.caps = a, a.unit, a.unit**depth, ends, caps
-        self.sizes, self.start = [list(each) for each in sizes], [0] * len(sizes)
+    def __init__(self, a: Arithmetic, depth: int, ends: Any, *sizes: Any) -> None:
+        self.a, self.unit, self.one, self.ends = a, a.unit, a.unit**depth, ends
+        self.sizes = [list(each) for each in sizes]
 
     def rounded(self, value: Any, aligned: bool, end: Any) -> Any:
-        """Round a value that is at most `end`, and at most any start and the sizes of its inputs and roundings."""
+        """Round a value that is at most `end`, and at most any sum of the sizes of its inputs and roundings."""
         sums = [up(sum([abs(f) * sizes[i] for i, f in value.items()]), self.one) for sizes in self.sizes]
-        error = self.a.error(min(*map(add, sums, self.start), end), aligned)
+        error = self.a.error(min(*sums, end), aligned)
         if error:
             value[len(self.sizes[0])] = self.one
             for sizes in self.sizes:
@@ -303,10 +322,10 @@ class RoundedStep(ExactArithmetic):
             value[i] = value.get(i, 0) + sign * f
         return self.rounded(value, True, end) if x and y else value
 
-    def multiply(self, x: Any, y: Any, end: Any = inf) -> Any:
+    def multiply(self, x: Any, y: Any) -> Any:
         """A number times a value."""
         value = {i: x * f // self.unit for i, f in y.items()} if x else {}
-        return self.rounded(value, False, end) if value and abs(x) not in self.a.exact else value
+        return self.rounded(value, False, inf) if value and abs(x) not in self.a.exact else value
 
     def last(self, x: Any, y: Any) -> Any:
         """The sums that are the new states."""
@@ -415,37 +434,191 @@ class Kalman:
         return U, x
 
 
+def peaks(F: Any, columns: Any, rows: Any, sizes: Any, steps: int | None, back: int) -> tuple[list[int], list[Any]]:
+    """Bound a vector, and rows times it, after at most some steps, each of which adds columns to F times it; see (6).
+
+    The vector is 0 at first, and within `sizes` in all earlier steps. The bounds are shares, in units of 2**-PEAK, of
+    the sizes and of the rows' sizes, which are returned as well.
+    """
+    d, one, lags = len(F), 1 << PEAK, 1 << max(back - 1, 0).bit_length()
+    wholes = [size(row, sizes) or Fraction(1) for row in rows]
+    share = lambda row, by, whole: [int(x * y * one // whole) for x, y in zip(row, by, strict=True)]  # noqa: E731
+    loop = turned([share(row, sizes, whole) for row, whole in zip(F, sizes, strict=True)])
+    G = [[int(x * one // y) for x, y in zip(g, sizes, strict=True)] for g in columns if any(g)]
+    C = diagonal(d, one) + [share(row, sizes, whole) for row, whole in zip(rows, wholes, strict=True)]
+    sums, rest, most = [d] * len(C), 0 if steps is None else steps % lags, list[int]()
+    for lag in range(lags if steps is None else min(steps, lags)):
+        most = sums[:d] if lag == rest else most
+        for i, c in enumerate(C):
+            if any(c):
+                added = sum([abs(sum(map(mul, c, g))) for g in G]) + (len(G) + d) * sum(map(abs, c))
+                sums[i] += (added >> PEAK) + d + 2
+                C[i] = [sum(map(mul, c, x)) >> PEAK for x in loop]
+    if steps is not None and steps <= lags:
+        return sums, wholes
+    blocks, P, T = None if steps is None else steps // lags, C[:d], sums[:d]
+    while True:  # |y_k - P y_(k-j)| <= T for all k, where j doubles
+        norm = max(sum(map(abs, row)) for row in P)
+        need(norm < one << 4 * PEAK, "errors grow without end")
+        after = lambda most: [(size(row, most) >> PEAK) + 1 + t for row, t in zip(P, T, strict=True)]  # noqa: B023, E731
+        if blocks is None and norm < one >> 30:
+            most = after([one] * d)
+            break
+        if blocks is not None:
+            most = after(most) if blocks & 1 else most
+            blocks >>= 1
+            if not blocks:
+                break
+        P, T = each(lambda x: x >> PEAK, across(P, turned(P))), [x + d for x in after(T)]
+        need(blocks is not None or max(T) < one << 4 * PEAK, "errors do not decay")
+    return [x + (size(c, most) >> PEAK) + 1 for x, c in zip(sums, C, strict=True)], wholes
+
+
 class Linear:
-    """Operations with fixed coefficients, which must compute the recursion that the file states."""
+    """The claim about operations with fixed coefficients: their states differ by at most b from an exact recursion.
 
-    cycle, start = 1, None
+    The recursion is x' = Ax + Bz, as the file states it. The operations must compute it, with their coefficients as
+    given or as stored. With coefficients as given, it also has the inputs as given.
+    """
 
-    def __init__(self, a: Arithmetic, **given: Any) -> None:
-        self.n, self.m, self.outputs = n, m, outputs = given["states"], given["inputs"], given["outputs"]
-        c, self.operations, sound = given["coefficients"], list[Any](), len(outputs) == n and min(outputs) >= 0
-        for v, (kind, p, q) in enumerate(given["operations"], n + m):
+    def __init__(self, given: Any, scale: int) -> None:
+        fmt, made = given["format"], given["filter"]
+        self.words = "data" in fmt
+        formats = [fmt[key] for key in ("data", "sums", "coefficients")] if self.words else [fmt] * 3
+        self.a, self.sums, kept = (Arithmetic(each, scale) for each in formats)
+        a = self.a
+        self.n, self.m, self.outputs = n, m, outputs = made["states"], made["inputs"], made["outputs"]
+        c, wide, sound = made["coefficients"], made["wide"], len(outputs) == n and min(outputs) >= 0
+        for v, (kind, p, q) in enumerate(made["operations"], n + m):
             if kind not in (MULTIPLY, ADD, SUBTRACT):
                 raise NotImplementedError(f"the operation {kind!r}")
             sound = sound and type(p) is type(q) is int and 0 <= q < v and 0 <= p < (len(c) if kind == MULTIPLY else v)
             need(sound, "operations on values that are not known")
-            self.operations.append((kind, a.store(c[p]) if kind == MULTIPLY else p, q))
-        self.depth = 1 + len(self.operations)
-        self.x0, self.stated = [0] * n, list(map(add, given["A"], given["B"]))
+        kept_wide = any(v >= n + m and wide[v - n - m] for v in outputs)
+        sound = not self.words or ({each["base"] for each in formats} == {2} and not kept_wide)
+        need(sound, "words with another base, or states that are not stored")
+        self.operations = list(zip(made["operations"], wide, strict=True))
+        self.c = [Fraction(kept.store(x), kept.unit) for x in c]
+        if kept.rounding == "stochastic":  # the file states what was drawn, which is next to the given numbers
+            self.c, near = made["stored"], [up(abs(x).numerator * a.unit, x.denominator) for x in c]
+            sound = all(kept.store(x) == x * a.unit for x in self.c)
+            far = [abs(x - y) * a.unit for x, y in zip(c, self.c, strict=True)]
+            sound = sound and all(x <= a.error(max(y, 1), False) for x, y in zip(far, near, strict=True))
+            need(sound, "stored coefficients that are not those given")
+        self.rows, self.as_given = self.values(self.c), made["exact"] == "as given"
+        exact = self.values(c) if self.as_given else self.rows
+        self.A, self.B = made["A"], made["B"]
+        dense = [[exact[v].get(i, Fraction(0)) for i in range(n + m)] for v in outputs]
+        need(max(outputs) < len(exact) and dense == list(map(add, self.A, self.B)), "operations of another recursion")
+        self.steps, self.back, Z = given["steps"], given["back"], given["limits"]["measurement"]
+        need(self.steps is None or self.steps > 0, "a number of steps that is none")
+        need(0 < self.back <= 2**20, "no step back, or too many")
+        self.b, self.X = given["bound"], given["derived"]["state"]
+        sizes, self.whole = [len(Z), len(self.b), len(self.X)], any(x is not None for x in Z)
+        if not self.whole and self.words and not self.as_given:  # in words, roundings do not depend on sizes
+            Z = [Fraction(0)] * m
+        need(sizes == [m, n, n] and all(x is not None and x >= 0 for x in Z), "limits or a bound of another filter")
+        need(all(x is not None and x > 0 for x in self.b + self.X), "a bound or a limit that is not positive")
+        units = [up(x.numerator * a.unit, x.denominator) for x in Z]
+        self.storing = [Fraction(a.error(x, False), a.unit) * self.as_given for x in units]
+        self.kept = [max(x, *(abs(Fraction(a.store(y), a.unit)) for y in (x, -x))) for x in Z]
+        self.Z = Z if self.as_given else self.kept
 
-    def step(self, k: int, P: Any, step: RoundedStep, x: Any, v: Any) -> Any:
-        """No covariance; the states after a step; all values but the first, and no exact loop."""
-        values, ends = [value for (value,) in x + v], dict[int, int]()
-        for output, limit in zip(self.outputs, step.ends, strict=True):
-            ends[output] = min(limit, ends.get(output, limit))
-        for i, (kind, p, q) in enumerate(self.operations):
-            step.start[2:], end = step.caps[i : i + 1], ends.get(len(values), inf)
+    def values(self, c: Any) -> list[dict[int, Fraction]]:
+        """Each value as a linear function of the states and the inputs."""
+        rows = [{i: Fraction(1)} for i in range(self.n + self.m)]
+        for (kind, p, q), _ in self.operations:
             if kind == MULTIPLY:
-                values.append(step.multiply(p, values[q], end))
+                rows.append({i: c[p] * x for i, x in rows[q].items()} if c[p] else {})
             else:
-                values.append(step.add(values[p], values[q], 1 if kind == ADD else -1, end))
-        found = [[Fraction(values[v].get(i, 0), step.one) for i in range(self.n + self.m)] for v in self.outputs]
-        need(found == self.stated, "the operations do not compute the recursion that the file states")
-        return None, [[values[v]] for v in self.outputs], [[x] for x in values[self.n + self.m :]], []
+                row = dict(rows[p])
+                for i, x in rows[q].items():
+                    row[i] = row.get(i, 0) + (x if kind == ADD else -x)
+                rows.append({i: x for i, x in row.items() if x})
+        return rows
+
+    def effects(self) -> list[tuple[Fraction, ...]]:
+        """The effect of an error of each value on the states after a step."""
+        found = [[Fraction(0)] * self.n for _ in self.rows]
+        for i, v in enumerate(self.outputs):
+            found[v][i] += 1
+        for v, ((kind, p, q), _) in reversed([*enumerate(self.operations, self.n + self.m)]):
+            if any(found[v]):
+                factor = self.c[p] if kind == MULTIPLY else 1 if kind == ADD else -1
+                found[q] = [x + factor * y for x, y in zip(found[q], found[v], strict=True)]
+                if kind != MULTIPLY:
+                    found[p] = list(map(add, found[p], found[v]))
+        return list(map(tuple, found))
+
+    def sizes(self) -> list[Any]:
+        """The largest size of each value, before it is rounded, without the roundings of its step."""
+        n, split = self.n, [([row.get(i, 0) for i in range(self.n)], row) for row in self.rows]
+        different = [row for row in {tuple(x): x for x, _ in split}.values() if sum(map(bool, row)) > 1]
+        inputs = scaled(turned(self.B), self.Z)
+        shares, wholes = peaks(self.A, inputs, different, self.X, self.steps, self.back)
+        need(max(shares[:n]) <= 1 << PEAK, "a state may exceed its limit")
+        caps = {tuple(r): Fraction(s, 1 << PEAK) * w for r, s, w in zip(different, shares[n:], wholes, strict=True)}
+        found = []
+        for row, whole in split:
+            seen = size([whole.get(n + j, 0) for j in range(self.m)], self.kept)
+            found.append(caps.get(tuple(row), size(row, self.X)) + size(row, self.b) + seen)
+        return found
+
+    def errors(self) -> list[Any]:
+        """The largest rounding error of each value."""
+        sizes, first = self.sizes(), self.n + self.m
+        before, found, unit = [Fraction(0)] * first, [Fraction(0)] * first, self.a.unit
+        bits = [self.a.scale - self.a.finest] * first if self.words else []
+        ends = dict[int, Any]()
+        for v, x, b in zip(self.outputs, self.X, self.b, strict=True):
+            ends[v] = min(x + b, ends.get(v, inf))
+        for v, ((kind, p, q), wide) in enumerate(self.operations, first):
+            moved = abs(self.c[p]) * before[q] if kind == MULTIPLY else before[p] + before[q]
+            most = up(*(min(sizes[v] + moved, ends.get(v, inf)) * unit).as_integer_ratio())
+            if self.words:
+                error, needed = self.word(kind, p, q, wide, most, bits)
+                bits.append(needed)
+            else:
+                none = not self.rows[v] or (kind != MULTIPLY and not (self.rows[p] and self.rows[q]))
+                error = self.a.error(most, kind != MULTIPLY)
+                if none or (kind == MULTIPLY and abs(self.c[p]) * unit in self.a.exact):
+                    error = 0
+            found.append(Fraction(error, unit))
+            before.append(moved + found[-1])
+        return found
+
+    def word(self, kind: str, p: int, q: int, wide: bool, most: int, bits: Any) -> tuple[int, int]:
+        """The largest error of a result in words, and the bits after its point."""
+        error, needed = 0, max(bits[q], bits[p] if kind != MULTIPLY else 0)
+        if kind == MULTIPLY:
+            c = self.c[p]
+            needed = needed + c.denominator.bit_length() - (c.numerator & -c.numerator).bit_length() if c else 0
+        for a, used in ((self.sums, True), (self.a, not wide)):
+            if used:
+                need(not self.whole or most <= a.largest or (wide and a.wraps), "a number may overflow")
+                if needed > a.scale - a.finest:
+                    needed = a.scale - a.finest
+                    error += up(a.powers[a.finest], 1 + a.nearest)
+                    most += error
+        return error, needed
+
+    def run(self) -> None:
+        """Bound the errors by those of roundings, of storing inputs and of storing coefficients."""
+        n, effects, groups = self.n, self.effects(), dict[Any, Any]()
+        for effect, error in zip(effects, self.errors(), strict=True):
+            key = max(effect, tuple(-x for x in effect))
+            groups[key] = groups.get(key, 0) + error
+        stored = [[self.rows[v].get(i, Fraction(0)) for i in range(n + self.m)] for v in self.outputs]
+        A, B = [row[:n] for row in stored], [row[n:] for row in stored]
+        columns = scaled(groups, groups.values()) + scaled(turned(B), self.storing)
+        shares, _ = peaks(A, columns, [], self.b, self.steps, self.back)
+        if (A, B) != (self.A, self.B):
+            zero = [[0] * n for _ in range(n)]
+            both = list(map(add, A, each(sub, A, self.A))) + list(map(add, zero, self.A))
+            inputs = scaled(turned(each(sub, B, self.B) + self.B), self.Z)
+            more, _ = peaks(both, inputs, [], self.b + self.X, self.steps, self.back)
+            shares = list(map(add, shares, more))
+        need(max(shares) <= 1 << PEAK, "the error may exceed its bound")
 
 
 def whole(a: Any) -> tuple[Any, int]:
@@ -580,8 +753,8 @@ class ErrorSet:
         added = across([list(map(mul, row, shares)) for row in x], x)
         self.M = each(lambda x, y, z: (x * up(total, own) + y >> 40) + z, self.M, added, diagonal(self.n, self.n))
 
-    def later(self, steps: Any, phase: int, back: int) -> Any:
-        """Prove that the vector is within limits after all steps of a phase; bound it, and rows before them."""
+    def later(self, steps: Any, phase: int, back: int) -> None:
+        """Prove that the vector, and rows before them, are within limits after all steps of a phase."""
         loops, rows, sums, known, period = self.loops, self.one, [0] * self.n, list[Any](), len(steps)
         box = [up(self.most(row), 1 << loops) for row in self.one]
         for lag in range(back):
@@ -599,21 +772,19 @@ class ErrorSet:
                         need(known[i][1] <= limit - x, f"{self.message} later")
         found = [x + size(row, self.sizes) for x, row in zip(sums, rows, strict=True)]
         need(all(map(le, found, self.limits)), f"{self.message}, in phase {phase} of the period")
-        return [up(x, 1 << loops) for x in found]
 
 
-class Proof:
+class Filter:
     """The claim of a certificate; sizes are in units of the format, loops in units of 2**-loops."""
 
     def __init__(self, given: Any, scale: int) -> None:
         self.given, self.a, made = given, Arithmetic(given["format"], scale), given["filter"]
         self.steps, self.period = given["steps"], given["period"]
         self.first = given["first"] if self.steps is None else self.steps
-        counts = [given[key] for key in COUNTS]
+        counts = [given[key] for key in (*COUNTS, "back")]
         need(self.steps != 0 and min(self.first, *counts) >= 0, "a number of steps that is none")
-        self.model: Any = (Kalman if made["kind"] == "kalman" else Linear)(self.a, **made)
-        self.n, self.m = self.model.n, self.model.m
-        self.exact: Any = made["kind"] == "kalman" and ExactCovariance(self.model)
+        self.model = Kalman(self.a, **made)
+        self.n, self.m, self.exact = self.model.n, self.model.m, ExactCovariance(self.model)
         self.limit(*[*given["limits"].values(), *given["derived"].values(), given["bound"]])
         lengths = [[x.bit_length() for x in xs if x] or [0] for xs in (self.b, self.X)]
         self.loops = 64 + max(max(each) - min(each) for each in lengths)
@@ -635,16 +806,14 @@ class Proof:
         need(within, "the first estimate is beyond its limit")
         sizes: Any = [[None if x is None else -(-x * unit // 1) for x in xs] for xs in (least[:n], least[n:], Z)]
         self.X, self.V, self.Z = sizes
-        sound = self.exact or (self.derived and all(map(le, self.Z, self.V)))
-        need(sound, "no limits on the inputs, or too small ones")
         self.b = [x * unit // 1 for x in bound]
 
-    def parts(self, k: int, P: Any, caps: Any) -> tuple[Any, Any]:
+    def parts(self, k: int, P: Any) -> tuple[Any, Any]:
         """The covariance after step k + 1; its loop, its gain, and columns of errors, measurements and the state."""
         n, m, computed = self.n, self.m, list(map(add, self.X, self.b))
         first, none = 2 * n + m, [0] * n
-        known = [] if None in self.Z else [computed + self.Z + none, self.b + self.Z + none][: 1 + bool(caps)]
-        step = RoundedStep(self.a, self.model.depth, computed, caps, self.b + self.V + self.X, *known)
+        known = [] if None in self.Z else [computed + self.Z + none]
+        step = RoundedStep(self.a, self.model.depth, computed, self.b + self.V + self.X, *known)
         x, v = [[{i: step.one, n + m + i: step.one}] for i in range(n)], [[{n + j: step.one}] for j in range(m)]
         P, made, seen, Phi = self.model.step(k, P, step, x, v)
         columns = [[value.get(i, 0) for (value,) in made] for i in range(len(step.sizes[0]))]
@@ -654,13 +823,13 @@ class Proof:
             found[key] = found.get(key, 0) + error
         F = each(lambda x: (x << self.loops) // step.one, turned(columns[:n]))
         seen = [[(row.get(i, 0) << self.loops) // step.one for i in range(n + m, first)] for (row,) in seen]
-        K = each(lambda x: (x << self.exact.bits) // step.one, turned(columns[n : n + m])) if self.exact else []
+        K = each(lambda x: (x << self.exact.bits) // step.one, turned(columns[n : n + m]))
         inputs = times(columns[n : n + m], self.Z, step.one) if self.derived else []
-        Phi = each(lambda x: x * step.one // self.a.unit, turned(Phi)) if Phi else columns[:n]
+        Phi = each(lambda x: x * step.one // self.a.unit, turned(Phi))
         both = list(filter(any, times(each(sub, columns[n + m : first], Phi), self.X, step.one)))
         return P, (F, K, times(found, found.values(), step.one), inputs, both, seen if self.derived else [])
 
-    def coefficients(self, caps: Any) -> Any:
+    def coefficients(self) -> Any:
         """The parts of each step, without end; the covariance is emulated until it recurs, as claimed."""
         given, model, known = self.given, self.model, list[Any]()
         begin, end = given["repeat"], given["repeat"] + self.period
@@ -669,22 +838,20 @@ class Proof:
         P = kept = model.start
         for k in range(self.steps or end):
             kept = P if k == begin else kept
-            P, parts = self.parts(k, P, caps)
+            P, parts = self.parts(k, P)
             need(self.steps or k + 1 < end or kept == P, "the computed covariance does not recur as claimed")
             known += [parts] if k >= begin else []
             yield parts
         yield from cycle(known)
 
-    def moves(self, caps: Any = ()) -> Any:
+    def moves(self) -> Any:
         """Yield, for each step, loop, columns, slack and rows before it, of the error and of the exact filter."""
         exact = self.exact
-        gains = exact.gains(self.first, self.period, self.given["width"]) if exact else repeat(None)
-        for (F, K, errors, inputs, both, seen), gain in zip(self.coefficients(caps), gains, strict=False):
-            slack = [2 + len(errors) + 2 * self.n + 3 * self.m] * self.n
-            if gain:
-                both = both + times(turned(each(sub, K, gain[0])), self.V, 1 << exact.bits)
-                off = [size(row, self.V) + sum(self.V) for row in gain[1]]
-                slack = [x + up(y, 1 << exact.bits) for x, y in zip(slack, off, strict=True)]
+        gains = exact.gains(self.first, self.period, self.given["width"])
+        for (F, K, errors, inputs, both, seen), (gain, far) in zip(self.coefficients(), gains, strict=False):
+            both = both + times(turned(each(sub, K, gain)), self.V, 1 << exact.bits)
+            off = [size(row, self.V) + sum(self.V) for row in far]
+            slack = [2 + len(errors) + 2 * self.n + 3 * self.m + up(x, 1 << exact.bits) for x in off]
             far, near = ([x + 2 * (sum(s) >> self.loops) + 2 for x in slack] for s in (self.b, self.X))
             yield (F, errors + both, far, []), (F, inputs + both, near, seen)
 
@@ -692,33 +859,39 @@ class Proof:
         """Take the first steps, and prove that all later ones remain within the limits."""
         sets = [ErrorSet(self.b, [], self.loops, "the error may exceed its bound")]
         if self.derived:
-            rooms = [v - z - 2 * self.missed for v, z in zip(self.V, self.Z, strict=True)] if self.exact else []
+            rooms = [v - z - 2 * self.missed for v, z in zip(self.V, self.Z, strict=True)]
             message = "a state or an innovation may exceed its limit"
             sets.append(ErrorSet(self.X, rooms, self.loops, message, self.model.x0))
         moves, back = self.moves(), self.given["back"]
-        for k in range(0, self.first, BLOCK):
-            steps = turned(islice(moves, min(BLOCK, self.first - k)))
-            for reach, block in zip(sets, steps, strict=False):
-                reach.advance(block, self.given["keep"])
+        k, keep = 0, self.given["keep"]
+        while k < self.first:  # longer blocks where sets have more segments
+            block = min(max(BLOCK, isqrt(min(k, keep))), self.first - k)
+            for reach, steps in zip(sets, turned(islice(moves, block)), strict=False):
+                reach.advance(steps, keep)
+            k += block
         if self.steps is None:
             need(back > 0, "no step back")
             errors, states = turned(islice(moves, self.period))
-            caps = [sets[1].later(states, phase, back) for phase in range(self.period)] if self.derived else []
-            if not self.exact:  # limits of states limit all values, and these the roundings
-                errors, _ = turned(islice(self.moves([x + self.missed for x in caps[0][self.n :]]), 1))
-            for phase in range(self.period):
-                sets[0].later(errors, phase, back)
+            for reach, steps in zip(sets, (errors, states), strict=False):
+                for phase in range(self.period):
+                    reach.later(steps, phase, back)
 
 
 def prove(given: Any) -> str:
     """Return the claim of a certificate as a sentence, proved; or raise NotProvedError or NotImplementedError."""
     try:
         fmt, made = given["format"], given["filter"]
-        parts = {"filter": FILTERS.get(made["kind"], ()), "format": FIXED if "overflow" in fmt else FLOAT}
-        content, scale = read(given, FILE | parts), 3 * fmt["precision"] + 40
+        kind = read(made["kind"], ("kalman", "linear"), "kind")
+        words = ("data", "sums", "coefficients") if "data" in fmt and kind == "linear" else ()
+        shape = {key: format_schema(fmt[key]) for key in words} if words else format_schema(fmt)
+        content = read(given, FILES[kind] | {"filter": FILTERS[kind], "format": shape})
+        if kind == "kalman" and fmt["rounding"] == "stochastic":
+            raise NotImplementedError("stochastic rounding of a covariance")
+        scale = 3 * max(each["precision"] for each in ([fmt[key] for key in words] if words else [fmt])) + 40
+        proof: Any = Filter if kind == "kalman" else Linear
         while scale < 20_000:
             try:
-                Proof(content, scale).run()
+                proof(content, scale).run()
                 bound = [nextafter(float(x), inf) for x in content["bound"]]
                 form = f"{made.get('form', 'fixed coefficients')}, {fmt}"
                 when = f"{given['steps'] or 'any number of'} steps within {given['limits']}"

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from gpbnb.bounds.guarantee import Guarantee
 from gpbnb.bounds.probable import separate_roundings
 
+_NEGLIGIBLE = 1e-9
+
 
 class Contributions(NamedTuple):
     """What the roundings of a step add to the error of each state.
@@ -60,17 +62,10 @@ def contributions(found: Guarantee) -> Contributions:
     >>> [int(o) for o in of_position.argsort()[-2:]], round(float(of_position[[2, 12]].sum() / found.bound[0]), 2)
     ([2, 12], 0.97)
     """
-    if not found.for_ever:
-        raise ValueError(
-            f"got a guarantee for {found.steps} steps: {found.why}; needed one that holds for ever, whose gain settles"
-        )
-    given = found.schedule
-    each = separate_roundings(found)
-    count, first = len(given.program.operations), given.first
-    F, G, errors = each.F[first:], each.G[first:, :, :count], each.limits[first:, :count]
-    rows, sums = np.eye(given.program.n), np.zeros((given.program.n, count))
-    for lag in range(found.lags):
-        at = (len(F) - 1 - lag) % len(F)
-        sums += np.abs(rows @ G[at]) * errors[at]
+    F, G, errors = separate_roundings(found)
+    rows, sums, at = np.eye(F.shape[1]), np.zeros(G.shape[1:]), len(F) - 1
+    while (added := np.abs(rows @ G[at]) * errors[at]).max() > _NEGLIGIBLE * sums.max() or at != len(F) - 1:
+        sums += added
         rows = rows @ F[at]
+        at = (at - 1) % len(F)
     return Contributions(errors[-1], G[-1], sums)

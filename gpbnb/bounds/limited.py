@@ -21,8 +21,7 @@ from gpbnb.arithmetic.bounds import above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.bounds.envelope import largest_error, units
-from gpbnb.bounds.storing import storing_errors
+from gpbnb.bounds.units import largest_errors, units
 from gpbnb.filters.program import AT_LEAST, AT_MOST, MULTIPLY, SUBTRACT
 from gpbnb.filters.system import LinearSystem
 
@@ -71,13 +70,13 @@ class _Steps:
 
     def __init__(self, system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: NDArray[np.float64]) -> None:
         made = system.as_filter()
-        self.program, self._units = made.program, units(fmt)
+        self.program, self._fmt, self._aligned = made.program, fmt, units(fmt).aligned
         given, stored = made.coefficients, made.stored(fmt)
         self._given = [above(abs(each)) for each in given]
         self._stored = [above(abs(each)) for each in stored]
         self._off = [above(abs(a - b)) for a, b in zip(given, stored, strict=True)]
         self._exact_given, self._exact_stored = given, stored
-        self._inputs, self._storing = largest, storing_errors(fmt, largest)
+        self._inputs, self._storing = largest, largest_errors(fmt, largest)
         #: (n,), largest size of each state of the system without rounding.
         self.largest_states = np.full(made.program.n, math.inf)
 
@@ -114,7 +113,7 @@ class _Steps:
                 error = found[a] + found[b]
                 if code == SUBTRACT and (taken := self._taken(a, b)) is not None:
                     error = found[b] + taken
-                if not self._units.sums_exact:
+                if self._aligned != math.inf:
                     error += self._rounding(sizes[first + o] + error)
             else:
                 pair = self._limits(code, a, b)
@@ -126,7 +125,7 @@ class _Steps:
         return np.array([found[value] for value in self.program.outputs])
 
     def _rounding(self, size: float) -> float:
-        return float(largest_error(self._units, size * _UP)) if math.isfinite(size) else math.inf
+        return float(largest_errors(self._fmt, np.float64(size * _UP))) if math.isfinite(size) else math.inf
 
     def _limits(self, code: int, a: int, b: int, stored: bool = False) -> tuple[Fraction, Fraction] | None:
         """Return the lowest and the highest result, if the operand of an upper limit is that of a lower one."""

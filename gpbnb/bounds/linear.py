@@ -1,71 +1,15 @@
-r"""The guarantee of linear filters with fixed coefficients, and their peak gains in ball arithmetic.
-
-A filter :math:`x_k = Ax_{k-1} + Bz_k,\ y_k = Cx_{k-1} + Dz_k` has known coefficients, so the
-guarantee needs no emulation of a gain. Its outputs become states that nothing else uses. The exact filter has the same
-stored coefficients, so the bound covers only rounding in the computation.
-"""
+r"""Peak gains of linear systems in ball arithmetic."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Sequence
-from fractions import Fraction
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import above
-from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
-from gpbnb.bounds.envelope import LOOP, ROUNDING, Columns, End, certify
-from gpbnb.bounds.gains import Schedule
-from gpbnb.filters.opening import as_packed, widened_array
-from gpbnb.filters.poles import eigenvalues
-from gpbnb.filters.program import functionals
-from gpbnb.filters.system import LinearFilter, LinearSystem
-
-
-def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Schedule:
-    """Return a filter in a format, for :func:`gpbnb.bounds.guarantee.from_schedule`.
-
-    Its coefficients come from :meth:`~gpbnb.filters.system.LinearFilter.stored`, so they are fixed even if the format
-    rounds at random. Each operation is then off by less than a unit in the last place, as with
-    directed rounding.
-
-    Raises
-    ------
-    ValueError : a filter that limits its values, which is not linear.
-    """
-    if not made.program.is_linear:
-        raise ValueError(f"got {made.name}, which limits its values; needed a linear filter for a schedule")
-    program, first = made.program, made.program.n + made.program.m
-    packed = as_packed(fmt, made.stored(fmt).reshape(1, -1))
-    coefficients = widened_array(packed)
-    count = first + len(program.operations)
-    rows, sizes = np.empty((count, first, 2)), np.empty((count, first))
-    functionals(program.operations, coefficients[0], first, rows, sizes)
-    whole = rows[program.outputs]
-    n, m = program.n, program.m
-    return Schedule(
-        program,
-        fmt,
-        coefficients,
-        packed,
-        np.ascontiguousarray(whole[None, :, :n]),
-        np.zeros((1, m, n, 2)),
-        np.ascontiguousarray(whole[None, :, n:]),
-        np.zeros((1, n, m)),
-        np.array([Fraction(0)] * n, dtype=object),
-        first=0,
-        settled=True,
-        repeat=None,
-        period=None,
-        origin=made,
-    )
-
 
 _COLUMNS = 256
 """Smallest number of columns of a block, which balls multiply at once."""
@@ -77,14 +21,7 @@ _NEGLIGIBLE = 2.0**-100
 """Share of its possible size below which a gain is negligible, so that its enclosure may be wide."""
 
 _SHARP = 2.0**-10
-"""Accuracy of the gains behind a bound."""
-
-_LEFT = 2.0**-30
-"""What a certificate in float64 leaves of the slowest mode."""
-
-_LEAST, _UNDERFLOW = 2.0**-200, 2.0**-600
-"""Smallest entry of a matrix with which float64 computes, and far more than what its underflow can then add up to."""
-
+"""Share of the states below which the trace of a power has decayed."""
 
 _SMALLEST = 2.0**-1074
 """The smallest float64 number, by which a rounded one may be off where factors near 1 change nothing."""
@@ -269,117 +206,6 @@ class _Sums:
         states = highs[: self._n]
         largest = [_largest(column) for column in zip(*states, strict=True)]
         return [*[largest] * self._n, *(arb_mat(_sizes(self._C)) * arb_mat(states)).tolist()]
-
-
-def largest_gains(
-    A: NDArray[Any], B: NDArray[Any], C: NDArray[Any], D: Any = None, terms: int | None = None
-) -> NDArray[np.float64]:
-    """Return upper bounds of the peak gains of exact matrices, (p, m), above them by a thousandth of them at most.
-
-    For the arguments and errors, see :func:`peak_gain`, which takes seconds where this takes milliseconds.
-    """
-    return _above((A, B, C, D), terms)[len(A) :]
-
-
-def _above(matrices: tuple[Any, ...], terms: int | None) -> NDArray[np.float64]:
-    """Return upper bounds of the gains to states and outputs, (n + p, m), in balls where float64 is not sharp."""
-    _check_terms(terms)
-    found = _certified(matrices, terms)
-    return _gains(matrices, terms, _SHARP).high if found is None else found
-
-
-def _certified(matrices: tuple[Any, ...], terms: int | None) -> NDArray[np.float64] | None:
-    """Bound the gains by the certificate of :mod:`gpbnb.bounds.envelope`; None if that is not sharp."""
-    A, B, C, D = matrices
-    numbers = [abs(each) for X in (A, B, C) for each in X.flat if each]
-    if not all(_LEAST < each < 1 / _LEAST for each in numbers):
-        return None
-    (F, F_off), (G, G_off), (rows, rows_off) = (_nearest(X) for X in (A, B, C))
-    radius = float(np.abs(eigenvalues(F)).max())
-    if terms is None and not radius < 1:
-        return None
-    lags = terms
-    if lags is None:
-        lags = math.ceil(math.log(_LEFT) / math.log(max(radius, 1e-3))) + 2 * len(F)
-    if lags > _MOST_TERMS:  # whether the response lasts that long is for balls to prove
-        return None
-    n, starts = len(F), np.concatenate([np.eye(len(F)), rows])
-    F_off += (n + 4) * 2.0**-53 * np.abs(F)
-    G_off += (2 * n + 16) * 2.0**-53 * np.abs(G)
-    found = np.zeros((len(starts), G.shape[1]))
-    _, different, places = np.unique(np.vstack([G, G_off]), axis=1, return_index=True, return_inverse=True)
-    for j in different:
-        column, part = np.ascontiguousarray(G[None, :, j : j + 1]), np.array([LOOP])
-        arrays = Columns(F[None], F_off[None], column, np.ones((1, 1)), np.ascontiguousarray(G_off[None, :, j]), part)
-        sums = certify(arrays, starts, lags, 0, terms is None, End(lags, np.zeros(n), 0.0))
-        known, later = sums.sums[:, LOOP], sums.residual + sums.tail
-        if not (np.isfinite(sums.sums).all() and np.isfinite(later).all()):
-            return None
-        states = known[:n]
-        for _ in range(5):  # each state stays within its number if what follows from all of them does not exceed it
-            with np.errstate(over="ignore", invalid="ignore"):
-                rest = sums.sums[:, ROUNDING] + later @ states
-                rest[n:] += rows_off @ states
-                rest *= 1 + 2.0**-40
-                if (known[:n] + rest[:n] <= states).all():
-                    break
-                states = (known[:n] + rest[:n]) * (1 + 2.0**-40)
-        else:
-            return None
-        if not (rest[n:] <= known[n:] * (_SHARP / 2)).all():
-            return None
-        found[:, j] = known + rest
-    found = found[:, different[places.ravel()]]
-    found[found > 0] += _UNDERFLOW
-    if D is not None:
-        found[n:] += [[above(abs(x)) for x in row] for row in exact(D)]
-    return found * (1 + 2.0**-40)
-
-
-def _nearest(X: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the numbers of float64 nearest to exact ones, and upper bounds of their distances."""
-    near = X.astype(np.float64)
-    off = [above(abs(x - Fraction(float(y)))) for x, y in zip(X.flat, near.flat, strict=True)]
-    return near, np.array(off).reshape(X.shape)
-
-
-class TransferGains(NamedTuple):
-    """Upper bounds of the peak gains of a system as stored.
-
-    Parameters
-    ----------
-    difference, inputs : (p, m), from inputs to the difference of the outputs, and to the outputs.
-    states : (n, m), from inputs to states.
-    """
-
-    difference: NDArray[np.float64]
-    inputs: NDArray[np.float64]
-    states: NDArray[np.float64]
-
-
-def transfer_gains(system: LinearSystem, stored: Sequence[NDArray[Any]], steps: int | None = None) -> TransferGains:
-    """Return the peak gains of a system whose exact A, B, C and D, as stored, are given.
-
-    Parameters
-    ----------
-    steps : number of steps for which the gains hold; by default all time, for a stable system.
-
-    Raises
-    ------
-    ValueError : the system is not stable, or decays too slowly, as in :func:`peak_gain`; or more than 2**20 steps.
-    OverflowError : a gain is beyond the range of float64.
-    """
-    A, B, C, D = stored
-    off = [x - y for x, y in zip((system.A, system.B, system.C, system.D), stored, strict=True)]
-    # The difference e of the states obeys e' = A e + (A - A') x' + (B - B') u, without any cancellation.
-    both = np.block([[system.A, off[0]], [np.zeros_like(A), A]]), np.vstack([off[1], B]), np.hstack([system.C, off[2]])
-    terms, difference = None if steps is None else steps - 1, np.zeros(D.shape)
-    if any(each.any() for each in off):
-        difference = largest_gains(*both, off[3], terms)
-    found = states = _above((A, B, C, D), terms)
-    if steps is not None:  # the state after a step has one term more than the output of the step
-        states = _above((A, B, C, D), steps)
-    return TransferGains(difference, found[system.n :], states[: system.n])
 
 
 def error_coefficients(A: Any, B: Any, C: Any, D: Any, largest_input: float) -> NDArray[np.float64]:

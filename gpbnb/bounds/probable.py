@@ -8,26 +8,52 @@ an estimate, not a bound. It is too small for chopped arithmetic, whose errors h
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds.envelope import Disturbances
-from gpbnb.bounds.guarantee import Guarantee, disturbances_of
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.bounds.gains import filter_schedule
+from gpbnb.bounds.guarantee import Guarantee, from_guess, limits
+from gpbnb.bounds.guess import linear_steps, rounding_errors, value_sizes
+from gpbnb.bounds.system import guessed_errors
 from gpbnb.filters.structures import steady_covariance
+from gpbnb.filters.system import LinearSystem
 
 
-def separate_roundings(found: Guarantee) -> Disturbances:
-    """Return disturbances with a column for each operation, even if operations have the same effect.
+class StepRoundings(NamedTuple):
+    """Roundings of the steps of a period.
 
-    A bound adds up the limits of operations with the same effect. Their variances must be added one by one, because
-    the largest of them usually outweighs the others.
+    Parameters
+    ----------
+    F : (steps, n, n), closed loops.
+    effects : (steps, n, o), effect of an error of each operation on the states after the step.
+    errors : (steps, o), the largest error of each operation.
     """
-    program = found.schedule.program
-    each = np.arange(len(program.operations))
-    alone = replace(program, groups=each, roots=each)
-    return disturbances_of(replace(found, schedule=replace(found.schedule, program=alone)))
+
+    F: NDArray[np.float64]
+    effects: NDArray[np.float64]
+    errors: NDArray[np.float64]
+
+
+def separate_roundings(found: Guarantee) -> StepRoundings:
+    """Return the roundings of a period, one by one, even if operations have the same effect.
+
+    Raises
+    ------
+    ValueError : the guarantee does not hold for ever.
+    """
+    if not found.for_ever:
+        raise ValueError(
+            f"got a guarantee for {found.steps} steps: {found.why}; needed one that holds for ever, whose gain settles"
+        )
+    given, program = found.schedule, found.schedule.program
+    steps = linear_steps(given, np.arange(given.first, given.steps))
+    sizes, ends = value_sizes(steps, found.limits), found.limits.state + found.bound
+    h = rounding_errors(program, given.fmt, steps, sizes, ends, found.bound)
+    return StepRoundings(steps.F, steps.effects[program.n + program.m :].transpose(1, 2, 0), h.T)
 
 
 def probable_error(found: Guarantee) -> NDArray[np.float64]:
@@ -39,16 +65,9 @@ def probable_error(found: Guarantee) -> NDArray[np.float64]:
     ------
     ValueError : the guarantee does not hold for ever.
     """
-    given = found.schedule
-    if not found.for_ever:
-        raise ValueError(
-            f"got a filter without a steady state: {found.why}; needed a filter with a bound that holds for all steps"
-        )
-    each = separate_roundings(found)
-    count, first = len(given.program.operations), given.first
-    F, G, variance = each.F[first:], each.G[first:, :, :count], each.limits[first:, :count] ** 2 / 3
-    noise = np.einsum("kig,kg,kjg->kij", G, variance, G)
-    whole, gathered = np.eye(given.program.n), np.zeros_like(noise[0])
+    F, G, errors = separate_roundings(found)
+    noise = np.einsum("kig,kg,kjg->kij", G, errors**2 / 3, G)
+    whole, gathered = np.eye(F.shape[1]), np.zeros_like(noise[0])
     for loop, added in zip(F, noise, strict=True):
         whole, gathered = loop @ whole, loop @ gathered @ loop.T + added
     covariance = steady_covariance(whole, gathered)
@@ -56,4 +75,18 @@ def probable_error(found: Guarantee) -> NDArray[np.float64]:
     for loop, added in zip(F, noise, strict=True):
         covariance = loop @ covariance @ loop.T + added
         largest = np.maximum(largest, np.diagonal(covariance))
-    return np.sqrt(largest)
+    return np.asarray(np.sqrt(largest))
+
+
+def probable_output_errors(
+    system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Estimate the error of each output, (p,): three standard deviations of roundings, and bounds of errors of storing.
+
+    Raises
+    ------
+    ValueError, OverflowError : as for :func:`gpbnb.bounds.system.output_errors`.
+    """
+    whole, made, n = guessed_errors(system, fmt, largest), system.as_filter(), system.n
+    found = from_guess(filter_schedule(made, fmt), limits(made.program.n, system.m, measurement=largest))
+    return np.asarray(whole - found.bound[n:] + 3 * probable_error(found)[n:])

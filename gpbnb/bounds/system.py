@@ -7,7 +7,6 @@ Over N steps, the sums over earlier steps have N terms, and the same bounds hold
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,39 +16,60 @@ from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.bounds.guarantee import Guarantee, from_schedule, limits
+from gpbnb.bounds.certificate import Proof, first_proved, of_operations
+from gpbnb.bounds.guess import Guess, constant_guess
 from gpbnb.bounds.limited import limited_errors
-from gpbnb.bounds.linear import filter_schedule, transfer_gains
-from gpbnb.bounds.storing import stored_sizes, storing_errors
+from gpbnb.bounds.units import largest_errors
 from gpbnb.filters.system import LinearSystem
 
-BUDGET = 2e7
-"""Approximate number of multiplications for a bound over a number of steps, a fraction of a second."""
+
+def _largest(system: LinearSystem, largest: Any) -> NDArray[np.float64]:
+    if any(system.x0):
+        raise ValueError(f"got a first state {system.x0.tolist()}; needed x0 = 0 for a bound")
+    return np.broadcast_to(all_above(largest), (system.m,))
 
 
-def rounding_bound(found: Guarantee) -> NDArray[np.float64]:
-    """Return the error of each state and output that rounding alone can cause, (n + p,)."""
-    return found.bound
+def guessed_errors(
+    system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: Any, steps: int | None = None
+) -> NDArray[np.float64]:
+    """Return what :func:`output_errors` is going to prove, without a proof."""
+    inputs = _largest(system, largest)
+    if not system.as_filter().program.is_linear:
+        return limited_errors(system, fmt, inputs, steps)
+    return _guess(system, fmt, inputs, steps).bound[system.n :]
+
+
+def _guess(
+    system: LinearSystem, fmt: FloatFormat | FixedFormat, inputs: NDArray[np.float64], steps: int | None
+) -> Guess:
+    if steps is None and (cause := system.unstable(fmt)):
+        raise ValueError(cause)
+    if not np.isfinite(largest_errors(fmt, inputs)).all():
+        raise ValueError(f"got inputs of up to {inputs}; needed inputs within the range of {arithmetic(fmt)}")
+    found = constant_guess(system.as_filter(), fmt, inputs, steps, as_given=True)
+    if not np.isfinite(found.state).all():
+        over, cure = ("", "scale the inputs") if steps is None else (f" over {steps} steps", "take fewer steps")
+        raise OverflowError(f"got a system whose largest gain{over} is beyond the range of float64; {cure}")
+    if not np.isfinite(found.bound).all():
+        why = "in this precision, an error causes rounding errors as large as itself"
+        if fmt.limits is not None:
+            why = f"a number may exceed the largest of {arithmetic(fmt)}"
+        raise ValueError(f"no bound was found: {why}")
+    return found
 
 
 def output_errors(
-    system: LinearSystem,
-    fmt: FloatFormat | FixedFormat,
-    largest: Any,
-    steps: int | None = None,
-    rounding: Callable[[Guarantee], NDArray[np.float64]] = rounding_bound,
+    system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: Any, steps: int | None = None
 ) -> NDArray[np.float64]:
     """Bound the error of each output, (p,), due to rounding and to storing coefficients and inputs.
 
-    Outputs differ by at most the peak gain of the difference of the given and the stored system times the largest
-    input, and the peak gain of the stored system times the largest error of storing an input, underflow included.
+    The bound of a linear system is proved by :mod:`gpbnb.bounds.check`.
 
     Parameters
     ----------
     system : a system that starts from rest.
     largest : limits on the size of the inputs before they are stored; one number, or (m,).
     steps : number of steps for which the bound holds; by default all time.
-    rounding : the error that rounding alone causes, from the guarantee of the stored system.
 
     Raises
     ------
@@ -65,25 +85,17 @@ def output_errors(
     >>> bool(output_errors(clock, FloatFormat(2, 17), 0.1, steps=200)[0] < 0.05)
     True
     """
-    if any(system.x0):
-        raise ValueError(f"got a first state {system.x0.tolist()}; needed x0 = 0 for a bound")
-    largest = np.broadcast_to(all_above(largest), (system.m,))
+    inputs = _largest(system, largest)
     if not system.as_filter().program.is_linear:
-        return limited_errors(system, fmt, largest, steps)
-    if steps is None and (cause := system.unstable(fmt)):
-        raise ValueError(cause)
-    given, n = system.as_filter(), system.n
-    gains = transfer_gains(system, system.stored(fmt), steps)
-    storing, sizes = storing_errors(fmt, largest), stored_sizes(fmt, largest)
-    if not np.isfinite(storing).all():
-        raise ValueError(f"got inputs of up to {largest}; needed inputs within the range of {arithmetic(fmt)}")
-    state = np.concatenate([gains.states, gains.inputs]) @ sizes * (1 + 2.0**-40)
-    if not np.isfinite(state).all():
-        raise OverflowError("a state or an output may be beyond the range of float64; scale the numbers")
-    within = limits(n + system.p, system.m, state=state, innovation=sizes, measurement=sizes)
-    found = from_schedule(filter_schedule(given, fmt), within, 1 if steps is None else steps, BUDGET)
-    if not found.for_ever and (steps is None or found.steps != steps):
-        raise ValueError(found.why)
-    # sums of m products in float64, with an error below 2**-40
-    errors = rounding(found)[n:] + gains.difference @ largest + gains.inputs @ storing
-    return np.asarray(errors * (1 + 2.0**-40))
+        return limited_errors(system, fmt, inputs, steps)
+    return output_proof(system, fmt, inputs, steps).bound[system.n :]
+
+
+def output_proof(system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: Any, steps: int | None = None) -> Proof:
+    """Return the bounds of states and outputs of a linear system with their certificate; see :func:`output_errors`."""
+    inputs, made = _largest(system, largest), system.as_filter()
+    found = _guess(system, fmt, inputs, steps)
+    proof = first_proved(found, lambda guess: of_operations(made, fmt, inputs, guess, steps, "as given"))
+    if proof.why:
+        raise ValueError(proof.why)
+    return proof

@@ -7,8 +7,8 @@ so the error of a state i has the bound
 .. math:: |e_i| \le \sum_g \Big(\sum_{l\ge0} |(A^l G)_{ig}|\Big) h_g
 
 where column g of G holds the effect of roundings on the states after a step, and :math:`h_g` the sum of their largest
-errors. A and G are exact, and :func:`gpbnb.bounds.linear.largest_gains` bounds the infinite sums. Over a number of
-steps, the sum over l has as many terms.
+errors. Over a number of steps, the sum over l has as many terms. These sums are guessed in float64, and
+:mod:`gpbnb.bounds.check` proves the answer.
 
 References
 ----------
@@ -27,15 +27,12 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.linear import largest_gains, transfer_gains
+from gpbnb.bounds.certificate import Proof, first_proved, of_operations
+from gpbnb.bounds.guess import EXCESS, Guess, gains, lags_of, loops, positive, radius_of
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, exact_functionals, matrices
-from gpbnb.filters.system import LinearSystem, is_stable
+from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable
 from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program
-
-_UP = 1 + 2.0**-40
-"""Factor that exceeds the effect of float64's roundings on a sum of up to 2**12 terms of one sign."""
 
 
 def largest_rounding(rounding: Rounding) -> float:
@@ -69,90 +66,67 @@ def _twos(n: int) -> int:
     return (n & -n).bit_length() - 1
 
 
-def effects_of_groups(program: Program, coefficients: NDArray[Any]) -> NDArray[Any]:
-    """Return the exact effect of an error in each group of operations on the states after the step, (n, groups)."""
-    n, first = program.n, program.n + program.m
-    effects = [[Fraction(0)] * n for _ in range(first + len(program.operations))]
-    for i, o in enumerate(program.outputs.tolist()):
-        effects[o][i] += 1
-    for o in range(len(program.operations) - 1, -1, -1):
-        code, a, b = program.operations[o].tolist()
-        for i, g in enumerate(effects[first + o]):
-            if g and code == MULTIPLY:
-                effects[b][i] += coefficients[a] * g
-            elif g:
-                effects[a][i] += g
-                effects[b][i] += -g if code == SUBTRACT else g
-    return np.array([effects[first + root] for root in program.roots], dtype=object).reshape(-1, n).T
-
-
-def rounding_gains(
-    program: Program, coefficients: NDArray[Any], groups: NDArray[np.bool_], steps: int | None = None
-) -> NDArray[np.float64]:
-    """Return upper bounds (n, groups) of the sums over l of ``abs(A**l G)``, zero for groups that are left out.
-
-    Parameters
-    ----------
-    groups : (groups,), those to sum.
-    steps : number of terms; by default all.
-
-    Raises
-    ------
-    ValueError : the filter is not stable, or its peak gain cannot be enclosed.
-    """
-    A, _ = matrices(program, coefficients)
-    G = effects_of_groups(program, coefficients)
-    n, gains = len(A), np.zeros(G.shape)
-    used = groups & (G != 0).any(axis=0)
-    identity = exact(np.eye(n, dtype=int))
-    reached = ((np.linalg.matrix_power((A != 0) + np.eye(n), n) @ (G != 0)) > 0) & used
-    for pattern in {tuple(row) for row in reached.tolist() if any(row)}:  # enclosures do not show which sums are zero
-        rows, columns = (reached == pattern).all(axis=1), np.array(pattern)
-        gains[np.ix_(rows, columns)] = largest_gains(A, G[:, columns], identity[rows], terms=steps)
-    return gains
-
-
-def _grouped(program: Program, limits: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Add the limits of operations with the same effect, (groups,)."""
-    return np.asarray(np.bincount(program.groups, limits, len(program.roots)), dtype=np.float64)
-
-
-def bounded_rounding(made: IntegerProgram) -> NDArray[np.float64]:
+def bounded_rounding(made: LinearFilter, words: WordFormats) -> NDArray[np.float64]:
     """Bound the error of each state, (n,), due to rounding, for ever and for all inputs, as long as nothing overflows.
 
     Raises
     ------
-    ValueError : the filter is not stable, or its peak gain cannot be enclosed.
+    ValueError : the filter is not stable.
     """
-    grouped = _grouped(made.program, rounding_limits(made))
-    gains = rounding_gains(made.program, made.coefficients, grouped > 0)
-    return np.asarray(gains @ grouped * _UP)
+    stored = integer_program(made, words)
+    A, _ = matrices(made.program, stored.coefficients)
+    if not is_stable(A):
+        raise ValueError("the system is not stable with its coefficients as stored")
+    F, n, m = A.astype(np.float64), made.program.n, made.program.m
+    sums = gains(F, _effects(stored), np.zeros((0, n)), None, lags_of(radius_of(F), None, n))
+    bound, inputs = positive(sums @ rounding_limits(stored) * EXCESS), np.full(m, np.inf)
+    guess = Guess(bound, bound, inputs, np.zeros((n, 3)))
+    proof = first_proved(guess, lambda each: of_operations(made, words, inputs, each, None))
+    if proof.why:
+        raise ValueError(proof.why)
+    return proof.bound
 
 
-class _Gains(NamedTuple):
-    """What does not depend on the unit of the data: gains of a system with certain stored coefficients.
+def _effects(made: IntegerProgram) -> NDArray[np.float64]:
+    """Return the effect of an error of each operation on the states after the step, (n, o)."""
+    program, c = made.program, made.coefficients.astype(np.float64)
+    first = program.n + program.m
+    found = np.zeros((first + len(program.operations), program.n))
+    np.add.at(found, (program.outputs, np.arange(program.n)), 1.0)
+    for o in range(len(program.operations) - 1, -1, -1):
+        code, a, b = program.operations[o].tolist()
+        if code == MULTIPLY:
+            found[b] += c[a] * found[first + o]
+        else:
+            found[a] += found[first + o]
+            found[b] += found[first + o] * (-1 if code == SUBTRACT else 1)
+    return found[first:].T
+
+
+class _Sums(NamedTuple):
+    """What does not depend on the unit of the data: sums for certain stored coefficients.
 
     Parameters
     ----------
-    difference, inputs : (p, m), peak gains of the difference from the system as given, and to the outputs.
-    states : (n + p, m), peak gains to states and outputs.
-    rows : linear function of (x, u) that each value approximates.
-    values : peak gains to stored results that are no states, (m,) by operation.
-    rounding : peak gains of the groups of roundings, by those that round.
+    state : (n + p, m), from inputs to states and outputs.
+    rows : (values, n + m), linear function of states and inputs that each value approximates.
+    values : (values, m), from inputs to values.
+    errors, storing : (n + p, m), from inputs, and from errors of storing them, to errors.
+    rounding : (n + p, o), from roundings of operations to errors.
     """
 
-    difference: NDArray[np.float64]
-    inputs: NDArray[np.float64]
-    states: NDArray[np.float64]
-    rows: list[dict[int, Fraction]]
-    values: dict[int, NDArray[np.float64]]
-    rounding: dict[bytes, NDArray[np.float64]]
+    state: NDArray[np.float64]
+    rows: NDArray[np.float64]
+    values: NDArray[np.float64]
+    errors: NDArray[np.float64]
+    storing: NDArray[np.float64]
+    rounding: NDArray[np.float64]
 
 
 class WordGuarantee:
     """Bounds of the errors of a linear system in fixed-point words, for all inputs within limits.
 
-    Gains are computed once for the same stored coefficients, so that a search over units of the data is fast.
+    Sums are computed once for the same stored coefficients, so that a search over units of the data is fast.
 
     Parameters
     ----------
@@ -168,11 +142,11 @@ class WordGuarantee:
     def __init__(self, system: LinearSystem, largest: Any, steps: int | None = None) -> None:
         self.system, self._made, self._steps = system, system.as_filter(), steps
         self._largest = np.broadcast_to(all_above(largest), (system.m,))
-        self._known = dict[tuple[Fraction, ...], _Gains]()
+        self._known = dict[tuple[Fraction, ...], _Sums]()
         if any(system.x0):
             raise ValueError(f"got a first state {system.x0.tolist()}; needed x0 = 0 for a bound")
         if not self._made.program.is_linear:
-            raise ValueError(f"got {system.name}, which limits its values; needed a linear system for a bound")
+            raise ValueError(f"got {self._made.name}, which limits its values; needed a linear system for a bound")
 
     def errors(self, words: WordFormats) -> NDArray[np.float64]:
         """Bound the error of each output, (p,), from the system as given, due to rounding and storing.
@@ -180,87 +154,93 @@ class WordGuarantee:
         Raises
         ------
         OverflowError : a result may overflow; the message names it, and its largest possible size.
-        ValueError : the system as stored is not stable, or its peak gain cannot be enclosed.
+        ValueError : the system as stored is not stable, or the bound is not proved.
         """
-        made, n = integer_program(self._made, words), self.system.n
-        gains = self._gains(made)
+        return self.proof(words).bound[self.system.n :]
+
+    def guessed(self, words: WordFormats) -> NDArray[np.float64]:
+        """Return what :meth:`errors` is going to prove, without a proof."""
+        return self._guess(words).bound[self.system.n :]
+
+    def proof(self, words: WordFormats) -> Proof:
+        """Return the bounds of states and outputs with their certificate; see :meth:`errors`."""
+        guess, inputs = self._guess(words), self._largest
+        proof = first_proved(
+            guess, lambda each: of_operations(self._made, words, inputs, each, self._steps, "as given")
+        )
+        if proof.why:
+            raise ValueError(proof.why)
+        return proof
+
+    def _guess(self, words: WordFormats) -> Guess:
+        made = integer_program(self._made, words)
+        found = self._sums(made)
         share = largest_rounding(words.data.rounding) * float(words.data.unit)
         inputs = self._largest + share
         if (inputs > float(words.data.largest)).any():
             raise OverflowError(
                 f"inputs of up to {self._largest.max():.6g} are beyond the range of {arithmetic(words.data)}"
             )
-        limits = rounding_limits(made)
-        grouped = _grouped(made.program, limits)
-        rounding = self._rounding(gains, made, grouped) @ grouped * _UP
-        self._check_range(gains, made, limits, inputs, rounding)
-        storing = np.full(self.system.m, share)
-        return np.asarray((rounding[n:] + gains.difference @ self._largest + gains.inputs @ storing) * _UP)
+        limits, state = rounding_limits(made), positive(found.state @ self._largest * EXCESS)
+        bound = found.errors @ self._largest + found.storing.sum(axis=1) * share + found.rounding @ limits
+        bound = positive(bound * EXCESS)
+        self._check_range(found, made, limits, state, inputs, bound)
+        return Guess(bound, state, inputs, np.zeros((len(bound), 3)))
 
-    def _gains(self, made: IntegerProgram) -> _Gains:
+    def _sums(self, made: IntegerProgram) -> _Sums:
         key = tuple(made.coefficients)
-        if key not in self._known:
-            program, n = made.program, self.system.n
-            A, B = matrices(program, made.coefficients)
-            stored = A[:n, :n], B[:n], A[n:, :n], B[n:]
-            if self._steps is None and not is_stable(stored[0]):
-                raise ValueError(
-                    "the system is stable, but not with its coefficients as stored; needed more of their bits"
-                )
-            difference, inputs, states = transfer_gains(self.system, stored, self._steps)
-            rows, first = exact_functionals(program, made.coefficients), program.n + program.m
-            inner = [
-                o for o in range(len(program.operations)) if not program.wide[o] and first + o not in program.outputs
+        if key in self._known:
+            return self._known[key]
+        program, n = made.program, self._made.program.n
+        nothing = np.zeros(program.m)
+        one = loops(program, made.coefficients, self._made.coefficients, nothing, nothing)
+        if self._steps is None and not is_stable(matrices(program, made.coefficients)[0]):
+            raise ValueError("the system is stable, but not with its coefficients as stored; needed more of their bits")
+        rows = np.array(
+            [
+                [float(row.get(j, 0)) for j in range(n + program.m)]
+                for row in exact_functionals(program, made.coefficients)
             ]
-            values = dict[int, NDArray[np.float64]]()
-            if inner:
-                row = np.array(
-                    [[rows[first + o].get(j, Fraction(0)) for j in range(first)] for o in inner], dtype=object
-                )
-                terms = None if self._steps is None else self._steps - 1
-                found = largest_gains(stored[0], stored[1], row[:, :n], row[:, program.n :], terms)
-                values = dict(zip(inner, found, strict=True))
-            self._known[key] = _Gains(difference, inputs, np.concatenate([states, inputs]), rows, values, {})
-        return self._known[key]
-
-    def _rounding(self, gains: _Gains, made: IntegerProgram, grouped: NDArray[np.float64]) -> NDArray[np.float64]:
-        key = (grouped > 0).tobytes()
-        if key not in gains.rounding:
-            gains.rounding[key] = rounding_gains(made.program, made.coefficients, grouped > 0, self._steps)
-        return gains.rounding[key]
+        )
+        lags = lags_of(max(radius_of(one.A), radius_of(one.F)), self._steps, n)
+        sums = gains(one.A, one.B, rows[:, :n], self._steps, lags)
+        errors = np.zeros((n, program.m))
+        if one.of_state.any() or one.of_input.any():
+            both = np.block([[one.F, one.of_state], [np.zeros((n, n)), one.A]])
+            errors = gains(both, np.vstack([one.of_input, one.B]), np.zeros((0, 2 * n)), self._steps, lags)[:n]
+        later = gains(one.F, np.hstack([one.K, _effects(made)]), rows[:0, :n], self._steps, lags)
+        values = sums[n:] + np.abs(rows[:, n:])
+        found = _Sums(sums[:n], rows, values, errors, later[:, : program.m], later[:, program.m :])
+        self._known[key] = found
+        return found
 
     def _check_range(
         self,
-        gains: _Gains,
+        found: _Sums,
         made: IntegerProgram,
         limits: NDArray[np.float64],
+        state: NDArray[np.float64],
         inputs: NDArray[np.float64],
         error: NDArray[np.float64],
     ) -> None:
         """Raise OverflowError if a result may be beyond its format; what wraps need not fit before it is stored."""
         program, words = made.program, made.words
-        peaks = gains.states @ inputs * _UP
-        sizes = np.concatenate([peaks, inputs])
-        errors = np.concatenate([error, np.zeros(program.m)])
         result_of = {int(value): i for i, value in enumerate(program.outputs)}
         first, off = program.n + program.m, [0.0] * (program.n + program.m)
+        sizes = np.minimum(found.values @ self._largest, np.abs(found.rows) @ np.concatenate([state, self._largest]))
+        moved_by = np.abs(found.rows) @ np.concatenate([error, inputs - self._largest])
         for o, (code, a, b) in enumerate(program.operations.tolist()):
             before = abs(float(made.coefficients[a])) * off[b] if code == MULTIPLY else off[a] + off[b]
-            off.append((before + limits[o]) * _UP)
-            row = gains.rows[first + o]
+            off.append(before + limits[o])
+            size = float(sizes[first + o] + moved_by[first + o]) + off[-1]
             if first + o in result_of:
-                size = float(peaks[result_of[first + o]])
-            elif o in gains.values:
-                size = float(gains.values[o] @ inputs)
-            else:
-                size = sum(abs(float(c)) * float(sizes[j]) for j, c in row.items())
-            moved = sum(abs(float(c)) * float(errors[j]) for j, c in row.items()) + off[-1]
-            size += min(moved, float(error[result_of[first + o]])) if first + o in result_of else moved
+                i = result_of[first + o]
+                size = min(size, float(state[i] + error[i]))
             wide = bool(program.wide[o])
             kept = [words.accumulator] if words.accumulator.overflow != "wrap" or not wide else []
             for fmt in kept if wide else [*kept, words.data]:
-                if size * _UP > float(fmt.largest):
-                    raise OverflowError(_beyond(program, o, size * _UP, fmt, fmt is words.data))
+                if size * EXCESS > float(fmt.largest):
+                    raise OverflowError(_beyond(program, o, size, fmt, fmt is words.data))
 
 
 def _beyond(program: Program, o: int, size: float, fmt: FixedFormat, is_data: bool) -> str:

@@ -24,8 +24,8 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.named import BINARY32, BINARY64, format_text, rounding_text
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import check_limits, guarantee
+from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.system import output_errors
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.caching import replace_file

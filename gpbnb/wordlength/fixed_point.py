@@ -196,8 +196,8 @@ def bound_per_unit(
     ValueError : the filter is not stable.
     """
     ones = FixedFormat(1, 0, Rounding.DOWN)
-    made = integer_program(given.filter, _words(given.filter, ones, coefficient_bits, wide))
-    return np.asarray(bounded_rounding(made) * 2.0 ** given.state.astype(float))
+    found = bounded_rounding(given.filter, _words(given.filter, ones, coefficient_bits, wide))
+    return np.asarray(found * 2.0 ** given.state.astype(float))
 
 
 def required_fraction_bits(
@@ -288,7 +288,7 @@ def required_fraction_bits(
         if (compiled := largest_compiled(strategy.like)) < largest:
             largest = max(compiled, strategy.least)
             most = f"{digits_text(largest, kind='fraction')} are the most with compiled loops"
-    found = Search(strategy.error, strategy.like, (), largest=largest, least=strategy.least)
+    found = Search(strategy.error, strategy.like, (), largest=largest, least=strategy.least, proof=strategy.proof)
     ratios = dict(found.tried)
     if cause := strategy.cause():
         return FixedAnswer(None, basis, None, (), cause)
@@ -367,6 +367,10 @@ class _Strategy:
     def wide_enough(self, fmt: FixedFormat) -> FixedFormat:
         """Return a format with the integer bits that its fraction bits needed."""
         return replace(fmt, integer_bits=fmt.integer_bits + self._more.get(fmt.fraction_bits, 0))
+
+    def proof(self, fmt: FixedFormat) -> Outcome:
+        """Return what is proved of the error, or infinity and why nothing is."""
+        return self.error(fmt)
 
     def errors(self, fmt: FixedFormat) -> NDArray[np.float64]:
         """Return the largest error of each state or output."""
@@ -459,12 +463,22 @@ class _Outputs(_Strategy):
             found = run_words(self._system, self._inputs, self._words_of(fmt)).outputs(self._system.p)
             error = (found[..., 0] - self._true[..., 0]) + (found[..., 1] - self._true[..., 1])
             return np.asarray(np.abs(error).max(axis=0))
-        return self._proof.errors(self._words_of(fmt))
+        return self._proof.guessed(self._words_of(fmt))
+
+    def proof(self, fmt: FixedFormat) -> Outcome:
+        """Return the bound over its tolerance that is proved, or infinity and why none is."""
+        found = self.error(fmt)
+        if self._proof is None or not found.ratio <= 1:
+            return found
+        try:
+            return Outcome(largest_ratio(self._proof.errors(self.words(fmt)), self.goal))
+        except (OverflowError, ValueError) as error:
+            return Outcome(math.inf, f"are refused: {error}")
 
     def of_words(self, words: WordFormats) -> Outcome:
         """Return the largest error or bound over its tolerance in these formats, or infinity and the reason."""
         self._words_of = lambda fmt: words
-        return self.error(words.data)
+        return self.proof(words.data)
 
     def words(self, fmt: FixedFormat) -> WordFormats | None:
         return self._words_of(self.wide_enough(fmt))

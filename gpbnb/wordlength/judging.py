@@ -10,8 +10,8 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text, rounding_text
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import check_limits, check_within
+from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form, form_named
@@ -27,6 +27,7 @@ from gpbnb.wordlength.requirement import (
     checked_tolerance,
     evidence,
     for_ever_or_over,
+    proved,
     without_evidence,
 )
 from gpbnb.wordlength.system import EmulatedSystem, system_strategy
@@ -114,7 +115,7 @@ def judge(
         limited = Guaranteed if basis == "guarantee" else Probable
         strategy = limited(model, compiled_form(form), within, tolerances)
     found, ends = for_ever_or_over(
-        steps, strategy, lambda each: each.error(kind), lambda outcome: not math.isinf(outcome.ratio)
+        steps, strategy, lambda each: proved(each, kind), lambda outcome: not math.isinf(outcome.ratio)
     )
     warnings = strategy.warnings() if isinstance(strategy, EmulatedSystem) else ()
     return Judgement(fmt, basis, steps, ((fmt.precision, found.ratio),), found.why, warnings, ends)

@@ -19,9 +19,9 @@ from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.named import digits
 from gpbnb.arithmetic.rounding import Rounding, digits_text, rounding_named
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search, largest_by_default, largest_compiled
-from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.gains import check_deterministic
-from gpbnb.bounds.guarantee import Guarantee, check_limits, check_within, guarantee
+from gpbnb.bounds.guarantee import Guarantee, check_limits, check_within, guarantee, guessed
+from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_run import ArrayRun
@@ -463,13 +463,20 @@ class Guaranteed(LastingBound):
     steps: int | None = None
 
     def error(self, fmt: FloatFormat) -> Outcome:
-        """Return the largest error over the tolerance, or infinity and the reason."""
+        """Return the largest error over the tolerance as it is guessed, or infinity and the reason."""
+        return self._outcome(fmt, guessed)
+
+    def proof(self, fmt: FloatFormat) -> Outcome:
+        """Return the largest error over the tolerance as it is proved, or infinity and the reason."""
+        return self._outcome(fmt, guarantee)
+
+    def _outcome(self, fmt: FloatFormat, bounded: Callable[..., Guarantee]) -> Outcome:
         asked = np.isfinite(self.tolerances)
         try:
             if self.steps is None:
-                found = guarantee(self.model, fmt, self.within, self.form, horizon=1)
+                found = bounded(self.model, fmt, self.within, self.form, horizon=1)
             else:
-                found = guarantee(self.model, fmt, self.within, self.form, max(self.steps, 1), self.steps)
+                found = bounded(self.model, fmt, self.within, self.form, max(self.steps, 1), self.steps)
         except ValueError as error:
             return Outcome(math.inf, str(error))
         except OverflowError as error:
@@ -491,6 +498,8 @@ class Guaranteed(LastingBound):
 
 class Probable(Guaranteed):
     """Three standard deviations of the error that independent roundings would cause."""
+
+    proof = None  # type: ignore[assignment]
 
     def over(self, steps: int) -> None:
         """Return None: the probable error is that of a steady state."""

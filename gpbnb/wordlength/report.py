@@ -15,7 +15,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
-from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel

@@ -227,6 +227,11 @@ class Strategy(Protocol):
         """Return the largest error or bound as a multiple of the tolerance; or infinity, with the reason."""
 
 
+def proved(strategy: Strategy, fmt: FloatFormat) -> Outcome:
+    """Return what a strategy proves of a format, or what it says of it if it proves nothing."""
+    return (getattr(strategy, "proof", None) or strategy.error)(fmt)
+
+
 class LastingBound(ABC):
     """A strategy that bounds errors for ever or, with `steps`, over these steps."""
 
@@ -293,7 +298,10 @@ class Asked(NamedTuple):
     ) -> Iterator[Callable[[Strategy], Search[FloatFormat]]]:
         """Return a function that searches with a strategy, given `checks` and `bounds` as in ``Search``."""
         with tqdm(desc="precisions", unit="run", disable=not self.progress) as bar:
-            yield lambda strategy: Search(strategy.error, self.like, checks, bar.update, bounds, self.largest)
+            yield lambda strategy: Search(
+                strategy.error, self.like, checks, bar.update, bounds, self.largest,
+                proof=getattr(strategy, "proof", None),
+            )  # fmt: skip
 
     def answer(
         self,

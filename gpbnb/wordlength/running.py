@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED, arithmetic, format_text
+from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED, format_text
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.envelope import FilterLimits
-from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
-from gpbnb.bounds.linear import filter_schedule
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.bounds.guess import FilterLimits
+from gpbnb.bounds.system import output_proof
 from gpbnb.caching import replace_file
 from gpbnb.filters.forms import CONSTANT_GAIN
 from gpbnb.filters.model import LinearModel
@@ -212,11 +212,11 @@ def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: Linear
 
 
 def certificate(asked: CommandInput, report: Report) -> Certified:
-    """Return the certificate of the first guarantee in a report; that of a linear system bounds its roundings only.
+    """Return the certificate of the first guarantee in a report.
 
     Raises
     ------
-    ValueError : no precision has a guarantee, or the format is fixed point.
+    ValueError : no precision has a guarantee, or the system limits its values.
     """
     given, source = asked.options, asked.source
     guaranteed = [each for each in report.answers if each.basis == "guarantee"]
@@ -225,10 +225,6 @@ def certificate(asked: CommandInput, report: Report) -> Certified:
     fmt = _format(given)
     if digits is None:
         raise ValueError("got no precision with a guarantee; needed one for a certificate; allow a larger tolerance")
-    if isinstance(fmt, FixedFormat):
-        raise ValueError(
-            f"got --certificate with {arithmetic(fmt)}; needed floating point: the checker covers no fixed point"
-        )
     if fmt is None:
         fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
     chosen = source.structures.get(report.structure, source.model)
@@ -236,9 +232,11 @@ def certificate(asked: CommandInput, report: Report) -> Certified:
         within = limits(chosen.n, chosen.m, **_sizes(given))
         form = form_named(_form(given))
         return Certified(guarantee(chosen, fmt, within, form, horizon=report.steps).certificate(), fmt)
-    made = filter_schedule(chosen.as_filter(), fmt)
-    within = limits(made.program.n, made.program.m, **_sizes(given))
-    return Certified(from_schedule(made, within, report.steps).certificate(), fmt)
+    within = limits(chosen.n, chosen.m, **_sizes(given))
+    if not chosen.as_filter().program.is_linear:
+        raise ValueError(f"got {chosen.name}, which limits its values; needed a linear system for a certificate")
+    steps = report.steps if chosen.unstable() else None
+    return Certified(output_proof(chosen, fmt, within.measurement, steps).text, fmt)
 
 
 def write_code_of(asked: CommandInput, structure: str = "") -> WrittenCode:

@@ -9,6 +9,7 @@ storing them.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,10 +20,10 @@ from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import CHECKED, Outcome, Search
-from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import check_limits
-from gpbnb.bounds.probable import probable_error
-from gpbnb.bounds.system import output_errors
+from gpbnb.bounds.guess import FilterLimits
+from gpbnb.bounds.probable import probable_output_errors
+from gpbnb.bounds.system import guessed_errors, output_errors
 from gpbnb.filters.named import named
 from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.system import LinearSystem, system_inputs
@@ -221,9 +222,16 @@ class BoundedSystem(LastingBound):
     steps: int | None = None
 
     def error(self, fmt: FloatFormat) -> Outcome:
-        """Return the largest bound over its tolerance, or infinity and the reason."""
+        """Return the largest bound over its tolerance as it is guessed, or infinity and the reason."""
+        return self._outcome(fmt, self._bounds)
+
+    def proof(self, fmt: FloatFormat) -> Outcome:
+        """Return the largest bound over its tolerance as it is proved, or infinity and the reason."""
+        return self._outcome(fmt, lambda fmt: output_errors(self.system, fmt, self.largest, self.steps))
+
+    def _outcome(self, fmt: FloatFormat, bounds: Callable[[FloatFormat], NDArray[np.float64]]) -> Outcome:
         try:
-            return _share(self._bounds(fmt), self.tolerances)
+            return _share(bounds(fmt), self.tolerances)
         except (ValueError, OverflowError) as fault:
             return Outcome(math.inf, str(fault))
 
@@ -233,12 +241,14 @@ class BoundedSystem(LastingBound):
         return replace(self, steps=steps) if limited else None
 
     def _bounds(self, fmt: FloatFormat) -> NDArray[np.float64]:
-        """Bound the error of each output, (p,)."""
-        return output_errors(self.system, fmt, self.largest, self.steps)
+        """Guess the error of each output, (p,)."""
+        return guessed_errors(self.system, fmt, self.largest, self.steps)
 
 
 class ProbableSystem(BoundedSystem):
     """As :class:`BoundedSystem`, with three standard deviations of the error of rounding in place of its bound."""
+
+    proof = None  # type: ignore[assignment]
 
     def over(self, steps: int) -> None:
         """Return None: the probable error is that of a steady state."""
@@ -246,7 +256,7 @@ class ProbableSystem(BoundedSystem):
     def _bounds(self, fmt: FloatFormat) -> NDArray[np.float64]:
         if not self.system.as_filter().program.is_linear:
             raise ValueError(f'got {self.system.name}, which limits its values, and basis "probable"; needed "bound"')
-        return output_errors(self.system, fmt, self.largest, rounding=lambda found: 3 * probable_error(found))
+        return probable_output_errors(self.system, fmt, self.largest)
 
 
 def _share(errors: NDArray[np.float64], tolerances: NDArray[np.float64]) -> Outcome:

@@ -7,7 +7,7 @@ import pytest
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.bounds.linear import filter_schedule
+from gpbnb.bounds.gains import filter_schedule
 from gpbnb.filters.run import Run, Sums
 from gpbnb.filters.system import state_space
 

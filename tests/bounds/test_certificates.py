@@ -18,11 +18,11 @@ import pytest
 from test_openings import NINE, WITHIN, raised_while_factored
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
-from gpbnb.bounds import check
-from gpbnb.bounds import guarantee as guarantees
+from gpbnb.bounds import check, guess
+from gpbnb.bounds.certificate import of_operations
 from gpbnb.bounds.check import NotProvedError, prove
+from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
-from gpbnb.bounds.linear import filter_schedule
 from gpbnb.filters.forms import Form
 from gpbnb.filters.system import biquad
 from gpbnb.report.guarantees import certificates
@@ -67,9 +67,7 @@ def test_the_checker_proves_the_guarantees_of_the_book(name: str) -> None:
     found = CHAPTER[name]()
     content = json.loads(found.certificate())
     prove(content)
-    claimed = np.array([float(Fraction(each)) for each in content["bound"]])
-    assert (claimed >= found.bound).all()
-    assert (claimed <= found.bound * (1 + 1e-6) + 1e-12 * found.bound.max()).all()
+    assert found.bound == pytest.approx([float(Fraction(each)) for each in content["bound"]], rel=1e-15, abs=0)
 
 
 FORMATS = [
@@ -116,12 +114,12 @@ def test_a_long_cycle_is_proved() -> None:
 
 
 def test_a_filter_that_settles_slowly_is_proved() -> None:
-    """Its interval of covariances was once 16 times as wide, and gains of any covariance in it were too far apart."""
+    """In a far wider interval of covariances, gains are too far apart."""
     model = small(Phi=[["0.9", "0.1"], [0, 1]], H=[[1, 0]], Q=[["0.01", 0], [0, "1e-4"]], R=[["0.01"]], x0=[0, 0])
     content = written(model, FORMAT, limits(2, 1, state=[10, 1], innovation=1))
     assert content["first"] > 1_000
     prove(content)
-    wide = content | {"width": [[factor(each, "16") for each in row] for row in content["width"]]}
+    wide = content | {"width": [[factor(each, "1e9") for each in row] for row in content["width"]]}
     assert "may exceed its bound later" in refused(wide)
     scale_bound("0.99")(content)
     refused(content)
@@ -129,7 +127,7 @@ def test_a_filter_that_settles_slowly_is_proved() -> None:
 
 @pytest.mark.parametrize("seed", range(30))
 def test_random_filters_are_proved(seed: int) -> None:
-    """Every form, rounding, base and kind of limits; two of the filters have no bound, or no filter."""
+    """Every form, rounding, base and kind of limits; some of the filters have no bound, or no filter."""
     drawn = draw(seed)
     try:
         found = guarantee(drawn.model, drawn.fmt, drawn.within, drawn.form, most=300, horizon=20)
@@ -137,14 +135,12 @@ def test_random_filters_are_proved(seed: int) -> None:
         assert seed in REFUSED
         return
     if np.isfinite(found.bound).all():
-        (refused if seed in DEGENERATE else prove)(json.loads(found.certificate()))
+        prove(json.loads(found.certificate()))
     else:
         assert seed in WITHOUT_BOUND
 
 
-REFUSED, WITHOUT_BOUND = (14, 23, 29), (11, 16)
-DEGENERATE = (28,)
-"""Nothing is measured, and all numbers are zero; but the checker, which rounds outwards, claims positive bounds."""
+REFUSED, WITHOUT_BOUND = (14, 23, 29), (11, 16, 28)
 
 
 @pytest.mark.parametrize("peak", range(1, 12))
@@ -178,7 +174,7 @@ def test_a_running_sum_is_proved_for_its_steps() -> None:
     assert content["steps"] == 50
     assert "after 50 steps" in prove(content)
     scale_bound("0.99")(content)
-    assert "may exceed its bound after step 50" in refused(content)
+    assert "may exceed its bound" in refused(content)
 
 
 def test_a_certificate_holds_the_model_as_given() -> None:
@@ -295,7 +291,7 @@ ALTERED: dict[str, tuple[tuple[str, ...], Callable[[Content], None]]] = {
     "one more binary digit": (EVERY, scale_bound("1/2")),
     "one more decimal digit": (EVERY, scale_bound("1/10")),
     "a negative bound": (EVERY, scale_bound("-1")),
-    "half of the steps back": (("joseph", "section"), set_to("back", lambda lags: lags // 2)),
+    "half of the steps back": (("joseph",), set_to("back", lambda lags: lags // 2)),
     "one step back": (STEADY, set_to("back", 1)),
     "no steps back": (EVERY, set_to("back", 0)),
     "steps back in floats": (EVERY, set_to("back", float)),
@@ -325,13 +321,14 @@ ALTERED: dict[str, tuple[tuple[str, ...], Callable[[Content], None]]] = {
     "a digit less": (EVERY, set_to("format", "precision", lambda t: t - 1)),
     "chopped": (("tracker", "joseph", "hung", "section"), set_to("format", "rounding", "chop")),
     "at random": (EVERY, set_to("format", "rounding", "stochastic")),
+    "compared with what was given": (("section",), set_to("filter", "exact", "as given")),
     "another order": (EVERY, set_to("order", "sums from right to left")),
     "a coefficient": (("section",), set_to("filter", "coefficients", 3, lambda x: factor(x, "1.01"))),
     "another operation": (("section",), set_to("filter", "operations", 1, 0, "subtract")),
     "an operation on itself": (("section",), set_to("filter", "operations", 1, 1, 5)),
     "another recursion": (("section",), set_to("filter", "A", 0, 0, lambda x: str(Fraction(x) + 1))),
     "too small a range": (("hung",), set_to("format", "emax", 1)),
-    "limits of another filter": (EVERY, set_to("limits", "innovation", ["1", "1"])),
+    "limits of another filter": (EVERY, set_to("limits", "measurement", ["1", "1"])),
 }
 
 
@@ -396,7 +393,7 @@ FORGED: dict[str, tuple[str, Callable[[Content], None]]] = {
     "a row more": ("joseph", set_to("filter", "Phi", 0, lambda rows: [*rows, rows[0]])),
     "a state less": ("joseph", set_to("filter", "x0", ["0"])),
     "a negative derived limit": ("section", set_to("derived", "state", lambda sizes: ["-1"] * len(sizes))),
-    "a derived limit of another filter": ("section", set_to("derived", "innovation", [])),
+    "a derived limit of another filter": ("section", set_to("derived", "state", [])),
     "known inputs": ("joseph", lambda content: content["filter"].update(B=[[["1"]]])),
     "an unknown entry": ("joseph", lambda content: content.update(assume="the bound holds")),
     "an unknown kind": ("section", set_to("filter", "kind", "nonlinear")),
@@ -493,8 +490,9 @@ def test_measurements_that_are_stored_beyond_their_limit_count(monkeypatch: pyte
     fmt, within = FloatFormat(2, 3), limits(2, 1, measurement=0.95)
     made = filter_schedule(LinearSystem([["0.5"]], [["1"]]).as_filter(), fmt)
     prove(json.loads(from_schedule(made, within).certificate()))
-    monkeypatch.setattr(guarantees, "stored_sizes", lambda _, sizes: sizes)
-    refused(json.loads(from_schedule(made, within).certificate()))
+    monkeypatch.setattr(guess, "stored_sizes", lambda _, sizes: sizes)
+    found = guess.constant_guess(made.origin, fmt, within.measurement, None)
+    refused(json.loads(of_operations(made.origin, fmt, within.measurement, found, None)))
 
 
 @pytest.mark.parametrize("subnormal", [True, False])
@@ -521,7 +519,7 @@ def test_signs_of_a_first_estimate_count() -> None:
     assert 982 < true - stored < 983
     first, later = [["16", "-16"], ["0", "1"]], [["255/256", "0"], ["0", "1"]]
     content = {
-        "certificate": "rounding guarantee 1",
+        "certificate": "rounding guarantee 2",
         "name": "a difference that is kept",
         "filter": {
             "kind": "kalman", "form": "innovation", "repair": False, "repaired": [],
@@ -564,8 +562,7 @@ def test_innovations_of_correlated_measurements_are_limited() -> None:
 
 def test_what_has_no_certificate_says_so() -> None:
     slow = guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(10, 2, state=100, innovation=10), most=1000)
-    with pytest.raises(ValueError, match="never repeats"):
-        slow.certificate()
+    assert "did not settle" in slow.why
     none = guarantee(small(), FloatFormat(2, 11, emin=-14, emax=15), limits(2, 1, measurement=1e6))
     with pytest.raises(ValueError, match="without a bound"):
         none.certificate()

@@ -12,8 +12,9 @@ from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, limits
-from gpbnb.bounds.linear import filter_schedule, peak_gain
+from gpbnb.bounds.linear import peak_gain
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.system import LinearSystem, biquad, controller, is_stable, state_space
 from gpbnb.wordlength.precision import required_precision

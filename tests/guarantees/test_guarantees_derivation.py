@@ -12,8 +12,6 @@ DERIVATIONS = steps.Derivations(
     derivation.telescope,
     derivation.induction,
     derivation.ellipsoid,
-    derivation.predicted,
-    derivation.joseph,
 )
 
 NAMES = {
@@ -33,18 +31,6 @@ NAMES = {
     },
     "ellipsoid": {
         "squared half-width of the new ellipsoid, less that of the sum of both sets": ("(tau*u - t*v)**2/(t*tau)"),
-    },
-    "predicted": {
-        "the updated covariance of V + δ, less that of V": (
-            "(1 - K*H)*delta*(1 - HT*S1*H*V) + ((V + delta)*HT - K*(H*(V + delta)*HT + R))*S1*H*V + "
-            "K*((H*V*HT + R)*S1 - 1)*H*V"
-        ),
-    },
-    "joseph": {
-        "Joseph's form with a gain that is off by δ": (
-            "(1 - K*H)*V*(1 - HT*KT) + K*R*KT + delta*(H*V*HT + R)*deltaT - ((1 - K*H)*V*HT - K*R)*deltaT - "
-            "delta*(H*V*(1 - HT*KT) - R*KT)"
-        ),
     },
 }
 """What each step derives, beside its name; see `steps.check_names`."""

@@ -18,7 +18,7 @@ import pytest
 import gpbnb
 from gpbnb import BFLOAT16, BINARY32, FixedFormat, FloatFormat, LinearSystem, limits
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.simulation import simulated_inputs
 from gpbnb.report import ledger_options
 from gpbnb.report.ledger.render import FORMATS

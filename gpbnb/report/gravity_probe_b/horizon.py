@@ -20,17 +20,30 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.bounds.envelope import GAIN, LOOP, ROUNDING, Disturbances, FilterLimits, Steps, columns, disturbances, units
 from gpbnb.bounds.gains import check_deterministic, packed_coefficients
 from gpbnb.bounds.guarantee import check_limits, limits
-from gpbnb.bounds.reach import Reach, forward, nothing, units_of_trace
-from gpbnb.bounds.storing import stored_sizes
+from gpbnb.bounds.guess import FilterLimits
+from gpbnb.bounds.units import stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import widened_array
 from gpbnb.filters.program import Program
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
+from gpbnb.report.gravity_probe_b.error_sets import (
+    GAIN,
+    LOOP,
+    ROUNDING,
+    Disturbances,
+    FilterSteps,
+    Reach,
+    columns,
+    disturbances,
+    forward,
+    nothing,
+    units,
+    units_of_trace,
+)
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS
 from gpbnb.report.gravity_probe_b.year import model as year_model
@@ -169,13 +182,13 @@ def _wide(stored: LinearModel) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 def _of_block(
     run: Run, true: Run, wide: tuple[NDArray[np.float64], NDArray[np.float64]], done: int, count: int
-) -> tuple[Program, Steps]:
+) -> tuple[Program, FilterSteps]:
     """Return the program of a step, and the numbers of a block that its disturbances follow from."""
     (Phi, HPhi), rows = wide, np.arange(count)
     at = (done + rows) % len(HPhi)
     program, packed = packed_coefficients(run, rows, done)
     coefficients = widened_array(packed)
-    return program, Steps(
+    return program, FilterSteps(
         coefficients,
         np.zeros(coefficients.shape[:2]),
         np.ascontiguousarray(Phi[at % len(Phi)]),

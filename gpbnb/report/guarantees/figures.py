@@ -21,12 +21,6 @@ def errors_of(found: Guarantee, z: Any) -> NDArray[np.float64]:
     return run_against(found, np.zeros((len(measured), n)), measured[:, None, :], np.zeros((m, n + 1)), False)[2]
 
 
-def bound_of(found: Guarantee, state: int, steps: int) -> NDArray[np.float64]:
-    """Return the bound of the error of a state after each of the first steps, (steps,)."""
-    history = found.history[:steps, state]
-    return np.concatenate([history, np.full(steps - len(history), found.bound[state])])
-
-
 def draw_errors(
     ax: Axes, found: Guarantee, chosen: NDArray[np.float64], random: NDArray[np.float64], state: int, quantity: str
 ) -> None:
@@ -39,7 +33,8 @@ def draw_errors(
     quantity : its name and unit, for the axis.
     """
     steps = np.arange(1, len(chosen) + 1)
-    ax.plot(steps, bound_of(found, state, len(steps)), color=VALID, label="bound for every measurement sequence")
+    bound = np.full(len(steps), found.bound[state])
+    ax.plot(steps, bound, color=VALID, label="bound for every measurement sequence")
     for errors, colour, words in (
         (chosen, OBSERVED, "measurements chosen by the adversary"),
         (random, OBSERVED_OTHERS[1], "random measurements"),
@@ -56,11 +51,9 @@ def reachable_corners(found: Guarantee) -> NDArray[np.float64]:
 
     It is the sum of one line segment for each operation and step, for a filter with two states and a settled gain.
     """
-    program, each = found.schedule.program, separate_roundings(found)
-    count = len(program.operations)
-    F, G, limits = each.F[-1], each.G[-1][:, :count], each.limits[-1][:count]
-    rows, halves = np.eye(program.n), list[NDArray[np.float64]]()
-    for _ in range(found.lags):
+    F, G, limits = (each[-1] for each in separate_roundings(found))
+    rows, halves = np.eye(len(F)), list[NDArray[np.float64]]()
+    while np.abs(rows).max() > 1e-9:
         halves += [*(rows @ G * limits).T]
         rows = rows @ F
     segments = np.array([half if (half[0], half[1]) > (0, 0) else -half for half in halves if half.any()])

@@ -20,7 +20,7 @@ from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.bounds.adversary import attack, responses, shares_of
 from gpbnb.bounds.guarantee import Guarantee, closed_loops, guarantee
 from gpbnb.filters.forms import Form
-from gpbnb.filters.run import Run, reference_states, widened
+from gpbnb.filters.run import Run, reference_states
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.random_filters import (
     DETERMINISTIC,
@@ -49,6 +49,7 @@ REASONS = (
     "gain not settled",
     "unstable loop",
     "too few digits",
+    "not proved",
     "another",
 )
 
@@ -147,13 +148,11 @@ def other_gains(drawn: Drawn, found: Guarantee) -> int:
     steps = STEPS if found.steps is None else min(STEPS, found.steps)
     run = Run(drawn.model, drawn.fmt, drawn.form, range(1, steps + 1))
     run.take(np.zeros((steps, drawn.model.m)))
-    at, count = _rows(found, run.steps), drawn.model.n * drawn.model.m
+    at, count = given.rows(np.arange(run.steps)), drawn.model.n * drawn.model.m
     gains = run.G[: run.steps].reshape(run.steps, count, *run.G.shape[3:])
     same = gains == given.packed[at, -count:]
     if same.ndim == 3:
         same = same.all(axis=2)
-    off = np.abs(widened(gains[:, :, None])[:, :, 0, 0] - given.coefficients[at, -count:, 0])
-    same |= off < given.offsets[at, -count:]  # a gain that never repeats is enclosed
     return int((~same.all(axis=1)).sum())
 
 
@@ -172,7 +171,7 @@ def inputs(drawn: Drawn, found: Guarantee, rng: np.random.Generator) -> Iterator
         yield "constant", _admissible(drawn, found, np.broadcast_to(level, (steps, m)))
     state = int(rng.integers(n))
     back = responses(found.schedule, F, state, steps)
-    at = _rows(found, steps)
+    at = found.schedule.rows(np.arange(steps))
     course = np.sign(np.einsum("ki,kim->km", back, found.schedule.exact[at][..., 0]))
     yield "chosen", _admissible(drawn, found, course)
     for part in range(2):
@@ -186,12 +185,6 @@ def inputs(drawn: Drawn, found: Guarantee, rng: np.random.Generator) -> Iterator
         yield "chosen", outcome.z
 
 
-def _rows(found: Guarantee, steps: int) -> NDArray[np.int64]:
-    """Return the row of the schedule for each step."""
-    given, k = found.schedule, np.arange(steps)
-    return np.where(k < given.steps, k, given.first + (k - given.first) % max(given.steps - given.first, 1))
-
-
 _FACTORS = np.array([[0.999], [0.5], [0.0], [-0.5], [-0.999]])
 
 
@@ -202,7 +195,7 @@ def _admissible(drawn: Drawn, found: Guarantee, course: NDArray[np.float64]) -> 
     """
     if drawn.limited == "measurement":
         return course * drawn.within.measurement
-    given, at = found.schedule, _rows(found, len(course))
+    given, at = found.schedule, found.schedule.rows(np.arange(len(course)))
     X, V, Z = drawn.within
     of_state, of_innovation = (np.where(limit > 0, 1 / np.maximum(limit, 1e-300), 1e300) for limit in (X, V))
     x, z = given.x0.astype(np.float64), np.zeros(course.shape)
@@ -297,6 +290,7 @@ def reason_of(text: str) -> str:
         "settle": "gain not settled",
         "not stable": "unstable loop",
         "as large as itself": "too few digits",
+        "not proved": "not proved",
     }
     return next((name for part, name in known.items() if part in text), "another")
 

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gpbnb.bounds.envelope import FilterLimits
-from gpbnb.bounds.guarantee import Guarantee, disturbances_of
+from gpbnb.bounds.guarantee import Guarantee
+from gpbnb.bounds.guess import FilterLimits, columns, linear_steps, rounding_errors, value_sizes
 from gpbnb.filters.program import ADD, MULTIPLY
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.guarantees.table import FORMAT, case_guarantee, case_named
@@ -56,8 +56,10 @@ def single_step(found: Guarantee) -> Guarantee:
 
 def ours(found: Guarantee) -> list[float]:
     """Bound the rounding errors of one step by our columns."""
-    step, groups = disturbances_of(found), len(found.schedule.program.roots)
-    return [float(x) for x in np.abs(step.G[-1, :, :groups]) @ step.limits[-1, :groups]]
+    given, program, b = found.schedule, found.schedule.program, found.bound
+    step = linear_steps(given, np.array([given.steps - 1]))
+    h = rounding_errors(program, given.fmt, step, value_sizes(step, found.limits), found.limits.state + b, b)
+    return [float(x) for x in np.abs(columns(program, step, h))[0].sum(axis=1)]
 
 
 def script(found: Guarantee) -> str:

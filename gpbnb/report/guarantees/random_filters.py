@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import limits
+from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import reference_states

@@ -10,8 +10,8 @@ import numpy as np
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.adversary import responses, run_against
+from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import closed_loops, from_schedule, limits
-from gpbnb.bounds.linear import filter_schedule
 from gpbnb.filters.system import state_space
 from gpbnb.sweeps import Column, Sweep
 

@@ -18,8 +18,8 @@ from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.bounds.adversary import attack, ceiling, random_errors
-from gpbnb.bounds.guarantee import BUDGET, Guarantee, from_schedule, guarantee, limits
-from gpbnb.bounds.linear import filter_schedule
+from gpbnb.bounds.gains import filter_schedule
+from gpbnb.bounds.guarantee import Guarantee, from_guess, from_schedule, guarantee, guessed, limits
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
@@ -65,7 +65,6 @@ class GuaranteeCase:
     horizon : number of steps that the bound covers, for filters without process noise.
     states : name and unit of each state.
     form : form of a Kalman filter.
-    budget : budget of the guarantee in binary32, for filters that settle slowly.
     """
 
     make: Callable[[], LinearModel | LinearFilter]
@@ -78,7 +77,6 @@ class GuaranteeCase:
     aims: tuple[int, ...] = ()
     horizon: int | None = None
     form: Form = Form.INNOVATION
-    budget: float = BUDGET
     states: tuple[str, ...] = ()
 
 
@@ -124,7 +122,6 @@ CASES = (
         2,
         center=(37, 0, 0.4),
         steps=20_000,
-        budget=2e9,
         states=("height, m", "speed, m/s", "bias, m/s²"),
     ),
     GuaranteeCase(
@@ -227,16 +224,18 @@ def compute(case: GuaranteeCase) -> GuaranteeRow:
     )
 
 
-def case_guarantee(case: GuaranteeCase, made: LinearModel | LinearFilter, fmt: FloatFormat) -> Guarantee:
-    """Compute the guarantee of a case, whose filter is `made`, in a format."""
+def case_guarantee(
+    case: GuaranteeCase, made: LinearModel | LinearFilter, fmt: FloatFormat, proved: bool = True
+) -> Guarantee:
+    """Compute the guarantee of a case, whose filter is `made`, in a format; or only guess it."""
+    bounded, of_filter = (guarantee, from_schedule) if proved else (guessed, from_guess)
     if isinstance(made, LinearModel):
         within = limits(made.n, made.m, state=case.state, innovation=case.innovation)
         if case.horizon is not None:
-            return guarantee(made, fmt, within, case.form, most=case.horizon, horizon=case.horizon)
-        budget = case.budget if fmt == FORMAT else BUDGET
-        return guarantee(made, fmt, within, case.form, most=100_000, horizon=1, budget=budget)
+            return bounded(made, fmt, within, case.form, most=case.horizon, horizon=case.horizon)
+        return bounded(made, fmt, within, case.form, most=100_000, horizon=1)
     schedule = filter_schedule(made, fmt)
-    return from_schedule(schedule, limits(schedule.program.n, schedule.program.m, measurement=case.measurement))
+    return of_filter(schedule, limits(schedule.program.n, schedule.program.m, measurement=case.measurement))
 
 
 def _bits(
@@ -258,7 +257,7 @@ def _bits(
 
     def meets(fmt: FloatFormat) -> bool:
         try:
-            found = case_guarantee(case, made, fmt)
+            found = case_guarantee(case, made, fmt, proved=False)
         except ValueError:
             return False
         if basis == "emulation":

@@ -1,35 +1,26 @@
-r"""Bound sums over all earlier steps by a certificate that a finite computation can check.
+r"""Sets that contain the error after each step of a filter that never settles, propagated forward in time.
 
-Let :math:`e_k = F_k e_{k-1} + w_k`. For any row vectors :math:`c_0, \dots, c_L` with :math:`1 \le L \le k`, which may
-depend on k, and :math:`r_l = c_l F_{k-l} - c_{l+1}`, telescoping gives *exactly*
+The error obeys :math:`e_k = F_k e_{k-1} + w_k`, where :math:`w_k = \sum_g G_{k,g}\rho_g + s`,
+:math:`|\rho_g| \le h_{k,g}`, :math:`|s| \le \text{slack}_k`. It lies in the Minkowski sum of
 
-.. math:: c_0 e_k = \sum_{l<L} c_l w_{k-l} + \sum_{l<L} r_l e_{k-l-1} + c_L e_{k-L}.
+* **segments**: the columns of the disturbances of the latest steps, each times its limit, propagated by the
+  closed loops of the steps since. They are exact, up to rounding in float64;
+* **ellipsoids** :math:`\{x: |a x| \le \sqrt{a M a^T}\ \text{for all}\ a\}`, one for each part of the
+  bound. They contain the segments of earlier steps.
 
-So the rows need not be exact. A float64 value of :math:`c_{l+1} = c_l F_{k-l}` is sufficient, since its rounding errors
-are the small residuals :math:`r_l`. The infinite sum needs no estimate of its tail, because the tail is the last term.
-If the error was within b at all earlier steps, then
+An ellipsoid absorbs segments :math:`g_j` by the Cauchy-Schwarz inequality. For any positive :math:`t, t_j` of sum s,
 
-.. math:: |c_0 e_k| \le \sum_{l<L} |c_l w_{k-l}| + \Big(\sum_{l<L} |r_l| + |c_L|\Big) b,
+.. math:: \Big(\sqrt{aMa^T} + \sum_j|a g_j|\Big)^2 \le a\,s\Big(\frac Mt + \sum_j\frac{g_jg_j^T}{t_j}\Big)a^T.
 
-and if the right side is at most b for each state and each step of the period, then the error stays within b for ever,
-by induction.
-
-Disturbances are given as columns: :math:`w_k = \sum_g G_{k,g}\rho_g + s`, :math:`|\rho_g| \le h_{k,g}`, :math:`|s| \le
-\text{slack}_k`, and :math:`|c w| \le \sum_g |c\,G_g| h_g + |c|\,\text{slack}`, which is smaller than :math:`|c||w|`
-if a disturbance affects several states at once.
-
-The limit of a rounding error follows from the largest size of a result *before* it is rounded: that of its linear
-function of the exact filter, plus what earlier errors and roundings of the step add. The last rounding of a state has
-another limit, the largest error h of a result of size X + b, if that is smaller. It uses the claim for the same step,
-but not in a circle: without this rounding, the certificate gives :math:`|s - x| \le b - h` for the sum s before it, so
-:math:`|s| \le X + b`, and the error of rounding such a number is at most h. The roundings of a step are taken in the
-order of its operations.
+With :math:`t^2 = \operatorname{tr} M` and :math:`t_j = |g_j|` the trace is smallest. Nothing is lost if all segments
+are parallel. Old errors nearly are: their fast modes have decayed, and only the slowest is left.
 
 Everything is float64. Each sum of terms of one sign is enlarged by more than its own rounding errors.
 """
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -47,12 +38,14 @@ from gpbnb.filters.program import MULTIPLY, effects, extents, functionals
 _U = 2.0**-53
 _UP = 1 + 2.0**-40
 """Factor that exceeds the effect of roundings on a sum of up to 2**12 terms of one sign."""
+_TINY = 1e-250
+"""Components below this are dropped; 1e-240 is added to the slack of a step that drops any."""
 
 ROUNDING, LOOP, GAIN, START = range(4)
 """Parts of a bound (roundings of the step, of the stored closed loop, error of the gain, and earlier errors)."""
 
 
-class Units(NamedTuple):
+class RoundingUnits(NamedTuple):
     r"""The largest rounding error of a result of at most a given size, :math:`\tfrac12 b^{e-t}` or :math:`b^{e-t}`.
 
     The size is below :math:`b^e`. The table covers sizes from 2**-900 to 2**900, or the range of the format. Below the
@@ -70,8 +63,8 @@ class Units(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def units(fmt: FloatFormat | FixedFormat) -> Units:
-    """Tables of :class:`Units` for a format."""
+def units(fmt: FloatFormat | FixedFormat) -> RoundingUnits:
+    """Tables of :class:`RoundingUnits` for a format."""
     limits, most = fmt.limits, int(850 / np.log2(fmt.base))
     sizes = [Fraction(fmt.base) ** k for k in range(-most, most + 1)]
     exact = [(float(power), float(power - Fraction(float(power)))) for power in sizes]
@@ -97,7 +90,7 @@ def units(fmt: FloatFormat | FixedFormat) -> Units:
         powers.append(near if Fraction(near) <= power else np.nextafter(near, 0))
         near_error = float(error)
         above.append(near_error if Fraction(near_error) >= error else np.nextafter(near_error, np.inf))
-    return Units(np.array(powers), np.array(above), np.array(exact), limits is not None and limits.fixed)
+    return RoundingUnits(np.array(powers), np.array(above), np.array(exact), limits is not None and limits.fixed)
 
 
 @compiled
@@ -118,20 +111,6 @@ def _is_power(units: Any, high: float, low: float) -> bool:
     if at >= len(units.exact):
         return False
     return bool(units.exact[at, 0] == sign * high and units.exact[at, 1] == sign * low)
-
-
-class FilterLimits(NamedTuple):
-    """Limits on the filter without rounding, in float64; none is negative, some may be infinite.
-
-    The state and the innovation, or the measurement, must be finite.
-    """
-
-    #: (n,), largest size of each state.
-    state: NDArray[np.float64]
-    #: (m,), largest size of each innovation.
-    innovation: NDArray[np.float64]
-    #: (m,), largest size of each measurement.
-    measurement: NDArray[np.float64]
 
 
 class Disturbances(NamedTuple):
@@ -158,7 +137,7 @@ def columns(found: Disturbances) -> NDArray[np.float64]:
     return np.abs(found.G) * np.where(found.G == 0, 0.0, found.limits[:, np.newaxis, :])
 
 
-class Steps(NamedTuple):
+class FilterSteps(NamedTuple):
     """Coefficients of some steps, and the exact filter of these steps."""
 
     #: (steps, c, 2), double-double.
@@ -199,7 +178,7 @@ def disturbances(program: Any, given: Any, units: Any, limits: Any, b: Any, caps
     Parameters
     ----------
     program : :class:`gpbnb.filters.program.Operations`.
-    given : Steps.
+    given : FilterSteps.
     units : units of the format.
     limits : limits on the filter without rounding.
     b : (n,), bound of the error before and after each step.
@@ -397,189 +376,160 @@ def _two_product(a: float, b: float, p: float) -> Any:
     return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
 
 
-class Columns(NamedTuple):
-    """Closed loops and columns of some steps; the first five fields are those of :class:`Disturbances`."""
+class Reach(NamedTuple):
+    """The set that contains the error after one step, the sum of all segments and ellipsoids."""
 
-    F: NDArray[np.float64]
-    spread: NDArray[np.float64]
-    G: NDArray[np.float64]
-    limits: NDArray[np.float64]
-    slack: NDArray[np.float64]
-    #: (g,), the part of the bound to which each column belongs.
-    part: NDArray[np.int64]
-
-
-class End(NamedTuple):
-    """When the rows of a certificate end."""
-
-    #: after this number of steps at the latest.
-    most: int
-    #: (n,), and once ``abs(c) @ scale`` of a row c is below `small`.
-    scale: NDArray[np.float64]
-    small: float
+    #: (window, columns, n); each segment is a row times a number from -1 to 1.
+    segments: NDArray[np.float64]
+    #: (columns,), the part of the bound to which a segment belongs.
+    kind: NDArray[np.int64]
+    #: (3, n, n), one for each part.
+    ellipsoids: NDArray[np.float64]
 
 
-class Sizes(NamedTuple):
-    """Sizes of the exact filter."""
-
-    #: (n,), largest size of each state so far.
-    state: NDArray[np.float64]
-    #: (m,), limit of each measurement.
-    measurement: NDArray[np.float64]
-    #: (n,), size of the first estimate.
-    first: NDArray[np.float64]
+def units_of_trace(scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return units of the states for :func:`take_in`, whose squares float64 can divide by; any are valid."""
+    return np.clip(np.where((scale > 0) & np.isfinite(scale), scale, 1.0), 1e-120, 1e120)
 
 
-class Certificate(NamedTuple):
-    """Results of :func:`certify` for each start."""
-
-    #: (t, 4), sums of each part of the disturbances, without earlier errors.
-    sums: NDArray[np.float64]
-    #: (t, n), sums of the residuals; they multiply the bound of errors at any earlier step.
-    residual: NDArray[np.float64]
-    #: (t, n), the last rows; they multiply the bound of the error where the rows end.
-    tail: NDArray[np.float64]
-    #: (t, n), the rows that reached the first estimate, zero if none did.
-    start: NDArray[np.float64]
-    #: number of steps that the rows went back.
-    lags: int
-
-
-@inner
-def effect(given: Any, at: int, c: Any, each: Any) -> None:
-    """Set `each`, (4,), to the effect of the disturbances of a step on the product c e, part by part."""
-    n, g_count = given.F.shape[1], given.G.shape[2]
-    for p in range(4):
-        each[p] = 0.0
-    for j in range(n):
-        each[ROUNDING] += abs(c[j]) * given.slack[at, j]
-    sums = np.zeros(g_count)
-    for j in range(n):  # sums of all columns side by side
-        for g in range(g_count):
-            sums[g] += c[j] * given.G[at, j, g]
-    for g in range(g_count):
-        if given.limits[at, g] != 0.0 and sums[g] != 0.0:
-            each[given.part[g]] += abs(sums[g]) * given.limits[at, g]
-
-
-@inner
-def _entries(given: Any) -> Any:
-    """Return where the rows of the closed loops have entries in any step, (n, n), and how many, (n,)."""
-    n = given.F.shape[1]
-    into, counts = np.zeros((n, n), np.int64), np.zeros(n, np.int64)
-    for j in range(n):
-        for r in range(n):
-            for k in range(given.F.shape[0]):
-                if given.F[k, j, r] != 0.0 or given.spread[k, j, r] != 0.0:
-                    into[j, counts[j]] = r
-                    counts[j] += 1
-                    break
-    return into, counts
+def nothing(window: int, part: NDArray[np.int64], n: int) -> Reach:
+    """Return the set before the first step, which contains only zero; `part` is the part of each column."""
+    kind = np.concatenate([part, np.full(n, ROUNDING, dtype=np.int64)])
+    return Reach(np.zeros((window, len(kind), n)), kind, np.zeros((3, n, n)))
 
 
 @compiled
-def certify(given: Any, starts: Any, k: int, first: int, steady: bool, end: Any) -> Any:
-    """Sum the effects of all earlier disturbances on some linear functions of the error after step k.
+def forward(
+    F: Any, spread: Any, G: Any, limits: Any, slack: Any, reach: Any, done: int, steps: int, before: Any, size: Any
+) -> Any:
+    """Bound the error after each of some steps, (steps, n), and its parts, (steps, n, 4).
 
     Parameters
     ----------
-    given : Columns; the rows from `first` on repeat for ever.
-    starts : (t, n), the functions.
-    k : the step; with `steady`, it counts from `first`, and the past is infinite.
-    end : End, when to stop.
+    F, spread, G, limits, slack : fields of :class:`gpbnb.bounds.envelope.Disturbances`, one row for each
+        step.
+    reach : the set after the previous steps; it becomes the set after the last step.
+    done : number of previous steps.
+    before : (n,), bound of the error before the first of these steps.
+    size : (n,), positive, scales of the states, which are the units of the trace of an ellipsoid.
     """
-    n, t, g_count = given.F.shape[1], starts.shape[0], given.G.shape[2]
-    rows = given.F.shape[0]
-    period = rows - first
-    sums, residual, tail, lags = np.zeros((t, 4)), np.zeros((t, n)), np.zeros((t, n)), 0
-    begun = np.zeros((t, n))
-    following, rate, each = np.empty(n), np.empty(n), np.empty(4)
-    into, counts = _entries(given)
-    for i in range(t):
-        c = starts[i].copy()
-        for lag in range(end.most):
-            if not steady and k - lag <= 0:
-                break
-            at = k - lag - 1
-            if steady:
-                at = first + at % period
-            elif at >= rows:
-                at = first + (at - first) % period
-            size = 0.0
+    n, g_count = F.shape[1], G.shape[2]
+    segments, kind, ellipsoids = reach
+    window, columns = segments.shape[0], segments.shape[1]
+    bounds, parts, moved = np.zeros((steps, n)), np.zeros((steps, n, 4)), np.empty(n)
+    last, reached = before.copy(), np.empty((3, n))
+    for k in range(steps):
+        number = done + k
+        loop, slot, dropped = F[k], number % window, 0.0
+        turned = np.ascontiguousarray(loop.T)  # so that the entries of a product are computed side by side
+        if number >= window:
+            take_in(segments[slot : slot + 1], kind, ellipsoids, size)
+            for p in range(3):
+                _move_ellipsoid(loop, ellipsoids[p])
+        for w in range(min(number, window)):
+            if w != slot:
+                for c in range(columns):
+                    moved[:] = 0.0
+                    for j in range(n):
+                        s = segments[w, c, j]
+                        for i in range(n):
+                            moved[i] += turned[j, i] * s
+                    for i in range(n):
+                        s = moved[i]
+                        if s != 0.0 and abs(s) <= _TINY:
+                            s, dropped = 0.0, 1e-240
+                        segments[w, c, i] = s
+        for i in range(n):
+            own = slack[k, i] + dropped
             for j in range(n):
-                size += abs(c[j]) * end.scale[j]
-            if size < end.small and lag >= n:  # a state that only repeats an earlier one has no disturbance of its own
-                break
-            effect(given, at, c, each)  # a sum of its own: no term takes part in more than n + g + lags additions
-            for p in range(4):
-                sums[i, p] += each[p]
+                own += 2 * spread[k, i, j] * last[j]
+            for g in range(g_count):
+                limit = limits[k, g]
+                segments[slot, g, i] = G[k, i, g] * limit if limit != 0.0 and G[k, i, g] != 0.0 else 0.0
+                own += 2 * _U * abs(segments[slot, g, i])
             for j in range(n):
-                following[j] = rate[j] = 0.0
-            for j in range(n):
-                if c[j] != 0.0 and counts[j] == n:
-                    for r in range(n):
-                        following[r] += c[j] * given.F[at, j, r]
-                        rate[r] += abs(c[j]) * given.spread[at, j, r]
-                elif c[j] != 0.0:
-                    for e in range(counts[j]):
-                        r = into[j, e]
-                        following[r] += c[j] * given.F[at, j, r]
-                        rate[r] += abs(c[j]) * given.spread[at, j, r]
-            for r in range(n):
-                c[r] = following[r]
-                residual[i, r] += rate[r]
-            lags = max(lags, lag + 1)
-            if not steady and k - lag - 1 <= 0:
-                for r in range(n):
-                    begun[i, r], c[r] = abs(c[r]), 0.0
-        for r in range(n):
-            residual[i, r] *= 1 + (lags + n + g_count + 64) * 4 * _U
-            tail[i, r] = abs(c[r])
-        for p in range(4):
-            sums[i, p] *= 1 + (lags + n + g_count + 64) * 4 * _U
-    return Certificate(sums, residual, tail, begun, lags)
+                segments[slot, g_count + j, i] = 0.0
+            segments[slot, g_count + i, i] = own * _UP
+        reached[:] = 0.0
+        for w in range(min(number + 1, window)):
+            for c in range(columns):
+                for i in range(n):
+                    reached[kind[c], i] += abs(segments[w, c, i])
+        for i in range(n):
+            total = 0.0
+            for p in range(3):
+                parts[k, i, p] = reached[p, i] + math.sqrt(ellipsoids[p, i, i])
+                total += parts[k, i, p]
+            bounds[k, i] = total * (1 + (window * columns + 64) * 4 * _U)
+        for i in range(n):
+            last[i] = bounds[k, i]
+    return bounds, parts
 
 
 @compiled
-def peaks(given: Any, HPhi: Any, known: Any, first: int, early: int, steady: bool, end: Any) -> Any:
-    """Return worst-case peaks of state and innovation of the exact filter, driven by the columns.
+def take_in(segments: Any, kind: Any, ellipsoids: Any, size: Any) -> None:
+    """Add segments (w, columns, n) to the ellipsoids, each to that of its part of the bound."""
+    n = size.shape[0]
+    for p in range(ellipsoids.shape[0]):
+        M = ellipsoids[p]
+        trace = 0.0
+        for i in range(n):
+            trace += M[i, i] / (size[i] * size[i])
+        own = math.sqrt(trace)
+        total = own
+        for w in range(segments.shape[0]):
+            for c in range(segments.shape[1]):
+                if kind[c] == p:
+                    total += _length(segments[w, c], size)
+        if total == own:
+            continue
+        total *= _UP
+        if own > 0.0:
+            _scale(M, total / own)
+        for w in range(segments.shape[0]):
+            for c in range(segments.shape[1]):
+                length = _length(segments[w, c], size) if kind[c] == p else 0.0
+                if length > 0.0:
+                    for i in range(n):
+                        for j in range(n):
+                            M[i, j] += segments[w, c, i] * segments[w, c, j] * (total / length)
+        for i in range(n):
+            M[i, i] *= 1 + n * (segments.shape[0] * segments.shape[1] + 16) * 4 * _U
 
-    Parameters
-    ----------
-    given : Columns.
-    HPhi : (steps, m, n), float64.
-    known : Sizes; those of the states are for the small terms and the tail.
-    early : number of first steps to examine.
-    steady : whether to examine each step of the period as well.
-    end : End, as for :func:`certify`.
-    """
-    n, m, rows = given.F.shape[1], HPhi.shape[1], given.F.shape[0]
-    X, Z, x0 = known
-    peak_x, peak_v = x0.copy(), np.zeros(m)
-    for r in range(m):
-        s = Z[r]
-        for j in range(n):
-            s += abs(HPhi[0, r, j]) * x0[j]
-        peak_v[r] = s * _UP
-    starts = np.zeros((n + m, n))
+
+@inner
+def _scale(M: Any, factor: float) -> None:
+    for i in range(M.shape[0]):
+        for j in range(M.shape[1]):
+            M[i, j] *= factor
+
+
+@inner
+def _length(segment: Any, size: Any) -> float:
+    s = 0.0
+    for i in range(size.shape[0]):
+        s += (segment[i] / size[i]) ** 2
+    return math.sqrt(s)
+
+
+@inner
+def _move_ellipsoid(loop: Any, M: Any) -> None:
+    """Replace M by an upper bound of F M F^T."""
+    n = M.shape[0]
+    half, reached, turned, row = np.zeros((n, n)), np.zeros(n), np.ascontiguousarray(loop.T), np.empty(n)
     for i in range(n):
-        starts[i, i] = 1.0
-    for k in range(1, early + (rows - first if steady else 0) + 1):
-        settled = k > early
-        at = k - early if settled else k
-        following = at if not settled else first + at
-        if following >= rows:
-            following = first + (following - first) % (rows - first) if steady else rows - 1
-        starts[n:] = HPhi[following]
-        found = certify(given, starts, at, first, settled, end)
-        for i in range(n + m):
-            total = found.sums[i].sum()
+        for r in range(n):
+            reached[i] += abs(loop[i, r]) * math.sqrt(M[r, r])
             for j in range(n):
-                total += (found.residual[i, j] + found.tail[i, j]) * X[j] + found.start[i, j] * x0[j]
-            if i < n:
-                peak_x[i] = max(peak_x[i], total * _UP)
-            else:
-                for j in range(n):
-                    total += 2.0**-50 * abs(starts[i, j]) * X[j]
-                peak_v[i - n] = max(peak_v[i - n], (Z[i - n] + total) * _UP)
-    return peak_x, peak_v
+                half[i, j] += loop[i, r] * M[r, j]
+    for i in range(n):
+        row[:] = 0.0
+        for r in range(n):
+            for j in range(i + 1):
+                row[j] += half[i, r] * turned[r, j]
+        for j in range(i + 1):
+            s = row[j]
+            if i == j:
+                s = max(s, 0.0) + n * (n + 4) * 8 * _U * reached[i] * reached[i]
+            M[i, j] = s
+            M[j, i] = s

@@ -1,0 +1,499 @@
+r"""Guess how far rounding moves the states of a filter; :mod:`gpbnb.bounds.check` proves the guess, or rejects it.
+
+Let the program of a step compute :math:`\hat F_k x + \hat K_k z` up to its roundings, and the exact filter
+:math:`x_k = (I - K_kH_k)\Phi_k x_{k-1} + K_k z_k`, with innovation :math:`\nu_k = z_k - H_k\Phi_kx_{k-1}`. Then
+:math:`e_k = \hat x_k - x_k` obeys
+
+.. math:: e_k = \hat F_k e_{k-1} + \Delta F_k x_{k-1} + (\hat K_k - K_k)\nu_k + \Gamma_k\rho_k, \qquad
+    \Delta F_k = \hat F_k - (I - \hat K_kH_k)\Phi_k ,
+
+where ρ holds the rounding errors of the operations, and the columns of Γ their effects on the result. A guess adds the
+largest effects of all columns over all earlier steps. Sizes of numbers, and so roundings, depend on the bound itself,
+which is raised until it bounds the sizes that it assumed. All of this is plain float64: a wrong guess is rejected.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.bounds.gains import Schedule, filter_schedule
+from gpbnb.bounds.units import largest_errors, stored_sizes, units
+from gpbnb.filters.poles import eigenvalues
+from gpbnb.filters.program import ADD, MULTIPLY, Program, matrices
+from gpbnb.filters.system import LinearFilter
+
+Array = NDArray[np.float64]
+
+ROUNDING, LOOP, GAIN = range(3)
+"""Parts of a bound: roundings of the estimate, roundings of the closed loop, errors of the gain."""
+
+EXCESS = 1 + 2.0**-20
+"""Factor by which a guess is larger than the sums, so that the checker may round outwards."""
+
+_BLOCK, _LAGS, _WORK = 64, 1_024, 1_200_000
+"""Powers of a loop that are computed at a time; lags that are summed one by one, at least, and times squared states."""
+_DENSE, _RATIO = 256, 1.02
+"""Steps whose bounds are guessed one by one, and the ratio of the later ones."""
+_ROUNDS, _LARGE = 60, 5_000_000
+_NOISE = 2.0**-48
+"""More than the errors of float64 in the size of a number."""
+
+
+class FilterLimits(NamedTuple):
+    """Limits on the filter without rounding, in float64; none is negative, some may be infinite.
+
+    The state and the innovation, or the measurement, must be finite.
+    """
+
+    #: (n,), largest size of each state.
+    state: Array
+    #: (m,), largest size of each innovation.
+    innovation: Array
+    #: (m,), largest size of each measurement.
+    measurement: Array
+
+
+class Guess(NamedTuple):
+    """What the checker is asked to prove.
+
+    Parameters
+    ----------
+    bound : (n,), bound of the error of each state; infinite if there is none.
+    state, innovation : limits of the exact filter, given or derived.
+    parts : (n, 3), parts of each bound, where it is largest.
+    """
+
+    bound: Array
+    state: Array
+    innovation: Array
+    parts: Array
+
+
+class Steps(NamedTuple):
+    """Some steps of a program as linear functions, in float64.
+
+    Parameters
+    ----------
+    factors : (operations, steps), size of the coefficient of each product.
+    rows : (values, steps, n + m), each value as a function of states and measurements.
+    effects : (values, steps, n), effect of an error of each value on the states after the step.
+    exact : (values, steps), whether the operation of a value never rounds.
+    F, K : (steps, n, n) and (steps, n, m), what the program computes.
+    loop, gain : their differences from the exact filter.
+    HPhi : (steps, m, n), what a measurement is expected to be.
+    """
+
+    factors: Array
+    rows: Array
+    effects: Array
+    exact: NDArray[np.bool_]
+    F: Array
+    K: Array
+    loop: Array
+    gain: Array
+    HPhi: Array
+
+
+def linear_steps(given: Schedule, at: NDArray[np.int64]) -> Steps:
+    """Return some rows of a schedule as linear functions."""
+    program, wide = given.program, np.longdouble
+    n, first = program.n, program.n + program.m
+    c = given.coefficients[at].astype(wide).sum(axis=-1).T
+    count, steps, powers = first + len(program.operations), len(at), units(given.fmt).exact
+    rows, effects = np.zeros((count, steps, first), wide), np.zeros((count, steps, n))
+    rows[np.arange(first), :, np.arange(first)] = 1
+    factors, exact = np.zeros((count - first, steps)), np.ones((count, steps), dtype=bool)
+    zero = np.zeros((count, steps), dtype=bool)
+    for v, (code, a, b) in enumerate(program.operations.tolist(), first):
+        if code == MULTIPLY:
+            rows[v], size = c[a][:, None] * rows[b], np.abs(c[a])
+            near = powers[np.minimum(np.searchsorted(powers, size.astype(np.float64)), len(powers) - 1)]
+            zero[v] = zero[b] | (size == 0)
+            factors[v - first], exact[v] = size, zero[v] | (near == size)
+        else:
+            rows[v] = rows[a] + rows[b] if code == ADD else rows[a] - rows[b]
+            zero[v], exact[v] = zero[a] & zero[b], zero[a] | zero[b]
+    for i, o in enumerate(program.outputs.tolist()):
+        effects[o, :, i] += 1
+    for v in range(count - 1, first - 1, -1):
+        code, a, b = program.operations[v - first].tolist()
+        if code == MULTIPLY:
+            effects[b] += c[a][:, None].astype(np.float64) * effects[v]
+        else:
+            effects[a] += effects[v]
+            effects[b] += effects[v] if code == ADD else -effects[v]
+    whole = rows[program.outputs].transpose(1, 0, 2)
+    Phi, HPhi, K = (each[at].astype(wide).sum(axis=-1) for each in (given.Phi, given.HPhi, given.exact))
+    loop, gain = whole[:, :, :n] - Phi + whole[:, :, n:] @ HPhi, whole[:, :, n:] - K
+    floats = (each.astype(np.float64) for each in (whole[:, :, :n], whole[:, :, n:], loop, gain, HPhi))
+    return Steps(factors, rows.astype(np.float64), effects, exact, *floats)
+
+
+def _times(a: Array, x: Array) -> Array:
+    """Multiply sizes of factors by limits, some of which may be infinite."""
+    return np.where(a == 0, 0.0, np.abs(a) * np.where(a == 0, 0.0, x)).sum(axis=-1)
+
+
+def value_sizes(steps: Steps, within: FilterLimits) -> Array:
+    """Return the largest size of each value of the exact filter, (values, steps)."""
+    n = steps.F.shape[1]
+    of_state, of_input = steps.rows[..., :n], steps.rows[..., n:]
+    known = _times(of_state + np.einsum("vkm,kmn->vkn", of_input, steps.HPhi), within.state)
+    seen = _times(of_state, within.state) + _times(of_input, within.measurement)
+    return np.minimum(known + _times(of_input, within.innovation), seen)
+
+
+def rounding_errors(
+    program: Program, fmt: FloatFormat | FixedFormat, steps: Steps, sizes: Array, ends: Array, b: Array
+) -> Array:
+    """Return the largest rounding error of each operation, (operations, steps).
+
+    Parameters
+    ----------
+    sizes : (values, steps), sizes without the errors b of the states.
+    ends : (n,), largest size of each state after the step, with its error.
+    """
+    n, first, table = program.n, program.n + program.m, units(fmt)
+    moved = np.abs(steps.rows[..., :n]) @ b
+    sizes = sizes + moved
+    before, h = np.zeros(sizes.shape), np.zeros(sizes.shape)
+    for v, (code, a, c) in enumerate(program.operations.tolist(), first):
+        before[v] = steps.factors[v - first] * before[c] if code == MULTIPLY else before[a] + before[c]
+        size = sizes[v] + before[v]
+        for i in np.flatnonzero(program.outputs == v):
+            size = np.minimum(size, ends[i])
+        noise = np.where(before[v] + moved[v] > 0, _NOISE, -_NOISE)  # limits are often powers of the base
+        error = largest_errors(fmt, size * (1 + noise))
+        exact = steps.exact[v] | (code != MULTIPLY) & (size <= table.aligned)
+        h[v] = np.where(exact & np.isfinite(error), 0.0, error)
+        before[v] += h[v]
+    return h[first:]
+
+
+def columns(program: Program, steps: Steps, h: Array) -> Array:
+    """Return the effects of the largest roundings of a step, (steps, n, groups), equal ones added."""
+    first = program.n + program.m
+    grouped = np.zeros((len(program.roots), h.shape[1]))
+    np.add.at(grouped, program.groups, h)
+    G = steps.effects[first + program.roots].transpose(1, 2, 0)
+    return np.asarray(G * np.where(G == 0, 0.0, grouped.T[:, None, :]))
+
+
+# -- constant loops ---------------------------------------------------------------------------------------------------
+
+
+def lags_of(radius: float, steps: int | None, n: int) -> int:
+    """Return how many lags are summed one by one, a power of two: all that count, unless they take too long."""
+    needed = math.log(1e-12) / math.log(min(max(radius, 1e-3), 1 - 1e-9)) if radius < 1 else _LAGS
+    most = max(_LAGS, _WORK // n**2)
+    return 2 ** math.ceil(math.log2(max(min(needed, most, steps or most), 1)))
+
+
+def radius_of(F: Array) -> float:
+    """Return the spectral radius of a loop; proofs do not use it."""
+    return float(np.abs(eigenvalues(F)).max(initial=0.0))
+
+
+def gains(F: Array, G: Array, rows: Array, steps: int | None, lags: int) -> Array:
+    """Return the sums of the sizes of r F^l G over l, (n + rows, columns), for unit rows and others.
+
+    Sums over more than some lags follow from squares of powers of the loop, as in :mod:`gpbnb.bounds.check`.
+    """
+    start, count = np.vstack([np.eye(len(F)), rows]), lags if steps is None else min(lags, steps)
+    sums, C = np.zeros((len(start), G.shape[1])), start
+    for lag in range(0, count, _BLOCK):
+        some = [C]
+        for _ in range(min(_BLOCK, count - lag)):
+            some.append(some[-1] @ F)
+        C, block = some[-1], np.array(some[:-1])
+        sums += np.abs(block @ G).sum(axis=0)
+    if steps is not None and steps <= lags:
+        return sums
+    P, T = C[: len(F)], sums[: len(F)]
+    blocks = None if steps is None else steps // lags
+    most = gains(F, G, rows[:0], steps % lags, lags) if steps is not None else np.zeros_like(T)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(200):
+            if blocks is None and np.abs(P).sum(axis=1).max() < 1e-30:
+                most = T
+                break
+            if blocks is not None:
+                most = T + np.abs(P) @ most if blocks & 1 else most
+                blocks >>= 1
+                if not blocks:
+                    break
+            P, T = P @ P, T + np.abs(P) @ T
+            if not np.isfinite(T).all():
+                return np.full(sums.shape, np.inf)
+        else:
+            return np.full(sums.shape, np.inf)
+    return sums + np.abs(C) @ most
+
+
+def positive(sizes: Array) -> Array:
+    """Return tiny numbers for zeros, so that the checker may round outwards."""
+    return np.asarray(np.maximum(sizes, 2.0**-40 * float(sizes[sizes > 0].min(initial=1.0))))
+
+
+def raised(bounded: Any, n: int) -> Array:
+    """Return the least positive bound that bounds itself, found from zero; infinite if there is none."""
+    b = np.zeros(n)
+    for _ in range(_ROUNDS):
+        new = bounded(b * EXCESS)
+        if not np.isfinite(new).all():
+            break
+        if (new <= b).all():
+            if (b > 0).all():
+                return b * EXCESS
+            new = positive(b)
+        b = np.maximum(b, new) * (1 + 2.0**-30)
+    return np.full(n, np.inf)
+
+
+class Loops(NamedTuple):
+    """Matrices of a filter with fixed coefficients, as stored and as given, in float64.
+
+    Parameters
+    ----------
+    F, K : (n, n) and (n, m), as stored.
+    A, B : (n, n) and (n, m), of the exact filter.
+    of_state, of_input : (n, n) and (n, m), F - A and K - B.
+    storing, kept : (m,), largest error of storing an input, and largest size of a stored one.
+    """
+
+    F: Array
+    K: Array
+    A: Array
+    B: Array
+    of_state: Array
+    of_input: Array
+    storing: Array
+    kept: Array
+
+
+def loops(program: Program, stored: Any, given: Any, storing: Array, kept: Array) -> Loops:
+    """Return the matrices of a program with stored coefficients and, for the exact filter, with others."""
+    (F, K), (A, B) = matrices(program, stored), matrices(program, given)
+    return Loops(*(each.astype(np.float64) for each in (F, K, A, B, F - A, K - B)), storing, kept)
+
+
+class Inputs(NamedTuple):
+    """What inputs do to a filter with fixed coefficients, whatever is rounded.
+
+    Parameters
+    ----------
+    state : (n,), largest size of each state of the exact filter.
+    values : (rows,), largest size of functions of state and input.
+    errors : (n,), error of each state due to storing coefficients and inputs.
+    """
+
+    state: Array
+    values: Array
+    errors: Array
+
+
+def of_inputs(given: Loops, Z: Array, rows: Array, steps: int | None) -> Inputs:
+    """Bound what inputs within limits do; `rows` (rows, n + m) are functions of state and input."""
+    n = len(given.F)
+    lags = lags_of(max(radius_of(given.A), radius_of(given.F)), steps, n)
+    sums = gains(given.A, given.B * Z, rows[:, :n], steps, lags).sum(axis=1)
+    state = positive(sums[:n] * EXCESS)
+    values = np.minimum(sums[n:] * EXCESS, _times(rows[:, :n], state)) + _times(rows[:, n:], given.kept)
+    errors = gains(given.F, given.K * given.storing, rows[:0, :n], steps, lags).sum(axis=1)
+    if given.of_state.any() or given.of_input.any():
+        both = np.block([[given.F, given.of_state], [np.zeros((n, n)), given.A]])
+        inputs = np.vstack([given.of_input, given.B]) * Z
+        errors += gains(both, inputs, np.zeros((0, 2 * n)), steps, lags)[:n].sum(axis=1)
+    return Inputs(state, values, errors)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def constant_guess(
+    made: LinearFilter, fmt: FloatFormat | FixedFormat, measurement: Array, steps: int | None, as_given: bool = False
+) -> Guess:
+    """Guess the bound of a filter with fixed coefficients.
+
+    Parameters
+    ----------
+    measurement : (m,), limits on the inputs before they are stored.
+    as_given : whether to compare with the filter and the inputs as given, and not as stored.
+    """
+    program, schedule = made.program, filter_schedule(made, fmt)
+    n, stored = program.n, made.stored(fmt)
+    kept = stored_sizes(fmt, measurement)
+    Z = measurement if as_given else kept
+    storing = largest_errors(fmt, measurement) * as_given
+    given = loops(program, stored, made.coefficients if as_given else stored, storing, kept)
+    none, slowest = np.full(n, np.inf), max(radius_of(given.A), radius_of(given.F))
+    if steps is None and slowest >= 1:
+        return Guess(none, none, Z, np.zeros((n, 3)))
+    step = linear_steps(schedule, np.zeros(1, dtype=np.int64))
+    inputs = of_inputs(given, Z, step.rows[:, 0], steps)
+    effects = step.effects[n + program.m :, 0].T
+    of_roundings = gains(given.F, effects, np.zeros((0, n)), steps, lags_of(slowest, steps, n))
+
+    def bounded(b: Array) -> Array:
+        h = rounding_errors(program, fmt, step, inputs.values[:, None], inputs.state + b, b)[:, 0]
+        return np.asarray(_times(of_roundings, h) + inputs.errors)
+
+    b = raised(bounded, n)
+    parts = np.zeros((n, 3))
+    parts[:, ROUNDING] = b
+    return Guess(b, inputs.state, Z, parts)
+
+
+# -- loops that change ------------------------------------------------------------------------------------------------
+
+
+class Course(NamedTuple):
+    """Which steps a guess looks at.
+
+    Parameters
+    ----------
+    at : rows of the schedule whose steps are taken as different; those from `first` on repeat.
+    ends : numbers of steps after which the errors are guessed.
+    lags : the largest number of earlier steps that count.
+    """
+
+    at: NDArray[np.int64]
+    first: int
+    ends: NDArray[np.int64]
+    lags: int
+
+    def rows(self, k: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the place in `at` of some steps, counted from 0."""
+        last = len(self.at) - 1
+        return np.minimum(np.where(k <= last, k, self.first + (k - self.first) % max(last + 1 - self.first, 1)), last)
+
+
+def course(given: Schedule, steps: int | None, radius: float, dense: bool) -> Course:
+    """Choose the steps of a guess; a gain that has nearly settled counts as settled."""
+    if steps is not None:
+        return Course(given.rows(np.arange(steps)), steps, np.arange(1, steps + 1), steps)
+    period, first = given.steps - given.first, given.first
+    c, k = given.coefficients[..., 0], np.arange(first)
+    late = first + (k - first) % period
+    size = np.abs(c[first:]).max(axis=0)
+    begun = first
+    if first * (given.program.n + given.program.m) * len(given.program.operations) > _LARGE:
+        near = (np.abs(c[:first] - c[late]) <= 1e-5 * (1 - radius) * size).all(axis=1)
+        begun = int(np.flatnonzero(~near).max(initial=-1)) + 1
+        begun = first - (first - begun) // period * period
+    at = np.concatenate([np.arange(begun), np.arange(first, first + period)])
+    lags = math.ceil(math.log(1e-9) / math.log(min(max(radius, 1e-3), 1 - 1e-12))) + 2 * period
+    some = np.arange(1, begun + lags + 1)
+    if not dense and len(some) > _DENSE:
+        grown = _DENSE * _RATIO ** np.arange(math.ceil(math.log(len(some) / _DENSE) / math.log(_RATIO)))
+        some = np.unique(np.concatenate([some[:_DENSE], grown.astype(np.int64)]))
+    return Course(at, begun, np.concatenate([some, begun + (lags // period + 1) * period + np.arange(period)]), lags)
+
+
+def summed(chosen: Course, F: Array, G: Array, part: NDArray[np.int64], starts: Array | None = None) -> Array:
+    """Sum the effects of the columns of all earlier steps after each end, part by part, (ends, rows, parts).
+
+    Parameters
+    ----------
+    starts : (ends, rows, n), functions of the state; by default each state.
+    """
+    n, parts = F.shape[1], np.eye(int(part.max(initial=0)) + 1)[part]
+    C = np.broadcast_to(np.eye(n), (len(chosen.ends), n, n)) if starts is None else starts
+    sums, ends, left = np.zeros((*C.shape[:2], parts.shape[1])), chosen.ends, np.arange(len(chosen.ends))
+    for lag in range(chosen.lags):
+        if (over := ends <= lag).any():
+            C, ends, left = C[~over], ends[~over], left[~over]
+        if not len(ends):
+            break
+        at = chosen.rows(ends - 1 - lag)
+        added = np.abs(C @ G[at]) @ parts
+        sums[left] += added
+        C = C @ F[at]
+        if lag % 16 == 15 and (added.sum(axis=2) <= 1e-12 * sums[left].sum(axis=2)).all():
+            break
+    return sums
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def filter_guess(given: Schedule, within: FilterLimits, steps: int | None, dense: bool = False) -> Guess:
+    """Guess the bound of a filter whose gain repeats, or over some steps."""
+    program, n, m = given.program, given.program.n, given.program.m
+    none = Guess(np.full(n, np.inf), np.full(n, np.inf), np.full(m, np.inf), np.zeros((n, 3)))
+    radius = 0.0 if steps is not None else loop_radius(given)
+    if radius >= 1:
+        return none
+    chosen = course(given, steps, radius, dense)
+    each = linear_steps(given, chosen.at)
+    known = derived_limits(given, chosen, each, within)
+    if not all(np.isfinite(limit).all() for limit in known[:2]):
+        return none
+    exact = each.loop * known.state, each.gain * known.innovation
+    part = np.array([ROUNDING] * len(program.roots) + [LOOP] * n + [GAIN] * m)
+    sizes, found = value_sizes(each, known), np.zeros((0, n, 3))
+
+    def bounded(b: Array) -> Array:
+        nonlocal found
+        h = rounding_errors(program, given.fmt, each, sizes, known.state + b, b)
+        if not np.isfinite(h).all():
+            return np.full(n, np.inf)
+        G = np.concatenate([columns(program, each, h), *exact], axis=2)
+        found = summed(chosen, each.F, G, part)
+        return np.asarray(found.sum(axis=2).max(axis=0, initial=0.0))
+
+    b = raised(bounded, n)
+    if not np.isfinite(b).all():
+        return none._replace(state=known.state, innovation=known.innovation)
+    worst = found[found.sum(axis=2).argmax(axis=0), np.arange(n)]
+    return Guess(b, known.state, known.innovation, worst)
+
+
+def loop_radius(given: Schedule) -> float:
+    """Return the growth of an error per step, averaged over a period."""
+    F, whole = linear_steps(given, np.arange(given.first, given.steps)).F, np.eye(given.program.n)
+    for each in F:
+        whole = each @ whole
+    return float(radius_of(whole) ** (1 / len(F)))
+
+
+def derived_limits(given: Schedule, chosen: Course, each: Steps, within: FilterLimits) -> FilterLimits:
+    """Return limits on state and innovation, derived from those of the measurements where they are not given."""
+    if np.isfinite(within.state).all() and np.isfinite(within.innovation).all():
+        return within
+    n, m, Z = given.program.n, given.program.m, within.measurement
+    x0 = given.x0.astype(np.float64)
+    X, V, part = np.zeros(n), np.zeros(m), np.zeros(m + n + m, dtype=np.int64)
+    ends = np.concatenate([[0], chosen.ends])
+    whole = chosen._replace(ends=ends)
+    following = each.HPhi[chosen.rows(ends)]
+    starts = np.concatenate([np.broadcast_to(np.eye(n), (len(ends), n, n)), following], axis=1)
+    begun = np.abs(_begun(whole, each.F, starts, x0))
+    for _ in range(_ROUNDS):
+        G = np.concatenate([each.K * Z, each.loop * X, each.gain * V], axis=2)
+        peaks = (summed(whole, each.F, G, part, starts)[..., 0] + begun).max(axis=0)
+        x, v = np.minimum(peaks[:n], within.state), np.minimum(Z + peaks[n:], within.innovation)
+        if not (np.isfinite(x).all() and np.isfinite(v).all()):
+            break
+        if (x <= X).all() and (v <= V).all():
+            X, V = positive(X * EXCESS), positive(V * EXCESS)
+            return FilterLimits(np.minimum(within.state, X), np.minimum(within.innovation, V), Z)
+        X, V = np.maximum(X, x) * (1 + 2.0**-30), np.maximum(V, v) * (1 + 2.0**-30)
+    return FilterLimits(np.full(n, np.inf), np.full(m, np.inf), Z)
+
+
+def _begun(chosen: Course, F: Array, starts: Array, x0: Array) -> Array:
+    """Return what is left of the first estimate after each end, (ends, rows)."""
+    if not x0.any():
+        return np.zeros(starts.shape[:2])
+    states, x, most = np.zeros((len(chosen.ends), len(x0))), x0, int(chosen.ends.max())
+    places = {int(end): i for i, end in enumerate(chosen.ends)}
+    for k in range(most + 1):
+        if k in places:
+            states[places[k]] = x
+        x = F[chosen.rows(np.array([k]))[0]] @ x
+        if np.abs(x).max() < 1e-30 * np.abs(x0).max():
+            break
+    return np.einsum("ern,en->er", starts, states)

@@ -1,0 +1,162 @@
+"""Attack guarantees with emulated runs: ``python -m gpbnb.report.guarantees.attack`` prints a table by form and format.
+
+A seed determines a filter, a format, limits and inputs. Kalman filters are those of
+:mod:`gpbnb.report.guarantees.filters`. Linear systems are compared with the system as given, in floating point with and
+without a range, in fixed point and in words. Their inputs are random, constant, those that move an output furthest, and
+the best of some tries at each step.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.bounds.system import output_errors
+from gpbnb.bounds.words import WordGuarantee
+from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.words import WordFormats, run_words
+from gpbnb.report.guarantees.filters import examine
+from gpbnb.report.guarantees.random_filters import DETERMINISTIC
+
+KINDS = ("unlimited", "subnormal", "flushed", "fixed point", "words")
+STEPS, CANDIDATES = 200, 8
+
+
+class Attacked(NamedTuple):
+    """A filter that was attacked: its kind, the number of runs, and the largest error / bound."""
+
+    kind: str
+    runs: int
+    largest: float
+
+
+def kalman(seed: int) -> Attacked:
+    """Attack the guarantee of a Kalman filter."""
+    row = examine(seed)
+    if row.wrong:
+        raise AssertionError(f"got {row}; needed no error above its bound")
+    return Attacked(row.form.replace("_", " "), row.runs, row.largest)
+
+
+def drawn_system(rng: np.random.Generator) -> tuple[LinearSystem, NDArray[np.float64]]:
+    """Draw a stable system with one to four states, and limits on its inputs."""
+    n, m, p = int(rng.integers(1, 5)), int(rng.integers(1, 3)), int(rng.integers(1, 3))
+    A = rng.standard_normal((n, n))
+    A *= rng.uniform(0.2, 0.95) / np.abs(np.linalg.eigvals(A)).max()
+    parts = (A, rng.standard_normal((n, m)), rng.standard_normal((p, n)), rng.standard_normal((p, m)))
+    return LinearSystem(*(np.round(each * 2**12) / 2**12 for each in parts)), 10.0 ** rng.uniform(-1, 1, m)
+
+
+def drawn_format(rng: np.random.Generator, kind: str) -> FloatFormat | FixedFormat | WordFormats:
+    """Draw a format of a kind."""
+    rounding, base = DETERMINISTIC[int(rng.integers(len(DETERMINISTIC)))], int(rng.choice([2, 3, 10, 16]))
+    digits = int(rng.integers(8, 25) / np.log2(base)) + 2
+    if kind == "unlimited":
+        return FloatFormat(base, digits, rounding)
+    if kind in ("subnormal", "flushed"):
+        span = int(np.ceil(rng.integers(8, 20) / np.log2(base)))
+        return FloatFormat(2 if base == 10 else base, digits, rounding, -span, 64, kind == "subnormal")
+    data = FixedFormat(16, int(rng.integers(8, 20)), rounding)
+    if kind == "fixed point":
+        return data
+    wide = FixedFormat(20, data.fraction_bits + int(rng.integers(0, 12)), rounding)
+    return WordFormats(data, int(rng.integers(10, 20)), wide if rng.integers(2) else None)
+
+
+def outputs(system: LinearSystem, fmt: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the outputs of a run, (steps, p, 2)."""
+    if isinstance(fmt, FixedFormat):
+        fmt = WordFormats(fmt)
+    if isinstance(fmt, WordFormats):
+        return np.asarray(run_words(system, u, fmt).outputs(system.p))
+    return np.asarray(system.outputs(u, fmt))
+
+
+def errors(system: LinearSystem, fmt: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the error of each output at each step, (steps, p)."""
+    off = outputs(system, fmt, u) - system.outputs(u)
+    return np.asarray(off[..., 0] + off[..., 1])
+
+
+def inputs(
+    system: LinearSystem, fmt: Any, most: NDArray[np.float64], rng: np.random.Generator
+) -> Iterator[NDArray[np.float64]]:
+    """Give the inputs of each run, (steps, m)."""
+    m, at = system.m, int(rng.integers(system.p))
+    for _ in range(3):
+        yield most * rng.uniform(-1, 1, (STEPS, m))
+    for level in (np.ones(m), rng.choice((-1.0, 1.0), m), rng.uniform(-1, 1, m)):
+        yield np.broadcast_to(most * level, (STEPS, m)).copy()
+    responses = []
+    for j in range(m):
+        unit = np.zeros((STEPS, m))
+        unit[0, j] = 1.0
+        responses.append(system.outputs(unit)[::-1, at, 0])
+    worst = most * np.where(np.array(responses).T >= 0, 1.0, -1.0)
+    yield worst
+    yield worst * rng.uniform(0.9, 1, (STEPS, m))
+    chosen = worst.copy()
+    for k in range(0, STEPS, 25):  # the best of some tries for a stretch, by the error at its end
+        tries = [chosen]
+        for _ in range(CANDIDATES - 1):
+            other = chosen.copy()
+            other[k : k + 25] = most * rng.uniform(-1, 1, (len(other[k : k + 25]), m))
+            tries.append(other)
+        chosen = max(tries, key=lambda u: float(np.abs(errors(system, fmt, u[: k + 25])[-1, at])))
+    yield chosen
+
+
+def linear(seed: int) -> Attacked:
+    """Attack the guarantee of a linear system."""
+    rng, kind = np.random.default_rng([55, seed]), KINDS[seed % len(KINDS)]
+    system, most = drawn_system(rng)
+    fmt = drawn_format(rng, kind)
+    try:
+        if isinstance(fmt, FloatFormat):
+            bound = output_errors(system, fmt, most)
+        else:
+            words = WordFormats(fmt) if isinstance(fmt, FixedFormat) else fmt
+            bound = WordGuarantee(system, most).errors(words)
+    except (ValueError, OverflowError):
+        return Attacked(kind, 0, 0.0)
+    runs, largest = 0, 0.0
+    for u in inputs(system, fmt, most, rng):
+        ratio = float((np.abs(errors(system, fmt, u)).max(axis=0) / bound).max())
+        if ratio > 1:
+            raise AssertionError(f"seed {seed}: got {ratio} of the bound in {fmt}; needed at most 1")
+        runs, largest = runs + 1, max(largest, ratio)
+    return Attacked(kind, runs, largest)
+
+
+def table(found: Sequence[Attacked]) -> str:
+    """Count filters and runs by kind, with the largest error / bound."""
+    lines = ["kind                    filters   bounded      runs   largest error / bound"]
+    for kind in sorted({each.kind for each in found}):
+        some = [each for each in found if each.kind == kind]
+        bounded, runs = sum(each.runs > 0 for each in some), sum(each.runs for each in some)
+        lines.append(f"{kind:22} {len(some):8} {bounded:9} {runs:9}   {max(each.largest for each in some):.4f}")
+    lines.append(f"{'all':22} {len(found):8} {'':9} {sum(each.runs for each in found):9}")
+    return "\n".join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Attack some filters of each kind, and print the table."""
+    parser = argparse.ArgumentParser(prog="python -m gpbnb.report.guarantees.attack", description=__doc__)
+    parser.add_argument("--filters", type=int, default=1_500, help="number of Kalman filters")
+    parser.add_argument("--systems", type=int, default=1_500, help="number of linear systems")
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    given = parser.parse_args(arguments)
+    found = [kalman(given.first + seed) for seed in range(given.filters)]
+    found += [linear(given.first + seed) for seed in range(given.systems)]
+    print(table(found))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

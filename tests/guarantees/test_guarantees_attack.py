@@ -1,0 +1,28 @@
+"""gpbnb.report.guarantees.attack: no run of a seeded slice exceeds its bound, and the bounds are not far above."""
+
+from __future__ import annotations
+
+import pytest
+
+from gpbnb.report.guarantees import attack
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_run_of_a_linear_system_exceeds_its_bound(seed: int) -> None:
+    found = attack.linear(seed)
+    assert found.kind == attack.KINDS[seed % 5]
+    assert found.largest <= 1
+    assert found.runs in (0, 9)
+    assert not found.runs or found.largest > 0.02
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_run_of_a_kalman_filter_exceeds_its_bound(seed: int) -> None:
+    assert attack.kalman(seed).largest <= 1
+
+
+def test_a_bound_that_promises_too_much_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = attack.output_errors
+    monkeypatch.setattr(attack, "output_errors", lambda *given: whole(*given) / 50)
+    with pytest.raises(AssertionError, match="of the bound"):
+        attack.linear(5)
