@@ -195,6 +195,31 @@ def test_mathjax_is_left_out_where_a_page_has_no_formula(equations, kept):
     assert scripts[2] in context["script_files"]
 
 
+STYLES = """@import "a;b{c";
+.used { color: red } /* .used{ */ .unused, .used > p:not(.unused) { content: "}" } .unused{}
+:is(.used, .unused), .w-50\\% { margin: 0 } a[href=".x"] {b:c}
+@media print { .unused { d: e } .used { f: g } } @media screen { .unused { h: i } }
+@font-face { font-family: "x" }"""
+
+
+def test_rules_stay_that_fit_a_class_of_a_page_or_no_class():
+    kept = [
+        '@import "a;b{c";',
+        ".used{ color: red }",
+        ' .used > p:not(.unused){ content: "}" }',
+        ":is(.used, .unused){ margin: 0 }",
+        'a[href=".x"]{b:c}',
+        "@media print{.used{ f: g }}",
+        '@font-face{ font-family: "x" }',
+    ]
+    assert weight.applying(STYLES, {"used"}) == "".join(kept)
+
+
+def test_braces_that_do_not_match_are_refused():
+    with pytest.raises(ValueError, match="balanced"):
+        weight.applying("a { b: c", set())
+
+
 # -- the ledger's rows as labels, its formulas and links -----------------------------------------------
 
 

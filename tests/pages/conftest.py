@@ -89,12 +89,12 @@ def look_at(open_page):
         yield look_at
 
 
-# All tests of one address follow each other.
-@pytest.fixture(params=[(a, s) for a in tools.pages() for s in tools.SIZES], ids="-".join)
+# Of the session, so that pytest lets all tests of one address follow each other.
+@pytest.fixture(scope="session", params=[(a, s) for a in tools.pages() for s in tools.SIZES], ids="-".join)
 def page(request, look_at):
     return look_at(*request.param)
 
 
-@pytest.fixture(params=tools.pages(), ids=lambda address: f"{address}-paper")
+@pytest.fixture(scope="session", params=tools.pages(), ids=lambda address: f"{address}-paper")
 def paper(request, look_at):
     return look_at(request.param, "paper")
