@@ -232,12 +232,21 @@ PLAIN_FORMS = {
 
 
 def as_functions(model: Model, z: Any, fmt: Format, form: str) -> Steps:
-    if form not in PLAIN_FORMS or len(model.Q) > 1 or len(model.R) > 1:
+    if form in ("Potter", "Carlson", "symmetrized"):
         raise NotImplementedError
-    given = (model.Q[0], model.R[0], model.x0, model.P0)
-    plain = Extended(Linear(model.Phi[0]), Linear(model.H[0]), given, PLAIN_FORMS[form], rounds(fmt))
-    plain.angle = False
-    yield from _followed(plain, z, [[]] * len(z), form)
+    parts = (Linear(model.Phi[0]), Linear(model.H[0]))
+    plain, *others = (
+        Extended(*parts, (Q, R, model.x0, model.P0), PLAIN_FORMS[form], rounds(fmt)) for Q in model.Q for R in model.R
+    )
+    plain.angle, noise = False, [(each.Q, each.R) for each in (plain, *others)]
+    for k, row in enumerate(z):
+        plain.Q = noise[k % len(model.Q) * len(model.R)][0]
+        plain.R = noise[k % len(model.R)][1]
+        try:
+            plain.step(row, [])
+        except (OverflowError, ZeroDivisionError, ValueError):
+            return
+        yield {"x": list(plain.x), "P": _of_factors(plain.P) if form == "UD" else plain.P}
 
 
 def tracked(motion: str, given: Any, z: Any, u: Any, fmt: Format, form: str, **options: Any) -> Steps:
