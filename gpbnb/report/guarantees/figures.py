@@ -53,7 +53,7 @@ def reachable_corners(found: Guarantee) -> NDArray[np.float64]:
     """
     F, G, limits = (each[-1] for each in separate_roundings(found))
     rows, halves = np.eye(len(F)), list[NDArray[np.float64]]()
-    while np.abs(rows).max() > 1e-9:
+    while np.abs(rows).max() > 1e-16:
         halves += [*(rows @ G * limits).T]
         rows = rows @ F
     segments = np.array([half if (half[0], half[1]) > (0, 0) else -half for half in halves if half.any()])
