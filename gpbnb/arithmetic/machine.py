@@ -45,7 +45,7 @@ def tables(formats: Sequence[Any]) -> tuple[Any, Any]:
         if tag is None:
             raise ValueError("no loops")
         if isinstance(tag, tags.Limited) and isinstance(tag.mode, tags.Random):
-            random = fmt.backend.tag.mode.state.reshape(1, 2) if len(formats) == 1 else random
+            random = tag.mode.state.reshape(1, 2)
         kinds.add(_row(fmt, tag, whole[i], numbers[i]))
     (kind,) = kinds
     made = {"masks": machine.Masks, "pairs": machine.InPairs, "words": machine.InTwoWords}[kind]()

@@ -69,6 +69,15 @@ def transpose(fmt: Any, a: Any, c: Any) -> None:
 
 
 @borrowing
+def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """c = a + b."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            put(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+    guard(fmt, c)
+
+
+@borrowing
 def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a - b."""
     for i in range(a.shape[0]):
