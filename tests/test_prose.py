@@ -40,7 +40,6 @@ NOT_PROSE = re.compile(
             r"^```\{glossary\}$|```.*?```|^```$",  # code and figures, but not the glossary
             r"<form.*?</form>",  # fields of calculators
             r"^:{3,}.*?$|^:\w+:.*?$",  # directives and their options
-            r"<form.*?</form>|</?[a-z][^>]*>",  # HTML
             r"\$\$.*?\$\$|\$[^$]*\$",  # math
             r"\{[\w:-]+\}`[^`]*`|`[^`]*`",  # roles, glue among them, and inline code
             r"(?<=\])\([^)\s]*\)",  # where a link leads
