@@ -224,8 +224,8 @@ def _check(given: argparse.Namespace) -> None:
     if given.fixed:
         if given.certificate:
             raise ValueError(
-                "got --fixed and --certificate; needed floating point for a certificate, since its checker covers no "
-                "fixed point; leave out one of the two"
+                "got --fixed and --certificate; needed floating point for a certificate: the command writes none for "
+                "words; leave out one of the two, or call WordGuarantee(...).proof(...) from Python"
             )
         names = ("format", "digits", "base", "emin", "emax")
         if others := [f"--{name}" for name in names if getattr(given, name) is not None]:
