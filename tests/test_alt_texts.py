@@ -17,7 +17,6 @@ from gpbnb.filters.forms import Form
 from gpbnb.report.budget import theory as budget
 from gpbnb.report.geometry import theory as geometry
 from gpbnb.report.gravity_probe_b import answers, threshold, year
-from gpbnb.report.kalman import ensembles
 from gpbnb.report.rolling import experiment as rolling_experiment
 from gpbnb.report.rolling import theory as rolling
 from gpbnb.report.rounding import experiment as rounding
@@ -70,28 +69,6 @@ def test_years_within_a_milliarcsecond():
         "all points lie above it up to 24 bits, some at 25, and none from 26 bits on",
         "a factor of about two in the coarsest formats, and of up to ten in finer ones",
     )
-
-
-def test_violations_of_the_kalman_bounds():
-    found = ensembles.load()
-
-    def share(field: str, form: str) -> float:
-        group = [each for each in found if each.form == form]
-        return 100 * sum(getattr(each, field) for each in group) / sum(each.trials for each in group)
-
-    forms = [form.name.lower() for form in Form]
-    first, second, third = ([share(f"violations_{n}", form) for form in forms] for n in (105, 108, 125))
-    assert first[0] == first[1] == first[2]
-    says(
-        "kalman",
-        "fig-kalman-violations",
-        f"{first[0]:.0f} percent of the filters violate (105) in the three conventional forms",
-        f"{first[3]:.0f} percent in Joseph's form and {first[4]:.0f} percent with the factors",
-        ", ".join(f"{each:.0f}" for each in second[:4]) + f" and {second[4]:.0f} percent violate (108)",
-        f"{third[0]:.0f} percent violate (125), but {third[1]:.0f} percent with the second gain",
-        f"{third[3]:.0f} percent in Joseph's form",
-    )
-    assert 0 <= third[4] < 1
 
 
 def test_what_rolling_buys():

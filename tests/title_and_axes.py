@@ -76,7 +76,6 @@ TITLE_AND_AXES = {
     ),
     "kalman test_guarantee": ("", "step", "rounding error of the speed, m/s"),
     "kalman test_shares": ("", "decimal digits", "largest error in a year (mas, mas/yr)"),
-    "kalman test_violations": ("", "form of the filter", "filters that violate the bound (%)"),
     "kalman test_years[covariance]": ("", "step $k$", "relative error of the covariance"),
     "kalman test_years[drift]": ("", "step $k$", "error of the drift angle (mas)"),
     "kalman test_years[gain]": ("", "step $k$", "relative error of the gain"),

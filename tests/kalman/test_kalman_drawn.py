@@ -221,27 +221,6 @@ def test_contraction(ax):
     ]
 
 
-def test_violations(ax):
-    def summary(form, trials, *violated):
-        names = dict(zip(("violations_105", "violations_108", "violations_125"), violated, strict=True))
-        return SimpleNamespace(form=form, trials=trials, **names)
-
-    found = [summary("hung", 10, 10, 5, 0), summary("hung", 30, 10, 5, 1), summary("ud", 20, 5, 0, 2)]
-    bars = figures.violations(found, ax)
-    assert [(bar.get_x() + bar.get_width() / 2, bar.get_height()) for bar in bars] == [
-        (pytest.approx(x), pytest.approx(y))
-        for x, y in [(-0.27, 50), (0.73, 25), (0, 25), (1, 0), (0.27, 2.5), (1.27, 10)]
-    ]
-    assert [to_hex(bar.get_facecolor()).upper() for bar in bars] == [BLUE, BLUE, PURPLE, PURPLE, PINK, PINK]
-    shown = {
-        text.get_text(): to_hex(handle.patches[0].get_facecolor()).upper()
-        if hasattr(handle, "patches")
-        else to_hex(handle.get_facecolor()).upper()
-        for text, handle in zip(ax.get_legend().get_texts(), ax.get_legend().legend_handles, strict=True)
-    }
-    assert shown == {"(105)": BLUE, "(108)": PURPLE, "(125)": PINK}
-
-
 def test_shares(ax):
     def share(states, precision, errors):
         return Share("", states, "", FloatFormat(2, precision), np.array(errors), 0, 0.0, 0.0, 0.0)

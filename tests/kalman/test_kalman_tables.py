@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,139 +12,19 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.confidence import interval
+from gpbnb.report.display.tables import short
 from gpbnb.report.gravity_probe_b import tables as gravity_probe_b_tables
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.answers import Moved
 from gpbnb.report.gravity_probe_b.model import gravity_probe_b
 from gpbnb.report.gravity_probe_b.threshold import Share
-from gpbnb.report.kalman import ensembles, independent, printed, report_bounds, smallest, tables
+from gpbnb.report.kalman import independent, printed, report_bounds, tables
 from gpbnb.wordlength.requirement import Requirement
 
 
 def cells(table):
     assert len({len(row) for row in (table.header, *table.body)}) == 1
     return [list(row) for row in table.body]
-
-
-def test_the_example_by_every_formula():
-    table = tables.example(*report_bounds.EXAMPLE)
-    rows = cells(table)
-    assert table.title == "the closing example, 4 ways"
-    assert by_header(table)[7] == {
-        "(125)": "and covariance errors carried on",
-        "term": "second",
-        "coefficient": r"$8.8862\times10^{20}$",
-        r"$\beta$ = 1 / coefficient": r"$1.125\times10^{-21}$",
-        "decimal digits": "22",
-        "error in IEEE double": r"$9.9\times10^{4}$",
-    }
-    assert [row[0] for row in rows[::2]] == [row[0] for row in rows[1::2]] == list(report_bounds.CORRECTIONS)
-    assert rows[0][1:] == ["first", r"$2.5860\times10^{8}$", r"$3.867\times10^{-9}$", "10", r"$2.9\times10^{-8}$"]
-    assert rows[1][1:] == ["second", r"$4.0775\times10^{14}$", r"$2.452\times10^{-15}$", "16", r"$4.5\times10^{-2}$"]
-    assert [row[4] for row in rows] == ["10", "16", "10", "16", "10", "16", "15", "22"]
-
-
-def test_the_misprints():
-    table = tables.misprints(*report_bounds.EXAMPLE)
-    rows = {row[0]: row[1:] for row in cells(table)}
-    assert table.title == "the printed numbers of the closing example"
-    assert by_header(table)[0] == {
-        "number": "first coefficient",
-        "printed": r"$2.6490\times10^{8}$",
-        "formula": r"$2.5860\times10^{8}$",
-        "explanation": "84 times $k$, from a factor $7n+4m+6$ or $7n+3m+8$",
-    }
-    assert rows["second coefficient"][2] == (r"84 as above, and × in place of +: $k(3n+1)\cdot0.5(k-1)\cdot84$")
-    assert list(rows) == [
-        "first coefficient",
-        "second coefficient",
-        "first beta",
-        "first digits",
-        "second beta",
-        "second digits",
-    ]
-    assert rows["first coefficient"][:2] == [r"$2.6490\times10^{8}$", r"$2.5860\times10^{8}$"]
-    assert rows["second coefficient"][:2] == [r"$1.2949\times10^{16}$", r"$4.0775\times10^{14}$"]
-    assert "84" in rows["first coefficient"][2]
-    assert r"\cdot84$" in rows["second coefficient"][2]
-    assert rows["first beta"] == [
-        r"$.3775\times10^{-8}$",
-        r"$3.867\times10^{-9}$",
-        "1 divided by the printed coefficient",
-    ]
-    assert rows["first digits"] == ["$9$", "10", "the printed β corresponds to 9.12 digits, so 10 are needed"]
-    assert rows["second digits"] == ["$17$", "16", "the printed β corresponds to 16.81 digits, so 17 are needed"]
-
-
-def test_misprints_that_are_none_are_not_claimed():
-    rows = {row[0]: row[1:] for row in cells(tables.misprints(1000, 3, 1))}
-    assert rows["second coefficient"][2] == "not found"
-
-
-def test_a_printed_beta_that_does_not_follow_is_named(monkeypatch):
-    monkeypatch.setitem(report_bounds.PRINTED, "first beta", ".5e-8")
-    rows = {row[0]: row[1:] for row in cells(tables.misprints(*report_bounds.EXAMPLE))}
-    assert rows["first beta"][2] == "not 1 divided by the printed coefficient"
-
-
-def test_what_one_grants():
-    table = tables.tolerances(*report_bounds.EXAMPLE, Fraction(1), Fraction(6606))
-    rows = cells(table)
-    assert table.title == "digits for an error of 1 and for the tolerance"
-    assert by_header(table)[3] == {
-        "dominant term": "second",
-        "allowed error, relative": r"$1.5\times10^{-4}$",
-        "allowed error (mas)": "$1.0$",
-        "decimal digits": "20",
-        "bits": "62",
-    }
-    assert [row[0] for row in rows] == ["first", "first", "second", "second"]
-    assert [row[3:] for row in rows] == [["10", "28"], ["13", "41"], ["16", "49"], ["20", "62"]]
-    assert rows[1][1:3] == [r"$1.5\times10^{-4}$", "$1.0$"]
-
-
-def test_violations():
-    table = tables.violations([FloatFormat(10, 4), FloatFormat(10, 4, Rounding.CHOP)])
-    rows = cells(table)
-    assert table.title == "4 runs of the smallest filter"
-    assert by_header(table)[0] == {
-        "arithmetic": "4 decimal digits",
-        "form of (99)": "first",
-        "error / (105)": "333",
-        "error / (108)": "0.00222",
-        "error / (125)": "125",
-    }
-    assert rows[0] == ["4 decimal digits", "first", "333", "0.00222", "125"]
-    assert rows[1] == ["4 decimal digits", "second", "333", "222", r"$1.25\times10^{7}$"]
-    assert rows[2][0] == "4 decimal digits, chopped"
-
-
-def test_the_order():
-    table = tables.order()
-    assert table.title == "the order of (98)-(101)"
-    assert by_header(table) == [
-        {"form of (99)": "first", "order": "(100) → (99) → (101) → (98)"},
-        {"form of (99)": "second", "order": "none: (99) needs the result of (101), and (101) that of (99)"},
-    ]
-
-
-def test_the_largest_violating_noise():
-    fmt = FloatFormat(2, 5)
-    table = tables.largest_violating_noise([fmt])
-    rows = cells(table)
-    assert table.title == "the largest noise that breaks a bound, 2 ways"
-    assert by_header(table)[1] == {
-        "arithmetic": "5 bits",
-        "form of (99)": "second",
-        "$R$ for (105)": "0.117",
-        "$R$ for (108)": "0.105",
-        "$R$ for (125)": "0.164",
-    }
-    first, second = (smallest.largest_violating_noise(fmt, form) for form in (False, True))
-    assert [row[:2] for row in rows] == [["5 bits", "first"], ["5 bits", "second"]]
-    assert rows[0][2] == f"{float(first['covariance']):.3g}"
-    assert rows[0][3] == "none"
-    assert rows[1][2:] == [f"{float(second[name]):.3g}" for name in ("covariance", "gain", "state")]
 
 
 def test_the_states():
@@ -228,7 +107,7 @@ def test_slack():
         "(125), and covariance errors carried on",
         "companion bound",
     )
-    assert row[:3] == ["24 bits", "0.5", tables.short(beta * (7 * first + 5 * second) / 0.5)]
+    assert row[:3] == ["24 bits", "0.5", short(beta * (7 * first + 5 * second) / 0.5)]
     assert row[-1] == "1.25000"
     with pytest.raises(ValueError, match="needed one up to step 3"):
         gravity_probe_b_tables.slack(
@@ -236,52 +115,6 @@ def test_slack():
             [year.YearBounds(*[*vars(bounds).values()][:1], np.array([1, 2]), *[*vars(bounds).values()][2:])],
             terms,
         )
-
-
-def summary(**numbers):
-    filled = {name: "" if name in ("kind", "form") else 0 for name in ensembles.Summary._fields}
-    return ensembles.Summary(**{**filled, **numbers})
-
-
-def test_trials():
-    found = [
-        summary(
-            kind="a",
-            trials=10,
-            violations_105=10,
-            worst_105=3.0,
-            worst_125=0.5,
-            state=0.25,
-            gain=0.5,
-            compared=1,
-            typical=0.25,
-        ),
-        summary(kind="b", trials=30, violations_105=1, worst_105=7.0, worst_125=0.1, covariance=0.75),
-        summary(
-            kind="a", trials=10, violations_125=1, worst_125=2.0, contraction_violations=1, compared=3, typical=1 / 64
-        ),
-    ]
-    table = tables.trials(found)
-    rows = cells(table)
-    assert table.title == "50 random filters"
-    assert table.header == (
-        "models",
-        "runs",
-        "(105) violated",
-        "(105) largest error / bound",
-        "(108) violated",
-        "(108) largest error / bound",
-        "(125) violated",
-        "(125) largest error / bound",
-        "contraction bound violated",
-        "contraction bound, largest error / bound",
-        "contraction bound / error, typical",
-    )
-    assert rows == [
-        ["a", "20", "50.0 %", "3", "0.0 %", "0", "5.0 %", "2", "1", "0.500", "32"],
-        ["b", "30", "3.3 %", "7", "0.0 %", "0", "0.0 %", "0.1", "0", "0.750", ""],
-        ["all", "50", "22.0 %", "7", "0.0 %", "0", "2.0 %", "2", "1", "0.750", "32"],
-    ]
 
 
 def test_requirements():

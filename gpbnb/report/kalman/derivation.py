@@ -13,7 +13,7 @@ from gpbnb.report.display.derivation import Derivation, Step, first_order, over,
 N, M, K = sp.symbols("n m k", integer=True, positive=True)
 NTH, J = sp.symbols("i j", integer=True, positive=True)
 BETA, EPS = sp.Symbol("beta", positive=True), sp.Symbol("epsilon")
-C, D, G = sp.symbols("c d g", positive=True)  # roundings of a closed loop and of an input; growth of both per step
+C, D = sp.symbols("c d", positive=True)  # roundings of a closed loop and of an input
 
 
 def _error(rounded: sp.Expr) -> sp.Expr:
@@ -64,52 +64,7 @@ def state_error() -> sp.Expr:
     return _error((loop * (1 + N * EPS) + U * (1 + input_error().coeff(U) * EPS)) * (1 + EPS))
 
 
-def report() -> Derivation:
-    """Derive (102)-(114) by the report's own algebra, and show the terms that it omits."""
-    return Derivation(
-        (
-            Step("(102), (103): $\\tilde P_{kp}/\\epsilon$", prediction_error(), (2 * N + 1) * PP - 2 * N * Q),
-            Step(
-                "(104), (105): $\\tilde P_k/\\epsilon$; the last two terms are left out, (104) keeps the first of them",
-                covariance_error(),
-                together((3 * N + M + 2) * P, -M * PP, -2 * N * CQ),
-            ),
-            Step(
-                "(107), (108): $\\tilde K_k/\\epsilon$; the last term is left out",
-                gain_error(),
-                together((4 * N + 2 * M + 3) * KZ, -M * KREST),
-            ),
-            Step(
-                "(112): $\\tilde F_k/\\epsilon$; the last term is left out",
-                transition_error(),
-                together((5 * N + 3 * M + 4) * FK, -(4 * N + 3 * M + 3) * PHI),
-            ),
-            Step("(113): $\\tilde u_k/\\epsilon$", input_error(), (4 * N + 3 * M + 3) * U),
-            Step(
-                "(114)-(117): $\\tilde x_k/\\epsilon$",
-                state_error(),
-                together((6 * N + 3 * M + 5) * FK * X, (4 * N + 3 * M + 4) * U),
-            ),
-        )
-    )
-
-
 # -- (118)-(125) ------------------------------------------------------------------------------------------------------
-
-
-def propagated() -> Derivation:
-    r"""Derive (118), (123) by induction over k: :math:`x_k = \Psi_k x_0 + \sum_i \Psi_{k,i}u_i`, factors in order."""
-    F, psi, x0, s, u = sp.symbols("F_{k+1} Psi_k x_0 s_k u_{k+1}", commutative=False)
-    return Derivation(
-        (
-            Step(
-                "(111) of step $k+1$ on $x_k = \\Psi_k x_0 + s_k$: $\\Psi_{k+1} = F_{k+1}\\Psi_k$, "
-                "$s_{k+1} = F_{k+1}s_k + u_{k+1}$",
-                F * unevaluated(psi * x0 + s) + u,
-                together(F * psi * x0, F * s + u),
-            ),
-        )
-    )
 
 
 def count_start(c: sp.Expr = C, g: sp.Expr = sp.S.Zero) -> sp.Expr:
@@ -132,83 +87,7 @@ TWICE = (ONCE[0] + N + 1, ONCE[1] + 1)
 GROWTH = 3 * N + M + 2
 
 
-def printed_coefficients() -> tuple[sp.Expr, sp.Expr]:
-    """Return the factors of β‖x_k‖ and βB in (125)."""
-    loop = 7 * N + 3 * M + 6
-    return K * loop, K * (3 * N + 1) + K * (K - 1) / 2 * loop
-
-
-def general() -> Derivation:
-    """Derive (119)-(125) for every k, by summation instead of a pattern."""
-    c, d = TWICE
-    start, inputs = count_start(c), count_input(c, d)
-    first, second = printed_coefficients()
-    x_0, *each = (start.subs(K, 3), *(inputs.subs({K: 3, NTH: i}) for i in (1, 2, 3)))
-    differences = (3 * N + 1, 10 * N + 3 * M + 7, 17 * N + 6 * M + 13)
-    return Derivation(
-        (
-            Step("what follows (118): $n+1$ more roundings of each loop", c, together(ONCE[0], N + 1)),
-            Step("(119), $x_0$", 3 * unevaluated(c), 3 * (7 * N + 3 * M + 6)),
-            Step("(119), $u_1$", together(2 * unevaluated(c), d), 18 * N + 9 * M + 17),
-            Step("(119), $u_2$", together(c, d), 11 * N + 6 * M + 11),
-            Step("(119), $u_3$", together(ONCE[1], 1), 4 * N + 3 * M + 5),
-            *(
-                Step(f"(119)-(121), $u_{i}$ by difference", together(x_0, sp.Mul(-1, u_i, evaluate=False)), difference)
-                for i, (u_i, difference) in enumerate(zip(each, differences, strict=True), 1)
-            ),
-            Step("(122), first line", together(*differences), 30 * N + 9 * M + 21),
-            Step(
-                "(124): the second coefficient",
-                second_coefficient(c, d).subs(K, 4),
-                together(4 * unevaluated(3 * N + 1), 6 * unevaluated(7 * N + 3 * M + 6)),
-            ),
-            Step("(125), first coefficient, every $k$", start, first),
-            Step("(125), second coefficient, every $k$", second_coefficient(c, d), second),
-        )
-    )
-
-
-def corrected() -> Derivation:
-    r"""Derive the coefficients of (125) with its faults corrected one after another.
-
-    Each term :math:`T_i` of (118) has its own error of at most :math:`a_i\beta`. With
-    :math:`T_0 = x_k - \sum T_i`, the sum is :math:`a_0\|x_k\| + \sum(a_0 + a_i)\|T_i\|`, with a plus sign.
-    """
-    c, d = ONCE
-    one, own, x, t = sp.symbols("e_0 e_i x_k T_i")
-    return Derivation(
-        (
-            Step(
-                "errors of their own: with $T_0 = x_k - T_i$, the worst is $a_0|x_k| + (a_0+a_i)|T_i|$",
-                one * unevaluated(x - t) + own * t,
-                together(one * x, (own - one) * t),
-            ),
-            Step("counted once: first coefficient", count_start(c), K * ONCE[0]),
-            Step(
-                "counted once: second coefficient",
-                second_coefficient(c, d),
-                K * (2 * N + 1) + K * (K - 1) / 2 * ONCE[0],
-            ),
-            Step(
-                "signs of their own: second coefficient",
-                second_coefficient(c, d, sign=1),
-                K * ONCE[1] + K * (3 * K - 1) / 2 * ONCE[0],
-            ),
-            Step(
-                "errors of $P_{k-1}$ carried on: first coefficient",
-                count_start(c, GROWTH),
-                K * ONCE[0] + K * (K - 1) / 2 * GROWTH,
-            ),
-            Step(
-                "and second: of third order in $k$",
-                sp.limit(second_coefficient(c, d, GROWTH) / K**3, K, sp.oo),
-                unevaluated(GROWTH) / 6,
-            ),
-        )
-    )
-
-
-# -- when the printed steps are bounds --------------------------------------------------------------------------------
+# -- inputs that a filter forgets ------------------------------------------------------------------------------------
 
 
 def forgotten() -> Derivation:
@@ -220,66 +99,6 @@ def forgotten() -> Derivation:
         (
             Step("sum of $f^{k-i}$: one more step", f * over(1 - f**K, 1 - f) + 1, over(1 - f ** (K + 1), 1 - f)),
             Step("$a_0$ is at least $a_i$, with $i = j+1$", start, later, sp.expand(start - later)),
-        )
-    )
-
-
-def scalar_conditions() -> Derivation:
-    r"""Compare (105) with the possible error for one state and one measurement if only (101) is rounded.
-
-    With :math:`\kappa = KH`, :math:`P_{kp} = P_k/(1-\kappa)`; each rounding has its own sign. The error can be
-    :math:`\beta P_k(2 + 3\kappa)/(1-\kappa)`, but the step from (104) to (105) allows only :math:`3\beta P_k`. The
-    relative error of a gain in the first form stays below (108), because no difference is formed.
-    """
-    kappa = sp.Symbol("kappa", nonnegative=True)
-    n = m = 1
-    allowed = n + m + 1
-
-    def may(kappa: sp.Expr) -> sp.Expr:
-        return over(together(n + 1, (n + m + 1) * unevaluated(kappa)), together(1, -kappa))
-
-    return Derivation(
-        (
-            Step(
-                "where $\\kappa=\\frac16$, possible and allowed are equal",
-                may(sp.Rational(1, 6)),
-                sp.Integer(allowed),
-            ),
-            Step(
-                "beyond it they differ: possible minus allowed, times $1-\\kappa$",
-                unevaluated(together(may(kappa), -allowed)) * unevaluated(1 - kappa),
-                6 * kappa - 1,
-            ),
-            Step(
-                "(108), first form: 4 roundings of $P_pH$ in the numerator and, times $\\kappa$, in the denominator; "
-                "1 of $H(P_pH)$; 1 each of sum, quotient and product",
-                sp.Integer(9),
-                together(4 * (1 - kappa), kappa, 3),
-                2 + 3 * kappa,
-            ),
-        )
-    )
-
-
-def smallest() -> Derivation:
-    r"""Derive the errors of the scalar filter with z = Q = 0 and an R so small that 1 + R rounds to 1; the rest is 1.
-
-    The rounded values are :math:`S = 1`, :math:`K = 1`, :math:`P = 0`. The exact values are below.
-    """
-    r = sp.Symbol("R", positive=True)
-    p, gain = 1 - 1 / (1 + r), 1 / (1 + r)
-    return Derivation(
-        (
-            Step("exact covariance", unevaluated(1) - over(1, 1 + r), r / (1 + r)),
-            Step("both forms of (99) agree", over(p, r), gain),
-            Step("(105): error of $\\hat P = 0$ over its bound", over(p, 6 * BETA * p), 1 / (6 * BETA)),
-            Step("(108): error of $\\hat K = 0$ over its bound", over(gain, 9 * BETA * gain), 1 / (9 * BETA)),
-            Step("(125), $u_1 = 0$: error of $\\hat x = 0$ over its bound", over(p, 16 * BETA * p), 1 / (16 * BETA)),
-            Step(
-                "(125), second form: $\\hat x = 1$",
-                over(1 - p, 16 * BETA * p),
-                1 / (16 * BETA * r),
-            ),
         )
     )
 

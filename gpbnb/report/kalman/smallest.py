@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.algebra import Algebra, rounded_algebra
-from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.algebra import rounded_algebra
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, max_norm
 from gpbnb.filters.forms import Form
@@ -113,78 +112,6 @@ def ratios(fmt: FloatFormat, case: FilterCase, second: bool = False, steps: int 
         _worst(K - true.gain, report_bounds.printed_gain_bound(true.gain, beta)),
         _worst(exact([max_norm(x - true.x)]), exact([bound])),
     )
-
-
-class RandomSteps(NamedTuple):
-    """Numbers of first steps of random filters with one state, and of those that violate (105) and (125)."""
-
-    steps: int
-    covariance: int
-    state: int
-
-
-def random_numbers(fmt: FloatFormat, steps: int, rng: np.random.Generator) -> tuple[FloatArray, ...]:
-    """Draw Φ, H, x, z as normal numbers and P, Q, R as squares of such, (steps,) each, rounded to a format."""
-    drawn = rng.standard_normal((7, steps))
-    drawn[4:] **= 2
-    return tuple(fmt.array(row) for row in drawn)
-
-
-def random_steps(fmt: FloatFormat, steps: int, rng: np.random.Generator) -> RandomSteps:
-    """Take one step with each operation rounded, as :func:`rounded_step`, for random filters with one state.
-
-    The exact step is computed in float64, so the format must be much coarser.
-    """
-    if fmt.unit_roundoff < Fraction(1, 2**30):
-        raise ValueError(f"got {fmt}; needed a unit roundoff of at least 2**-30, so that float64 can serve as exact")
-    numbers = random_numbers(fmt, steps, rng)
-    rounded_x, _, rounded_P = scalar_step(fmt.array(np.ones(steps)), *numbers)
-    Phi, H, x, z, P, Q, R = (each.to_float() for each in numbers)
-    predicted = Phi * P * Phi + Q
-    S = H * predicted * H + R
-    gain, P, transition = predicted * H / S, predicted * R / S, R / S * Phi  # without subtractions
-    x, beta = transition * x + gain * z, float(fmt.unit_roundoff)
-    first, second = (float(count) for count in report_bounds.coefficients(1, 1, 1))
-    bound = beta * (first * abs(x) + second * abs(gain * z))
-    allowed = report_bounds.covariance_count(1, 1) * beta * P
-    return RandomSteps(
-        steps,
-        int(np.sum(abs(rounded_P.to_float() - P) > allowed)),
-        int(np.sum(abs(rounded_x.to_float() - x) > bound)),
-    )
-
-
-def scalar_step(one: FloatArray, *numbers: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return x, K and P after one step of filters with one state, in the order of :func:`rounded_step`."""
-    Phi, H, x, z, P, Q, R = (_one_by_one(each) for each in numbers)
-    algebra = Algebra(lambda n: _one_by_one(one))
-    found = kalman_step(algebra, Form.HUNG, StepModel(Phi, H, Q, R), x, P, z)
-    return found.x[0, 0], found.K[0, 0], found.P[0, 0]
-
-
-def _one_by_one(numbers: FloatArray) -> NDArray[Any]:
-    """Return a matrix (1, 1) whose entry is an array with a number for each filter."""
-    matrix = np.empty((1, 1), dtype=object)
-    matrix[0, 0] = numbers
-    return matrix
-
-
-def largest_violating_noise(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:
-    """Find the largest R in :func:`scalar` that violates each bound, among all R of the format above b**-t up to 1.
-
-    Returns
-    -------
-    largest : values by the names of `Ratios`; a bound that no R violates is omitted.
-    """
-    largest: dict[str, Fraction] = {}
-    b, t = fmt.base, fmt.precision
-    for e in range(t + 1):
-        for d in range(b**t - 1, b ** (t - 1) - 1, -1):
-            r = Fraction(d, b ** (t - 1 + e))
-            if r <= 1 and len(largest) < 3:
-                found = ratios(fmt, scalar(fmt, r), second)._asdict()
-                largest |= {name: r for name, ratio in found.items() if ratio > 1 and name not in largest}
-    return largest
 
 
 def _worst(error: NDArray[Any], bound: NDArray[Any]) -> float:
