@@ -58,10 +58,6 @@ TITLE_AND_AXES = {
         "iteration rate $f_c$ (Hz)",
         "total error, rms\n(unit of $x_1$ $\\times$ s)",
     ),
-    "inversion test_ratios_against_condition": ("", "condition number", "bound / error"),
-    "inversion test_ratios_against_size": ("", "rows $n$", "bound / error, median"),
-    "inversion test_table1": ("", "places after the decimal point", "error norm"),
-    "inversion test_violations": ("", "inverses with an error above the bound (%)", "family of matrices"),
     "kalman test_contraction": ("", "step $k$", "error of rate (mas/yr)"),
     "kalman test_years_with_limits": ("", "step $k$", "relative error of the gain"),
     "kalman test_digits_needed[others]": (

@@ -2,7 +2,7 @@ r"""Proved bounds on the error of a computed inverse, from a priori to a posteri
 
 Each function bounds :math:`\|X - A^{-1}\|` in the column-sum norm (22), where X is the inverse of the t-digit matrix A
 as :func:`gpbnb.arithmetic.linalg.inv` computes it. It returns a float64 above the value of its formula, and raises
-ValueError if no bound can be proved. :mod:`gpbnb.report.inversion.costs` compares sharpness and cost. The bounds use:
+ValueError if no bound can be proved. The bounds use:
 
 ============================  =========================================================================
 bound                         uses

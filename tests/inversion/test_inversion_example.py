@@ -106,14 +106,6 @@ class TestAgreement:
     def test_other_numbers(self, value):
         assert not example.agree(Fraction(value), "3.706e-2")
 
-    def test_chance_is_the_share_of_a_decade(self):
-        # A number from 3.7055 to 3.707 on a logarithmic scale.
-        assert example.chance("3.706e-2") == pytest.approx(math.log10(3.707 / 3.7055), rel=1e-12)
-        rng = np.random.default_rng(1)
-        share = np.mean([example.agree(v, "3.7e-2") for v in 10 ** rng.uniform(-2, -1, 20000)])
-        p = example.chance("3.7e-2")
-        assert share == pytest.approx(p, abs=4 * math.sqrt(p / 20000))
-
 
 class TestReadings:
     def test_how_many(self):
@@ -132,8 +124,10 @@ class TestReadings:
         ]
         for value, places in zip(column.values, PLACES, strict=True):
             a = FloatFormat(10, places + 1).array(example.MATRIX)
-            exact = procedure.run(a, reading=Reading(False, "(96)", True, "row sum")).bound
-            assert value == pytest.approx(float(exact), rel=1e-12, abs=0)
+            reduction = procedure.as_fractions(procedure.reduce(a))
+            reading = Reading(False, "(96)", True, "row sum")
+            (exact,) = procedure.evaluate_all(reduction, a.format.unit_roundoff, [reading])
+            assert value == pytest.approx(float(exact.bound), rel=1e-12, abs=0)
 
     def test_an_error_is_that_of_the_inverse(self):
         (column,) = [
@@ -166,11 +160,10 @@ class TestSearch:
     def test_counts(self, column):
         found = example.search(column)
         readings = example.bound_readings() if column == "bound" else example.error_readings()
-        assert found.numbers == 3 * found.readings == 3 * len(readings)
+        assert found.readings == len(readings)
         assert found.agreements == sum(
             example.agree(v, p) for c in readings for v, p in zip(c.values, PRINTED[column], strict=True)
         )
-        assert found.expected == pytest.approx(len(readings) * sum(map(example.chance, PRINTED[column])))
         assert all(found.closest.distance <= c.distance for c in readings)
         assert found.closest in readings
 
@@ -180,7 +173,6 @@ class TestSearch:
         planted = readings[17]
         monkeypatch.setitem(PRINTED, column, tuple(f"{v:.3e}" for v in planted.values))
         found = example.search(column)
-        assert found.columns >= 1
         assert found.agreements >= 3
         assert planted.agreements == 3
         assert found.closest.distance < 1.001

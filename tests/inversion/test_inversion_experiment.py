@@ -46,10 +46,9 @@ class TestTrial:
         one = experiment.trial(a)
         assert tuple(one.bounds) == experiment.ALL_BOUNDS
         assert set(experiment.ALL_BOUNDS) == {*map(str, experiment.PRINTED), *experiment.BETTER}
-        reduction, beta = procedure.reduce(a, True), FMT.unit_roundoff
-        for reading in experiment.PRINTED:
-            exact = procedure.evaluate(reduction, beta, reading).bound
-            assert one.bounds[str(reading)] == pytest.approx(float(exact), rel=1e-11)
+        reduction, beta = procedure.as_fractions(procedure.reduce(a, True)), FMT.unit_roundoff
+        for found in procedure.evaluate_all(reduction, beta, experiment.PRINTED):
+            assert one.bounds[str(found.reading)] == pytest.approx(float(found.bound), rel=1e-11)
         assert one.bounds["corrected"] == pytest.approx(float(theory.bound(reduction, beta)), rel=1e-12)
         assert one.bounds["strict"] == pytest.approx(float(theory.strict_bound(reduction, beta)), rel=1e-12)
         factors, x = linalg.lu(a, True), linalg.inv(a, True)
@@ -276,22 +275,6 @@ class TestKept:
         assert float(whole["median"]) <= 1.1
         assert int(whole["tight"]) > int(whole["trials"]) / 2
 
-    @pytest.mark.parametrize("bound", ["signed, (96), A_T", "sizes, chart, A_T"])
-    def test_the_worst_is_the_one_that_was_kept(self, bound):
-        one = experiment.worst(bound)
-        assert one.regular
-        assert one.violates(bound)
-        least = min(
-            float(row["smallest_regular"] or "inf") for row in experiment.frozen("variants").select(bound=bound)
-        )
-        assert f"{one.overestimation(bound):.4g}" == f"{least:.4g}"
-        again = experiment.trial(one.matrix, one.pivot, (bound,))
-        assert (again.error, again.bounds) == (one.error, one.bounds)
-
-    def test_no_such_bound(self):
-        with pytest.raises(ValueError, match="got bound 'best'; needed one of signed, chart, A, signed, chart, A_T"):
-            experiment.worst("best")
-
     def test_no_such_sweep(self):
         with pytest.raises(ValueError, match="got sweep 'all'; needed one of variants, random"):
             experiment.frozen("all")
@@ -309,18 +292,6 @@ def test_what_is_recomputed_is_read(tmp_path, monkeypatch):
     assert experiment.stored_sweep("small").load(file).records()[-1]["trials"] == "10"
 
 
-class TestFigureData:
-    def test_against_size(self):
-        trials = experiment.against_size(FMT, (2, 5), 3, np.random.default_rng(1))
-        assert [one.n for one in trials] == [2, 2, 2, 5, 5, 5]
-        assert set(trials[0].bounds) == set(experiment.BETTER)
-
-    def test_against_condition(self):
-        trials = experiment.against_condition(FMT, 5, (0, 3, 5), np.random.default_rng(1))
-        assert trials[0].condition < trials[1].condition < trials[2].condition
-        assert len(experiment.against_condition(FloatFormat(10, 2), 5, (12,) * 9, np.random.default_rng(1))) < 9
-
-
 @pytest.mark.parametrize(
     ("matrix", "reading"),
     [([[-12, -11], [-17, 83]], Reading()), ([[9, -2], [-59, 71]], Reading(triangular=True))],
@@ -328,6 +299,8 @@ class TestFigureData:
 def test_the_signed_procedure_is_no_bound(matrix, reading):
     fmt = FloatFormat(10, 3)
     one = experiment.trial(fmt.array(matrix), names=(str(reading), str(Reading(False, "(96)"))))
-    assert procedure.run(one.matrix, True, reading).bound < one.error
+    reduction = procedure.as_fractions(procedure.reduce(one.matrix, True))
+    (found,) = procedure.evaluate_all(reduction, fmt.unit_roundoff, [reading])
+    assert found.bound < one.error
     assert one.violates(str(reading))
     assert not one.violates("sizes, (96), A")

@@ -16,7 +16,7 @@ from . import browser as tools
 PAGES = tools.pages()
 FORMULAS = 12
 """Formulas that axe looks at, at the beginning and at the end of a page."""
-LONG_PAGES = ("book/kalman.html", "book/inversion.html", "book/ledger-1984-3.html")
+LONG_PAGES = ("book/kalman.html", "book/ledger-1984-3.html")
 CHAPTERS = [each for each in PAGES if each.startswith("book/") and not each.startswith("book/ledger-")]
 
 
@@ -308,7 +308,7 @@ def test_the_front_page_shows_claim_answers_and_doors_at_once(open_page):
 
 
 def test_what_was_collapsed_is_ready_once_opened(open_page):
-    with open_page("book/inversion.html", "phone", shared=True) as page:
+    with open_page("book/geometry.html", "phone", shared=True) as page:
         part = page.locator("details.derivation").first
         assert part.locator("mjx-container").count() == 0
         part.locator("summary").click()

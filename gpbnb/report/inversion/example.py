@@ -186,12 +186,6 @@ def agree(value: float | Fraction, printed: str) -> bool:
     return bool(low <= Fraction(value) < high)
 
 
-def chance(printed: str) -> float:
-    """Return the probability that a number with uniformly distributed logarithm agrees with the printed digits."""
-    low, high = interval(printed)
-    return math.log10(high / low)
-
-
 @cache
 def interval(printed: str) -> tuple[Fraction, Fraction]:
     """Return the interval of the numbers that round or chop to the printed one."""
@@ -261,23 +255,17 @@ def error_readings() -> tuple[PrintedColumn, ...]:
 
 @dataclass(frozen=True)
 class Agreements:
-    """Result of a search among readings: agreements in all digits, and the number expected by chance.
+    """Result of a search among readings.
 
     Parameters
     ----------
-    agreements : count of numbers that agree with the print in each digit, out of `numbers` compared.
-    columns : readings in which all three numbers agree.
-    expected : number of agreements expected by chance, if digits have their usual distribution and every power of
-        ten is right, which overestimates it.
+    agreements : number of values that agree with the print in each digit.
     closest : the reading with the smallest :attr:`PrintedColumn.distance`.
     """
 
     column: str
     readings: int
-    numbers: int
     agreements: int
-    columns: int
-    expected: float
     closest: PrintedColumn
 
 
@@ -287,10 +275,7 @@ def search(column: str) -> Agreements:
     return Agreements(
         column,
         len(found),
-        len(found) * len(PLACES),
         sum(one.agreements for one in found),
-        sum(one.agreements == len(PLACES) for one in found),
-        len(found) * sum(chance(printed) for printed in PRINTED[column]),
         min(found, key=lambda one: one.distance),
     )
 

@@ -6,8 +6,7 @@ True errors are exact rationals, computed by python-flint, so even the smallest 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property, partial
 from itertools import product
@@ -244,25 +243,6 @@ class InverseCell:
         return len(self.sizes) * (1 if self.family in FIXED else self.repeats)
 
 
-def against_size(fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[InverseTrial]:
-    """Invert random matrices of growing size with pivoting, and evaluate :data:`BETTER`."""
-    return [trial(fmt.array(_uniform(n, rng)), True, BETTER, "random") for n in sizes for _ in range(repeats)]
-
-
-def against_condition(
-    fmt: FloatFormat, n: int, digits: Iterable[float], rng: np.random.Generator
-) -> list[InverseTrial]:
-    """Invert matrices of one size that approach a singular one, by :func:`conditioned`, and evaluate :data:`BETTER`.
-
-    Matrices that are singular in the format are omitted.
-    """
-    trials = []
-    for d in digits:
-        with suppress(np.linalg.LinAlgError):
-            trials.append(trial(fmt.array(conditioned(n, d, rng)), True, BETTER, "nearly singular"))
-    return trials
-
-
 SEED = 1984
 
 #: The formats of the sweep over all readings and families, and of the sweep over random matrices.
@@ -410,28 +390,6 @@ def sum_rows(samples: Iterable[tuple[InverseCell, InverseSample]], names: Sequen
         for family, sample in families.items():
             rows += sample.rows(family, "all", "all", "all")
     return rows + whole.rows("all", "all", "all", "all")
-
-
-def worst(bound: str, sweep: str = "variants") -> InverseTrial:
-    """Recompute the regular matrix of a stored sweep whose error is largest relative to a bound.
-
-    Parameters
-    ----------
-    bound : a bound of the sweep, as text.
-    """
-    rows = [row for row in frozen(sweep).select(bound=bound) if row["format"] != "all" and row["smallest_regular"]]
-    if not rows:
-        raise ValueError(f"got bound {bound!r}; needed one of {', '.join(SWEEPS[sweep][1])}")
-    row = min(rows, key=lambda row: float(row["smallest_regular"]))
-    (cell,) = (cell for cell in SWEEPS[sweep][0]() if all(row[key] == text for key, text in _where(cell).items()))
-    regular = _regular_trials(cell, tuple(map(str, PRINTED)) if bound in map(str, PRINTED) else (bound,))
-    found = min(regular, key=lambda one: one.overestimation(bound))
-    return replace(found, bounds={bound: found.bounds[bound]})
-
-
-@cache  # printed readings, which are evaluated together, often have their worst matrix in one cell
-def _regular_trials(cell: InverseCell, names: tuple[str, ...]) -> tuple[InverseTrial, ...]:
-    return tuple(one for one in cell.trials(names) if one is not None and one.error and one.regular)
 
 
 def format_name(fmt: FloatFormat) -> str:

@@ -1,8 +1,7 @@
 r"""The procedure of Figure III-1: a bound on the error of an inverse, computed while inverting.
 
-There is one function for each box of the chart, and :func:`run` for the whole chart. The inverse is computed in the
-arithmetic of the format. The errors are then evaluated from its digits by the formulas of
-:mod:`gpbnb.report.inversion.theory`. A :class:`Reading` settles whatever the text leaves open.
+The inverse is computed in the arithmetic of the format. Its errors are then evaluated from the digits by the formulas
+of :mod:`gpbnb.report.inversion.theory`. A :class:`Reading` settles whatever the text leaves open.
 
 Source: hung1984, ch. II, section 11; the texts of the boxes are in hung1982, ch. III.
 """
@@ -12,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounds import column_sum
 from gpbnb.arithmetic.rational import exact
 from gpbnb.report.inversion import theory
-from gpbnb.report.inversion.theory import Norm, Perturbation, Reduction
+from gpbnb.report.inversion.theory import Norm, Reduction
 
 # -- the computation, in the arithmetic of the format ---------------------------------------------
 
@@ -49,24 +48,18 @@ class Triangularization(NamedTuple):
 def triangularize(a: FloatArray, pivot: bool = False) -> Triangularization:
     """Box "Triangularization of A into A_T", (45)-(58); the digits are those of :func:`gpbnb.arithmetic.linalg.lu`.
 
-    Parameters
-    ----------
-    a : (n, n).
-    pivot : whether to use partial pivoting, which section 10 mentions and section 11 omits.
+    Section 10 mentions partial pivoting, which section 11 omits.
     """
     from gpbnb.arithmetic import linalg
 
     found = linalg.lu(a, pivot)
     n, order = len(a), found.permutation
     work = a[order]
-    zero = a.format.array(0)
     stages, multipliers = [work], []
     for k in range(n - 1):
         m = -found.lower[k + 1 :, k]
         changed = work[k + 1 :, k + 1 :] + m[:, np.newaxis] * work[k, k + 1 :]
-        below = np.zeros((n, n), dtype=bool)
-        below[k + 1 :, k] = True
-        work = _replaced(cast(FloatArray, np.where(below, zero, cast(Any, work))), (k + 1, k + 1), changed)
+        work = work.at[k + 1 :, k].set(0).at[k + 1 :, k + 1 :].set(changed)
         stages.append(work)
         multipliers.append(m)
     return Triangularization(tuple(stages), tuple(multipliers), order)
@@ -75,45 +68,25 @@ def triangularize(a: FloatArray, pivot: bool = False) -> Triangularization:
 def transform(triangular: Triangularization, right: FloatArray) -> tuple[FloatArray, ...]:
     """Box "Use the same triangularization transformation to change u_j to b_j": every stage of the right-hand sides.
 
-    Parameters
-    ----------
-    right : (n, p), a column for each right-hand side; the identity for an inverse.
-
-    Returns
-    -------
-    rights : n FloatArrays (n, p), with rows in the order of elimination; the last is b_T of (64).
+    Each has the shape of `right`, with rows in the order of elimination; the last is b_T of (64).
     """
     work = right[triangular.order]
     rights = [work]
     for k, m in enumerate(triangular.multipliers):
-        work = _replaced(work, (k + 1, 0), work[k + 1 :] + m[:, np.newaxis] * work[k])
+        work = work.at[k + 1 :].set(work[k + 1 :] + m[:, np.newaxis] * work[k])
         rights.append(work)
     return tuple(rights)
 
 
 def substitute(upper: FloatArray, right: FloatArray) -> FloatArray:
-    """Box "Back substitution to solve A_T x_j = b_j", (65)-(79).
-
-    Parameters
-    ----------
-    upper, right : (n, n), upper triangular, and (n, p).
-
-    Returns
-    -------
-    solution : (n, p).
-    """
+    """Box "Back substitution to solve A_T x_j = b_j", (65)-(79)."""
     from gpbnb.arithmetic import linalg
 
     return linalg.solve(upper, right)
 
 
 def reduce(a: FloatArray, pivot: bool = False) -> Reduction:
-    """Run the three boxes of the computation: stages, right-hand sides and the inverse, as FloatArrays.
-
-    Parameters
-    ----------
-    a, pivot : as in :func:`triangularize`.
-    """
+    """Run the three boxes of the computation: stages, right-hand sides and the inverse, as FloatArrays."""
     triangular = triangularize(a, pivot)
     rights = transform(triangular, a.format.array(np.eye(len(a), dtype=int)))
     return Reduction(triangular.stages, rights, substitute(triangular.upper, rights[-1]))
@@ -125,11 +98,11 @@ def as_floats(reduction: Reduction) -> Reduction:
     return Reduction(stages, rights, reduction.solution.to_float())
 
 
-def _replaced(a: FloatArray, corner: tuple[int, int], block: FloatArray) -> FloatArray:
-    """Return `a` with its lower right block, from `corner` on, replaced."""
-    i, j = corner
-    lower = cast(FloatArray, np.concatenate([cast(Any, a[i:, :j]), cast(Any, block)], axis=1))
-    return cast(FloatArray, np.concatenate([cast(Any, a[:i]), cast(Any, lower)]))
+def as_fractions(reduction: Reduction) -> Reduction:
+    """Convert a reduction to exact numbers."""
+    return Reduction(
+        [exact(s) for s in reduction.stages], [exact(r) for r in reduction.rights], exact(reduction.solution)
+    )
 
 
 # -- its errors, from the digits of the computation -----------------------------------------------
@@ -182,141 +155,53 @@ def readings() -> Iterator[Reading]:
             yield Reading(signed, form, triangular, norm)
 
 
-def triangularization_errors(reduction: Reduction, beta: Any, signed: bool = True) -> Perturbation:
-    """Boxes "Generate Ã, error in A_T" and "Generate b̃_j, error in b_j", (59) and (60)."""
-    if signed:
-        return Perturbation(
-            theory.printed_triangularization_error(reduction.stages, beta),
-            theory.printed_right_side_error(reduction.rights, beta),
-        )
-    return Perturbation(
-        theory.triangularization_bounds(reduction.stages, beta), theory.right_side_bounds(reduction.rights, beta)
-    )
-
-
-def back_substitution_errors(reduction: Reduction, beta: Any, signed: bool = True) -> Perturbation:
-    """Boxes "Generation of ΔA, do it once" and "Generation of Δb_j", (89) and (90)."""
-    change = theory.printed_back_substitution_error(reduction.stages[-1], beta)
-    right = theory.printed_back_substitution_right_error(reduction.rights[-1], beta)
-    return Perturbation(change, right) if signed else Perturbation(abs(change), abs(right))
-
-
-def resultant_errors(first: Perturbation, second: Perturbation) -> Perturbation:
-    """Box "δA = Ã + ΔA, δb_j = b̃_j + Δb_j", (91) and (92)."""
-    return Perturbation(first.matrix + second.matrix, first.right + second.right)
-
-
-def bracket(errors: Perturbation, solution: Any, signed: bool = True) -> NDArray[Any]:
-    r"""E of (95), :math:`\delta b_j-\delta A\hat x_j`, or of sizes :math:`|\delta b_j|+|\delta A||\hat x_j|`."""
-    x = _plain(solution)
-    e = errors.right - errors.matrix @ x if signed else abs(errors.right) + abs(errors.matrix) @ abs(x)
-    return np.asarray(e)
-
-
-def inverse_error(inverse: Any, e: Any, signed: bool = True) -> NDArray[Any]:
-    """Box "δ(A⁻¹) = A⁻¹ [δb_1 - δA x_1 ... δb_n - δA x_n]", (95)."""
-    front = _plain(inverse)
-    return np.asarray(front @ e if signed else abs(front) @ abs(e))
-
-
-@dataclass(frozen=True)
-class ProcedureResult:
-    """Intermediate results and bound of the procedure.
-
-    `norm_of_inverse` is the norm of the computed inverse, by which (97) divides.
-    """
+class Bound(NamedTuple):
+    """The bound of the procedure in one reading, absolute (96) and relative (97)."""
 
     reading: Reading
-    reduction: Reduction
-    beta: Any
-    errors: Perturbation
     bound: Any
-    norm_of_inverse: Any
-
-    @property
-    def relative_bound(self) -> Any:
-        """Bound of the relative error norm, (97)."""
-        return self.bound / self.norm_of_inverse
+    relative_bound: Any
 
 
-def evaluate(reduction: Reduction, beta: Any, reading: Reading | None = None) -> ProcedureResult:
-    """Evaluate the error boxes in one reading.
+def evaluate_all(reduction: Reduction, beta: Any, several: Iterable[Reading]) -> Iterator[Bound]:
+    """Evaluate the error boxes in several readings, with their common parts computed once.
 
     Parameters
     ----------
-    reduction : reduction of an inverse, whose first right-hand sides are the columns of the identity; in FloatArrays
-        or exact entries for an exact bound, or in float64.
-    beta : unit roundoff β.
-    reading : by default with signs, the norm of (95), and the computed inverse of A.
+    reduction : reduction of an inverse, whose first right-hand sides are the columns of the identity; in float64, or in
+        Fractions for an exact bound.
+    beta : unit roundoff β, a float or a Fraction accordingly.
     """
-    return next(evaluate_all(reduction, beta, (reading or Reading(),)))
-
-
-def evaluate_all(reduction: Reduction, beta: Any, several: Iterable[Reading]) -> Iterator[ProcedureResult]:
-    """Evaluate several readings, with their common parts computed once."""
-    solution = _plain(reduction.solution)
-    second = {signed: back_substitution_errors(reduction, beta, signed) for signed in (True, False)}
-    errors = {s: resultant_errors(triangularization_errors(reduction, beta, s), second[s]) for s in second}
-    brackets = {signed: bracket(errors[signed], solution, signed) for signed in errors}
+    x = reduction.solution
+    brackets = {s: theory.bracket(reduction, theory.perturbation(reduction, beta, s), s) for s in (True, False)}
     # The rows of the errors, and so the columns of the inverse that multiplies them, are in the order of elimination.
-    order = np.argmax(_plain(reduction.rights[0]) != 0, axis=1)
-    fronts = {False: solution[:, order], True: _upper_inverse(reduction.stages[-1])}
+    order = np.argmax(reduction.rights[0] != 0, axis=1)
+    fronts = {False: x[:, order], True: _upper_inverse(reduction.stages[-1])}
     for reading in several:
         norm, front, e = NORMS[reading.norm], fronts[reading.triangular], brackets[reading.signed]
         if reading.form == "norms throughout":
-            bound = norm(front) * _sum_of_norms(reduction, beta, second[False], norm)
+            bound = norm(front) * _sum_of_norms(reduction, beta, norm)
         elif reading.form == "chart":
-            bound = norm(inverse_error(front, e, reading.signed))
+            bound = norm(front @ e if reading.signed else abs(front) @ e)
         else:
             bound = norm(front) * norm(e)
-        yield ProcedureResult(reading, reduction, beta, errors[reading.signed], bound, norm(solution))
+        yield Bound(reading, bound, bound / norm(x))
 
 
-def run(a: FloatArray, pivot: bool = False, reading: Reading | None = None) -> ProcedureResult:
-    """Run the whole chart, from the given matrix to the error bound of its inverse; the bound is exact.
-
-    Parameters
-    ----------
-    a : (n, n).
-    pivot : whether to use partial pivoting.
-    reading : see :func:`evaluate`.
-
-    Returns
-    -------
-    outcome : the bound is a Fraction, or a float for the Frobenius and spectral norms.
-
-    References
-    ----------
-    hung1984, ch. II, Figure III-1.
-    """
-    return evaluate(reduce(a, pivot), a.format.unit_roundoff, reading)
-
-
-def _sum_of_norms(reduction: Reduction, beta: Any, second: Perturbation, norm: Norm) -> Any:
+def _sum_of_norms(reduction: Reduction, beta: Any, norm: Norm) -> Any:
     """Return ‖Ã‖‖x‖ + ‖ΔA‖‖x‖ + ‖b̃‖ + ‖Δb‖ with (61) and (62), for all right-hand sides as matrices."""
-    stages, rights = ([_plain(part) for part in parts] for parts in reduction[:2])
+    back = theory.back_substitution_error(reduction, beta)
     first = theory.printed_triangularization_norm(reduction.stages, beta, norm)
-    # (62) for all columns at once, so that the same norm is used throughout
-    right = sum(
-        weight * beta * norm(theory.trailing(rights[i], k, columns=False))
-        for k in range(1, len(stages))
-        for weight, i in ((3, k), (2, k - 1))
-    )
-    return (first + norm(second.matrix)) * norm(_plain(reduction.solution)) + right + norm(second.right)
+    right = theory.printed_triangularization_norm(reduction.rights, beta, norm, columns=False)
+    return (first + norm(back.matrix)) * norm(reduction.solution) + right + norm(back.right)
 
 
-def _upper_inverse(upper: Any) -> NDArray[Any]:
+def _upper_inverse(u: Any) -> NDArray[Any]:
     """Invert an upper triangular matrix by back substitution in the arithmetic of its entries."""
-    u = _plain(upper)
     n = len(u)
-    x = np.zeros_like(u) + np.eye(n, dtype=int)
+    x = 0 * u + np.eye(n, dtype=int)
     for k in reversed(range(n)):
         for j in range(k + 1, n):
             x[k] = x[k] - u[k, j] * x[j]
         x[k] = x[k] / u[k, k]
-    return x
-
-
-def _plain(a: Any) -> NDArray[Any]:
-    """Keep float64, convert everything else to exact numbers."""
-    return a if isinstance(a, np.ndarray) and a.dtype == np.float64 else exact(a)
+    return np.asarray(x)

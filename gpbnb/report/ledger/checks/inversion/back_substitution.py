@@ -349,7 +349,7 @@ def backward(printed: Statement) -> Finding:
 @cache
 def _perturbed_inverse() -> tuple[float, bool, bool]:
     sample, _ = of_example()
-    change = theory.perturbation_bounds(sample.reduction, sample.beta).matrix
+    change = theory.perturbation(sample.reduction, sample.beta, signed=False, transfer=True).matrix
     hat = inverse_of(sample.reduction.stages[0] + change)
     computed = sample.reduction.solution
     apart = column_sum_norm(hat - computed) / column_sum_norm(computed)

@@ -14,11 +14,12 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
+import sympy as sp
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.inversion import derivation
+from gpbnb.report.display.derivation import errors, first_order
 from gpbnb.report.ledger.checks.inversion.first_order import EPSILON, FirstOrder, joined, matrix, quantity
 from gpbnb.report.ledger.checks.inversion.judging import Names
 
@@ -276,10 +277,25 @@ def roundings(n: int) -> tuple[tuple[tuple[int, ...], ...], tuple[int, ...]]:
     """Count how often each a_kj and each b_k is rounded, with a separate error for each operation."""
     rows, rights = [], []
     for k in range(1, n + 1):
-        right, products = derivation.back_row_weights(n - k)
+        right, products = back_row_weights(n - k)
         rows.append((0,) * k + tuple(products))
         rights.append(right)
     return tuple(rows), tuple(rights)
+
+
+def back_row_weights(terms: int) -> tuple[int, tuple[int, ...]]:
+    r"""Count the roundings of the right side and of each product in a row with `terms` entries right of the diagonal.
+
+    The computed a_kk x̂_k is b less the products, each with its own error, as is each subtraction and the division.
+    """
+    eps, b = errors(2 * terms + 1), sp.Symbol("b")
+    products = sp.symbols(f"p_1:{terms + 1}")
+    value: sp.Expr = b
+    for product, of_product, of_sum in zip(products, eps[::2], eps[1::2], strict=False):
+        value = (value - product * (1 + of_product)) * (1 + of_sum)
+    error = first_order(value * (1 + eps[-1]), eps)
+    right, *others = (sum(error.coeff(term).coeff(e) != 0 for e in eps) for term in (b, *products))
+    return right, tuple(others)
 
 
 def weights(n: int) -> tuple[FirstOrder, FirstOrder]:

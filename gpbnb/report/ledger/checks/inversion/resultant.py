@@ -6,7 +6,7 @@ from functools import cache
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm
-from gpbnb.report.inversion import derivation, experiment, procedure, theory
+from gpbnb.report.inversion import experiment, procedure, theory
 from gpbnb.report.ledger.checks.inversion.environments import factored_errors, inverses
 from gpbnb.report.ledger.checks.inversion.judging import corrected, holds, says, slip
 from gpbnb.report.ledger.checks.inversion.registry import CHECKS
@@ -22,7 +22,7 @@ TWO_SYSTEMS = "two-systems-added"
 def _left_out() -> tuple[float, float]:
     """Return the share that (91) and (92) omit, as norms of sizes, in the example of 11.4."""
     sample, _ = of_example()
-    whole, bare = (theory.perturbation_bounds(sample.reduction, sample.beta, transfer) for transfer in (True, False))
+    whole, bare = (theory.perturbation(sample.reduction, sample.beta, False, transfer) for transfer in (True, False))
     parts = [column_sum_norm(w - b) / column_sum_norm(w) for w, b in zip(whole, bare, strict=True)]
     return float(parts[0]), float(parts[1])
 
@@ -78,13 +78,17 @@ def _sum_text() -> str:
     )
 
 
+def with_l(printed: Statement) -> Statement:
+    """Return (91) or (92) with the errors of back substitution multiplied by L."""
+    return corrected(printed, printed.form.replace("+ DeltaA", "+ L*DeltaA").replace("+ Deltab", "+ L*Deltab"))
+
+
 @CHECKS.add(*both("eq91"), *both("eq92"))
 def resultant_perturbations(printed: Statement) -> Finding:
-    with_l = printed.form.replace("+ DeltaA", "+ L*DeltaA").replace("+ Deltab", "+ L*Deltab")
     return compare(
         holds(printed, inverses()),
         _sum_text(),
-        Verdict.WRONG if holds(corrected(printed, with_l), inverses()) else Verdict.INCONSISTENT,
+        Verdict.WRONG if holds(with_l(printed), inverses()) else Verdict.INCONSISTENT,
         otherwise_note=NO_SUM,
         root=TWO_SYSTEMS,
     )
@@ -171,7 +175,7 @@ def relative_error_norm(printed: Statement) -> Finding:
 def terms_of_96() -> tuple[float, float, float]:
     """Return the norms of error, computed inverse and bracket of (95) in the example of 11.4."""
     sample, error = of_example()
-    bracket = theory.printed_bracket(sample.reduction, sample.beta)
+    bracket = theory.bracket(sample.reduction, theory.perturbation(sample.reduction, sample.beta))
     return error, float(column_sum_norm(sample.reduction.solution)), float(column_sum_norm(bracket))
 
 
@@ -234,7 +238,7 @@ def computation(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.III.s11-3.figure-iii-1")
 def flow_chart_1982() -> Finding:
-    right = derivation.two_systems().holds and derivation.reductions().holds
+    right = holds(with_l(statement("hung1984.II.eq91")), inverses())
     return unverifiable(
         "the texts of the boxes follow (59), (60) and (89) to (95). One box calls $\\tilde A$ the error in $A_T$; "
         f"by (91) it is {'an error in $A$, which the derivation confirms' if right else 'not derived'}",

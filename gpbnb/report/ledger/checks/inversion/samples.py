@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
+from gpbnb.arithmetic.rational import column_sum_norm, inverse_of
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import example, procedure
 from gpbnb.report.inversion.theory import Reduction
@@ -36,8 +36,7 @@ class Sample:
     @cached_property
     def reduction(self) -> Reduction:
         """Stages, right sides and inverse, as Fractions."""
-        stages, rights, solution = procedure.reduce(self.matrix, self.pivot)
-        return Reduction([exact(s) for s in stages], [exact(r) for r in rights], exact(solution))
+        return procedure.as_fractions(procedure.reduce(self.matrix, self.pivot))
 
     @cached_property
     def inverse(self) -> Matrix:
