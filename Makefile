@@ -108,6 +108,7 @@ format: .venv/with-dev ## let ruff lay out the code and mend what it can
 
 exactness: .venv/made-for ## billions of operations compared with independent arithmetic, digit for digit, and more altered statements; it resumes
 	GPBNB_ALTERATIONS=more $(PY) -m pytest -q tests/ledger/test_alterations.py
+	$(PY) -m tests.corpus
 	$(PY) -m benchmarks.exactness
 	$(PY) -m benchmarks.wide
 	$(PY) -m benchmarks.processors

@@ -10,9 +10,13 @@ from tests.corpus import package
 STORED = corpus.stored()
 
 
-@pytest.mark.parametrize("name", list(STORED)[3::10])
+@pytest.mark.parametrize("name", corpus.names()[3::10])
 def test_the_digits_of_a_run_are_those_that_were_stored(name):
     assert corpus.difference(corpus.row(name), STORED[name]) == ""
+
+
+def test_every_run_is_stored():
+    assert list(STORED) == corpus.names()
 
 
 def test_a_changed_quantity_is_found_after_the_last_checkpoint_that_agrees(monkeypatch):
