@@ -184,8 +184,8 @@ def _format(fmt: FloatFormat | FixedFormat) -> dict[str, Any]:
 
 
 def _words(words: WordFormats) -> dict[str, Any]:
-    kept = words.data if words.coefficients is None else words.coefficients
-    kept = FloatFormat(2, kept) if isinstance(kept, int) else kept
+    given = words.data if words.coefficients is None else words.coefficients
+    kept = FloatFormat(2, given) if isinstance(given, int) else given
     formats = {"data": words.data, "sums": words.accumulator, "coefficients": kept}
     return {name: _format(fmt) for name, fmt in formats.items()}
 
@@ -253,7 +253,10 @@ def _width(
 
 def _difference(given: Schedule, P: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the distance of the exact covariance at the end of the schedule from its limit."""
-    return given.covariance[..., 0] - P + given.covariance[..., 1]
+    found = given.covariance
+    if found is None:
+        raise ValueError("got a schedule without a covariance; needed that of a Kalman filter")
+    return np.asarray(found[..., 0] - P + found[..., 1])
 
 
 def _limit(F: NDArray[np.float64], added: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -280,7 +280,8 @@ class Loops(NamedTuple):
 def loops(program: Program, stored: Any, given: Any, storing: Array, kept: Array) -> Loops:
     """Return the matrices of a program with stored coefficients and, for the exact filter, with others."""
     (F, K), (A, B) = matrices(program, stored), matrices(program, given)
-    return Loops(*(each.astype(np.float64) for each in (F, K, A, B, F - A, K - B)), storing, kept)
+    f, k, a, b, of_state, of_input = (each.astype(np.float64) for each in (F, K, A, B, F - A, K - B))
+    return Loops(f, k, a, b, of_state, of_input, storing, kept)
 
 
 class Inputs(NamedTuple):

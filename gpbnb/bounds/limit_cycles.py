@@ -124,14 +124,15 @@ def limit_cycles(
         raise TypeError(f"got a {type(system).__name__}; needed a LinearSystem")
     if not isinstance(words, WordFormats):
         raise TypeError(f"got words {words!r}; needed WordFormats, such as WordFormats(FixedFormat(0, 15))")
-    made = integer_program(system.as_filter(), words)
+    given = system.as_filter()
+    made = integer_program(given, words)
     if not made.program.is_linear:
         raise ValueError(f"got {system.name}, which limits its values; needed a linear system for its limit cycles")
     data, n = words.data, made.program.n
     inputs = integers_of(exact(np.broadcast_to(np.asarray(u, dtype=object), (1, system.m))), data)[0]
     if cause := _unstable(made, system.n):
         raise ValueError(cause)
-    error = bounded_rounding(made) / float(data.unit) * (1 + 2.0**-40)
+    error = bounded_rounding(given, words) / float(data.unit) * (1 + 2.0**-40)
     rest = _at_rest(made, inputs)
     if everywhere:
         low = np.full(n, int(data.lowest / data.unit), np.int64)

@@ -125,7 +125,7 @@ class _Steps:
         return np.array([found[value] for value in self.program.outputs])
 
     def _rounding(self, size: float) -> float:
-        return float(largest_errors(self._fmt, np.float64(size * _UP))) if math.isfinite(size) else math.inf
+        return float(largest_errors(self._fmt, np.array([size * _UP]))[0]) if math.isfinite(size) else math.inf
 
     def _limits(self, code: int, a: int, b: int, stored: bool = False) -> tuple[Fraction, Fraction] | None:
         """Return the lowest and the highest result, if the operand of an upper limit is that of a lower one."""

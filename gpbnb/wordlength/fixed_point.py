@@ -471,7 +471,7 @@ class _Outputs(_Strategy):
         if self._proof is None or not found.ratio <= 1:
             return found
         try:
-            return Outcome(largest_ratio(self._proof.errors(self.words(fmt)), self.goal))
+            return Outcome(largest_ratio(self._proof.errors(self._words_of(self.wide_enough(fmt))), self.goal))
         except (OverflowError, ValueError) as error:
             return Outcome(math.inf, f"are refused: {error}")
 

@@ -63,7 +63,7 @@ class Certified(NamedTuple):
     """The text of a certificate, and the format for which it proves a guarantee."""
 
     text: str
-    fmt: FloatFormat
+    fmt: FloatFormat | FixedFormat
 
 
 class WrittenCode(NamedTuple):

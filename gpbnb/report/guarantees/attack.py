@@ -50,7 +50,8 @@ def drawn_system(rng: np.random.Generator) -> tuple[LinearSystem, NDArray[np.flo
     A = rng.standard_normal((n, n))
     A *= rng.uniform(0.2, 0.95) / np.abs(np.linalg.eigvals(A)).max()
     parts = (A, rng.standard_normal((n, m)), rng.standard_normal((p, n)), rng.standard_normal((p, m)))
-    return LinearSystem(*(np.round(each * 2**12) / 2**12 for each in parts)), 10.0 ** rng.uniform(-1, 1, m)
+    A, B, C, D = (np.round(each * 2**12) / 2**12 for each in parts)
+    return LinearSystem(A, B, C, D), 10.0 ** rng.uniform(-1, 1, m)
 
 
 def drawn_format(rng: np.random.Generator, kind: str) -> FloatFormat | FixedFormat | WordFormats:

@@ -225,7 +225,8 @@ def covariance_equation(printed: Statement) -> Finding:
 @CHECKS.add(MAIN + "sanalysis.substitution-21")
 def expanded(printed: Statement) -> Finding:
     cited = [statement(MAIN + f"eq{number}") for number in re.findall(r"\((\d+)\)", printed.says("equations"))]
-    given = {part.sides[0].text: part.sides[-1].text for each in cited for part in each.parts if part.equates}
+    parts = [part for each in cited for part in each.parts if isinstance(part, Relation) and part.equates]
+    given = {part.sides[0].text: part.sides[-1].text for part in parts}
     missing = [name for name in ("P", "A_underline", "N_p") if not given.get(name, "").startswith("[[")]
     return compare(
         not missing,
