@@ -251,12 +251,12 @@ def test_shares(ax):
 
 
 def test_guarantee(ax):
-    found = SimpleNamespace(history=np.array([[9.0, 1.0], [9.0, 2.0]]), bound=np.array([9.0, 3.0]))
+    found = SimpleNamespace(bound=np.array([9.0, 3.0]))
     chosen, random = np.array([[5.0, -0.5], [5.0, 1.5], [5.0, 2.5]]), np.array([[4.0, 0.1], [4.0, -0.2], [4.0, 0.3]])
     guarantee_figures.draw_errors(ax, found, chosen, random, 1, "speed, m/s")
     (bound,) = ax.lines
     adversary, noise = ax.collections
-    assert at(bound, (1, 1), (2, 2), (3, 3))  # the limit, once the history ends
+    assert at(bound, (1, 3), (2, 3), (3, 3))
     for band, heights in ((adversary, [0.5, 1.5, 2.5]), (noise, [0.1, 0.2, 0.3])):
         assert sorted({float(y) for y in band.get_paths()[0].vertices[:, 1]}) == heights
     assert legend_of(ax) == [
