@@ -31,7 +31,7 @@ def test_a_still_figure_follows_the_rule_of_figures(picture):
 
 @PICTURES
 def test_the_html_is_the_same_at_every_run(picture):
-    assert picture.html() == picture.html()
+    assert picture._repr_html_() == picture._repr_html_()
 
 
 @PICTURES
