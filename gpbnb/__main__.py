@@ -14,6 +14,7 @@ COMMANDS = {
     "warm": "compile all that wordlength needs, so that later runs start at once",
     "ledger": "every printed equation, number and claim, with its verdict",
     "bounds.check": "prove the claim of a certificate, without the rest of the package",
+    "report.guarantees.attack": "attack guarantees with emulated runs, and list the largest errors",
     "report.guarantees.certificates": "write and check certificates of the book's guarantees",
     "report.stored": "list the stored sweeps, verify a sample of them, or compute them again",
 }

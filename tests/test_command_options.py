@@ -72,6 +72,7 @@ LISTED = {
     "warm": "compile all that wordlength needs, so that later runs start at once",
     "ledger": "every printed equation, number and claim, with its verdict",
     "bounds.check": "prove the claim of a certificate, without the rest of the package",
+    "report.guarantees.attack": "attack guarantees with emulated runs",
     "report.guarantees.certificates": "write and check certificates of the book's guarantees",
     "report.stored": "list the stored sweeps, verify a sample of them, or compute them again",
 }
@@ -105,7 +106,8 @@ def test_each_option_has_its_default_and_its_help(module, monkeypatch):
     [
         (
             wordlength,
-            "Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong.",
+            "Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong, 130 "
+            "if it is interrupted.",
         ),
         (
             ledger,

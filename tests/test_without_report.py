@@ -36,7 +36,8 @@ within = limits(1, 1, innovation=1000.0, state=2000.0)
 print(guarantee(model, FloatFormat(2, 24), within).for_ever)
 print(required_precision(model, 20, 1.0, basis="probable", within=within).fmt.precision)
 for structure in ("balanced state space", "cascade of direct form II"):
-    system = LinearSystem.from_sections([[1, 2, 1, 1, -1, 0.5], [1, 2, 1, 1, -1, 0.25]], structure, scale=True)
+    scale = structure.startswith("cascade")
+    system = LinearSystem.from_sections([[1, 2, 1, 1, -1, 0.5], [1, 2, 1, 1, -1, 0.25]], structure, scale=scale)
     print(required_precision(system, 20, 0.01, z=np.ones((20, 1))).fmt.precision)
 """
 COMMAND = "import runpy\nsys.argv = ['gpbnb', *{}]\nrunpy.run_module('gpbnb', run_name='__main__')\n"

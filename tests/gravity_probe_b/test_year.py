@@ -88,7 +88,7 @@ def test_a_slice_of_the_bounds_comes_out_again(base, tmp_path, monkeypatch):
 def test_every_case_is_stored_to_the_end_of_the_year():
     runs = year.load()
     assert [run.case for run in runs] == list(CASES)
-    assert len(set(CASES)) == len(CASES) == 45
+    assert len(set(CASES)) == len(CASES) == 46
     for run in runs:
         assert run.steps.tolist() == list(year.checkpoint_steps())
         assert run.steps[-1] == YEAR == 3_153_600
@@ -147,7 +147,7 @@ def test_the_refined_bound_is_near_the_error_at_the_end_of_the_year():
                 total = contraction.companion_bound(error, own)
                 assert (total >= np.abs(error)).all()
                 ratios.append((total / np.abs(error)).max())
-    assert len(ratios) == 2 * 43
+    assert len(ratios) == 2 * 44
     assert max(ratios) < 1.5
     assert max(bounds[SINGLE.reference].drift[-1]) < 1e-12 * MILLIARCSECOND
 
