@@ -111,6 +111,8 @@ def confirmed(name: str, seed: int = 0) -> tuple[int, str]:
     import tests.corpus.package as package
 
     run, count = drawn(name, seed)[0], 0
+    if isinstance(run, Case) and not hasattr(oracle, run.function):
+        return 0, ""
     try:
         expected = list(run.steps(oracle))
     except NotImplementedError:
