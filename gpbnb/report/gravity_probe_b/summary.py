@@ -57,7 +57,7 @@ def find() -> tuple[YearAnswer, ...]:
     }
     return (
         YearAnswer("Report, own criterion", "error equals the drift", printed.printed),
-        YearAnswer("Same, one simulated year", "observed", (), answers.find_answers(DRIFT).bits),
+        YearAnswer("The same, simulated", "observed", (), answers.find_answers(DRIFT).bits),
         YearAnswer("Report, for 1 mas", "(125) is not a bound", within),
         YearAnswer("One simulated year", "observed", (), record),
         YearAnswer(
