@@ -46,6 +46,7 @@ LONGEST = {"text": 1000, "complete": 4000}
 LOADS = 10  # at most
 HIGHEST = 20_000  # pixels, on a desktop
 HEAVIEST = 300_000  # bytes of HTML
+REFERENCE = "book/api.html"  # all public names, looked up and not read through: it may be heavier and higher
 SIZES = {"desktop": {"width": 1280, "height": 900}, "phone": {"width": 390, "height": 844}}
 PAPER = {"width": 688, "height": 974}  # A4 without margins, at 96 dots an inch
 

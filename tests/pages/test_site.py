@@ -10,7 +10,6 @@ import pytest
 from . import browser as tools
 
 PAGES = [each for each in tools.pages() if each.startswith("book/")]
-REFERENCE = "book/api.html"
 HEAVIEST = 1_500_000  # bytes of a page with its pictures, scripts, styles and fonts
 on_a_desktop = pytest.mark.parametrize(
     "page", [(each, "desktop") for each in tools.pages()], ids="-".join, indirect=True
@@ -37,7 +36,7 @@ def search(open_page):
 
 
 def rank(page):
-    return 2 if page == REFERENCE else 1 if page.startswith("book/ledger-") else 0
+    return 2 if page == tools.REFERENCE else 1 if page.startswith("book/ledger-") else 0
 
 
 @pytest.mark.parametrize(("words", "number"), [("6606", "6606"), ("3153600", "3153600"), ("3,153,600", "3153600")])
