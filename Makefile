@@ -106,15 +106,10 @@ format: .venv/with-dev ## let ruff lay out the code and mend what it can
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-exactness: .venv/made-for ## billions of operations compared with independent arithmetic, digit for digit, and more altered statements; it resumes
+exactness: .venv/made-for ## more altered statements, the golden corpus, and fresh inputs compared with independent arithmetic, digit for digit; SLICE=0/10 takes a part
 	GPBNB_ALTERATIONS=more $(PY) -m pytest -q tests/ledger/test_alterations.py
-	$(PY) -m tests.corpus
-	$(PY) -m benchmarks.exactness
-	$(PY) -m benchmarks.wide
-	$(PY) -m benchmarks.processors
-	$(PY) -m benchmarks.paths
-	$(PY) -m benchmarks.nonlinear
-	$(PY) -m benchmarks.code
+	$(PY) -m tests.corpus $(if $(SLICE),--slice $(SLICE))
+	$(PY) -m tests.corpus.conformance $(if $(SLICE),--slice $(SLICE))
 
 bench: .venv/with-bench ## timings against peers, side by side, the short formats against gfloat, and guarantees
 	$(PY) -m benchmarks

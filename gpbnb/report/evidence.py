@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,17 +23,16 @@ def operations(file: Path) -> Checked:
 
     Parameters
     ----------
-    file : a table as CSV with the columns `compared` and `different`, or as Markdown with the columns `all` and
-        `different`.
+    file : a table with the columns `all` and `different`.
+
+    Raises
+    ------
+    ValueError : the table has other columns.
     """
-    if file.suffix == ".md":
-        rows, compared = _rows(file), "all"
-    else:
-        rows, compared = list(csv.DictReader(file.read_text(encoding="utf-8").splitlines())), "compared"
-    if not rows or not {compared, "different"} <= rows[0].keys():
-        raise ValueError(f"got the table {file.name}; needed the columns {compared!r} and 'different'")
-    numbers = [[int(row[name].replace(",", "")) for row in rows] for name in (compared, "different")]
-    return Checked(sum(numbers[0]), sum(numbers[1]))
+    rows = _rows(file)
+    if not rows or not {"all", "different"} <= rows[0].keys():
+        raise ValueError(f"got the table {file.name}; needed the columns 'all' and 'different'")
+    return Checked(*(sum(int(row[name].replace(",", "")) for row in rows) for name in ("all", "different")))
 
 
 def _rows(file: Path) -> list[dict[str, str]]:

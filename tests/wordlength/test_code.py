@@ -10,11 +10,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from built_code import SANITIZER, disagreement, installed, models
 
-import benchmarks.code
-from benchmarks import code_batch
-from benchmarks.code import cases, installed, models, run, settings_of
-from benchmarks.code_batch import Case, compare
 from gpbnb import (
     BINARY16,
     BINARY32,
@@ -45,40 +42,19 @@ from gpbnb.wordlength.c_source import places
 from gpbnb.wordlength.code import _in_long_words, model_coefficients, prepared
 from gpbnb.wordlength.models import read_model
 from gpbnb.wordlength.precision import required_precision
+from tests.corpus import conformance
 from tests.plain_program import steps_in_python
 
-CASES = list(cases())
-STEPS = 3_000
-"""Steps of each combination; `make exactness` compares 10,000 of all combinations."""
 needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang")
 
 
-def slice_of(seed, count):
-    """Combinations of each kind of format and each kind of filter, drawn with a seed."""
-    rng = np.random.default_rng(seed)
-    small = [case for case in CASES if "ten states" not in case.label]
-    kinds = dict.fromkeys((case.kind, isinstance(case.given, LinearModel)) for case in small)
-    for kind in kinds:
-        mine = [case for case in small if (case.kind, isinstance(case.given, LinearModel)) == kind]
-        yield from (mine[i] for i in rng.choice(len(mine), min(count, len(mine)), replace=False))
-
-
-SLICE = [*slice_of(1, 2)]
-
-
-@pytest.fixture(scope="module")
-def compared():
-    """What became of each combination of the slice; they are compiled together, which takes a third of the time."""
-    return compare(SLICE, STEPS, settings_of(installed(), sanitize=False))
-
-
 @needs_compiler
-@pytest.mark.parametrize("i", range(len(SLICE)), ids=[f"{case.kind} {case.label}" for case in SLICE])
-def test_code_has_the_digits_of_its_emulation(i, compared):
-    builds = len(settings_of(installed(), sanitize=False))
-    assert compared[i].case is SLICE[i]
-    assert compared[i].faults == ()
-    assert (compared[i].builds, compared[i].steps) == (builds, builds * STEPS)
+@pytest.mark.parametrize("name", [f"code {i}" for i in range(0, 60, 5)])
+def test_code_has_the_digits_of_its_emulation(name):
+    _, builds, steps, faults = conformance.built(name, 2026)
+    assert faults == []
+    assert builds >= len(conformance.LEVELS)
+    assert steps > 3
 
 
 def built(folder, flags=FLAGS):
@@ -91,90 +67,7 @@ def built(folder, flags=FLAGS):
     return done.returncode, done.stdout + done.stderr
 
 
-@needs_compiler
-@pytest.mark.parametrize(
-    ("old", "new", "fault"),
-    [
-        (" * r", " + r", "step 1: number"),
-        ("_OK;\n}", "_OK + 3;\n}", "step 1: status 3"),
-        ("{\n    const", "{\n    int unused;\n    const", "unused variable"),
-    ],
-)
-def test_the_filter_of_a_batch_that_is_at_fault_is_named(old, new, fault, monkeypatch):
-    def write(given, fmt, form, folder, name, **settings):
-        paths = write_code(given, fmt, form, folder, name, **settings)
-        if given.name == "bad":
-            text = paths[1].read_text()
-            assert old in text
-            paths[1].write_text(text.replace(old, new, 1))
-
-    monkeypatch.setattr(code_batch, "write_code", write)
-    filters = [replace(BIQUAD, name=name) for name in ("good", "bad", "good too")]
-    settings = settings_of(installed()[:1])
-    found = compare([Case("", each.name, each, BINARY32, "direct form I") for each in filters], 50, settings)
-    assert [each.counts for each in found] == [(3, 150, 750), (0, 0, 0), (3, 150, 750)]
-    assert [len(each.faults) for each in found] == [0, len(settings), 0]
-    assert all(fault in each for each in found[1].faults)
-
-
-def test_every_bit_of_every_step_is_compared(tmp_path):
-    case = Case("", "", BIQUAD, BINARY32, "direct form I")
-    written = code_batch._written(case, "f0", tmp_path, 300, 0)
-    written.expected[6, 4] = 0
-    rows = np.zeros(300, [("status", "i4"), ("row", "f4", 5)])
-    rows["row"] = written.expected
-    for step, number in ((300, np.nextafter(written.expected[299, 4], np.float32(1))), (7, -0.0)):
-        wrong = rows.copy()
-        wrong["row"][step - 1, 4] = number
-        wrong.tofile(tmp_path / "f0.out")
-        assert code_batch._difference(tmp_path, written) == f"step {step}: number 4 differs"
-    rows[:-1].tofile(tmp_path / "f0.out")
-    assert code_batch._difference(tmp_path, written) == "299 steps in place of 300"
-    rows.tofile(tmp_path / "f0.out")
-    assert code_batch._difference(tmp_path, written) == ""
-
-
-@needs_compiler
-def test_a_comparison_may_take_only_combinations_with_a_text():
-    found = [outcome for batch in run(1, 20, file=None, only="binary64 smoother") for outcome in batch]
-    assert [(each.case.kind, each.case.label, each.faults) for each in found] == [("binary64", "smoother", ())]
-
-
 GROWING = LinearSystem([["1.5"]], [[1]])
-
-
-def test_a_filter_that_overflows_starts_again_with_the_next_input():
-    vectors = code_batch.restarted(prepared(GROWING, FixedFormat(4, 11), None).emulate, np.ones((100, 1)))
-    assert vectors.status.tolist() == [*([0, 0, 0, 0, 0, -2] * 16), 0, 0, 0, 0]
-    states = [2048, 5120, 9728, 16640, 27008, 27008]  # 1, 2.5, 4.75, 8.125, 13.1875; then 20.78
-    assert vectors.states[:, 0].tolist() == [*(states * 16), *states[:4]]
-    assert vectors.inputs.tolist() == [[2048]] * 100
-
-
-@needs_compiler
-def test_every_step_of_a_filter_that_overflows_is_compared(monkeypatch):
-    case, settings = Case("int16", "growing", GROWING, FixedFormat(4, 11), None), settings_of(installed()[:1])
-    (found,) = compare([case], 300, settings)
-    assert (found.counts, found.faults) == ((3, 900, 1800), ())
-    main_ = code_batch._main
-    monkeypatch.setattr(code_batch, "_main", lambda batch: main_(batch).replace("status >= 2", "0"))
-    (found,) = compare([case], 300, settings)
-    assert len(found.faults) == 3
-
-
-@needs_compiler
-def test_a_comparison_resumes_where_it_ended(tmp_path, monkeypatch):
-    file = tmp_path / "code.csv"
-    first = [outcome for found in run(0.002, 20, file=file) for outcome in found]
-    assert len(first) == 4
-    file.write_text("".join(file.read_text().splitlines(keepends=True)[:3]))
-    left = []
-    monkeypatch.setattr(benchmarks.code, "compare", lambda batch, *rest: left.extend(batch) or compare(batch, *rest))
-    again = [outcome for found in run(0.002, 20, file=file) for outcome in found]
-    assert [each.label for each in left] == [first[3].case.label]
-    assert [(each.case.label, each.counts) for each in again] == [(each.case.label, each.counts) for each in first]
-
-
 BIQUAD = FilterDesign(["0.1", "0.2", "0.1"], [1, "-1.2", "0.5"], name="a low-pass section")
 
 
@@ -285,7 +178,7 @@ def test_the_longest_words_are_divided_as_fractions(integer, fraction, overflow,
         fmt = FixedFormat(integer, fraction, rounding, overflow)
         helpers = Integers(WordFormats(fmt), Needs(fmt.precision + abs(fraction), 63)).text("divide")
         (tmp_path / "run.c").write_text(DIVISIONS.format(helpers=helpers))
-        command = [installed()[0], *FLAGS.split(), "-Werror", *benchmarks.code.SANITIZER.split(), "-o", "run", "run.c"]
+        command = [installed()[0], *FLAGS.split(), "-Werror", *SANITIZER.split(), "-o", "run", "run.c"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stderr) == (0, "")
         within = [each for each in numbers if fmt.lowest <= each * fmt.unit <= fmt.largest]
@@ -305,9 +198,8 @@ def blind(form):
 @needs_compiler
 def test_what_is_chosen_by_a_zero_is_chosen_in_the_code():
     formats = BINARY32, FixedFormat(8, 23, "even", "raise")
-    cases = [Case("", f"{form}, {fmt}", blind(form), fmt, form) for form in Form for fmt in formats]
-    found = compare(cases, 50, settings_of(installed()[:1]))
-    assert {each.case.label: each.faults for each in found} == {case.label: () for case in cases}
+    z = np.random.default_rng(0).uniform(-1, 1, (50, 2))
+    assert [disagreement(blind(form), fmt, form, z) for form in Form for fmt in formats] == [""] * 2 * len(Form)
 
 
 def sparse(seed):
@@ -329,16 +221,11 @@ def sparse(seed):
 def test_what_zeros_leave_without_use_ends_the_code_as_the_emulation():
     """An inverse that a zero row of H multiplies may overflow; a factor that multiplies a zero gain is not computed."""
     formats = BINARY32, FixedFormat(2, 13, "even"), FixedFormat(3, 6, "even", "saturate")
-    cases = [
-        Case("", f"{seed}, {form}, {fmt}", sparse(seed), fmt, form)
-        for seed in range(40, 52)
-        for form in Form
-        for fmt in formats
-        if fits(sparse(seed), fmt, form)
-    ]
-    assert len(cases) > 100
-    found = compare(cases, 12, settings_of(installed()[:1], sanitize=False)[:1])
-    assert {each.case.label: each.faults for each in found} == {case.label: () for case in cases}
+    models = [(sparse(seed), formats[seed % 3]) for seed in range(40, 52)]
+    cases = [(model, fmt, form) for model, fmt in models for form in Form if fits(model, fmt, form)]
+    assert len(cases) > 30
+    z = np.random.default_rng(0).uniform(-1, 1, (12, 2))
+    assert [disagreement(model, fmt, form, z[:, : model.m]) for model, fmt, form in cases] == [""] * len(cases)
 
 
 def fits(model, fmt, form):
