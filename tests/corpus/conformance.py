@@ -294,21 +294,21 @@ def arithmetic(chosen: list[Row], options: Any, whole: bool) -> int:
         counts = list(pool.map(compare, chosen, [options.count] * count, [options.seed] * count, chunksize=4))
     for each in [text for found in counts for text in found.different][:20]:
         print(each)
-    groups: dict[tuple[str, str, str], list[Count]] = {}
+    groups: dict[tuple[str, str], list[Count]] = {}
     for each in counts:
         fmt = each.row.fmt
         base = "2" if isinstance(fmt, Fixed) else str(fmt.base)
-        groups.setdefault((base, each.row.storage, fmt.rounding), []).append(each)
+        groups.setdefault((base, each.row.storage), []).append(each)
     body = []
     for key, mine in groups.items():
         numbers = [sum(each.compared.get(name, 0) for each in mine) for name in OPERATIONS]
         cells = (*(f"{n:,}" for n in (*numbers, sum(numbers))), str(sum(len(each.different) for each in mine)))
-        body.append((*key, *cells))
+        body.append((*key, str(len(mine)), *cells))
     about = (
         f"Compared on {_today()} with decimal {decimal.__version__}, gmpy2 {gmpy2.version()} ({gmpy2.mpfr_version()}) "
         "and exact fractions."
     )
-    _table("exactness.md", ("base", "stored as", "rounding", *OPERATIONS, "all", "different"), body, about, whole)
+    _table("exactness.md", ("base", "stored as", "formats", *OPERATIONS, "all", "different"), body, about, whole)
     return sum(len(each.different) for each in counts)
 
 
