@@ -1,12 +1,12 @@
 """A stored table: a CSV file with its provenance, whose shape and ranges are checked when it is read.
 
-The file starts with lines ``# key: value``, the last of which gives the number of rows. The repository keeps the
-digits.
+The file starts with lines ``# key: value``, the last of which give a checksum of the rows and their number.
 """
 
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import math
 import re
@@ -20,6 +20,9 @@ from gpbnb.sweeps.numbers import plain_integer, plain_number
 
 Record = tuple[str, ...]
 T = TypeVar("T")
+
+CHECK = "sha256"
+"""Key of the checksum; it covers all rows."""
 
 
 class DamagedFileError(ValueError):
@@ -96,7 +99,7 @@ def write(file: Path, columns: Sequence[Column], rows: Iterable[Record], provena
             raise ValueError(f"{file.name}, row {count + 1}: {fault}")
         lines.append(_line(row))
         count += 1
-    head = {**provenance, "rows": str(count)}
+    head = {**provenance, CHECK: _digest(lines), "rows": str(count)}
     for key, value in head.items():
         if ":" in key or any(ord(c) < 32 for c in key + value) or value != value.strip():
             raise ValueError(f"got {key!r}: {value!r} as provenance; needed one line of text, and no colon in its name")
@@ -183,6 +186,11 @@ def read(file: Path, columns: Sequence[Column], cure: str) -> StoredTable:
         rows.append(tuple(row))
     if len(rows) < expected:
         raise damaged(len(lines), f"the file ends after {len(rows)} of {expected} rows")
+    digest = _digest(f"{line}\n" for line in lines[start + 1 : -1])
+    if digest != provenance.get(CHECK):
+        raise damaged(
+            start - 1, f"the checksum of the rows is {digest}, not {provenance.get(CHECK)}: some value differs"
+        )
     return StoredTable(tuple(columns), tuple(rows), provenance)
 
 
@@ -194,6 +202,10 @@ def _fault(columns: Sequence[Column], row: Sequence[str]) -> str | None:
         if fault:
             return f"got {column.name} = {text!r}; {fault}"
     return None
+
+
+def _digest(lines: Iterable[str]) -> str:
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def _line(fields: Sequence[str]) -> str:

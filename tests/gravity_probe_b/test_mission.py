@@ -48,6 +48,21 @@ def test_annual_aberration_is_the_ellipse_of_the_star_s_latitude():
     assert axes == pytest.approx([math.sin(latitude), 1], rel=2e-3)
 
 
+@pytest.mark.parametrize(
+    ("quarter", "apex"),
+    [(0, (90, 23.44)), (1, (180, 0)), (2, (270, -23.44)), (3, (0, 0))],
+    ids=["September", "December", "March", "June"],
+)
+def test_the_earth_flies_to_where_the_sun_was_three_months_ago(quarter, apex):
+    """The model's year starts at the September equinox: the Sun is at 12 h, the Earth flies toward 6 h."""
+    ra, dec, star_ra, star_dec = (math.radians(each) for each in (*apex, 343.259, 16.841))
+    north = math.sin(dec) * math.cos(star_dec) - math.cos(dec) * math.sin(star_dec) * math.cos(ra - star_ra)
+    east = math.cos(dec) * math.sin(ra - star_ra)
+    steps = np.array([round(quarter / 4 * 365 * 86400 / 10)])
+    moved = Mission().known_signal(steps) - Mission(annual=False).known_signal(steps)
+    assert moved[0] == pytest.approx([20.5 * north, 20.5 * east], abs=1e-3)
+
+
 def test_the_orbit_moves_the_star_north_and_south_only():
     steps = np.arange(1, 2000)
     signal = Mission(annual=False).known_signal(steps)

@@ -25,6 +25,16 @@ def test_every_stored_sweep_is_undamaged(sweep):
 
 
 @pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
+def test_one_changed_digit_is_found(sweep, tmp_path):
+    text = sweep.file.read_text(encoding="utf-8")
+    last = max(text.rfind(each) for each in "123456789")
+    changed = tmp_path / sweep.file.name
+    changed.write_text(f"{text[:last]}{'8' if text[last] == '9' else '9'}{text[last + 1 :]}", encoding="utf-8")
+    with pytest.raises(DamagedFileError):
+        sweep.load(changed)
+
+
+@pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
 def test_a_cut_sweep_is_rejected(sweep, tmp_path):
     lines = sweep.file.read_text(encoding="utf-8").splitlines(keepends=True)
     cut = tmp_path / sweep.file.name

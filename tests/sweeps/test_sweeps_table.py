@@ -50,17 +50,22 @@ def test_every_lost_end_is_found(file):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda lines: [*lines[:27], ""], "line 28: the file ends after 23 of 45 rows"),
-        (lambda lines: lines[:9] + lines[10:], "line 49: the file ends after 44 of 45 rows"),
-        (lambda lines: [*lines[:-1], lines[-2], ""], "line 50: the file has more than the 45 rows"),
+        (lambda lines: [*lines[:27], ""], "line 28: the file ends after 22 of 45 rows"),
+        (lambda lines: lines[:9] + lines[10:], "line 50: the file ends after 44 of 45 rows"),
+        (lambda lines: [*lines[:-1], lines[-2], ""], "line 51: the file has more than the 45 rows"),
         (lambda lines: [*lines[:6], lines[6].replace(",", ";"), *lines[7:]], "line 7: got 1 fields; needed 5"),
-        (lambda lines: [*lines[:6], lines[6].replace("2,0.28", "2,-0.28"), *lines[7:]], "line 7: got error = '-0.28"),
+        (lambda lines: [*lines[:7], lines[7].replace("2,0.28", "2,-0.28"), *lines[8:]], "line 8: got error = '-0.28"),
         (lambda lines: [line for line in lines if "rows" not in line], "the line '# rows: …' is missing"),
         (lambda lines: [lines[0], lines[0], *lines[1:]], "line 2: .* each key once"),
         (
             lambda lines: [line.replace("kind,seed", "seed,kind") for line in lines],
-            "line 4: got the columns 'seed,kind,.*; needed 'kind,seed",
+            "line 5: got the columns 'seed,kind,.*; needed 'kind,seed",
         ),
+        (
+            lambda lines: [*lines[:9], lines[9].replace("0.5714", "0.5715"), *lines[10:]],
+            "line 3: the checksum .* differs",
+        ),
+        (lambda lines: [line for line in lines if "sha256" not in line], "the checksum of the rows is .*, not None"),
         (lambda lines: [], "line 1: the line '# rows: …' is missing"),
     ],
 )
@@ -93,7 +98,7 @@ def test_a_missing_and_a_foreign_file_are_reported(tmp_path):
 def test_values_out_of_range_are_neither_written_nor_read(tmp_path, column, text, fault):
     path = tmp_path / "year.csv"
     write(path, [Column(column.name, "text")], [(text,)], {})
-    with pytest.raises(DamagedFileError, match=rf"line 3: got {column.name} = .*{fault}"):
+    with pytest.raises(DamagedFileError, match=rf"line 4: got {column.name} = .*{fault}"):
         read(path, [column], CURE)
     before = path.read_bytes()
     with pytest.raises(ValueError, match=f"row 1: got {column.name} = .*{fault}"):

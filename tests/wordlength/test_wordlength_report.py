@@ -50,6 +50,13 @@ def tables_of(page: str) -> dict[str, list[list[str]]]:
     }
 
 
+def test_a_name_is_text_not_markup():
+    page = replace(REPORT, name="<script>alert(1)</script>", names=("<b>", "&", "'")).to_html()
+    assert "<script>alert" not in page
+    assert "<b>" not in page
+    assert page.count("Wordlength for &lt;script&gt;alert(1)&lt;/script&gt;") == 2
+
+
 def test_each_power_stands_beside_its_grid_line():
     """The tolerance is the power zero. Logarithms from -1 to 2 take 250 pixels."""
     drawn = REPORT.to_html()
