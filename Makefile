@@ -35,7 +35,7 @@ export MYPY_CACHE_DIR := $(HERE)/.cache/mypy
 export PYTHONNOUSERSITE := 1
 # Without bytecode, which images of containers turn off, each process compiles up to 2,700 modules again.
 unexport PYTHONDONTWRITEBYTECODE
-unexport NUMBA_CACHE_DIR GPBNB_CACHE_DIR PYTHONPATH PYTHONHOME MPLBACKEND JUPYTER_PATH JUPYTER_CONFIG_PATH
+unexport NUMBA_CACHE_DIR PYTHONPATH PYTHONHOME MPLBACKEND JUPYTER_PATH JUPYTER_CONFIG_PATH
 
 # IPython and pytest want theirs to be there.
 _ := $(shell mkdir -p .cache/tmp)
@@ -91,7 +91,7 @@ verify-sweeps: .venv/made-for ## a sample of every stored sweep computed again o
 	$(PY) -m gpbnb.report.stored verify --sample $(or $(SAMPLE),1)
 
 notebooks: .venv/made-for ## execute the notebooks in place; NOTEBOOKS="book/kalman.ipynb" picks some
-	ls -S $(or $(NOTEBOOKS),book/*.ipynb) | GPBNB_QUIET=1 xargs -P 2 -n 1 .venv/bin/jupyter nbconvert $(EXECUTE)
+	ls -S $(or $(NOTEBOOKS),book/*.ipynb) | xargs -P 2 -n 1 .venv/bin/jupyter nbconvert $(EXECUTE)
 
 findings: .venv/made-for ## run every check of the ledger and store the findings
 	$(PY) -c "from gpbnb.report.ledger import stored; stored.write_findings()"

@@ -31,7 +31,6 @@ Each chapter of the book has a sub-package of ``gpbnb.report``, such as ``gpbnb.
 from importlib import import_module
 from typing import Any
 
-from gpbnb import clock as clock  # before all other modules, because it notes the time
 from gpbnb.names import HOMES, NAMED_FORMATS
 
 __version__ = "0.2.0"

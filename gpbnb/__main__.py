@@ -11,7 +11,6 @@ import gpbnb
 
 COMMANDS = {
     "wordlength": "how many digits your own filter needs, with a report",
-    "warm": "compile all that wordlength needs, so that later runs start at once",
     "ledger": "every printed equation, number and claim, with its verdict",
     "bounds.check": "prove the claim of a certificate, without the rest of the package",
     "report.guarantees.attack": "attack guarantees with emulated runs, and list the largest errors",

@@ -13,7 +13,7 @@ import sys
 from flit_core import buildapi
 print(buildapi.build_wheel(sys.argv[1]))" "$work"
 cd "$work"
-unset PYTHONPATH NUMBA_CACHE_DIR GPBNB_CACHE_DIR
+unset PYTHONPATH NUMBA_CACHE_DIR
 export PYTHONNOUSERSITE=1 HOME="$work"
 start=$(date +%s)
 python3 -m venv venv
@@ -64,10 +64,10 @@ for question in "nile 1 100" "tracker 0.01 1000" "magnetometer 1e-9 1000"; do
 	set -- $question
 	for when in "first" "next"; do
 		begin=$(date +%s)
-		answer=$(GPBNB_CACHE_DIR="$work/cache-$1" venv/bin/python ask.py "$1.toml" "$2" "$3" 2> "$1.err")
+		answer=$(NUMBA_CACHE_DIR="$work/cache-$1" venv/bin/python ask.py "$1.toml" "$2" "$3" 2> "$1.err")
 		echo "$1, $when time, $(($(date +%s) - begin)) s: $answer"
 	done
-	GPBNB_CACHE_DIR="$work/cache-$1" venv/bin/python -m gpbnb wordlength "$1.toml" --tolerance "$2" --steps "$3" \
+	NUMBA_CACHE_DIR="$work/cache-$1" venv/bin/python -m gpbnb wordlength "$1.toml" --tolerance "$2" --steps "$3" \
 		--basis emulation --report "$1.html" > "$1.txt" 2> "$1.err"
 	test -s "$1.html" && test -s "$1.json" && test -s "$1.txt"
 done

@@ -14,14 +14,14 @@ import gpbnb
 ROOT = Path(gpbnb.__file__).parent
 LONGEST_FILE = 800
 TOPICS = ("rounding", "inversion", "kalman", "guarantees", "rolling", "integration", "budget", "geometry", "processors")
-LIBRARY = (("clock", "names"), ("caching",), ("arithmetic",), ("sweeps",), ("filters",), ("bounds",), ("wordlength",))
+LIBRARY = (("files", "names"), ("arithmetic",), ("sweeps",), ("filters",), ("bounds",), ("wordlength",))
 REPORT = (
     ("display", "measurement", "confidence"),
     TOPICS,
     ("gravity_probe_b",),  # its answers are compared with the bounds of the report of 1984
     ("wordlengths", "pictures", "ledger", "ledger_options", "stored", "evidence"),
 )
-LAYERS = (*LIBRARY, ("warm",), *(tuple(f"report.{name}" for name in names) for names in REPORT), ("ledger",))
+LAYERS = (*LIBRARY, *(tuple(f"report.{name}" for name in names) for names in REPORT), ("ledger",))
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 FILES = {".".join(path.relative_to(ROOT.parent).with_suffix("").parts): path for path in sorted(ROOT.rglob("*.py"))}
 
@@ -116,23 +116,26 @@ def names_defined(nodes):
 
 EXTERNAL = {
     "_asdict",
+    "_cache_path",
     "_codegen",
     "_compiled_object",
-    "_compiler",
     "_engine",
     "_ensure_finalized",
     "_fields",
     "_final_module",
-    "_index_key",
+    "_impl",
+    "_index_path",
+    "_load_data",
+    "_load_overload",
     "_make",
     "_mpf_",
     "_object_caching_enabled",
     "_print",
-    "_rebuild",
-    "_reduce",
     "_replace",
     "_repr_html_",
     "_repr_markdown_",
+    "_save_data",
+    "_source_stamp",
 }
 """Names of other libraries that begin with an underscore."""
 

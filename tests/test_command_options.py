@@ -51,10 +51,6 @@ OPTIONS = {
             "--code": (None, "folder for the filter as C99 with test vectors"),
         },
     ),
-    "warm": (
-        "Compile all that python -m gpbnb wordlength needs",
-        {"--base": (None, "only formats of this base; default: all")},
-    ),
     "ledger": (
         "Check every statement of the three documents",
         {
@@ -69,7 +65,6 @@ OPTIONS = {
 }
 LISTED = {
     "wordlength": "how many digits your own filter needs",
-    "warm": "compile all that wordlength needs, so that later runs start at once",
     "ledger": "every printed equation, number and claim, with its verdict",
     "bounds.check": "prove the claim of a certificate, without the rest of the package",
     "report.guarantees.attack": "attack guarantees with emulated runs",

@@ -24,8 +24,9 @@ from gpbnb.bounds.guarantee import Guarantee, closed_loops
 from gpbnb.bounds.guess import FilterLimits, linear_steps
 from gpbnb.bounds.units import largest_errors, units
 from gpbnb.filters.kernels.bounded import widened
+from gpbnb.filters.kernels.linear import effects, execute
 from gpbnb.filters.opening import as_packed
-from gpbnb.filters.program import MULTIPLY, SUBTRACT, effects, execute
+from gpbnb.filters.program import MULTIPLY, SUBTRACT
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,15 +5,15 @@ products with known coefficients, sums and differences: a *linear program*. A fi
 constant coefficients from the start, and each of its structures is another program. The same list of operations serves
 several purposes, so that they cannot disagree:
 
-* :func:`execute` runs it in any format, digit for digit like the filter itself;
-* :func:`matrices` and :func:`functionals` compute the linear function of (x, z) that each value approximates;
-* :func:`effects` computes the effect of a rounding error in each operation on the result of the step;
+* :mod:`gpbnb.filters.kernels.linear` runs it in any format, digit for digit like the filter itself, and computes the
+  effect of a rounding error in each operation on the result of the step;
+* :func:`matrices` computes the linear function of (x, z) that the step approximates;
 * :mod:`gpbnb.filters.words` runs it on integers, with formats of their own for coefficients, data and sums;
 * :mod:`gpbnb.wordlength.code` prints it as C.
 
 A step that also computes the covariance is not linear: it multiplies and divides values. :mod:`gpbnb.filters.tracing`
 lists its operations with the same codes, and :mod:`gpbnb.filters.nonlinear_system` those of a step of your own, for C
-code; the compiled functions here take linear programs and limits.
+code; the compiled loops take linear programs and limits.
 
 The coefficients are arguments and not part of the program, because they may change from step to step. A product with a
 zero coefficient is exact, and so is a sum with this product; the compiled kernels omit both.
@@ -28,11 +28,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from gpbnb.arithmetic.kernels import doubledouble
-from gpbnb.arithmetic.kernels.compiling import compiled, inner
-from gpbnb.arithmetic.kernels.scalar import add, less, load, multiply, put, store, subtract
-from gpbnb.arithmetic.kernels.tags import DoubleDouble
 
 # fmt: off
 (
@@ -313,50 +308,6 @@ def sequential_program(n: int, m: int) -> Program:
     return build.finish(x, count)
 
 
-# -- execution --------------------------------------------------------------------------------------------------------
-
-
-@inner
-def execute(fmt: Any, operations: Any, outputs: Any, coefficients: Any, x: Any, z: Any, values: Any) -> None:
-    """Take one step in the arithmetic that the tag selects, and overwrite x and the workspace `values`."""
-    n, m = x.shape[0], z.shape[0]
-    for i in range(n):
-        put(fmt, values, i, load(fmt, x, i))
-    for i in range(m):
-        put(fmt, values, n + i, load(fmt, z, i))
-    for o in range(operations.shape[0]):
-        code, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
-        right = load(fmt, values, b)
-        if code == MULTIPLY:
-            put(fmt, values, n + m + o, multiply(fmt, load(fmt, coefficients, a), right))
-        elif code == ADD:
-            put(fmt, values, n + m + o, add(fmt, load(fmt, values, a), right))
-        elif code == SUBTRACT:
-            put(fmt, values, n + m + o, subtract(fmt, load(fmt, values, a), right))
-        else:
-            limit = load(fmt, coefficients, a)
-            beyond = less(fmt, right, limit) if code == AT_LEAST else less(fmt, limit, right)
-            put(fmt, values, n + m + o, limit if beyond else right)
-    for i in range(n):
-        store(fmt, x, i, load(fmt, values, outputs[i]))
-
-
-@compiled
-def advance(fmt: Any, operations: Any, outputs: Any, coefficients: Any, start: Any, z: Any, x: Any, X: Any) -> None:
-    """Take a step with each of the measurements z and keep every state in X.
-
-    Parameters
-    ----------
-    coefficients : (steps, c), one row for each step; after the last row, those from `start` on repeat.
-    """
-    values = np.empty((x.shape[0] + z.shape[1] + operations.shape[0], *x.shape[1:]), x.dtype)
-    rows = coefficients.shape[0]
-    for k in range(z.shape[0]):
-        row = k if k < rows else start + (k - start) % (rows - start)
-        execute(fmt, operations, outputs, coefficients[row], x, z[k], values)
-        X[k] = x
-
-
 # -- linear functions -------------------------------------------------------------------------------------------------
 
 
@@ -392,96 +343,3 @@ def matrices(program: Program, coefficients: Sequence[Any] | NDArray[Any]) -> tu
         for j, c in rows[value].items():
             whole[i, j] = c
     return whole[:, : program.n], whole[:, program.n :]
-
-
-@compiled
-def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes: Any) -> None:
-    """Compute the linear function of (x, z) that each value approximates.
-
-    Parameters
-    ----------
-    coefficients : (c, 2), double-double.
-    first : n + m.
-    rows : (n + m + o, n + m, 2), to be filled, double-double; relative to `sizes`, errors are below 2**-90.
-    sizes : (n + m + o, n + m), to be filled: the result with all signs made positive.
-    """
-    exactly, reach = DoubleDouble(), extents(operations, first)
-    rows[:] = 0.0
-    sizes[:] = 0.0
-    for i in range(first):
-        rows[i, i, 0] = 1.0
-        sizes[i, i] = 1.0
-    for o in range(operations.shape[0]):
-        code, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
-        v = first + o
-        if code == MULTIPLY:
-            c = (coefficients[a, 0], coefficients[a, 1])
-            for j in range(reach[b, 0], reach[b, 1]):
-                right = (rows[b, j, 0], rows[b, j, 1])
-                s = doubledouble.multiply(exactly, c, right) if c[0] != 0.0 and right[0] != 0.0 else (0.0, 0.0)
-                rows[v, j, 0], rows[v, j, 1] = s[0], s[1]
-                sizes[v, j] = abs(c[0]) * sizes[b, j]
-            continue
-        for j in range(reach[a, 0], reach[a, 1]):
-            rows[v, j, 0], rows[v, j, 1] = rows[a, j, 0], rows[a, j, 1]
-            sizes[v, j] = sizes[a, j]
-        for j in range(reach[b, 0], reach[b, 1]):
-            right = (rows[b, j, 0], rows[b, j, 1])
-            if code == SUBTRACT:
-                right = (-right[0], -right[1])
-            s = doubledouble.add(exactly, (rows[v, j, 0], rows[v, j, 1]), right)
-            rows[v, j, 0], rows[v, j, 1] = s[0], s[1]
-            sizes[v, j] += sizes[b, j]
-
-
-@compiled
-def extents(operations: Any, first: int) -> Any:
-    """Return the range of states and measurements, begin and end, outside of which each value does not depend on any.
-
-    A sum of products with the states, from left to right, depends on the first states only. Bounds that know this take
-    half the time.
-    """
-    found = np.empty((first + operations.shape[0], 2), np.int64)
-    for i in range(first):
-        found[i, 0], found[i, 1] = i, i + 1
-    for o in range(operations.shape[0]):
-        code, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
-        begin, end = found[b, 0], found[b, 1]
-        if code != MULTIPLY:
-            begin, end = min(begin, found[a, 0]), max(end, found[a, 1])
-        found[first + o, 0], found[first + o, 1] = begin, end
-    return found
-
-
-@compiled
-def effects(operations: Any, outputs: Any, coefficients: Any, first: int, G: Any, sizes: Any) -> None:
-    """Compute the effect of an error in each value on the states after the step.
-
-    Parameters
-    ----------
-    coefficients : (c,), float64.
-    G : (n + m + o, n), to be filled; relative to `sizes`, errors are below (3 o + 3) 2**-53.
-    sizes : (n + m + o, n), to be filled: the result with all signs made positive.
-    """
-    n = outputs.shape[0]
-    G[:] = 0.0
-    sizes[:] = 0.0
-    for i in range(n):
-        G[outputs[i], i] += 1.0
-        sizes[outputs[i], i] += 1.0
-    for o in range(operations.shape[0] - 1, -1, -1):
-        code, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
-        v = first + o
-        if code == MULTIPLY:
-            c = coefficients[a]
-            for i in range(n):
-                G[b, i] += c * G[v, i]
-                sizes[b, i] += abs(c) * sizes[v, i]
-            continue
-        sign = 1.0 if code == ADD else -1.0
-        for i in range(n):
-            G[a, i] += G[v, i]
-            sizes[a, i] += sizes[v, i]
-        for i in range(n):
-            G[b, i] += sign * G[v, i]
-            sizes[b, i] += sizes[v, i]

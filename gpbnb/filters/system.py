@@ -24,10 +24,11 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact, rationals
+from gpbnb.filters.kernels.linear import advance
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
 from gpbnb.filters.opening import as_packed, packed_array, stored_start, widened_array
-from gpbnb.filters.program import AT_MOST, Program, advance, matrices
+from gpbnb.filters.program import AT_MOST, Program, matrices
 from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
 from gpbnb.filters.structures import (
     CASCADES,

@@ -27,6 +27,7 @@ from gpbnb.arithmetic.kernels.tags import Double
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
+from gpbnb.filters.kernels.linear import execute
 from gpbnb.filters.program import (
     ADD,
     AT_LEAST,
@@ -41,7 +42,6 @@ from gpbnb.filters.program import (
     PRODUCT,
     SUBTRACT,
     Program,
-    execute,
 )
 from gpbnb.filters.system import LinearFilter, LinearSystem, system_inputs
 

@@ -6,7 +6,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 
-from gpbnb.caching import replace_file
+from gpbnb.files import replace_file
 from gpbnb.wordlength.options import printable, read
 
 INTERRUPTED = 130

@@ -28,7 +28,7 @@ from gpbnb.bounds.guarantee import check_limits, guarantee
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.system import output_errors
 from gpbnb.bounds.words import WordGuarantee
-from gpbnb.caching import replace_file
+from gpbnb.files import replace_file
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, Form
 from gpbnb.filters.model import LinearModel, identity_in

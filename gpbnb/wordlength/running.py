@@ -18,7 +18,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.system import output_proof
-from gpbnb.caching import replace_file
+from gpbnb.files import replace_file
 from gpbnb.filters.forms import CONSTANT_GAIN
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named

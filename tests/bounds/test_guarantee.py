@@ -20,9 +20,10 @@ from gpbnb.bounds.linear import error_coefficients, peak_gain
 from gpbnb.bounds.probable import probable_error, separate_roundings
 from gpbnb.bounds.units import units
 from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.linear import advance
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
-from gpbnb.filters.program import advance, innovation_program, loop_program, sequential_program
+from gpbnb.filters.program import innovation_program, loop_program, sequential_program
 from gpbnb.filters.run import Run
 from gpbnb.filters.system import biquad, controller, state_space
 from gpbnb.report.guarantees import derivation

@@ -273,7 +273,6 @@ def main() -> int:
     parser.add_argument("--slice", default="0/1", metavar="I/K", help="every K-th run, from the I-th")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
-    os.environ.setdefault("GPBNB_QUIET", "1")
     first, every = map(int, options.slice.split("/"))
     chosen = names(options.only)[first::every]
     if options.confirm:

@@ -33,7 +33,8 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.doubledouble import two_sum
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.program import MULTIPLY, effects, extents, functionals
+from gpbnb.filters.kernels.linear import effects, extents, functionals
+from gpbnb.filters.program import MULTIPLY
 
 _U = 2.0**-53
 _UP = 1 + 2.0**-40
@@ -163,7 +164,7 @@ class _Values(NamedTuple):
     none: NDArray[np.bool_]
     drift: NDArray[np.float64]
     largest: NDArray[np.float64]
-    #: (values, 2), see :func:`gpbnb.filters.program.extents`.
+    #: (values, 2), see :func:`gpbnb.filters.kernels.linear.extents`.
     reach: NDArray[np.int64]
 
 

@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from gpbnb.caching import replace_file
+from gpbnb.files import replace_file
 from gpbnb.report.ledger.checking import FAILED, MISSING, Row, counts, examine, owners
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.render import FORMATS, describe
