@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -16,7 +17,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.budget import theory as budget
 from gpbnb.report.geometry import theory as geometry
-from gpbnb.report.gravity_probe_b import answers, threshold, year
+from gpbnb.report.gravity_probe_b import answers, summary, threshold, year
 from gpbnb.report.rolling import experiment as rolling_experiment
 from gpbnb.report.rolling import theory as rolling
 
@@ -140,7 +141,14 @@ def test_the_year():
     # What the ledger's closing example prints.
     needed = answers.find_answers(1.0)
     says("year", "fig-kalman-digits", "at {} and {} digits".format(*needed.printed))
-    says("index", "fig-front", "at {} and {} digits".format(*needed.printed))
+    own, simulated, formula, _, years, _, _, every, _, _ = summary.find()
+    asked = "9 and 17 digits, which are 28 and 54 bits", "13 and 20 digits, which are 41 and 64 bits"
+    for row, words in zip((own, formula), asked, strict=True):
+        assert [f"{t}" for t in row.decimal] == re.findall(r"\d+", words)[:2]
+        assert [f"{summary.binary_digits(t):.0f}" for t in row.decimal] == re.findall(r"\d+", words)[2:]
+        says("index", "fig-front", words)
+    says("index", "fig-front", f"a point stands at {simulated.bits} bits", f"a green bar stands at {every.bits} bits")
+    says("index", "fig-front", f"the point at {years.bits} bits")
 
 
 def test_geometry():

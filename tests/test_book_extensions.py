@@ -133,15 +133,30 @@ def app(folder, builder="html"):
 
 
 def test_the_first_page_leads_to_the_root(tmp_path):
-    book.write_first_page(app(tmp_path), None)
+    (tmp_path / "book").mkdir()
+    book.write_redirects(app(tmp_path), None)
     text = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert 'http-equiv="refresh" content="0; url=book/index.html"' in text
     assert '<a href="book/index.html">' in text
     assert text.count("The title") == 2
 
 
+def test_a_page_that_moved_leads_to_its_place(tmp_path):
+    (tmp_path / "book").mkdir()
+    book.write_redirects(app(tmp_path), None)
+    assert {path.stem for path in (tmp_path / "book").iterdir()} == set(book.MOVED)
+    for name, target in book.MOVED.items():
+        assert f"url={target}" in (tmp_path / "book" / f"{name}.html").read_text(encoding="utf-8")
+
+
+def test_no_page_that_moved_is_still_there():
+    there = {path.stem for path in FOLDER.parent.glob("*.*")}
+    assert there.isdisjoint(book.MOVED)
+    assert {target.partition(".")[0] for target in book.MOVED.values()} <= there
+
+
 def test_a_failed_build_is_left_alone(tmp_path):
-    book.write_first_page(app(tmp_path), ValueError("failed"))
+    book.write_redirects(app(tmp_path), ValueError("failed"))
     weight.lighten(app(tmp_path), ValueError("failed"))
     assert list(tmp_path.iterdir()) == []
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import quad
-from test_notebooks import OPEN
+from test_notebooks import SHOWN
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import doubledouble
@@ -276,8 +276,8 @@ def number(numeral: str) -> float:
 
 
 def in_sight(page: Path) -> set[float]:
-    """The numbers that an open chapter's cells print, and those in its code, which a reader can change."""
-    if page.stem not in OPEN:
+    """The numbers that an open page's cells print, and those in its code, which a reader can change."""
+    if page.stem not in SHOWN:
         return set()
     found = []
     for cell in json.loads(page.read_text(encoding="utf-8"))["cells"]:

@@ -17,7 +17,7 @@ from sphinx.util.inspect import TypeAliasForwardRef
 from gpbnb.names import HOMES
 from gpbnb.report.display.tables import POWER
 
-FIRST_PAGE = """<!DOCTYPE html>
+REDIRECT = """<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
@@ -28,6 +28,8 @@ FIRST_PAGE = """<!DOCTYPE html>
 <body><main><h1>{title}</h1><p><a href="{target}">Open the book</a></p></main></body>
 </html>
 """
+MOVED = {"open": "errata.html#what-the-documents-leave-undone", "reading": "index.html#run-and-cite"}
+"""Pages that are now part of another, in the folder of the book, and where their content is."""
 
 
 class KeyLabels(BaseLabelStyle):
@@ -41,12 +43,18 @@ class ShortNames(PlainStyle):
     default_label_style = KeyLabels
 
 
-def write_first_page(app: Sphinx, error: Exception | None) -> None:
-    """Write index.html, which leads to the page at the root of the table of contents."""
-    if not error:
-        target = app.builder.get_target_uri(app.config.root_doc)
-        page = FIRST_PAGE.format(title=app.config.html_title, target=target)
-        Path(app.outdir, "index.html").write_text(page, encoding="utf-8")
+def write_redirects(app: Sphinx, error: Exception | None) -> None:
+    """Write index.html, which leads to the page at the root of the table of contents, and the pages that moved."""
+    if error:
+        return
+    root = app.config.root_doc
+    targets = {"index.html": app.builder.get_target_uri(root)}
+    if app.builder.name == "html":
+        folder = Path(root).parent
+        targets |= {str(folder / f"{name}.html"): target for name, target in MOVED.items()}
+    for name, target in targets.items():
+        page = REDIRECT.format(title=app.config.html_title, target=target)
+        Path(app.outdir, name).write_text(page, encoding="utf-8")
 
 
 def unfold_fields(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
@@ -179,5 +187,5 @@ def setup(app: Sphinx) -> dict:
     app.connect("doctree-resolved", mend_links)
     # Sphinx numbers the figures with the priority 500.
     app.connect("env-get-updated", number_figures, priority=900)
-    app.connect("build-finished", write_first_page, priority=100)
+    app.connect("build-finished", write_redirects, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -19,7 +19,7 @@ from sphinx.config import Config
 from sphinx.errors import ConfigError
 
 from gpbnb.report.display import style
-from gpbnb.report.gravity_probe_b import answers, figures
+from gpbnb.report.gravity_probe_b import figures, summary
 
 VARIABLE = "BOOK_ADDRESS"
 PREVIEW = "_static/preview.png"
@@ -96,7 +96,7 @@ def write_preview(app: Sphinx, error: Exception | None) -> None:
         return
     figure, axes = style.figure(height=PREVIEW_SIZE[1])
     figure.set_size_inches(PREVIEW_SIZE)
-    figures.digits_needed(answers.find_answers(), axes[0])
+    figures.answer_line(summary.find(), axes[0])
     figure.savefig(Path(app.outdir, PREVIEW), dpi=PREVIEW_DPI, facecolor="white", bbox_inches=None)
     plt.close(figure)
 

@@ -81,7 +81,7 @@ def test_the_digits_follow_from_counting_step_by_step():
     rows = {each.source: each.bits for each in summary.find()}
     year, every = (1 + (rows[name] - 1) * np.log10(2) for name in ("One simulated year", "Every admissible record"))
     assert f"within 1 mas with {year:.1f} decimal digits" in second
-    assert f"every admissible record demands {every:.1f}." in second
+    assert f"every admissible record, scaled from 53 bits, demands {every:.1f}." in second
 
 
 def test_the_page_shows_both_formulas_and_a_line_for_each_letter():

@@ -72,9 +72,10 @@ def required() -> None:
 
 
 def pages() -> list[str]:
-    """Every HTML page of the book, as its address below the root; index.html only leads to the first."""
-    every = (p.relative_to(HTML) for p in HTML.rglob("*.html"))
-    return sorted(p.as_posix() for p in every if p.parts[0] != "_static" and p.parts != ("index.html",))
+    """Every HTML page of the book, as its address below the root, without those that only lead to another."""
+    every = (p for p in HTML.rglob("*.html") if not p.is_relative_to(HTML / "_static"))
+    read = (p for p in every if 'http-equiv="refresh"' not in p.read_text(encoding="utf-8"))
+    return sorted(p.relative_to(HTML).as_posix() for p in read)
 
 
 def chromium() -> str | None:

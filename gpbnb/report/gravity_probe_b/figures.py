@@ -32,6 +32,7 @@ from gpbnb.report.display.style import (
 )
 from gpbnb.report.gravity_probe_b.answers import Answers, decimal_digits, largest
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS, YEAR_SECONDS
+from gpbnb.report.gravity_probe_b.summary import DRIFT, YearAnswer, binary_digits
 from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.gravity_probe_b.year import Year
 from gpbnb.report.kalman import report_bounds
@@ -141,6 +142,37 @@ def digits_needed(found: Answers, ax: Axes, others: bool = False) -> list[Artist
     ax.set_xticks(range(4, 24, 2))
     legend(ax, loc="upper right")
     label(ax, "decimal digits, $1-\\log_{10} 2\\beta$", "largest error in a year (mas, mas/yr)")
+    return artists
+
+
+def answer_line(found: Sequence[YearAnswer], ax: Axes) -> list[Artist]:
+    """Draw the answers of the front page over bits, one line for each tolerance, and ring the answer to the title."""
+    own, simulated, formula, years, every = (
+        next(each for each in found if each.source.startswith(source))
+        for source in ("Report, own", "The same", "Report, for", "300", "Every")
+    )
+    artists: list[Artist] = []
+    for height, printed, observed in ((1, own, simulated), (0, formula, years)):
+        places = [binary_digits(t) for t in printed.decimal]
+        artists += ax.plot(places, [height] * 2, "o", mfc="none", mec=REFUTED, ms=9, mew=1.5)
+        artists += ax.plot([observed.bits], [height], "o", color=OBSERVED, ms=8)
+        marks = [*((place, f"{t} digits", REFUTED) for place, t in zip(places, printed.decimal, strict=True))]
+        for place, words, colour in [*marks, (observed.bits, f"{observed.bits} bits", OBSERVED)]:
+            side = "right" if place < BINARY32.precision else "center" if height == 0 else "left"
+            artists.append(name(ax, words, (place, height), colour, (0, 11), ha=side))
+    (every_mark,) = ax.plot([every.bits], [0], "|", color=VALID, ms=16, mew=3)
+    artists.append(every_mark)
+    artists.append(name(ax, f"{every.bits} bits", (every.bits, 0), VALID, (0, -22), ha="center"))
+    artists += ax.plot([years.bits], [0], "o", mfc="none", mec=BLACK, ms=18, mew=2)
+    for word, fmt in (("binary32", BINARY32), ("binary64", BINARY64)):
+        artists.append(ax.axvline(fmt.precision, color=REFERENCE, ls=":"))
+        artists.append(name(ax, word, (fmt.precision, -0.75), REFERENCE, (4, 0)))
+    for line, word in zip((artists[0], artists[1], every_mark), ("report", "simulated", "every record"), strict=True):
+        line.set_label(word)
+    ax.set(xlim=(12, 69), ylim=(-0.9, 2.5), yticks=[1, 0], yticklabels=[f"{DRIFT:,} mas", "1 mas"])
+    ax.set_xticks(range(20, 70, 10))
+    legend(ax, loc="upper right", ncols=3)
+    label(ax, "bits", "allowed")
     return artists
 
 

@@ -62,7 +62,7 @@ def changes() -> tuple[str, str]:
         "multiplies an error made $i$ steps ago by $F^i$. If $F<1$, the filter forgets it, and the sum stays below a "
         f"limit. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures "
         f"errors in another norm. An emulated year stays within 1 mas with {year:.1f} "
-        f"decimal digits, and the extrapolated guarantee for every admissible record demands {every:.1f}.",
+        f"decimal digits, and the bound for every admissible record, scaled from 53 bits, demands {every:.1f}.",
     )
 
 
