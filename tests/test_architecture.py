@@ -159,7 +159,10 @@ def test_nothing_is_imported_by_string():
         for module, nodes in syntax().items()
     }
     forbidden = {"import_module", "__import__", "exec", "eval"}
-    assert [module for module, names in called.items() if names & forbidden] == ["gpbnb.__init__"]
+    assert [module for module, names in called.items() if names & forbidden] == [
+        "gpbnb.__init__",
+        "gpbnb.report.ledger.judge",  # evaluates expressions that see the names of their topic, and no import
+    ]
 
 
 def test_files_are_as_long_as_their_subject():

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees import filters, scalar, survey
+from gpbnb.report.ledger.checks import TOPICS
+from gpbnb.report.ledger.registry import takes_statement
 from gpbnb.report.ledger.statements import load_statements
-from gpbnb.report.ledger.unjudged import load_unjudged
 
 
 class Checked(NamedTuple):
@@ -74,8 +75,8 @@ def true_errors() -> Checked:
 
 def statements() -> int:
     """Count the printed statements that a check reads, so that an altered one must be rejected."""
-    unjudged = {key for topic in load_unjudged().values() for key in topic}
-    return sum(bool(each.form) and each.id not in unjudged for each in load_statements())
+    judged = {key for checks in TOPICS.values() for key, check in checks.items() if takes_statement(check)}
+    return sum(bool(each.form) and each.id in judged for each in load_statements())
 
 
 def table(found: dict[str, tuple[str, Checked]]) -> Table:

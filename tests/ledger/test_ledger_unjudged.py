@@ -6,19 +6,22 @@ import pytest
 from alterations import altered
 
 from gpbnb.report.inversion import example as inverse
-from gpbnb.report.ledger import load_statements, topics
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.checks.kalman import example as year
 from gpbnb.report.ledger.checks.rolling.registry import SIX, TEN
 from gpbnb.report.ledger.finding import Verdict
 from gpbnb.report.ledger.formula import Number, Undefined, Words
 from gpbnb.report.ledger.html import chapter
+from gpbnb.report.ledger.judge import CheckRow
 from gpbnb.report.ledger.statements import statement
-from gpbnb.report.ledger.unjudged import load_unjudged, read_unjudged
 from gpbnb.report.rolling.theory import PERIOD
 
-UNJUDGED = {key: finding for findings in load_unjudged().values() for key, finding in findings.items()}
-HEAD = "id,topic,verdict,recomputed,note"
+UNJUDGED = {
+    key: checks
+    for checks in TOPICS.values()
+    for key, check in checks.items()
+    if isinstance(check, CheckRow) and not check.domain and check.verdict in ("given", "unverifiable")
+}
 SECTION_12 = {"n": year.N, "m": year.M}
 USED = {
     "hung1984.II.s11-4.matrix-a": {"A": inverse.MATRIX},
@@ -86,49 +89,11 @@ def test_each_given_number_is_compared_with_the_package():
     assert numbers == {*USED, *NOT_USED}
 
 
-def test_each_row_is_the_finding_on_its_statement():
-    owner = topics()
-    for topic, findings in load_unjudged().items():
-        for key, finding in findings.items():
-            assert owner[key] == topic
-            assert TOPICS[topic].run(statement(key)) == finding
-
-
 def test_an_alteration_of_an_unjudged_statement_is_not_judged_right():
-    verdicts = {
-        TOPICS[topic].run(other).verdict
-        for topic, findings in load_unjudged().items()
-        for key in findings
-        for _, other in altered(statement(key))
-    }
+    verdicts = {checks.run(other).verdict for key, checks in UNJUDGED.items() for _, other in altered(statement(key))}
     assert verdicts == {Verdict.GIVEN, Verdict.UNVERIFIABLE}
 
 
-def test_each_id_is_that_of_a_statement():
-    assert set(UNJUDGED) <= {each.id for each in load_statements()}
-
-
-def test_a_note_names_the_chapter_by_its_present_title(tmp_path):
-    path = tmp_path / "list.csv"
-    path.write_text(f"{HEAD}\na,rolling,unverifiable,,see the <chapter>\n", encoding="utf-8")
-    assert read_unjudged(path)["rolling"]["a"].note == f"see the {chapter('rolling')}"
-    assert chapter("rolling") in UNJUDGED["hung1984.III.s1.figure-iii-2"].note
-
-
-@pytest.mark.parametrize(
-    ("lines", "message"),
-    [
-        (["a,rounding,verified,,why"], "got 'a' with verdict 'verified' in list.csv; needed each id once"),
-        (
-            ["a,rounding,given,,why", "a,kalman,given,,why"],
-            "got 'a' with verdict 'given' in list.csv; needed each id once",
-        ),
-        (["a,rounding,given,,"], "list.csv, a: got verdict 'given' without a note"),
-        (["a,rounding,unverifiable,$x,why"], "list.csv, a: got recomputed='\\$x' with an unpaired"),
-    ],
-)
-def test_a_bad_row_is_named(tmp_path, lines, message):
-    path = tmp_path / "list.csv"
-    path.write_text("\n".join((HEAD, *lines)) + "\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=message):
-        read_unjudged(path)
+def test_a_note_names_the_chapter_by_its_present_title():
+    key = "hung1984.III.s1.figure-iii-2"
+    assert chapter("rolling") in UNJUDGED[key].run(statement(key)).note

@@ -85,7 +85,7 @@ class Checks(Mapping[str, Check]):
         TypeError : the check returned something other than a Finding.
         """
         check = self[statement.id]
-        finding = check(statement) if takes_statement(check) else check()
+        finding = check(statement) if inspect.signature(check).parameters else check()
         if not isinstance(finding, Finding):
             raise TypeError(
                 f"got {finding!r} from the check of {statement.id!r}, {_name(check)}; needed a "
@@ -115,9 +115,9 @@ class Checks(Mapping[str, Check]):
 
 
 def _name(check: Callable[..., object]) -> str:
-    return f"{check.__module__}.{check.__qualname__}"
+    return f"{check.__module__}.{getattr(check, '__qualname__', check)}"
 
 
 def takes_statement(check: Callable[..., Any]) -> bool:
     """Whether a check judges the printed statement that it is given."""
-    return bool(inspect.signature(check).parameters)
+    return bool(getattr(check, "takes_statement", inspect.signature(check).parameters))

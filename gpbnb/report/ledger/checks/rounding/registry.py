@@ -1,5 +1,0 @@
-"""The register of the checks of this topic."""
-
-from gpbnb.report.ledger.registry import Checks
-
-CHECKS = Checks()
