@@ -51,6 +51,19 @@ def kalman(draw: Draw, i: int) -> Case:
     return Case(f"{form}, {fmt}, n {n}, m {m}", "filtered", (model, draw.signal(_steps(n), m), fmt, form))
 
 
+def odd_sizes(draw: Draw, i: int) -> Case:
+    """Seven and nine states, which no other family has."""
+    form, fmt = LOOPS[i % 5], draw.floating(i)
+    n, m = (7, 9)[i % 2], draw.between(1, 3)
+    return Case(f"{form}, {fmt}, n {n}, m {m}", "filtered", (draw.model(n, m), draw.signal(16, m), fmt, form))
+
+
+def stochastic(draw: Draw, i: int) -> Case:
+    form, fmt = FORMS[i % 9], Float(*((2, 11), (10, 6), (16, 6), (2, 24))[i % 4], "stochastic")
+    model, n, m = _sized(draw, 4)
+    return Case(f"{form}, {fmt}, n {n}, m {m}", "filtered", (model, draw.signal(30, m), fmt, form))
+
+
 def fixed_kalman(draw: Draw, i: int) -> Case:
     form, fmt = FORMS[i % 9], draw.fixed(i // 9 + i % 9, draw.between(5, 9))
     model, n, m = _sized(draw, 4)
@@ -432,7 +445,8 @@ class Family(NamedTuple):
 
 
 FAMILIES = {
-    "kalman": Family(90, kalman), "fixed kalman": Family(27, fixed_kalman), "named kalman": Family(18, named_kalman),
+    "kalman": Family(90, kalman), "odd sizes": Family(10, odd_sizes), "stochastic": Family(9, stochastic),
+    "fixed kalman": Family(27, fixed_kalman), "named kalman": Family(18, named_kalman),
     "long kalman": Family(24, long_kalman), "known inputs": Family(14, known_inputs), "sums": Family(8, sums),
     "compensated": Family(6, compensated), "records": Family(12, records), "blocks": Family(18, blocks),
     "extended": Family(24, extended), "unscented": Family(11, unscented), "smoother": Family(16, smoother),

@@ -27,6 +27,8 @@ Rounding = Callable[[Fraction], Fraction]
 
 def rounds(fmt: Format) -> Rounding:
     """A function that rounds a number to a format; OverflowError beyond the range of one that raises."""
+    if fmt.rounding == "stochastic":
+        raise NotImplementedError("random numbers of the package")
     if isinstance(fmt, Fixed):
         r, keep = fixed(fmt.fraction, fmt.rounding), limited(fmt.fraction, fmt.integer, fmt.overflow)
         return lambda x: keep(r(x))
