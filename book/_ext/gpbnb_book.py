@@ -1,5 +1,6 @@
 """What the book needs of Sphinx beyond settings: a first page, labels, links, docstrings."""
 
+import os
 import re
 from enum import Enum
 from pathlib import Path
@@ -176,6 +177,11 @@ def pages_in_order(env: BuildEnvironment, page: str) -> list[str]:
     return [page, *(each for child in env.toctree_includes.get(page, ()) for each in pages_in_order(env, child))]
 
 
+def write_in_parallel(app: Sphinx, env: BuildEnvironment) -> None:
+    """Write pages while others are resolved; ``jupyter-book`` has no option for it, and not all extensions read so."""
+    app.parallel = os.cpu_count() or 1
+
+
 def setup(app: Sphinx) -> dict:
     pybtex.plugin.register_plugin("pybtex.style.formatting", "short_names", ShortNames)
     app.connect("autodoc-process-docstring", unfold_fields, priority=400)
@@ -187,5 +193,6 @@ def setup(app: Sphinx) -> dict:
     app.connect("doctree-resolved", mend_links)
     # Sphinx numbers the figures with the priority 500.
     app.connect("env-get-updated", number_figures, priority=900)
+    app.connect("env-updated", write_in_parallel)
     app.connect("build-finished", write_redirects, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
