@@ -18,7 +18,6 @@ from gpbnb.filters.forms import Form
 from gpbnb.report.budget import theory as budget
 from gpbnb.report.geometry import theory as geometry
 from gpbnb.report.gravity_probe_b import answers, summary, threshold, year
-from gpbnb.report.rolling import experiment as rolling_experiment
 from gpbnb.report.rolling import theory as rolling
 
 BOOK = Path(__file__).resolve().parents[1] / "book"
@@ -71,39 +70,16 @@ def test_years_within_a_milliarcsecond():
     )
 
 
-def test_what_rolling_buys():
-    study = rolling_experiment.survey()
-    error = dict(zip(study.periods, study.standard_error(), strict=True))
+def test_phase_errors():
+    geodetic, frame = rolling.phase_error_cost((6600.0, 40.0), math.radians(1))
+    small = rolling.phase_error_cost((6600.0, 40.0), math.radians(31 / 3600))[1]
     says(
         "rolling",
-        "fig-rolling-buys",
-        f"{error[77.5]:.2f} milliarcseconds a year at 77.5 seconds",
-        f"{error[600.0]:.2f} at 600, {error[6000.0]:.1f} at 6000",
-        f"Without rolling it is {error[None]:.0f}, above the {rolling.DRIFTS[1]:.0f} of frame dragging",
+        "fig-phase-cost",
+        f"they end at 40 and at {40 + frame:.0f} milliarcseconds",
+        f"at 31 arcseconds and {small:.0f} milliarcsecond, and a point at one degree and {frame:.0f}",
     )
-
-
-def test_phase_errors():
-    geodetic, frame = abs(rolling.phase_error_cost((6600.0, 40.0), math.radians(1)))
-    below = abs(rolling.phase_error_cost((6600.0, 40.0), math.radians(0.01)))[1]
-    assert below > 1
-    assert frame > 100
-    assert 65 < frame / geodetic < 70
-    says(
-        "rolling", "fig-phase-cost", "below a hundredth of a degree and 100 at one degree", "nearly seventy times less"
-    )
-
-
-def test_filters_and_resets():
-    density = rolling.FLOWN_DENSITY
-    least = rolling.filtered_error(6600.0, density, rolling.best_bandwidth(6600.0, density))
-    says("rolling", "fig-bandwidth", f"pass a minimum of {math.sqrt(least):.1f} milliarcseconds")
-    intensity = 3e-6 / rolling.YEAR**3
-    free = rolling.rate_walk_error(6600.0, intensity)
-    often, seldom = (rolling.rate_walk_error(6600.0, intensity, reset=p) for p in (6000, 600_000))
-    assert math.log10(often) == pytest.approx(-3, abs=0.3)
-    assert math.log10(seldom) == pytest.approx(-1, abs=0.3)
-    says("rolling", "fig-resets", "every 6000 seconds to a tenth at 600000", f"horizontal lines at {free:.0f} show")
+    assert abs(geodetic) < 2
 
 
 def test_budget():

@@ -15,7 +15,7 @@ BOOK = Path(__file__).resolve().parents[1] / "book"
 PATHS = sorted(BOOK.glob("*.ipynb"))
 MOST_LINES = 30
 MOST_LINES_OF_A_FUNCTION = 17
-OPEN = ("integration", "inversion", "kalman", "rounding")
+OPEN = ("integration", "inversion", "kalman", "rolling", "rounding")
 """Chapters whose cells do the work in sight."""
 SHOWN = (*OPEN, "index")
 """Pages that show at least half of their code, and everything it uses."""

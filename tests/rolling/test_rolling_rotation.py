@@ -53,7 +53,7 @@ def errors_of(n, c, s, period):
 @pytest.mark.parametrize("period", PERIODS)
 def test_the_compiled_recursion_is_that_of_exact_fractions(fmt, period):
     marks = [1, 2, 7, 40, 100]
-    found = experiment.recursion(fmt, period, marks)
+    found = rotations.recursion(fmt, period, marks)
     expected = {n: errors_of(n, c, s, period) for n, c, s in slow(fmt, period, 100) if n in marks}
     for i, n in enumerate(marks):
         size, amplitude, phase = expected[n]
@@ -68,7 +68,7 @@ def test_the_compiled_recursion_is_that_of_exact_fractions(fmt, period):
 @pytest.mark.parametrize("period", PERIODS)
 def test_errors_are_within_their_bounds_and_not_far_below(fmt, period):
     marks = list(range(1, 200, 7))
-    for rotate, least in ((experiment.recursion, 0.005), (experiment.direct, 0.15)):
+    for rotate, least in ((rotations.recursion, 0.005), (rotations.direct, 0.15)):
         found = rotate(fmt, period, marks)
         assert np.all(found.size <= found.bound)
         assert np.max(found.size / found.bound) > least
@@ -80,7 +80,7 @@ def test_errors_are_within_their_bounds_and_not_far_below(fmt, period):
 
 def test_direct_evaluation_is_that_of_the_rounded_product():
     fmt, period, n = FloatFormat(10, 7), 77.5, 123457
-    found = experiment.direct(fmt, period, [n])
+    found = rotations.direct(fmt, period, [n])
     angle = fmt.round(fmt.round(theory.roll_rate(period)) * fmt.round(n * 10))
     with mpmath.workdps(50):
         x = mpmath.mpf(angle.numerator) / angle.denominator
@@ -92,7 +92,7 @@ def test_direct_evaluation_is_that_of_the_rounded_product():
 def test_a_year_is_within_its_bound():
     marks = np.unique(np.geomspace(1, 3153600, 40).astype(int))
     for fmt in (FloatFormat(10, 10), FloatFormat(2, 40), FloatFormat(10, 12, CHOP)):
-        found = experiment.recursion(fmt, 77.5, marks)
+        found = rotations.recursion(fmt, 77.5, marks)
         ratio = found.size / found.bound
         assert np.max(ratio) <= 1
         assert np.max(ratio) > 0.005
@@ -101,7 +101,7 @@ def test_a_year_is_within_its_bound():
 
 def test_chopping_shrinks_the_amplitude_steadily():
     marks = np.linspace(1000, 20000, 5).astype(int)
-    found = experiment.recursion(FloatFormat(10, 10, CHOP), 77.5, marks)
+    found = rotations.recursion(FloatFormat(10, 10, CHOP), 77.5, marks)
     assert np.all(found.amplitude < 0)
     assert np.all(np.diff(found.amplitude) < 0)
     assert found.amplitude[-1] / found.amplitude[0] == pytest.approx(20, rel=0.2)
@@ -109,69 +109,25 @@ def test_chopping_shrinks_the_amplitude_steadily():
 
 def test_a_rounded_rotation_may_lock_into_a_cycle():
     """With sixty samples a turn and few digits the error stops growing; the bound knows nothing of it."""
-    found = experiment.recursion(FloatFormat(10, 4), 600.0, [60000, 60060, 120000, 600000])
+    found = rotations.recursion(FloatFormat(10, 4), 600.0, [60000, 60060, 120000, 600000])
     assert found.size[2] == found.size[0] == found.size[1] == found.size[3]
 
 
 def test_a_rotation_that_is_chopped_away_is_no_wrong_digit():
     with pytest.raises(OverflowError, match="got a result beyond the range of float64"):
-        experiment.recursion(FloatFormat(2, 5, CHOP), 600.0, [20000])
+        rotations.recursion(FloatFormat(2, 5, CHOP), 600.0, [20000])
 
 
 def test_before_the_first_sample_nothing_has_been_rounded():
-    found = experiment.recursion(FloatFormat(10, 8), 77.5, [0, 10])
+    found = rotations.recursion(FloatFormat(10, 8), 77.5, [0, 10])
     assert found.size[0] == 0
-    assert found.size[1] == experiment.recursion(FloatFormat(10, 8), 77.5, [10]).size[0]
-
-
-@pytest.mark.parametrize("marks", [[1000], [10, 1000]])
-def test_the_last_sample_decides_on_the_digits_that_are_tried(marks):
-    digits = experiment.digits_needed_observed("direct", 10, 6600.0, 77.5, marks, 1e-6)
-    errors = [experiment.direct(FloatFormat(10, digits + k), 77.5, marks).drift_error(6600.0) for k in (-1, 0)]
-    assert errors[1] <= 1e-6 < errors[0]
-
-
-def test_two_digits_are_tried():
-    assert experiment.digits_needed_observed("direct", 10, 6600.0, 600.0, [10], 1e3) == 2
-
-
-def test_digits_that_overflow_are_not_enough(monkeypatch):
-    whole, asked = rotations.direct, (10, 6600.0, 77.5, [1000])
-    digits = experiment.digits_needed_observed("direct", *asked, 1e-6)
-
-    def limited(fmt, period, steps):
-        if fmt.precision <= digits:
-            raise OverflowError("got a rotation that grows without limit")
-        return whole(fmt, period, steps)
-
-    monkeypatch.setattr(rotations, "direct", limited)
-    rotations._digits_needed_observed.cache_clear()
-    assert experiment.digits_needed_observed("direct", *asked, 1e-6) == digits + 1
-    rotations._digits_needed_observed.cache_clear()
+    assert found.size[1] == rotations.recursion(FloatFormat(10, 8), 77.5, [10]).size[0]
 
 
 def test_what_a_rotation_costs_a_drift():
-    found = experiment.recursion(FloatFormat(10, 8), 77.5, [10, 100, 1000])
+    found = rotations.recursion(FloatFormat(10, 8), 77.5, [10, 100, 1000])
     errors = found.size * np.array([100, 1000, 10000]) * 6600.0 / theory.YEAR
     assert found.drift_error(6600.0) == pytest.approx(np.max(errors))
-
-
-@pytest.mark.parametrize(("method", "base"), [("recursion", 10), ("direct", 10), ("direct", 2)])
-def test_digits_needed_for_an_error(method, base):
-    marks = [1000, 5000, 20000]
-    rotate = {"recursion": experiment.recursion, "direct": experiment.direct}[method]
-    digits = experiment.digits_needed_observed(method, base, 6600.0, 77.5, marks, 1e-6)
-    assert rotate(FloatFormat(base, digits), 77.5, marks).drift_error(6600.0) <= 1e-6
-    assert rotate(FloatFormat(base, digits - 1), 77.5, marks).drift_error(6600.0) > 1e-6
-    steps = marks[-1]
-
-    def bound(beta):
-        if method == "recursion":
-            return theory.recursion_bound(steps, beta)
-        return theory.direct_bound(2 * math.pi * steps * 10 / 77.5, beta)
-
-    limit = 1e-6 / (6600.0 * steps * 10 / theory.YEAR)
-    assert digits <= theory.digits_needed(bound, base, limit) <= digits + 12 * (base == 2) + 4 * (base == 10)
 
 
 @pytest.mark.parametrize(
@@ -186,19 +142,19 @@ def test_digits_needed_for_an_error(method, base):
 )
 def test_recursions_refuse(fmt, steps, message):
     with pytest.raises(ValueError, match=message):
-        experiment.recursion(fmt, 600.0, steps)
+        rotations.recursion(fmt, 600.0, steps)
 
 
 @pytest.mark.parametrize(("digits", "period", "samples", "locked"), [(10, 600.0, 60, True), (14, 600.0, 60, False)])
 def test_where_samples_come_back_the_recursion_may_lock(digits, period, samples, locked):
     year = experiment.YEAR_SAMPLES
-    found = experiment.recursion(FloatFormat(10, digits), period, [year - 2 * samples, year - samples, year])
+    found = rotations.recursion(FloatFormat(10, digits), period, [year - 2 * samples, year - samples, year])
     assert (len(set(found.size)) == 1) is locked
     assert (len(set(found.phase)) == 1) is locked
 
 
 def test_without_a_cycle_the_error_is_that_of_the_step_times_their_number():
-    found = experiment.recursion(FloatFormat(10, 10), 77.51, [1, 10**5, experiment.YEAR_SAMPLES])
+    found = rotations.recursion(FloatFormat(10, 10), 77.51, [1, 10**5, experiment.YEAR_SAMPLES])
     assert found.size[1:] / found.step[1:] == pytest.approx([found.size[0]] * 2, rel=0.1)
 
 
@@ -209,11 +165,3 @@ def test_every_term_of_the_bounds_with_three_bits():
     assert theory.recursion_bound(3, beta) == pytest.approx(float((angle * product) ** 3 - 1), rel=1e-14)
     assert theory.recursion_bound(5000, beta) == math.inf
     assert theory.direct_bound(-0.75, beta) == float(Fraction(3, 4) * Fraction(3, 5) + beta)
-
-
-def test_the_bound_of_a_method():
-    beta = Fraction(1, 10**12)
-    assert theory.rotation_bound("recursion", 600.0, 1000)(beta) == theory.recursion_bound(1000, beta)
-    assert theory.rotation_bound("direct", 600.0, 30, 20.0)(beta) == theory.direct_bound(2 * math.pi, beta)
-    with pytest.raises(ValueError, match='got the method \'guess\'; needed "recursion" or "direct"'):
-        theory.rotation_bound("guess", 600.0, 1)

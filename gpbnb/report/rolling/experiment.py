@@ -1,4 +1,4 @@
-"""Simulations: 1/f noise with roll and deroll, an uneven roll rate, and rotations computed in t digits."""
+"""Simulations: records of a rolled ramp in 1/f noise and their spectra, fitted drifts, filters, an uneven roll rate."""
 
 from __future__ import annotations
 
@@ -15,66 +15,37 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.conversion import MaybeNone
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
-from gpbnb.report.rolling.flicker import flicker
-from gpbnb.report.rolling.rotations import Rotation, digits_needed_observed, direct, recursion, rounded_rate_error
-from gpbnb.report.rolling.spectra import (
-    HANN,
-    YEAR_SAMPLES,
-    Slope,
-    Spectra,
-    Spectrum,
-    derolled_record,
-    fit_slope,
-    in_bands,
-    noise_spectrum,
-    periodogram,
-    samples_in,
-    spectra,
-    welch,
-)
+from gpbnb.report.rolling.flicker import flicker, record
 from gpbnb.report.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
 from gpbnb.sweeps import Column, Sweep
 
-__all__ = [
-    "HANN",
-    "SURVEY",
-    "SURVEY_COLUMNS",
-    "SURVEY_GYROS",
-    "SURVEY_PERIODS",
-    "YEAR_SAMPLES",
-    "DriftStudy",
-    "FilterStudy",
-    "LowPass",
-    "Rotation",
-    "Slope",
-    "Spectra",
-    "Spectrum",
-    "clean_drift_error",
-    "derolled_record",
-    "digits_needed_observed",
-    "direct",
-    "drift_rates",
-    "filter_study",
-    "fit_drift",
-    "fit_slope",
-    "image_behind",
-    "in_bands",
-    "noise_spectrum",
-    "periodogram",
-    "rate_sines",
-    "rate_walks",
-    "recursion",
-    "roll_rate_errors",
-    "rounded_rate_error",
-    "spectra",
-    "survey",
-    "survey_rng",
-    "survey_rows",
-    "welch",
-]
+YEAR_SAMPLES = round(YEAR / INTERVAL)
+
+
+def derolled_record(
+    drift: tuple[float, float],
+    level: float,
+    period: float,
+    rng: np.random.Generator,
+    samples: int = YEAR_SAMPLES,
+    interval: float = INTERVAL,
+    phase_error: Callable[[Any], Any] | None = None,
+) -> dict[str, NDArray[np.complex128]]:
+    """Simulate one gyro with two readouts through (5)-(7), with x and y as real and imaginary part."""
+    n = np.arange(samples)
+    ramp = np.asarray(complex(*drift) * (n * interval / YEAR))
+    pair = record(level, samples, 2, rng)
+    noise = pair[:, 0] + 1j * pair[:, 1]
+    turn = np.exp(1j * theory.roll_phase(n, period, interval))
+    rolled = ramp * np.conj(turn)
+    if phase_error is not None:
+        turn = turn * np.exp(1j * np.asarray(phase_error(n * interval)))
+    measured = rolled + noise
+    return {"signal": ramp, "rolled": rolled, "noise": noise, "measured": measured, "derolled": measured * turn}
 
 
 def fit_drift(derolled: NDArray[np.complex128], interval: float = INTERVAL) -> NDArray[np.float64]:
@@ -92,9 +63,149 @@ def clean_drift_error(
 ) -> NDArray[np.float64]:
     """Return the errors (2,) of both drifts, in mas a year, for a noise-free record derolled with a phase error."""
     stages = derolled_record(
-        drift, 0.0, period, np.random.default_rng(0), samples_in(duration, interval), interval, phase_error
+        drift, 0.0, period, np.random.default_rng(0), round(duration / interval), interval, phase_error
     )
     return fit_drift(stages["derolled"], interval) - np.array(drift)
+
+
+def rounded_rate_error(period: float, fmt: FloatFormat) -> float:
+    """Return the rounding error of ω_r = 2π/T in a register: rounded rate minus true rate, rad/s."""
+    rate = theory.roll_rate(period)
+    return float(fmt.round(rate) - rate)
+
+
+# -- spectra -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """One-sided density in mas²/Hz, averaged in bands; `averages` is the number of independent values in each band."""
+
+    frequency: NDArray[np.float64]
+    density: NDArray[np.float64]
+    averages: NDArray[np.float64]
+
+    @property
+    def error(self) -> NDArray[np.float64]:
+        """Relative standard error of the density, a mean of `averages` chi-square values of two degrees of freedom."""
+        return 1 / np.sqrt(self.averages)
+
+
+def in_bands(frequency: Any, density: Any, averages: float, first: float, last: float, bands: int) -> Spectrum:
+    """Average a density over bands of equal logarithmic width; bands without a frequency are left out."""
+    edges = np.geomspace(first, last, bands + 1)
+    place = np.digitize(frequency, edges) - 1
+    counts = np.array([np.count_nonzero(place == i) for i in range(bands)])
+    full = np.flatnonzero(counts)
+    middle = np.array([math.exp(np.mean(np.log(frequency[place == i]))) for i in full])
+    # Average f times the density, so that 1/f noise has no bias within a band.
+    mean = np.array([np.mean((frequency * density)[place == i]) for i in full]) / middle
+    return Spectrum(middle, mean, averages * counts[full])
+
+
+def welch(records: NDArray[np.float64], interval: float, segment: int) -> tuple[Any, Any, float]:
+    """Estimate the density of records (samples, channels) by Welch's method, with Hann windows that overlap by half."""
+    f, p = scipy.signal.welch(records, 1 / interval, "hann", segment, axis=0)
+    count = 2 * (len(records) // segment) - 1
+    # Periodograms of Hann-windowed segments that overlap by half have a correlation of 1/36 (Welch 1967), and
+    # neighbouring frequencies are correlated too: a sum over a band is worth 18/35 of its number (see below).
+    worth = count / (1 + 2 * (count - 1) / count / 36)
+    return f[3:], np.mean(p[3:], axis=1), worth * records.shape[1] * HANN
+
+
+HANN = 18 / 35
+r"""Independent values per frequency in a band of a Hann-windowed periodogram, :math:`1/(1 + 2(4/9) + 2/36)`."""
+
+
+@dataclass(frozen=True)
+class Slope:
+    """Exponent of a power law fitted to a density, and its standard error."""
+
+    value: float
+    error: float
+    decades: float
+
+
+def fit_slope(spectrum: Spectrum, interval: float = INTERVAL) -> Slope:
+    """Fit a line to log density against log frequency, with a weight for each band, and correct for sampling."""
+    x = np.log10(spectrum.frequency)
+    # The logarithm of a mean of m values is too low by 1/(2m). Sampling raises the density by x/sin x, x = πfΔt.
+    y = np.log10(spectrum.density * np.sinc(spectrum.frequency * interval)) + np.log10(np.e) / (2 * spectrum.averages)
+    w = spectrum.averages
+    x = x - np.sum(w * x) / np.sum(w)
+    square = np.sum(w * x**2)
+    return Slope(float(np.sum(w * x * y) / square), 1 / math.log(10) / math.sqrt(square), float(np.ptp(x)))
+
+
+def noise_spectrum(
+    rng: np.random.Generator,
+    samples: int = 2**21,
+    channels: int = 4,
+    segment: int = 2**19,
+    interval: float = INTERVAL,
+    bands: int = 24,
+) -> Spectrum:
+    """Estimate the density of generated noise by Welch's method, in bands from 4 cycles a segment to f = 0.12/Δt."""
+    records = record(LEVEL, samples, channels, rng)
+    f, p, averages = welch(records, interval, segment)
+    return in_bands(f, p, averages, 4 / (segment * interval), 0.12 / interval, bands)
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """One-sided densities in mas²/Hz: drift and noise in bands, and the noise at single frequencies.
+
+    `line_noise` is the noise of a readout around the roll frequency; `base_noise` is that of a derolled component, from
+    one cycle per record on.
+    """
+
+    level: float
+    duration: float
+    ramp: Spectrum
+    noise: Spectrum
+    line_noise: NDArray[np.float64]
+    base_noise: NDArray[np.float64]
+
+
+def _periodogram(x: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
+    """Return the one-sided density of a record, without a window, from one cycle per record on."""
+    return np.asarray(2 * np.abs(np.fft.rfft(x)[1:]) ** 2 * interval / len(x))
+
+
+def spectra(
+    drift: float,
+    rng: np.random.Generator,
+    gyros: int = 4,
+    level: float = LEVEL,
+    period: float = PERIOD,
+    samples: int = YEAR_SAMPLES,
+    interval: float = INTERVAL,
+    offsets: int = 25,
+    bands: int = 40,
+) -> Spectra:
+    """Simulate a drift, and the noise of gyros with two readouts each, for a whole number of turns."""
+    duration = samples * interval
+    turns = round(duration / period)
+    offset = np.concatenate([np.arange(-offsets, 0), np.arange(1, offsets + 1)])
+    frequency = np.arange(1, samples // 2 + 1) / duration
+
+    def banded(density: NDArray[np.float64], averages: int) -> Spectrum:
+        return in_bands(frequency, density, averages, 0.99 / duration, 0.5 / interval, bands)
+
+    before, after = np.zeros((2, samples // 2))
+    for child in rng.spawn(gyros):
+        stages = derolled_record((0.0, 0.0), level, period, child, samples, interval)
+        before += (_periodogram(stages["noise"].real, interval) + _periodogram(stages["noise"].imag, interval)) / 2
+        after += (_periodogram(stages["derolled"].real, interval) + _periodogram(stages["derolled"].imag, interval)) / 2
+    ramp = _periodogram(np.asarray(drift * (np.arange(samples) * interval / YEAR)), interval)
+    return Spectra(
+        level,
+        duration,
+        banded(ramp, 1),
+        banded(before / gyros, 2 * gyros),
+        before[turns + offset - 1] / gyros,
+        after[:offsets] / gyros,
+    )
 
 
 # -- drift rates ---------------------------------------------------------------------------------
@@ -147,25 +258,8 @@ def drift_rates(
     """Roll, measure, deroll and fit both drifts of gyros with two readouts each, in blocks that bound the memory.
 
     All periods use the same noise.
-
-    Parameters
-    ----------
-    periods : roll periods, s; None for no rolling.
-    gyros : number of gyros; gyro i has the same noise for any number.
-    rng : source of the noise.
-    level : level of the noise of each readout, mas².
-    duration, interval : length of the record and time between samples, s.
-    drift : drifts of x and y, mas a year.
-    progress : show a progress bar.
     """
-    n = samples_in(duration, interval)
-    if gyros < 1 or not periods:
-        raise ValueError(f"got {gyros} gyros and {len(periods)} roll periods; needed at least 1 of each")
-    for period in periods:
-        if period is not None and not 0 < period < math.inf:
-            raise ValueError(f"got a roll period of {period} s; needed more than 0, or None for no rolling")
-    if not all(map(math.isfinite, drift)):
-        raise ValueError(f"got drifts {drift}; needed finite numbers, in mas a year")
+    n = round(duration / interval)
     sums = np.zeros((len(periods), gyros, 2))
     slope = 2 / (n - 1)  # times run from -1 to 1
     half = (n - 1) * interval / YEAR / 2  # length of the record in years
@@ -290,17 +384,9 @@ def filter_study(
 
     Each component of each gyro, rolled and derolled, is a record. Averages start after ten time constants.
     """
-    n = samples_in(duration, interval)
+    n = round(duration / interval)
     kinds = (*(LowPass.SINGLE_POLE for _ in bandwidths), *(LowPass.MOVING_AVERAGE for _ in bandwidths))
-    if not len(bandwidths) or not min(bandwidths) > 0:
-        raise ValueError(f"got bandwidths {tuple(bandwidths)} Hz; needed at least one, and each above 0")
-    longest = 10 / (4 * min(bandwidths))
-    if longest > duration / 2:
-        raise ValueError(
-            f"got bandwidths {tuple(bandwidths)} Hz for {duration:g} s; needed each above {5 / duration:.3g} Hz; take "
-            "a longer record"
-        )
-    skip = math.ceil(longest / interval)
+    skip = math.ceil(10 / (4 * min(bandwidths)) / interval)
     squares = np.zeros((len(kinds), 2 * gyros))
     filters = [theory.single_pole(1 / (4 * b), interval) for b in bandwidths]
     filters += [theory.moving_average(1 / (2 * b), interval) for b in bandwidths]
@@ -320,24 +406,6 @@ def filter_study(
     return FilterStudy(drift, period, kinds, lag, width, squares)
 
 
-def image_behind(
-    weights: NDArray[np.float64], drift: float, period: float, samples: int, interval: float = INTERVAL
-) -> NDArray[np.float64]:
-    """Return the double-frequency term that remains after filtering a ramp rolled and derolled in one dimension; mas.
-
-    The filter gets twice the derolled signal, so that the ramp has its full strength. The filtered ramp itself is then
-    subtracted. The function returns the last turn.
-    """
-    n = np.arange(samples)
-    ramp = drift / YEAR * interval * n
-    phase = theory.roll_phase(n, period, interval)
-    image = 2 * ramp * np.cos(phase) * np.cos(phase) - ramp
-    turn = max(1, round(period / interval))
-    if samples < len(weights) + turn:
-        raise ValueError(f"got {samples} samples for a filter of {len(weights)}; needed {turn} more than the filter")
-    return np.asarray(scipy.signal.fftconvolve(image[-len(weights) - turn :], weights, mode="valid")[-turn:])
-
-
 # -- an uneven roll rate -------------------------------------------------------------------------
 
 
@@ -347,19 +415,7 @@ def roll_rate_errors(
     step: float,
     resets: Sequence[int | None],
 ) -> NDArray[np.float64]:
-    """Fit the cross drift rates of a ramp that is derolled at the nominal rate; mas a year.
-
-    Parameters
-    ----------
-    drift : k, mas a year.
-    rates : deviations (n,) of the roll rate from the nominal rate, rad/s, one array for each trial.
-    step : time between two rates, s; each rate lasts for one step.
-    resets : steps between resets of the phase by the star sensor; None for never.
-
-    Returns
-    -------
-    errors : (resets, trials).
-    """
+    """Fit the cross drift rates of a ramp that is derolled at the nominal rate; mas a year."""
     errors = []
     for rate in rates:
         n = len(rate)
@@ -382,12 +438,3 @@ def rate_walks(
     """Draw roll rates that are random walks from zero, whose variance is `intensity` (rad²/s³) times the time."""
     for _ in range(trials):
         yield np.cumsum(rng.standard_normal(steps)) * math.sqrt(intensity * step)
-
-
-def rate_sines(
-    amplitude: float, period: float, trials: int, steps: int, step: float, rng: np.random.Generator
-) -> Iterator[NDArray[np.float64]]:
-    """Draw roll rates that are sinusoids of random phase; amplitude in rad/s, period in s."""
-    t = np.arange(steps) * step
-    for _ in range(trials):
-        yield amplitude * np.cos(2 * np.pi * (t / period + rng.random()))

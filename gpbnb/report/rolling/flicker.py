@@ -27,17 +27,7 @@ LONGEST = 10**10
 
 
 def exponentials(accuracy: float = ACCURACY, longest: int = LONGEST) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    r"""Return poles p and weights w such that :math:`h_k = \sum_j w_j p_j^k`, for 1 ≤ k < `longest`.
-
-    Parameters
-    ----------
-    accuracy : largest relative error of h_k, between 1e-12 and 0.1.
-    longest : number of samples.
-
-    Returns
-    -------
-    poles, weights : (m,) each; m grows as the product of the logarithms of `longest` and 1/`accuracy`.
-    """
+    r"""Return poles p and weights w such that :math:`h_k = \sum_j w_j p_j^k`, for 1 ≤ k < `longest`."""
     if not 1e-12 <= accuracy <= 0.1:
         raise ValueError(f"got an accuracy of {accuracy}; needed 1e-12 to 0.1")
     if not 1 <= longest <= LONGEST:
@@ -82,18 +72,6 @@ def flicker(
 
     The one-sided density of samples taken Δt apart is :math:`\pi A\,\Delta t/\sin(\pi f\Delta t)`, and A/f at low
     frequencies, whatever Δt. A channel's noise depends neither on the number of channels nor on the block.
-
-    Parameters
-    ----------
-    level : A, in the square of the noise's unit.
-    samples : number of samples in each record.
-    channels : number of records.
-    rng : generator; each channel draws from a child of it.
-    block : number of samples at a time; it determines the memory.
-
-    Yields
-    ------
-    noise : (at most `block`, channels); the unit is that of √A.
     """
     if not 0 <= level < math.inf:
         raise ValueError(f"got a noise level of {level}; needed a finite number of at least 0")

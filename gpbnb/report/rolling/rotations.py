@@ -17,18 +17,9 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
-from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
-from gpbnb.arithmetic.rounding import digits_text
-from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
 from gpbnb.report.rolling.theory import INTERVAL
-
-
-def rounded_rate_error(period: float, fmt: FloatFormat) -> float:
-    """Return the rounding error of ω_r = 2π/T in a register: rounded rate minus true rate, rad/s."""
-    rate = theory.roll_rate(period)
-    return float(fmt.round(rate) - rate)
 
 
 @dataclass(frozen=True)
@@ -107,14 +98,7 @@ def recursion(
     steps: Sequence[int],
     interval: float = INTERVAL,
 ) -> Rotation:
-    """Rotate by the angle of one sample repeatedly, with every operation rounded: the recursive deroll of (7).
-
-    Parameters
-    ----------
-    fmt : a format in base 2, 10 or 16 with a precision that has compiled loops.
-    period, interval : roll period and time between samples, s.
-    steps : samples at which errors are evaluated, ascending.
-    """
+    """Rotate by the angle of one sample repeatedly, with every operation rounded: the recursive deroll of (7)."""
     marks = np.asarray(steps, dtype=np.int64)
     if marks.ndim != 1 or not len(marks) or marks[0] < 0 or np.any(np.diff(marks) <= 0):
         raise ValueError(f"got steps {steps!r}; needed numbers of samples that ascend from 0 or later")
@@ -144,36 +128,3 @@ def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: floa
     phases = 2 * np.pi * marks * (interval / period)
     bounds = np.array([theory.direct_bound(float(phase), fmt.unit_roundoff) for phase in phases])
     return _compared(fmt, period, interval, "direct", marks, values, bounds)
-
-
-def digits_needed_observed(
-    method: str, base: int, drift: float, period: float, steps: Sequence[int], error: float = 1.0
-) -> int:
-    """Find the smallest precision with which a year's deroll of a drift stays within `error` mas.
-
-    :func:`gpbnb.arithmetic.search.smallest_precision` searches up to the precision that the bound proves to be enough.
-    """
-    return _digits_needed_observed(method, base, drift, period, tuple(map(int, steps)), error)
-
-
-@cache
-def _digits_needed_observed(
-    method: str, base: int, drift: float, period: float, steps: tuple[int, ...], error: float
-) -> int:
-    bound = theory.rotation_bound(method, period, steps[-1])
-    rotate = {"recursion": recursion, "direct": direct}[method]
-    enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
-    most = min(LARGEST_PRECISION[base], enough)
-    first = steps[: len(steps) // 2]
-
-    def within(fmt: FloatFormat) -> bool:
-        try:
-            # With too few digits, the first half of the steps is usually enough to see it.
-            return all(rotate(fmt, period, some).drift_error(drift) <= error for some in (first, steps) if some)
-        except OverflowError:  # with few digits, the rotation grows without limit
-            return False
-
-    found = smallest_precision(within, base, least=2, largest=most)
-    if found is None:
-        raise ValueError(f"got an error of {error:g} mas; needed one reached within {digits_text(most, base)}")
-    return found.precision

@@ -21,8 +21,6 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import digits_text
-from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.report.measurement import YEAR
 
 DRIFTS = (6600.0, 40.0)
@@ -54,15 +52,6 @@ def phase_error_cost(drift: tuple[float, float], phase: float) -> NDArray[np.flo
 
     .. math:: z\,(e^{i\theta} - 1), \qquad
         \begin{bmatrix} k_x(\cos\theta-1) - k_y\sin\theta \\ k_x\sin\theta + k_y(\cos\theta-1) \end{bmatrix}
-
-    Parameters
-    ----------
-    drift : k_x, k_y, any unit.
-    phase : θ, rad.
-
-    Returns
-    -------
-    error : (2,), in the unit of `drift`.
     """
     z = complex(*drift)
     error = z * complex(-2 * math.sin(phase / 2) ** 2, math.sin(phase))
@@ -85,20 +74,6 @@ def fitted_drift(
     .. math:: \frac{12}{T^3}\int_0^T \Bigl(t-\frac T2\Bigr)\, z t\, e^{i\psi(t)}\, dt
 
     The integral is evaluated by 400-point Gauss-Legendre quadrature, for phase errors below some hundred radians.
-
-    Parameters
-    ----------
-    drift : k_x, k_y, any unit.
-    phase : ψ, a function of times (n,) in s, in rad.
-    duration : T, s.
-
-    Returns
-    -------
-    fitted : (2,), in the unit of `drift`.
-
-    References
-    ----------
-    hung1984, ch. III, (11), for one dimension, where ½cos ψ replaces e^{iψ}.
     """
     nodes, weights = _points_and_weights(400)
     x = (nodes + 1) / 2
@@ -116,12 +91,7 @@ def roll_rate(period: float) -> Fraction:
 
 
 def worst_rate_error(period: float, fmt: FloatFormat) -> Fraction:
-    """Bound on the error of ω_r in a register, rad/s: half a unit in the last place, or one unit if chopped.
-
-    References
-    ----------
-    hung1984, ch. III, section 4, sample calculations 1 and 2.
-    """
+    """Bound on the error of ω_r in a register, rad/s: half a unit in the last place, or one unit if chopped."""
     _, _, e = fmt.split(roll_rate(period))
     return Fraction(fmt.base) ** (e - 1) * fmt.unit_roundoff
 
@@ -142,11 +112,6 @@ def off_tuned_drift(drift: float, rate_error: float, duration: float = YEAR) -> 
 # -- spectra -------------------------------------------------------------------------------------
 
 
-def printed_ramp_density(drift: float, frequency: Any) -> NDArray[np.float64]:
-    r"""Density of a drift as printed, :math:`k^2/\omega^4`, with k in mas/s; hung1984, ch. III, section 5."""
-    return np.asarray((drift / YEAR) ** 2 / (2 * np.pi * np.asarray(frequency, dtype=np.float64)) ** 4)
-
-
 def ramp_density(drift: float, duration: float, frequency: Any) -> NDArray[np.float64]:
     r"""One-sided density of a record of the ramp k t, from 0 to T, in mas²/Hz.
 
@@ -155,12 +120,6 @@ def ramp_density(drift: float, duration: float, frequency: Any) -> NDArray[np.fl
 
     j are spherical Bessel functions. The density falls as :math:`2k^2T/\omega^2`, not as :math:`\omega^{-4}`,
     because the record ends with a jump.
-
-    Parameters
-    ----------
-    drift : k, mas a year.
-    duration : T, s.
-    frequency : (...), Hz; may be negative, as in an offset from the roll frequency.
     """
     z = np.abs(np.pi * np.asarray(frequency, dtype=np.float64) * duration)
     size = scipy.special.spherical_jn(0, z) ** 2 + scipy.special.spherical_jn(1, z) ** 2
@@ -173,27 +132,11 @@ def flicker_density(level: float, frequency: Any, interval: float | None = None)
     .. math:: \frac{A}{f}, \qquad \frac{\pi A\,\Delta t}{|\sin \pi f \Delta t|}
 
     The second formula is the density of white noise with variance πA after a fractional difference of order one half.
-
-    References
-    ----------
-    Kasdin 1995.
     """
     f = np.abs(np.asarray(frequency, dtype=np.float64))
     if interval is None:
         return np.asarray(level / f)
     return np.asarray(np.pi * level * interval / np.abs(np.sin(np.pi * f * interval)))
-
-
-def derolled_density(level: float, period: float, frequency: Any, interval: float | None = None) -> NDArray[np.float64]:
-    r"""One-sided density of the noise in each component derolled by (7), from two equal and independent noises.
-
-    .. math:: \tfrac12\bigl[S(f_r - f) + S(f_r + f)\bigr] \;\to\; S(f_r) \text{ for } f \to 0
-
-    In one dimension, (3), the noise :math:`n\cos(\omega_r t+\theta)` has half this density, and the signal half its
-    size.
-    """
-    f, roll = np.asarray(frequency, dtype=np.float64), 1 / period
-    return np.asarray((flicker_density(level, roll - f, interval) + flicker_density(level, roll + f, interval)) / 2)
 
 
 FLOWN_DENSITY = float(flicker_density(LEVEL, 1 / PERIOD_FLOWN, INTERVAL))
@@ -220,19 +163,8 @@ def variance_of_sum(weights: Any, level: float) -> float:
     .. math:: \pi A \sum_i \Bigl(\sum_{m\ge i} a_m h_{m-i}\Bigr)^2
 
     Every linear use of the noise is such a sum, for example a fitted drift or the output of a filter.
-
-    Parameters
-    ----------
-    weights : a, (n,).
-    level : A, mas².
-
-    Returns
-    -------
-    variance : mas² times the square of the weights' unit.
     """
     a = np.asarray(weights, dtype=np.float64)
-    if a.ndim != 1 or not len(a):
-        raise ValueError(f"got weights of shape {a.shape}; needed (n,), one per sample")
     size = scipy.fft.next_fast_len(2 * len(a), real=True)
     on_white = scipy.fft.irfft(scipy.fft.rfft(a, size) * np.conj(_response_transform(len(a), size)), size)[: len(a)]
     return float(np.pi * level * np.sum(on_white**2))
@@ -240,26 +172,8 @@ def variance_of_sum(weights: Any, level: float) -> float:
 
 def slope_weights(samples: int, interval: float = INTERVAL) -> NDArray[np.float64]:
     """Weights (n,) that give the slope, per second, of a straight line fitted by least squares."""
-    if samples < 2:
-        raise ValueError(f"got {samples} samples; needed at least 2 to fit a line")
     t = (np.arange(samples) - (samples - 1) / 2) * interval
     return np.asarray(t / np.sum(t**2))
-
-
-def drift_error(level: float, samples: int, period: float | None = None, interval: float = INTERVAL) -> float:
-    """Exact standard error of a fitted drift rate, in mas a year, for sampled noise that starts at rest.
-
-    Parameters
-    ----------
-    level : level of the noise of each readout, mas².
-    samples, interval : number of samples, and seconds between them.
-    period : roll period, s; None without rolling.
-    """
-    a = slope_weights(samples, interval)
-    if period is None:
-        return math.sqrt(variance_of_sum(a, level)) * YEAR
-    phase = roll_phase(np.arange(samples), period, interval)
-    return math.sqrt(sum(variance_of_sum(a * part(phase), level) for part in (np.cos, np.sin))) * YEAR
 
 
 def drift_error_unrolled(level: float, duration: float = YEAR, at_rest: bool = False) -> float:
@@ -268,30 +182,18 @@ def drift_error_unrolled(level: float, duration: float = YEAR, at_rest: bool = F
     .. math:: \sigma^2 = \int_0^\infty \frac Af\, \frac{36}{T^2}\, j_1(\pi f T)^2\, df
         = \frac{36A}{T^2}\cdot\frac14
 
-    Parameters
-    ----------
-    level : A, mas².
-    duration : T, s.
-    at_rest : whether the noise begins with the record, which gives :math:`\sqrt{8A}/T`; otherwise it is much older.
+    It is :math:`\sqrt{8A}/T` for noise `at_rest`, which begins with the record.
     """
     return math.sqrt((8 if at_rest else 9) * level) / duration * YEAR
 
 
 def drift_error_rolled(level: float, period: float, duration: float = YEAR, interval: float | None = None) -> float:
-    r"""Standard error of a drift with many turns, as for white noise: :math:`\sqrt{6 S(f_r)/T^3}`; mas a year.
-
-    Parameters
-    ----------
-    level, period, duration : A, T_r and T, mas² and s.
-    interval : time between samples, for the density of samples at f_r; None for A/f_r.
-    """
+    r"""Standard error of a drift with many turns, as for white noise: :math:`\sqrt{6 S(f_r)/T^3}`; mas a year."""
     return math.sqrt(6 * float(flicker_density(level, 1 / period, interval)) / duration**3) * YEAR
 
 
 def roll_phase(index: Any, period: float, interval: float = INTERVAL) -> NDArray[np.float64]:
     """Roll angle, in [0, 2π), at samples counted from 0; `period` and `interval` in s."""
-    if not (0 < period < math.inf and 0 < interval < math.inf):
-        raise ValueError(f"got a roll period of {period} s, a sample every {interval} s; needed positive numbers")
     return np.asarray(2 * np.pi * np.mod(np.asarray(index) * (interval / period), 1.0))
 
 
@@ -301,25 +203,13 @@ def roll_phase(index: Any, period: float, interval: float = INTERVAL) -> NDArray
 def moving_average(length: float, interval: float = INTERVAL) -> NDArray[np.float64]:
     """Weights of the mean of the last samples, newest first; `length` in s."""
     n = round(length / interval)
-    if n < 1:
-        raise ValueError(f"got a length of {length} s; needed at least the interval of {interval} s")
     return np.full(n, 1 / n)
 
 
 def single_pole(time_constant: float, interval: float = INTERVAL) -> NDArray[np.float64]:
     """Weights of exponential smoothing, newest first, down to 1e-16; `time_constant` in s."""
-    if not time_constant > 0:
-        raise ValueError(f"got a time constant of {time_constant} s; needed more than 0")
     keep = math.exp(-interval / time_constant)
     return np.asarray((1 - keep) * keep ** np.arange(math.ceil(37 * time_constant / interval) + 1))
-
-
-def filter_gain(weights: Any, frequency: Any, interval: float = INTERVAL) -> NDArray[np.float64]:
-    """Amplitude response of a filter of weights (n,), newest first, at frequencies in Hz."""
-    f = np.asarray(frequency, dtype=np.float64)
-    a, lag = np.asarray(weights), np.arange(len(weights)) * interval
-    sums = [np.sum(a * np.exp(-2j * np.pi * value * lag)) for value in f.reshape(-1)]
-    return np.abs(np.array(sums)).reshape(f.shape)
 
 
 def filter_lag(weights: Any, interval: float = INTERVAL) -> float:
@@ -352,12 +242,6 @@ def filtered_error(drift: float, density: float, bandwidth: Any) -> NDArray[np.f
 
     The formula holds for two filters of noise bandwidth B: a single pole, whose time constant and lag are 1/(4B), and
     a moving average of length 1/(2B), whose lag is half its length.
-
-    Parameters
-    ----------
-    drift : k, mas a year.
-    density : N_0, one-sided, of the derolled noise in the band, mas²/Hz.
-    bandwidth : B, Hz.
     """
     b = np.asarray(bandwidth, dtype=np.float64)
     return np.asarray((drift / YEAR) ** 2 / (16 * b**2) + density * b)
@@ -376,32 +260,6 @@ def signal_to_noise(drift: float, duration: float, error: Any) -> NDArray[np.flo
     return np.asarray((drift / YEAR * duration) ** 2 / 3 / np.asarray(error))
 
 
-def pedestal(weights: Any, level: float, samples: int, period: float, interval: float = INTERVAL) -> float:
-    r"""Approximate power, in mas², of slow noise that derolling moves to the roll frequency and a filter lets through.
-
-    .. math:: |H(f_r)|^2\, \pi A \sum_{k<n} h_k^2
-
-    after n samples of noise that starts at rest. A moving average over whole turns lets none of it through.
-    """
-    slow = np.pi * level * float(np.sum(impulse_response(samples) ** 2))
-    return float(filter_gain(weights, 1 / period, interval)) ** 2 * slow
-
-
-def image_in_fit(drift: float, period: float, samples: int, interval: float = INTERVAL) -> float:
-    r"""Error of a drift fitted over whole turns due to the term of (3) at twice the roll frequency; mas a year.
-
-    .. math:: \frac{12k}{n(n^2-1)}\Bigl[\frac{n}{2\sin^2(\omega_r\Delta t)} - \frac{n(n+1)}{4}\Bigr]
-
-    for a ramp at twice its derolled strength, so that its slope is k.
-    """
-    turns = samples * interval / period
-    if samples < 2 or abs(turns - round(turns)) > 1e-9 * turns:
-        raise ValueError(f"got {turns:g} turns; needed a whole number of them; shorten the record")
-    n = float(samples)
-    square = math.sin(2 * math.pi * interval / period) ** 2
-    return 12 * drift / (n * (n**2 - 1)) * (n / (2 * square) - n * (n + 1) / 4)
-
-
 # -- an uneven roll rate -------------------------------------------------------------------------
 
 
@@ -411,36 +269,11 @@ def rate_walk_error(drift: float, intensity: float, duration: float = YEAR, rese
     .. math:: k\sqrt{\tfrac{383}{1260}\, q T^3} \text{ without resets}, \qquad
         k \frac P2 \sqrt{\tfrac{38}{35}\, q T} \text{ with the phase reset every } P \ll T
 
-    Parameters
-    ----------
-    drift : k, mas a year.
-    intensity : q, rad²/s³; the variance of the rate grows by q per second.
-    duration : T, s.
-    reset : P, s; None for never.
+    The variance of the rate grows by `intensity`, q in rad²/s³, per second.
     """
     if reset is None:
         return drift * math.sqrt(383 / 1260 * intensity * duration**3)
     return drift * reset / 2 * math.sqrt(38 / 35 * intensity * duration)
-
-
-def rate_sine_error(drift: float, amplitude: float, period: float, reset: float | None = None) -> float:
-    r"""Root mean square cross drift due to a drift k, over all phases of a sinusoidal roll rate; mas a year.
-
-    .. math:: \frac{k\,a}{\Omega\sqrt2}
-
-    for many cycles without resets, or with resets a whole number of cycles apart. It is zero for all other resets.
-
-    Parameters
-    ----------
-    drift : k, mas a year.
-    amplitude : a of the rate, rad/s.
-    period : 2π/Ω, s.
-    reset : time between resets of the phase, s; None for never.
-    """
-    cycles = 0.0 if reset is None else reset / period
-    if abs(cycles - round(cycles)) > 1e-9:
-        return 0.0
-    return drift * amplitude * period / (2 * math.pi) / math.sqrt(2)
 
 
 # -- rotations in t digits -----------------------------------------------------------------------
@@ -454,10 +287,6 @@ def recursion_bound(steps: int, beta: Fraction) -> float:
 
     Cosine and sine of the angle are rounded once; a product of complex numbers has a relative error of at most
     :math:`\sqrt2\gamma_2`.
-
-    References
-    ----------
-    Higham 2002, Lemma 3.5.
     """
     growth = steps * (math.log1p(float(beta)) + math.log1p(math.sqrt(2) * float(gamma(2, beta))))
     return math.expm1(growth) if growth < 700 else math.inf
@@ -469,26 +298,3 @@ def direct_bound(phase: float, beta: Fraction) -> float:
     The rate, the time and their product are rounded, then the cosine and sine.
     """
     return abs(phase) * float(gamma(3, beta)) + float(beta)
-
-
-def rotation_bound(method: str, period: float, steps: int, interval: float = INTERVAL) -> Callable[[Fraction], float]:
-    """The bound after some samples, "recursion" or "direct", as a function of the unit roundoff."""
-    if method == "recursion":
-        return lambda beta: recursion_bound(steps, beta)
-    if method == "direct":
-        return lambda beta: direct_bound(2 * math.pi * steps * interval / period, beta)
-    raise ValueError(f'got the method {method!r}; needed "recursion" or "direct"')
-
-
-def digits_needed(bound: Callable[[Fraction], float], base: int, largest: float) -> int:
-    """Smallest precision at which a bound, given as a function of the unit roundoff, is at most `largest`."""
-
-    def meets(fmt: FloatFormat) -> bool:
-        return 3 * fmt.unit_roundoff < 1 and bound(fmt.unit_roundoff) <= largest
-
-    found = smallest_precision(meets, base, least=2, largest=399, monotone=True)
-    if found is not None:
-        return found.precision
-    raise ValueError(
-        f"got a bound above {largest:g} at {digits_text(399, base)}; needed one that falls with the unit roundoff"
-    )

@@ -25,7 +25,7 @@ from gpbnb.report.ledger.checks.rolling.registry import CHAPTER, CHECKS, TEN, en
 from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare, unverifiable
 from gpbnb.report.ledger.statements import Statement
 from gpbnb.report.measurement import YEAR
-from gpbnb.report.rolling import derivation, experiment, theory
+from gpbnb.report.rolling import derivation, experiment, rotations, theory
 from gpbnb.report.rolling.theory import DRIFTS, LEVEL, PERIOD, PERIOD_FLOWN
 
 Names = dict[str, Any]
@@ -251,11 +251,11 @@ def eq7(printed: Statement) -> Finding:
 
 
 @cache
-def recursion() -> tuple[experiment.Rotation, bool]:
+def recursion() -> tuple[rotations.Rotation, bool]:
     """Return a product of rounded rotations, and whether each rotation is the previous one times a fixed one."""
     n, step = sp.symbols("n delta", real=True)
     one_more = derivation.deroll(step) * derivation.deroll(n * step) - derivation.deroll((n + 1) * step)
-    found = experiment.recursion(TEN, PERIOD, (60, 3600))
+    found = rotations.recursion(TEN, PERIOD, (60, 3600))
     return found, bool(sp.simplify(one_more) == sp.zeros(2, 2) and np.all(found.size <= found.bound))
 
 
