@@ -310,8 +310,7 @@ def claim_table(rows: Iterable[Row]) -> Html:
             f'<tr><th scope="row">{escape(claim.text)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
             f"<td><p>{escape(claim.consequence)} {chapter_link(owner[key])}</p>{printed}</td></tr>"
         )
-    table = _wrapped(("Claim", "Outcome", "What follows"), lines, "ledger-claims")
-    return _folded(f"{len(lines)} claims", table, len(lines))
+    return Html(f"{len(lines)} claims", _wrapped(("Claim", "Outcome", "What follows"), lines, "ledger-claims"))
 
 
 def _link(row: Row) -> str:
