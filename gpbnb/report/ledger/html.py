@@ -14,7 +14,7 @@ CHAPTERS = {
     "kalman": "Why (125) fails",
     "contraction": "A bound that holds",
     "year": "One year of Gravity Probe B",
-    "rolling": "Roll and deroll",
+    "rolling": "1/f noise: roll and deroll",
     "integration": "Digital integration error",
     "budget": "Error budget",
     "geometry": "Measurement geometry",
