@@ -21,7 +21,7 @@ import csv
 import string
 from collections import ChainMap
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib.resources import files
 from typing import Any
@@ -35,7 +35,7 @@ from gpbnb.report.ledger.agreement import DIGITS, vanishes
 from gpbnb.report.ledger.corrections import intended
 from gpbnb.report.ledger.dotted import DottedMatrix
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare
-from gpbnb.report.ledger.formula import OPERATORS, Link, Number, Part, Relation, Words
+from gpbnb.report.ledger.formula import OPERATORS, Link, Number, Part, Relation, Undefined, Words
 from gpbnb.report.ledger.html import chapter
 from gpbnb.report.ledger.registry import Checks
 from gpbnb.report.ledger.statements import Statement
@@ -43,8 +43,8 @@ from gpbnb.report.ledger.statements import Statement
 Names = Mapping[str, Any]
 SECOND_ORDER = Fraction(1, 10**60)
 """Differences below this value are of second order, since roundings are at most 1e-40 and the data are of order one."""
-ATTAINED = Fraction(99, 100)
-"""A bound counts as attained if the value reaches this share of it."""
+ATTAINED, TIGHT = Fraction(99, 100), 1 - Fraction(1, 10**9)
+"""A bound counts as attained if the value reaches this share of it, in a tight instance the second one."""
 CLOSE, EQUAL = 1e-2, 1e-9
 """Relative differences that ≈ and = allow in the mode ``close``."""
 
@@ -92,14 +92,21 @@ def judge(stated: Statement | Iterable[Part], domain: Names | Iterable[Names], m
     count = violated = 0
     attained: dict[tuple[int, int], bool] = {}
     missed = set()
+    undefined: list[Undefined] = []
     for names in [domain] if isinstance(domain, Mapping) else domain:
         count += 1
-        held, reached = _held(parts, names, mode)
+        held, reached = False, dict[tuple[int, int], bool]()
+        try:
+            held, reached = _held(parts, names, mode)
+        except Undefined as error:
+            undefined.append(error)
         violated += held != names.get("holds", True)
         if names.get("holds", True):
             attained |= {place: here or attained.get(place, False) for place, here in reached.items()}
             first = {i: (i, j) for i, j in reversed(reached)}
             missed |= {place for place in first.values() if names.get("tight") and not reached[place]}
+    if undefined and len(undefined) == count:
+        raise undefined[0]
     loose = {place for place, here in attained.items() if not here} | missed
     return StatementOutcome(count, violated, len(loose) if mode in ("bound", "first order") else 0)
 
@@ -120,7 +127,8 @@ def _held(parts: tuple[Part, ...], names: Names, mode: str) -> tuple[bool, dict[
                 for j, link in enumerate(part.links(names, names.get("numbers", Fraction))):
                     held &= holds(link, mode, sides[j + 1])
                     if link.symbol in ("<=", "<", ">=", ">"):
-                        reached[i, j] = attains(link, "0" in (sides[j].text, sides[j + 1].text))
+                        zero = "0" in (sides[j].text, sides[j + 1].text)
+                        reached[i, j] = attains(link, zero, TIGHT if names.get("tight") else ATTAINED)
     return bool(held), reached
 
 
@@ -170,14 +178,14 @@ def _close(left: Any, right: Any, symbol: str, side: Relation | None) -> bool:
     return abs(left - right) <= (CLOSE if symbol == "≈" else EQUAL) * abs(right)
 
 
-def attains(link: Link, zero: bool = False) -> bool:
+def attains(link: Link, zero: bool = False, share: Fraction = ATTAINED) -> bool:
     """Whether some entry reaches its bound, or is zero where the bound is printed as zero."""
     smaller, larger = (link.left, link.right) if link.symbol in ("<=", "<") else (link.right, link.left)
     a, b = entries(smaller), entries(larger)
     if a.shape != b.shape:
         return False
     pairs = list(zip(a.flat, b.flat, strict=True))
-    return any((sign(y) > 0 and sign(x - y * ATTAINED) >= 0) or (zero and sign(x - y) == 0) for x, y in pairs)
+    return any((sign(y) > 0 and sign(x - y * share) >= 0) or (zero and sign(x - y) == 0) for x, y in pairs)
 
 
 def entries(value: Any) -> Any:
@@ -212,7 +220,7 @@ def sign(x: Any, slack: Any = 0) -> int:
 class CheckRow:
     """A row: where some statements must hold, and what the ledger says about them; see this module."""
 
-    topic: Mapping[str, Any]
+    topic: Mapping[str, Any] = field(repr=False)
     domain: str
     mode: str
     also: str

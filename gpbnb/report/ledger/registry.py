@@ -115,7 +115,7 @@ class Checks(Mapping[str, Check]):
 
 
 def _name(check: Callable[..., object]) -> str:
-    return f"{check.__module__}.{getattr(check, '__qualname__', check)}"
+    return f"{check.__module__}.{check.__qualname__}" if inspect.isfunction(check) else repr(check)
 
 
 def takes_statement(check: Callable[..., Any]) -> bool:

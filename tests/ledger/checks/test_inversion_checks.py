@@ -15,17 +15,12 @@ from faults import finding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.report import ledger
 from gpbnb.report.inversion import example, procedure
-from gpbnb.report.ledger.checks.inversion import (
-    CHECKS,
-    environments,
-    first_approach,
-    numerical_example,
-    resultant,
-    triangularization,
-)
-from gpbnb.report.ledger.checks.inversion.first_order import EPSILON, FirstOrder, matrix
-from gpbnb.report.ledger.checks.inversion.judging import holds
+from gpbnb.report.ledger.checks import inversion, inversion_table
+from gpbnb.report.ledger.checks.inversion import CHECKS
+from gpbnb.report.ledger.elimination import Elimination
 from gpbnb.report.ledger.finding import Verdict
+from gpbnb.report.ledger.first_order import EPSILON, FirstOrder, matrix
+from gpbnb.report.ledger.judge import judge
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement, statement
 
@@ -105,7 +100,7 @@ def test_findings_quote_the_computed_numbers(rows):
     assert "omit 6% of the size of $\\delta A$ and 22%" in finding(rows, "hung1984.II.eq91").recomputed
     assert "in 13 of 24 eliminations" in finding(rows, "hung1984.II.eq59").recomputed
     # 12 + 5 to reduce and 18 to solve; 2(10 + 4) for (59) and (60), 3 for (89), 9, 27 and 1 for (90), (95) and (96)
-    computation = finding(rows, "hung1984.II.s11-3.computation").recomputed
+    computation = finding(rows, "hung1984.II.s11-3.computation").note
     assert "for $n=3$ the bound takes 68 multiplications and the inverse 35" in computation
     unchanged = finding(rows, "hung1984.II.s11-2.claim-only-back-substitution").recomputed
     assert re.search(r"does not change (\d+) of \1 triangular systems and 0 of \1 full systems", unchanged)
@@ -115,7 +110,7 @@ def test_findings_quote_the_computed_numbers(rows):
 def test_the_counterexamples_are_not_due_to_bad_matrices():
     """Condition 2.2 in three digits, without pivoting; and below 3000 in six, with it. Sizes leave much room."""
     for form, largest, room in (("(96)", 2.3, 2), ("chart", 3000, 50)):
-        trial, name = resultant.counterexample(form)
+        trial, name = inversion.counterexample(form)
         assert trial.condition < largest
         assert trial.violates(name)
         assert trial.error > trial.bounds[name]
@@ -145,7 +140,7 @@ COLUMNS = ("proposed", "actual")
 
 def as_computed(column):
     """The numbers of a column of Table 1 as one of the readings gives them."""
-    return [f"{value:.3e}" for value in numerical_example.readings(column)[0].values]
+    return [f"{value:.3e}" for value in inversion_table.readings(column)[0].values]
 
 
 def test_a_number_that_a_reading_gives_is_verified():
@@ -163,51 +158,38 @@ def test_a_number_that_a_reading_gives_is_verified():
 
 def test_readings_belong_to_the_columns_of_the_table():
     """Errors are far below bounds."""
-    proposed, actual = (median(each.values[0] for each in numerical_example.readings(c)) for c in COLUMNS)
+    proposed, actual = (median(each.values[0] for each in inversion_table.readings(c)) for c in COLUMNS)
     assert proposed > 10 * actual
 
 
 def test_a_bound_near_the_printed_error_is_not_conservative(monkeypatch):
-    _, actual = numerical_example._columns()
-    monkeypatch.setattr(numerical_example, "_columns", lambda: (actual, actual))
-    numerical_example._margin.cache_clear()
-    try:
-        assert numerical_example._margin()[0] == "are not conservative"
-        monkeypatch.undo()
-        numerical_example._margin.cache_clear()
-        assert numerical_example._margin()[0] == "are indeed very conservative"
-    finally:
-        numerical_example._margin.cache_clear()
+    numbers = inversion_table._numbers
+    with faults.forgetting(monkeypatch, inversion_table):
+        monkeypatch.setattr(inversion_table, "_numbers", lambda printed, column: numbers(printed, "actual"))
+        assert inversion_table.claims()["margin"] == "are not conservative"
+    assert inversion_table.claims()["margin"] == "are indeed very conservative"
 
 
 @pytest.mark.parametrize("key", both("s10.practicality-of-44"))
 def test_a_residue_that_is_hard_to_obtain_is_verified(monkeypatch, key):
+    found = inversion.residue_of_example()
     assert CHECKS.run(statement(key)).verdict is Verdict.WRONG
-    monkeypatch.setattr(first_approach, "_residual_bound", lambda: ("it is hard", False))
+    hard = {**found, "residue": "cannot easily be obtained"}
+    monkeypatch.setattr(inversion, "residue_of_example", lambda: hard)
     assert CHECKS.run(statement(key)).verdict is Verdict.VERIFIED
-
-
-def test_the_error_of_the_chart_is_derived_only_if_91_holds_with_l(monkeypatch):
-    printed = statement("hung1982.III.s11-3.figure-iii-1")
-    assert "by (91) it is an error in $A$, which the derivation confirms" in CHECKS.run(printed).recomputed
-    monkeypatch.setattr(resultant, "with_l", lambda printed: printed)
-    assert "by (91) it is not derived" in CHECKS.run(printed).recomputed
 
 
 def test_without_rounding_no_error_is_compounded(monkeypatch):
     given, right = ([[Fraction(x) for x in row] for row in rows] for rows in (example.MATRIX, [[1], [2], [3]]))
-    run = environments.Elimination(np.array(given), np.array(right), lambda x: x)
-    monkeypatch.setattr(triangularization, "runs", lambda n: [(run, None, None)])
-    triangularization._compounded.cache_clear()
-    try:
-        assert triangularization._compounded() == (1, 0, 1)
-    finally:
-        triangularization._compounded.cache_clear()
+    run = Elimination(np.array(given), np.array(right), lambda x: x)
+    with faults.forgetting(monkeypatch, inversion):
+        monkeypatch.setattr(inversion, "runs", lambda n: [(run, None, None)])
+        assert inversion.compounded() == {"verb": {"will not affect"}, "adds": 1, "changes": 0}
 
 
 def test_sizes_in_place_of_signs_are_verified():
     """(59) and (60) with sums of sizes bound the errors that occurred in every elimination."""
-    for run, _, beta in (*environments.runs(3), *environments.runs(4)):
+    for run, _, beta in (*inversion.runs(3), *inversion.runs(4)):
         for right in (False, True):
             error = sum(each.value for each in run.errors(right))
             assert (abs(error) <= beta * run.sizes(right)).all()
@@ -227,7 +209,7 @@ def test_the_right_side_is_judged_in_every_row():
 def test_each_sign_compares(symbol, expected):
     """The left side is less than, equal to, or greater than the right side."""
     printed = Statement("hung1984.II.x", "hung1984", "II", "1", "x", "equation", "x", f"x {symbol} 2")
-    found = [holds(printed, [{"x": Fraction(x)}], sharp=False) for x in (1, 2, 3)]
+    found = [judge(printed, {"x": Fraction(x)}).holds for x in (1, 2, 3)]
     assert found == [each == "1" for each in expected]
 
 
@@ -250,13 +232,13 @@ def test_first_order_arithmetic_is_that_of_polynomials():
     assert a * a.inv() == unit
     assert matrix([x, y, 2]).value.tolist() == [[3, 7, 2]]
     assert (a * a).T == a.T * a.T
-    with pytest.raises(ValueError, match="needed an exact quantity"):
-        abs(x)
+    assert abs(matrix([[x, -x, -EPSILON]])) == matrix([[x, x, EPSILON]])
+    assert abs(-x) == x
 
 
 def test_stages_and_solution_are_those_of_the_procedure():
-    run, _, _ = environments.runs(3)[0]
-    fmt = environments.FORMATS[0]
+    run, _, _ = inversion.runs(3)[0]
+    fmt = inversion.FORMATS[0]
     triangular = procedure.triangularize(fmt.array(run.a.tolist()))
     rights = procedure.transform(triangular, fmt.array(run.b.tolist()))
     for k, stage in enumerate(run.stages[1]):
@@ -268,7 +250,7 @@ def test_stages_and_solution_are_those_of_the_procedure():
 
 @pytest.mark.parametrize("n", [3, 4])
 def test_the_lower_factor_carries_the_errors_to_the_given_matrix(n):
-    for run, _, _ in environments.runs(n):
+    for run, _, _ in inversion.runs(n):
         for right in (False, True):
             last, given = (run.part(stage, right) for stage in (run.stages[1][-1], run.stages[0][0]))
             errors = run.errors(right)
@@ -277,19 +259,19 @@ def test_the_lower_factor_carries_the_errors_to_the_given_matrix(n):
 
 @pytest.mark.parametrize("terms", range(5))
 def test_a_row_of_back_substitution_has_the_weights_of_87_and_88(terms):
-    assert environments.back_row_weights(terms) == (terms + 1, tuple(range(terms + 2, 2, -1)))
+    assert inversion.back_row_weights(terms) == (terms + 1, tuple(range(terms + 2, 2, -1)))
 
 
 def test_the_resultant_perturbations_belong_to_the_computed_inverse():
     printed = Statement(
         "hung1984.II.x", "hung1984", "II", "1", "x", "equation", "x", "A_hat*x_hat[j] == u[j] + deltab[j]"
     )
-    assert holds(printed, environments.inverses())
-    assert not holds(replace(printed, form="A_hat*x_hat[j] == u[j]"), environments.inverses())
+    assert judge(printed, inversion.inverses()).holds
+    assert not judge(replace(printed, form="A_hat*x_hat[j] == u[j]"), inversion.inverses()).holds
 
 
 def test_an_entry_is_named_by_the_last_step_that_changed_it():
-    names = environments.eliminations(3)[0]
+    names = inversion.eliminations(3)[0]
     with pytest.raises(KeyError, match="last step"):
         names["a"](1, 2, 1)
     with pytest.raises(KeyError, match="last step"):
@@ -298,11 +280,11 @@ def test_an_entry_is_named_by_the_last_step_that_changed_it():
 
 def test_pivoting_is_not_needed_if_it_does_not_mend_what_fails(monkeypatch):
     """Without a pivot the inversion fails as before; with one it now finds another matrix."""
-    inv = first_approach.linalg.inv
+    inv = inversion.linalg.inv
 
     def doubled(a, pivot=False):
         return inv(a, pivot=True) + inv(a, pivot=True) if pivot else inv(a)
 
-    monkeypatch.setattr(first_approach.linalg, "inv", doubled)
+    monkeypatch.setattr(inversion.linalg, "inv", doubled)
     for key in both("s10.claim-partial-pivoting"):
         assert CHECKS.run(statement(key)).agrees is False

@@ -12,12 +12,12 @@ import sympy as sp
 
 from gpbnb.arithmetic.rational import exact, max_norm
 from gpbnb.report.kalman import derivation, exact_step, report_bounds, smallest
-from gpbnb.report.ledger.checks.inversion.first_order import FirstOrder
 from gpbnb.report.ledger.checks.kalman import algebra, worst_case
 from gpbnb.report.ledger.checks.kalman.judging import bounded, judge
 from gpbnb.report.ledger.checks.kalman.registry import CHECKS, FOUR
 from gpbnb.report.ledger.checks.kalman.steps import SIGNS
 from gpbnb.report.ledger.finding import Finding, Verdict, compare
+from gpbnb.report.ledger.first_order import FirstOrder
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement, statement
 

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.report.ledger.checks.inversion.first_order import FirstOrder, quantity
 from gpbnb.report.ledger.checks.kalman import algebra
 from gpbnb.report.ledger.checks.kalman.worst_case import Instance, Names
 from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.finding import Finding, compare
+from gpbnb.report.ledger.first_order import FirstOrder, quantity
 from gpbnb.report.ledger.formula import OPERATORS, Relation, Undefined
 from gpbnb.report.ledger.statements import Statement
 

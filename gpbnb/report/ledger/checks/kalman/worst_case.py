@@ -20,8 +20,8 @@ from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel, gain, predicted, reduction, second_gain, updated
 from gpbnb.report.kalman import report_bounds, smallest
-from gpbnb.report.ledger.checks.inversion.first_order import FirstOrder
 from gpbnb.report.ledger.checks.kalman.registry import FOUR
+from gpbnb.report.ledger.first_order import FirstOrder
 from gpbnb.report.ledger.tracked import Matrix, largest, rounded, tracked
 
 Names = dict[str, Any]

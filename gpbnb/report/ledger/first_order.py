@@ -86,9 +86,8 @@ class FirstOrder:
         ]
 
     def __abs__(self) -> FirstOrder:
-        if np.any(self.slope) and np.any(self.value):
-            raise ValueError("got a quantity with a rounding error; needed an exact quantity or a pure error")
-        return FirstOrder(abs(self.value), abs(self.slope))
+        sign = np.where(self.value == 0, np.sign(self.slope), np.sign(self.value))
+        return self * Fraction(int(sign)) if not self.shape else FirstOrder(self.value * sign, self.slope * sign)
 
     def __eq__(self, other: object) -> bool:
         if isinstance(other, DottedMatrix):
