@@ -1,6 +1,6 @@
 """Warn of replaced words in identifiers and in the text that people read: ``make lint`` calls it.
 
-``tests/replaced_words.csv`` lists the words, and what to use instead.
+``scripts/replaced_words.csv`` lists the words, and what to use instead.
 """
 
 import ast
@@ -12,7 +12,7 @@ import tokenize
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-REPLACED = list(csv.DictReader((ROOT / "tests" / "replaced_words.csv").read_text(encoding="utf-8").splitlines()))
+REPLACED = list(csv.DictReader((ROOT / "scripts" / "replaced_words.csv").read_text(encoding="utf-8").splitlines()))
 CODE = sorted([*(ROOT / "gpbnb").rglob("*.py"), *(ROOT / "benchmarks").glob("*.py"), *(ROOT / "scripts").glob("*.py")])
 TEXT = sorted([*(ROOT / "book").glob("*.md"), *(ROOT / "book").glob("*.ipynb"), *ROOT.glob("*.md")])
 NOT_PROSE = re.compile(r"```.*?```|\$\$.*?\$\$|\$[^$]*\$|`[^`]*`|\]\([^)]*\)", re.DOTALL)
