@@ -50,6 +50,7 @@ NUMERAL = re.compile(r"(?<![\w-])\.?\d[\d.,]*")
 GIVEN = {
     "index": ("a step every 10 s", "Python 3.11", "CC BY 4.0"),
     "integration": ("34 equations", "wrong by 20 %"),
+    "nonlinear": ("pull request 18008", "PX4-ECL 1026"),
     "rolling": ("allows 0.15 mas",),
 }
 """Phrases of open pages with a numeral that is given, not computed."""

@@ -23,7 +23,7 @@ CELLS = [
 
 
 def test_there_are_figures():
-    assert len(CELLS) >= 40
+    assert CELLS
 
 
 @pytest.mark.parametrize("cell", [pytest.param(cell, id=f"{page}-{number}") for page, number, cell in CELLS])
