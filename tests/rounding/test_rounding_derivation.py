@@ -8,18 +8,13 @@ import pytest
 import steps
 import sympy as sp
 
-from gpbnb.report.display.derivation import first_order
 from gpbnb.report.rounding import derivation, theory
 
 DERIVATIONS = steps.Derivations(
     derivation.one_rounding,
     derivation.sums,
-    derivation.ties,
-    derivation.roundings,
-    derivation.matrix_sums,
     derivation.dots,
     derivation.chains,
-    derivation.examples,
 )
 
 NAMES = {
@@ -41,24 +36,6 @@ NAMES = {
         "(18), first inequality: the difference between the weight of $x_j$ and $n-1$": "n - 1",
         "(18), second inequality: the sum of the weights": "(n - 1)*(n - 2)/2",
     },
-    "ties": {
-        r"error $(n-1)\beta$ over bound (18), while $s = 1-(n-3)\beta \ge 0$; it exceeds one from $n = 5$ on": (
-            "1/(1 - (n - 4)*beta/2)"
-        ),
-    },
-    "roundings": {
-        r"first order: $k\beta$": "k",
-        r"chopping, from $k$ to $k+1$: $(1-k\beta)(1-\beta) \ge 1-(k+1)\beta$, so that the error $1 - "
-        r"(1-\beta)^k$ is never above $k\beta$": "1 - (k + 1)*beta",
-        r"nearest: $k$ errors of $\beta/(1+\beta)$ exceed $k\beta$ by this times $\beta^2$, for small "
-        r"$\beta$; positive from $k = 4$ on": "k*(k - 3)/2",
-        r"$1+\gamma_k$": "1/(1 - k*beta)",
-        r"$(1+\gamma_k)(1+\beta) \le 1+\gamma_{k+1}$, cleared of denominators": ("(1 + beta)*(1 - (k + 1)*beta)"),
-        r"$(1+\gamma_j)(1+\gamma_k) \le 1+\gamma_{j+k}$, cleared of denominators": "1 - (j + k)*beta",
-    },
-    "matrix_sums": {
-        r"(24) for one entry, $|r_{ij}| = c\,(\beta - w)$, with no term left out": "c*(beta - w)",
-    },
     "dots": {
         "three products, as printed before (26)": (
             "a_1*b_1*(epsilon_1 + epsilon_3 + epsilon_5) + a_2*b_2*(epsilon_2 + epsilon_3 + epsilon_5) + "
@@ -73,9 +50,6 @@ NAMES = {
             "beta*(s + d) + beta**2*s*d"
         ),
     },
-    "examples": {
-        "the computed result; the last term is of second order": "P + D + E + (P + D)*epsilon + E*epsilon",
-    },
 }
 """What each step derives, beside its name; see `steps.check_names`."""
 
@@ -86,7 +60,7 @@ def test_each_step_holds_and_is_named_for_what_it_derives(name):
 
 
 def test_the_derivations_are_those_of_the_chapter():
-    assert sum(steps.lengths(DERIVATIONS).values()) == 24
+    assert sum(steps.lengths(DERIVATIONS).values()) == 15
 
 
 @pytest.mark.parametrize("n", range(1, 7))
@@ -149,15 +123,6 @@ def test_the_error_of_a_product_is_no_multiple_of_the_product():
     assert sp.expand(leftover.subs(shared, e1 + e3)) != 0
 
 
-def test_the_sum_of_ties_exceeds_18_from_five_terms_on():
-    ratio, n, beta = derivation.tie_sum_ratio(), derivation.N, derivation.BETA
-    assert sp.simplify(ratio.subs(n, 4)) == 1
-    for count in (2, 3):
-        assert sp.simplify(1 - ratio.subs(n, count)).subs(beta, sp.Rational(1, 8)) > 0
-    for count in (5, 6, 100):
-        assert sp.simplify(ratio.subs(n, count) - 1).subs(beta, sp.Rational(1, 2000)) > 0
-
-
 def test_one_rounding_at_numbers():
     """The last step of (8) is β/(1+β), with β of format and base."""
     step = DERIVATIONS["one_rounding"].steps[-1]
@@ -166,12 +131,3 @@ def test_one_rounding_at_numbers():
         beta = sp.Rational(1, 2) * sp.Integer(base) ** (1 - precision)
         value = step.left.subs({b: base, t: precision, e: exponent}).doit()
         assert sp.simplify(value - beta / (1 + beta)) == 0
-
-
-@pytest.mark.parametrize("k", range(1, 8))
-def test_roundings_on_top_of_each_other_at_numbers(k):
-    """The second-order excess of k errors of β/(1+β) over kβ is k(k-3)/2."""
-    beta = sp.Symbol("beta", positive=True)
-    series = sp.series((1 + beta / (1 + beta)) ** k - 1 - k * beta, beta, 0, 3).removeO()
-    assert series.coeff(beta, 2) == sp.Rational(k * (k - 3), 2)
-    assert first_order((1 + beta) ** k, (beta,)) == k * beta

@@ -14,7 +14,7 @@ from flint import fmpq_mat
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rational import column_sum_norm, exact
+from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import theory
 
@@ -261,106 +261,3 @@ def test_inner_products_of_all_small_vectors(rounding):
                 assert error <= fmt.unit_roundoff * sum(w * abs(p) for w, p in zip((3, 3, 2), terms, strict=True))
             largest = max(largest, error / coarse)
     assert largest > Fraction(3, 10)
-
-
-# -- refusals -------------------------------------------------------------------------------------
-
-VECTOR, MATRIX = [1, 2], [[1, 2], [3, 4]]
-MANY = FloatFormat(2, 24).array(np.ones((1001, 2)))
-REFUSED = [
-    (
-        theory.strict_sum_bound,
-        (MANY, MANY.format.unit_roundoff),
-        ValueError,
-        r"got terms of shape \(1001, 2\); needed a vector",
-    ),
-    *(
-        (bound, (MATRIX, BETA), ValueError, r"got terms of shape \(2, 2\); needed a vector \(n,\); sum a matrix row")
-        for bound in (
-            theory.printed_sum_bound_1982,
-            theory.printed_sum_bound,
-            theory.printed_sum_bound_coarse,
-            theory.sum_bound,
-            theory.strict_sum_bound,
-        )
-    ),
-    *(
-        (bound, (VECTOR, [1], BETA), ValueError, r"got vectors of lengths 2 and 1; needed equal lengths")
-        for bound in (theory.dot_bound, theory.strict_dot_bound, theory.relative_dot_bound)
-    ),
-    *(
-        (
-            bound,
-            (0, 2, BETA),
-            ValueError,
-            r"got 0 factors and 2 divisors; needed at least 1 factor and 0 divisors; write 1/y",
-        )
-        for bound in (theory.printed_product_bound, theory.product_bound, theory.strict_product_bound)
-    ),
-    (theory.product_bound, (2, -1, BETA), ValueError, r"got 2 factors and -1 divisors"),
-    (theory.strict_product_bound, (3, 0, Fraction(1, 2)), ValueError, r"got 2 roundings .*; needed less than 1; use"),
-    (theory.strict_sum_bound, ([1, 1, 1], Fraction(1, 2)), ValueError, r"got 2 roundings"),
-    (theory.relative_dot_bound, ([1, 1], [1, -1], BETA), ZeroDivisionError, r"got an inner product of zero; .*use str"),
-    (theory.probabilistic_sum_factor, (0, BETA), ValueError, r"got a sum of 0 terms; needed at least 1"),
-    (theory.probabilistic_sum_factor, (3, BETA, 0), ValueError, r"got failure = 0.0; needed a probability"),
-    (theory.product, ([],), ValueError, r"got shapes none; needed matrices"),
-    (theory.chain_bound, ([A, C], BETA), ValueError, r"got shapes \(2, 3\), \(2, 2\); needed matrices, each with as m"),
-    (theory.strict_chain_bound, ([A, C], BETA), ValueError, r"got shapes"),
-    (theory.printed_chain_claim, ([A, C], BETA), ValueError, r"got shapes"),
-    (theory.interfaces, ([A, VECTOR],), ValueError, r"got shapes \(2, 3\), \(2,\); .*transpose or reshape"),
-    (theory.matrix_sum_bound, (A, ONE, BETA), ValueError, r"got a sum of shapes \(2, 3\) and \(1, 1\); needed equal"),
-    *(
-        (bound, (A, B, C, ONE, BETA), ValueError, r"got a sum of shapes \(2, 2\) and \(1, 1\); needed equal")
-        for bound in (theory.printed_example_bound, theory.example_bound, theory.strict_example_bound)
-    ),
-    (theory.sum_bound, ([1, float("nan")], BETA), ValueError, r"entry 1: got nan; needed a finite number"),
-]
-
-
-@pytest.mark.parametrize(("function", "arguments", "error", "message"), REFUSED)
-def test_refused_with_what_came_and_what_was_needed(function, arguments, error, message):
-    with pytest.raises(error, match=message):
-        function(*arguments)
-
-
-def test_a_strict_bound_of_a_million_terms_is_an_upper_one_without_fractions(monkeypatch):
-    x = np.random.default_rng(5).standard_normal(10**6)
-    beta = Fraction(1, 2**53)
-    with monkeypatch.context() as patch:
-        patch.setattr(theory, "_vector", lambda _: pytest.fail("a million terms were made fractions"))
-        found = theory.strict_sum_bound(x, beta)
-        assert theory.strict_sum_bound(FloatFormat(2, 53).array(x), beta) == found
-    assert theory.sum_bound(x[:2000], beta) < theory.strict_sum_bound(x[:2000], beta)
-    exactly = theory.strict_sum_bound(list(x[:1500]), Fraction(1, 2**24))
-    fast = theory.strict_sum_bound(x[:1500], Fraction(1, 2**24))
-    assert exactly <= fast <= exactly * (1 + Fraction(1, 2**44))
-    assert found > theory.strict_sum_bound(x[:-1000], beta)
-
-
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 9), FloatFormat(16, 6)], ids=str)
-@pytest.mark.parametrize("kind", [list, tuple, "array", "float32", "whole"])
-def test_a_strict_bound_of_many_terms_of_any_kind_is_the_exact_one_and_little_more(kind, fmt):
-    x = np.round(np.random.default_rng(5).standard_normal(1200) * 1000)
-    if kind == "array":
-        terms = fmt.array(x / 7)
-    elif kind in ("float32", "whole"):
-        terms = x.astype(np.float32 if kind == "float32" else np.int64)
-    else:
-        terms = kind((x / 7).tolist())
-    found = theory.strict_sum_bound(terms, fmt.unit_roundoff)
-    sizes = map(abs, exact(terms))
-    true = sum(gamma(w, fmt.unit_roundoff) * size for w, size in zip(theory.sum_weights(1200), sizes, strict=True))
-    assert true <= found <= true * (1 + Fraction(1, 2**45))
-
-
-@pytest.mark.parametrize("kind", [np.longdouble, object])
-def test_terms_that_float64_does_not_hold_are_not_rounded(kind):
-    tiny = Fraction(1, 2**60)
-    x = np.array([1 + tiny] * 1001, dtype=object)
-    if kind is np.longdouble:
-        x = np.full(1001, np.longdouble(1) + np.longdouble(2) ** -60)
-        tiny = x[0].as_integer_ratio()
-        tiny = Fraction(*tiny) - 1  # zero where a long double is a float64
-    beta = Fraction(1, 2**53)
-    one = sum(gamma(w, beta) for w in theory.sum_weights(1001))
-    assert theory.strict_sum_bound(x, beta) == one * (1 + tiny)

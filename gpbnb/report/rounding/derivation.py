@@ -105,76 +105,7 @@ def sums() -> Derivation:
     )
 
 
-def ties() -> Derivation:
-    r"""Error over the bound (18) of 1984 for n terms 1, β, −β, …, −β.
-
-    Each of the n - 1 additions is a tie that rounds up by β. The sum itself, 1 - (n - 3)β, must not
-    be negative.
-    """
-    total = 1 + BETA - (N - 2) * BETA
-    tail = BETA * (N - 1) * (N - 2) / 2
-    return Derivation(
-        (
-            Step(
-                "error $(n-1)\\beta$ over bound (18), while $s = 1-(n-3)\\beta \\ge 0$; it exceeds one from $n = 5$ on",
-                over((N - 1) * BETA, BETA * ((N - 1) * total + tail)),
-                tie_sum_ratio(),
-            ),
-        )
-    )
-
-
-def tie_sum_ratio() -> sp.Expr:
-    """Return the right-hand side of the step in :func:`ties`."""
-    return 1 / (1 - (N - 4) * BETA / 2)
-
-
 # -- products, (19)-(20), and roundings on top of each other --------------------------------------
-
-
-def roundings() -> Derivation:
-    r"""Derive strict bounds for k roundings in sequence, :math:`\prod(1+\epsilon_i) - 1`."""
-    j = sp.Symbol("j", integer=True, positive=True)
-    growth = (1 + BETA / (1 + BETA)) ** K
-    return Derivation(
-        (
-            Step(
-                "first order: $k\\beta$",
-                sp.Limit(((1 + BETA) ** K - 1) / BETA, BETA, 0),
-                K,
-            ),
-            Step(
-                "chopping, from $k$ to $k+1$: $(1-k\\beta)(1-\\beta) \\ge 1-(k+1)\\beta$, so that the"
-                " error $1 - (1-\\beta)^k$ is never above $k\\beta$",
-                unevaluated(1 - K * BETA) * unevaluated(1 - BETA),
-                1 - (K + 1) * BETA,
-                K * BETA**2,
-            ),
-            Step(
-                "nearest: $k$ errors of $\\beta/(1+\\beta)$ exceed $k\\beta$ by this times $\\beta^2$, for"
-                " small $\\beta$; positive from $k = 4$ on",
-                sp.Limit((growth - 1 - K * BETA) / BETA**2, BETA, 0),
-                K * (K - 3) / 2,
-            ),
-            Step(
-                "$1+\\gamma_k$",
-                together(1, over(K * BETA, 1 - K * BETA)),
-                1 / (1 - K * BETA),
-            ),
-            Step(
-                "$(1+\\gamma_k)(1+\\beta) \\le 1+\\gamma_{k+1}$, cleared of denominators",
-                1 - K * BETA,
-                unevaluated(1 + BETA) * unevaluated(1 - (K + 1) * BETA),
-                (K + 1) * BETA**2,
-            ),
-            Step(
-                "$(1+\\gamma_j)(1+\\gamma_k) \\le 1+\\gamma_{j+k}$, cleared of denominators",
-                unevaluated(1 - j * BETA) * unevaluated(1 - K * BETA),
-                1 - (j + K) * BETA,
-                j * K * BETA**2,
-            ),
-        )
-    )
 
 
 def product_operations() -> sp.Expr:
@@ -190,24 +121,6 @@ def quotient_error(n: int, m: int) -> tuple[sp.Expr, tuple[sp.Symbol, ...]]:
 
 
 # -- matrix sums, (23)-(25) -----------------------------------------------------------------------
-
-
-def matrix_sums() -> Derivation:
-    r"""Derive the bound for the sum of two matrices: (15) for each entry, summed over the largest column.
-
-    For an entry with :math:`c = |a_{ij}+b_{ij}|`, let :math:`|\epsilon_{ij}| = \beta - w`, w ≥ 0.
-    """
-    c, w = sp.symbols("c w", nonnegative=True)
-    return Derivation(
-        (
-            Step(
-                "(24) for one entry, $|r_{ij}| = c\\,(\\beta - w)$, with no term left out",
-                BETA * c,
-                unevaluated(c) * unevaluated(BETA - w),
-                c * w,
-            ),
-        )
-    )
 
 
 # -- inner products and matrix products, (26)-(28) ------------------------------------------------
@@ -288,17 +201,3 @@ def chain_shortcut() -> sp.Expr:
     error, products, _ = dot_error(2)
     shared = sp.Symbol(r"{\epsilon'}")
     return sp.factor(sp.expand(error - shared * sum(products)))
-
-
-def examples() -> Derivation:
-    """Derive the error of R = ABC + D, where the computed product ABC has the error E."""
-    abc, d, e, eps = sp.symbols("P D E epsilon")
-    return Derivation(
-        (
-            Step(
-                "the computed result; the last term is of second order",
-                unevaluated(abc + e + d) * (1 + eps),
-                abc + d + e + (abc + d) * eps + e * eps,
-            ),
-        )
-    )
