@@ -20,9 +20,9 @@ from gpbnb.arithmetic.bounds import above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.check import NotProvedError, prove
+from gpbnb.bounds.check import BEYOND, NotProvedError, prove
 from gpbnb.bounds.gains import Schedule
-from gpbnb.bounds.guess import FilterLimits, Guess, lags_of, radius_of
+from gpbnb.bounds.guess import EXCESS, FilterLimits, Guess, radius_of
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.poles import eigenvalues
@@ -59,14 +59,22 @@ class Proof(NamedTuple):
 
 
 def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
-    """Ask the checker for a guess, and for somewhat larger ones if it rejects that."""
-    why, content = "", json.loads(written(guess))
+    """Ask the checker for a guess, and for somewhat larger ones if it rejects that.
+
+    For fixed coefficients, the checker says how much larger; otherwise some factors are tried.
+    """
+    why, content, larger = "", json.loads(written(guess)), np.ones(len(guess.bound))
     for factor in SLOW if content.get("keep", math.inf) < content["back"] else RAISED:
-        text = written(guess._replace(bound=guess.bound * factor))
+        claim = guess._replace(bound=guess.bound * larger * factor)
+        text = written(claim)
         try:
             prove(json.loads(text))
         except NotProvedError as error:
-            why = f"not proved: {error}"
+            why, needed = f"not proved: {error}", np.array([above(each) for each in error.shares]) * EXCESS
+            if len(needed) and str(error) == BEYOND:
+                guess = guess._replace(state=guess.state * np.maximum(needed, 1))
+            elif len(needed):
+                larger = larger * np.maximum(needed, 1)
         except NotImplementedError as error:
             return Proof(guess.bound, "", f"not covered: {error}")
         else:
@@ -103,7 +111,6 @@ def of_operations(
     drawn = not isinstance(fmt, WordFormats) and fmt.rounding is Rounding.STOCHASTIC
     stored = integer_program(made, fmt).coefficients if isinstance(fmt, WordFormats) else made.stored(fmt)
     A, B = matrices(program, stored if exact == "as stored" else made.coefficients)
-    radius = radius_of(matrices(program, stored)[0].astype(np.float64))
     content = {
         "filter": {
             "kind": "linear",
@@ -122,7 +129,7 @@ def of_operations(
         "limits": {"measurement": texts(measurement)},
         "derived": {"state": texts(guess.state)},
     }
-    return _text(_head(made.name, guess.bound, steps, lags_of(radius, steps, program.n)) | content)
+    return _text(_head(made.name, guess.bound, steps, guess.lags) | content)
 
 
 def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | None, F: NDArray[np.float64]) -> str:

@@ -47,8 +47,7 @@ the file: filter, format, form, limits. It verifies the answer: the bound b, and
     steps if |y| <= Y after i, for any number of steps; and for all steps once P is small. A rounding in words is half a
     unit of the data or the sums, or a whole one, if it drops a bit; limits of none are for inputs without an overflow.
 
-    Not covered: a covariance rounded at random; known inputs; gains that never repeat; limited values; fused
-    operations; other orders of sums.
+    Not covered: covariances rounded at random, gains that never repeat, known inputs, limited values, other orders.
 """
 
 from __future__ import annotations
@@ -95,16 +94,21 @@ FILES = {
 }
 NUMBER = re.compile(r"-?[0-9]{1,4000}([./][0-9]{1,4000})?", re.ASCII)
 MULTIPLY, ADD, SUBTRACT = "multiply", "add", "subtract"
+BEYOND, LARGER = "a state may exceed its limit", "the error may exceed its bound"
 BLOCK, PEAK = 8, 128  # steps that are taken together, for speed; bits of the shares in (6)
 
 
 class NotProvedError(Exception):
-    """A claim that is wrong, or that this program cannot prove."""
+    """A claim that is wrong, or that this program cannot prove; with the shares of its bounds that it needs."""
+
+    shares: Any = ()
 
 
-def need(truth: Any, message: str) -> None:
+def need(truth: Any, message: str, shares: Any = ()) -> None:
     if not truth:
-        raise NotProvedError(message)
+        error = NotProvedError(message)
+        error.shares = shares
+        raise error
 
 
 def read(given: Any, schema: Any, name: str = "") -> Any:
@@ -556,7 +560,7 @@ class Linear:
         different = [row for row in {tuple(x): x for x, _ in split}.values() if sum(map(bool, row)) > 1]
         inputs = scaled(turned(self.B), self.Z)
         shares, wholes = peaks(self.A, inputs, different, self.X, self.steps, self.back)
-        need(max(shares[:n]) <= 1 << PEAK, "a state may exceed its limit")
+        need(max(shares[:n]) <= 1 << PEAK, BEYOND, [Fraction(x, 1 << PEAK) for x in shares[:n]])
         caps = {tuple(r): Fraction(s, 1 << PEAK) * w for r, s, w in zip(different, shares[n:], wholes, strict=True)}
         found = []
         for row, whole in split:
@@ -618,7 +622,7 @@ class Linear:
             inputs = scaled(turned(each(sub, B, self.B) + self.B), self.Z)
             more, _ = peaks(both, inputs, [], self.b + self.X, self.steps, self.back)
             shares = list(map(add, shares, more))
-        need(max(shares) <= 1 << PEAK, "the error may exceed its bound")
+        need(max(shares) <= 1 << PEAK, LARGER, [Fraction(x, 1 << PEAK) for x in shares])
 
 
 def whole(a: Any) -> tuple[Any, int]:
@@ -857,7 +861,7 @@ class Filter:
 
     def run(self) -> None:
         """Take the first steps, and prove that all later ones remain within the limits."""
-        sets = [ErrorSet(self.b, [], self.loops, "the error may exceed its bound")]
+        sets = [ErrorSet(self.b, [], self.loops, LARGER)]
         if self.derived:
             rooms = [v - z - 2 * self.missed for v, z in zip(self.V, self.Z, strict=True)]
             message = "a state or an innovation may exceed its limit"

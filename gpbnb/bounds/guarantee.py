@@ -57,6 +57,7 @@ class Guarantee:
     schedule : the filter's coefficients.
     radius : growth of an error per step, averaged over a period.
     asked : limits as given.
+    lags : how many earlier steps the checker sums one by one, for fixed coefficients.
     text : what was proved, as JSON; empty if there is no bound.
     """
 
@@ -68,6 +69,7 @@ class Guarantee:
     schedule: Schedule
     radius: float
     asked: FilterLimits
+    lags: int = 1
     text: str = ""
 
     @property
@@ -267,10 +269,12 @@ def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000) -> G
         steps = 0
         if for_ever:
             why = "no bound was found: in this precision, an error causes rounding errors as large as itself"
-        if given.fmt.limits is not None:
+        if found.why:
+            why = found.why
+        elif given.fmt.limits is not None:
             why = f"no bound was found within the range of {arithmetic(given.fmt)}: a number may exceed the largest"
     derived = FilterLimits(found.state, found.innovation, stored_sizes(given.fmt, within.measurement))
-    return Guarantee(found.bound, steps, why, found.parts, derived, given, radius, within)
+    return Guarantee(found.bound, steps, why, found.parts, derived, given, radius, within, found.lags)
 
 
 def _guess(given: Schedule, within: FilterLimits, steps: int | None, dense: bool = False) -> Guess:
@@ -285,7 +289,7 @@ def _answered(found: Guarantee) -> Guarantee:
     given, steps = found.schedule, found.steps
     if not np.isfinite(found.bound).all():
         return found
-    guess = Guess(found.bound, found.limits.state, found.limits.innovation, found.parts)
+    guess = Guess(found.bound, found.limits.state, found.limits.innovation, found.parts, found.lags)
     if isinstance(given.origin, LinearFilter):
         made, inputs = given.origin, found.asked.measurement
         proof = first_proved(guess, lambda claim: of_operations(made, given.fmt, inputs, claim, steps))

@@ -36,8 +36,12 @@ ROUNDING, LOOP, GAIN = range(3)
 EXCESS = 1 + 2.0**-20
 """Factor by which a guess is larger than the sums, so that the checker may round outwards."""
 
-_BLOCK, _LAGS, _WORK = 64, 1_024, 1_200_000
-"""Powers of a loop that are computed at a time; lags that are summed one by one, at least, and times squared states."""
+_BLOCK, _LAGS, _WORK = 64, 1_024, 300_000
+"""Powers of a loop that are computed at a time; most lags that are summed one by one, and times squared states."""
+_LOSS = 16.0
+"""Largest factor by which sums over twice as many lags may grow, once these are many."""
+_LEFT = 2.0**-12
+"""Share of a response that may be left after the lags that are summed one by one."""
 _DENSE, _RATIO = 256, 1.02
 """Steps whose bounds are guessed one by one, and the ratio of the later ones."""
 _ROUNDS, _LARGE = 60, 5_000_000
@@ -67,12 +71,16 @@ class Guess(NamedTuple):
     bound : (n,), bound of the error of each state; infinite if there is none.
     state, innovation : limits of the exact filter, given or derived.
     parts : (n, 3), parts of each bound, where it is largest.
+    lags : how many earlier steps are summed one by one, for fixed coefficients.
+    why : why there is no bound, if more is known than that.
     """
 
     bound: Array
     state: Array
     innovation: Array
     parts: Array
+    lags: int = 1
+    why: str = ""
 
 
 class Steps(NamedTuple):
@@ -188,11 +196,14 @@ def columns(program: Program, steps: Steps, h: Array) -> Array:
 # -- constant loops ---------------------------------------------------------------------------------------------------
 
 
-def lags_of(radius: float, steps: int | None, n: int) -> int:
+@np.errstate(over="ignore", invalid="ignore")
+def lags_of(F: Array, G: Array, steps: int | None) -> int:
     """Return how many lags are summed one by one, a power of two: all that count, unless they take too long."""
-    needed = math.log(1e-12) / math.log(min(max(radius, 1e-3), 1 - 1e-9)) if radius < 1 else _LAGS
-    most = max(_LAGS, _WORK // n**2)
-    return 2 ** math.ceil(math.log2(max(min(needed, most, steps or most), 1)))
+    most, lags, P, T = max(_LAGS, _WORK // len(F) ** 2), 1, F, np.abs(G).sum(axis=1)
+    most = most if steps is None else min(most, steps)
+    while lags < most and not (np.abs(P) @ T <= _LEFT * T).all():
+        P, T, lags = P @ P, T + np.abs(P) @ T, 2 * lags
+    return lags
 
 
 def radius_of(F: Array) -> float:
@@ -204,6 +215,10 @@ def gains(F: Array, G: Array, rows: Array, steps: int | None, lags: int) -> Arra
     """Return the sums of the sizes of r F^l G over l, (n + rows, columns), for unit rows and others.
 
     Sums over more than some lags follow from squares of powers of the loop, as in :mod:`gpbnb.bounds.check`.
+
+    Raises
+    ------
+    ValueError : squares are far above these sums.
     """
     start, count = np.vstack([np.eye(len(F)), rows]), lags if steps is None else min(lags, steps)
     sums, C = np.zeros((len(start), G.shape[1])), start
@@ -219,20 +234,22 @@ def gains(F: Array, G: Array, rows: Array, steps: int | None, lags: int) -> Arra
     blocks = None if steps is None else steps // lags
     most = gains(F, G, rows[:0], steps % lags, lags) if steps is not None else np.zeros_like(T)
     with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(200):
+        while blocks != 0:
             if blocks is None and np.abs(P).sum(axis=1).max() < 1e-30:
                 most = T
                 break
             if blocks is not None:
                 most = T + np.abs(P) @ most if blocks & 1 else most
                 blocks >>= 1
-                if not blocks:
-                    break
-            P, T = P @ P, T + np.abs(P) @ T
-            if not np.isfinite(T).all():
+            once = np.abs(P) @ T
+            if not np.isfinite(once).all():
                 return np.full(sums.shape, np.inf)
-        else:
-            return np.full(sums.shape, np.inf)
+            if blocks is None and (once > _LOSS * T).any():
+                raise ValueError(
+                    f"the system decays too slowly for a bound: its response is not negligible after {lags} steps; "
+                    "shorten its memory, or split it into sections"
+                )
+            P, T = P @ P, T + once
     return sums + np.abs(C) @ most
 
 
@@ -299,10 +316,9 @@ class Inputs(NamedTuple):
     errors: Array
 
 
-def of_inputs(given: Loops, Z: Array, rows: Array, steps: int | None) -> Inputs:
+def of_inputs(given: Loops, Z: Array, rows: Array, steps: int | None, lags: int) -> Inputs:
     """Bound what inputs within limits do; `rows` (rows, n + m) are functions of state and input."""
     n = len(given.F)
-    lags = lags_of(max(radius_of(given.A), radius_of(given.F)), steps, n)
     sums = gains(given.A, given.B * Z, rows[:, :n], steps, lags).sum(axis=1)
     state = positive(sums[:n] * EXCESS)
     values = np.minimum(sums[n:] * EXCESS, _times(rows[:, :n], state)) + _times(rows[:, n:], given.kept)
@@ -335,9 +351,13 @@ def constant_guess(
     if steps is None and slowest >= 1:
         return Guess(none, none, Z, np.zeros((n, 3)))
     step = linear_steps(schedule, np.zeros(1, dtype=np.int64))
-    inputs = of_inputs(given, Z, step.rows[:, 0], steps)
     effects = step.effects[n + program.m :, 0].T
-    of_roundings = gains(given.F, effects, np.zeros((0, n)), steps, lags_of(slowest, steps, n))
+    lags = max(lags_of(given.A, given.B * Z, steps), lags_of(given.F, effects, steps))
+    try:
+        inputs = of_inputs(given, Z, step.rows[:, 0], steps, lags)
+        of_roundings = gains(given.F, effects, np.zeros((0, n)), steps, lags)
+    except ValueError as slow:
+        return Guess(none, none, Z, np.zeros((n, 3)), why=str(slow))
 
     def bounded(b: Array) -> Array:
         h = rounding_errors(program, fmt, step, inputs.values[:, None], inputs.state + b, b)[:, 0]
@@ -346,7 +366,7 @@ def constant_guess(
     b = raised(bounded, n)
     parts = np.zeros((n, 3))
     parts[:, ROUNDING] = b
-    return Guess(b, inputs.state, Z, parts)
+    return Guess(b, inputs.state, Z, parts, lags)
 
 
 # -- loops that change ------------------------------------------------------------------------------------------------

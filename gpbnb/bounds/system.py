@@ -47,6 +47,8 @@ def _guess(
     if not np.isfinite(largest_errors(fmt, inputs)).all():
         raise ValueError(f"got inputs of up to {inputs}; needed inputs within the range of {arithmetic(fmt)}")
     found = constant_guess(system.as_filter(), fmt, inputs, steps, as_given=True)
+    if found.why:
+        raise ValueError(found.why)
     if not np.isfinite(found.state).all():
         over, cure = ("", "scale the inputs") if steps is None else (f" over {steps} steps", "take fewer steps")
         raise OverflowError(f"got a system whose largest gain{over} is beyond the range of float64; {cure}")

@@ -29,7 +29,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.certificate import Proof, first_proved, of_operations
-from gpbnb.bounds.guess import EXCESS, Guess, gains, lags_of, loops, positive, radius_of
+from gpbnb.bounds.guess import EXCESS, Guess, gains, lags_of, loops, positive
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, exact_functionals, matrices
 from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable
 from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program
@@ -78,9 +78,11 @@ def bounded_rounding(made: LinearFilter, words: WordFormats) -> NDArray[np.float
     if not is_stable(A):
         raise ValueError("the system is not stable with its coefficients as stored")
     F, n, m = A.astype(np.float64), made.program.n, made.program.m
-    sums = gains(F, _effects(stored), np.zeros((0, n)), None, lags_of(radius_of(F), None, n))
+    effects = _effects(stored)
+    lags = lags_of(F, effects, None)
+    sums = gains(F, effects, np.zeros((0, n)), None, lags)
     bound, inputs = positive(sums @ rounding_limits(stored) * EXCESS), np.full(m, np.inf)
-    guess = Guess(bound, bound, inputs, np.zeros((n, 3)))
+    guess = Guess(bound, bound, inputs, np.zeros((n, 3)), lags)
     proof = first_proved(guess, lambda each: of_operations(made, words, inputs, each, None))
     if proof.why:
         raise ValueError(proof.why)
@@ -113,6 +115,7 @@ class _Sums(NamedTuple):
     values : (values, m), from inputs to values.
     errors, storing : (n + p, m), from inputs, and from errors of storing them, to errors.
     rounding : (n + p, o), from roundings of operations to errors.
+    lags : how many earlier steps are summed one by one.
     """
 
     state: NDArray[np.float64]
@@ -121,6 +124,7 @@ class _Sums(NamedTuple):
     errors: NDArray[np.float64]
     storing: NDArray[np.float64]
     rounding: NDArray[np.float64]
+    lags: int
 
 
 class WordGuarantee:
@@ -185,7 +189,7 @@ class WordGuarantee:
         bound = found.errors @ self._largest + found.storing.sum(axis=1) * share + found.rounding @ limits
         bound = positive(bound * EXCESS)
         self._check_range(found, made, limits, state, inputs, bound)
-        return Guess(bound, state, inputs, np.zeros((len(bound), 3)))
+        return Guess(bound, state, inputs, np.zeros((len(bound), 3)), found.lags)
 
     def _sums(self, made: IntegerProgram) -> _Sums:
         key = tuple(made.coefficients)
@@ -202,15 +206,16 @@ class WordGuarantee:
                 for row in exact_functionals(program, made.coefficients)
             ]
         )
-        lags = lags_of(max(radius_of(one.A), radius_of(one.F)), self._steps, n)
+        columns = np.hstack([one.K, _effects(made)])
+        lags = max(lags_of(one.A, one.B * self._largest, self._steps), lags_of(one.F, columns, self._steps))
         sums = gains(one.A, one.B, rows[:, :n], self._steps, lags)
         errors = np.zeros((n, program.m))
         if one.of_state.any() or one.of_input.any():
             both = np.block([[one.F, one.of_state], [np.zeros((n, n)), one.A]])
             errors = gains(both, np.vstack([one.of_input, one.B]), np.zeros((0, 2 * n)), self._steps, lags)[:n]
-        later = gains(one.F, np.hstack([one.K, _effects(made)]), rows[:0, :n], self._steps, lags)
+        later = gains(one.F, columns, rows[:0, :n], self._steps, lags)
         values = sums[n:] + np.abs(rows[:, n:])
-        found = _Sums(sums[:n], rows, values, errors, later[:, : program.m], later[:, program.m :])
+        found = _Sums(sums[:n], rows, values, errors, later[:, : program.m], later[:, program.m :], lags)
         self._known[key] = found
         return found
 

@@ -45,7 +45,7 @@ from gpbnb.filters.words import (
 from gpbnb.wordlength.precision import checked_question, recorded_strategy
 from gpbnb.wordlength.recursion import Recursion, recursion_strategy
 from gpbnb.wordlength.requirement import Strategy, WordlengthAnswer, checked_tolerance, largest_ratio
-from gpbnb.wordlength.system import weak_evidence
+from gpbnb.wordlength.system import slowest_response, weak_evidence
 
 Basis = Literal["emulation", "guarantee"]
 LARGEST_FRACTION = 60  # bits
@@ -516,7 +516,8 @@ class _Outputs(_Strategy):
         largest = LARGEST_FRACTION - 1 if fmt is None else fmt.fraction_bits - 1
         other = self._scaled()
         if other is None or largest < other.least:
-            return ""
+            slow = "" if fmt is not None or self._proof is None else slowest_response(self._system, len(self._inputs))
+            return slow and f"errors add up because the system is slow: its {slow}"
         found = Search(other.error, other.like, (), largest=largest, least=other.least)
         words = None if found.fmt is None else other.words(found.fmt)
         if words is None:

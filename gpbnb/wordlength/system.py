@@ -67,7 +67,7 @@ def required_system_precision(
     limited = not system.as_filter().program.is_linear
     cause = "" if found.fmt is not None or limited else system.unstable()
     if not cause:
-        advice = "" if found.fmt is not None else _too_many_digits(system, found, asked.like.base)
+        advice = "" if found.fmt is not None else _too_many_digits(system, found, asked)
         warnings = strategy.warnings() if found.fmt is not None and isinstance(strategy, EmulatedSystem) else ()
         remedy = "" if _is_long(system) else asked.in_more_digits(found)
         return asked.answer(found, advice=advice, ends=ends, warnings=warnings, remedy=remedy)
@@ -94,13 +94,15 @@ def _lost_design(system: LinearSystem) -> str:
     )
 
 
-def _too_many_digits(system: LinearSystem, found: Search[FloatFormat], base: int) -> str:
-    """Return how far the largest precision misses the tolerance, and which structure needs fewer digits."""
-    digits, ratio = found.tried[-1]
+def _too_many_digits(system: LinearSystem, found: Search[FloatFormat], asked: Asked) -> str:
+    """Return how far the largest precision misses the tolerance, why, and which structure needs fewer digits."""
+    (digits, ratio), base = found.tried[-1], asked.like.base
     parts = [] if math.isinf(ratio) else [f"{digits_text(digits, base)} give {ratio:.3g} times the tolerance"]
     if _is_long(system):
         fewer = f"fewer {digit_unit(base)}"
         parts.append(f"second-order sections usually need {fewer}: their coefficients move the poles less")
+    elif asked.basis != "emulation" and (slow := slowest_response(system, asked.steps)):
+        parts.append(f"errors add up because the system is slow: its {slow}")
     return "; ".join(parts)
 
 
@@ -157,6 +159,17 @@ _FORGOTTEN = 0.01
 """Share to which the slowest response must decay within a run."""
 
 
+def slowest_response(system: LinearSystem, steps: int) -> str:
+    """Say how long the slowest response of a stable system lasts; nothing if it decays to 1 % within some steps."""
+    entries = system.A.astype(np.float64)
+    radius = float(np.abs(eigenvalues(entries)).max()) if np.isfinite(entries).all() else math.inf
+    if not 0 < radius < 1 or radius**steps <= _FORGOTTEN:
+        return ""
+    needed = math.log(_FORGOTTEN) / math.log(radius)
+    digits = max(len(str(int(needed))) - 2, 0)
+    return f"slowest response takes {math.ceil(needed / 10**digits) * 10**digits} steps to decay to 1 %"
+
+
 def weak_evidence(system: LinearSystem, true: NDArray[np.float64], tolerances: NDArray[np.float64]) -> tuple[str, ...]:
     """Return why the errors of a run may say little about other runs, in a sentence each; empty if nothing does.
 
@@ -169,14 +182,10 @@ def weak_evidence(system: LinearSystem, true: NDArray[np.float64], tolerances: N
     tolerances : (p,).
     """
     found = list[str]()
-    entries = system.A.astype(np.float64)
-    radius = float(np.abs(eigenvalues(entries)).max()) if np.isfinite(entries).all() else math.inf
-    if 0 < radius < 1 and radius ** len(true) > _FORGOTTEN:
-        steps = math.log(_FORGOTTEN) / math.log(radius)
-        digits = max(len(str(int(steps))) - 2, 0)
+    if slow := slowest_response(system, len(true)):
         found.append(
-            f"the run of {len(true)} steps is shorter than the memory of the system, whose slowest response takes "
-            f"{math.ceil(steps / 10**digits) * 10**digits} steps to decay to 1 %: take as many, or ask for a guarantee"
+            f"the run of {len(true)} steps is shorter than the memory of the system, whose {slow}: take as many, or "
+            "ask for a guarantee"
         )
     largest = np.abs(true[..., 0]).max(axis=0)
     for i in np.flatnonzero((largest <= tolerances) & np.isfinite(tolerances)):

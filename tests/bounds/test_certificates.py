@@ -19,7 +19,7 @@ from test_openings import NINE, WITHIN, raised_while_factored
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
 from gpbnb.bounds import check, guess
-from gpbnb.bounds.certificate import of_operations
+from gpbnb.bounds.certificate import first_proved, of_operations
 from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
@@ -566,3 +566,13 @@ def test_what_has_no_certificate_says_so() -> None:
     none = guarantee(small(), FloatFormat(2, 11, emin=-14, emax=15), limits(2, 1, measurement=1e6))
     with pytest.raises(ValueError, match="without a bound"):
         none.certificate()
+
+
+def test_a_claim_that_is_too_small_is_raised_to_one_that_is_proved() -> None:
+    system = LinearSystem([["0.9", "0.2"], ["-0.2", "0.8"]], [[1], [0]], [[1, 0]])
+    made, fmt, inputs = system.as_filter(), FloatFormat(2, 20), np.array([1.0])
+    near = guess.constant_guess(made, fmt, inputs, None, as_given=True)
+    small = near._replace(bound=near.bound / 3, state=near.state * [0.25, 1, 0.5])
+    found = first_proved(small, lambda each: of_operations(made, fmt, inputs, each, None, "as given"))
+    assert not found.why
+    np.testing.assert_allclose(found.bound, near.bound, rtol=4e-3)  # the factors that are tried

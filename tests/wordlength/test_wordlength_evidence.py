@@ -213,8 +213,14 @@ def test_a_direct_form_that_no_precision_suits_says_by_how_much_it_misses():
     long = LinearSystem.from_coefficients(*signal.butter(8, 0.02))
     found = required_precision(long, 500, 1e-7, z=np.ones((500, 1)))
     assert f"; 53 bits give {found.tried[-1][1]:.3g} times the tolerance; second-order sections usually" in str(found)
-    lasting = required_precision(long, 500, 1e-3, basis="bound", z=np.ones((500, 1)))
-    assert "in 53 bits not proved: a state may exceed its limit; second-order sections usually" in str(lasting)
+    lasting = required_precision(long, 500, 1e-4, basis="bound", z=np.ones((500, 1)))
+    assert f"; 53 bits give {lasting.tried[-1][1]:.3g} times the tolerance; second-order" in str(lasting)
+
+
+def test_a_slow_system_that_no_precision_suits_names_its_slowness():
+    slow = LinearSystem([["0.9999999"]], [[1]])
+    found = str(required_precision(slow, 20, 1e-3, basis="bound", z=np.ones((20, 1))))
+    assert found.endswith("because the system is slow: its slowest response takes 47000000 steps to decay to 1 %")
 
 
 @pytest.mark.parametrize("basis", ["emulation", "bound", "guarantee"])
