@@ -128,4 +128,4 @@ def test_a_row_without_a_domain_judges_nothing():
 def test_a_definition_is_given_if_it_holds():
     definition = row(domain="true()", verdict="given", recomputed="x", note="defines x", otherwise="not so")
     assert definition(PRINTED).verdict is Verdict.GIVEN
-    assert definition(OTHER).verdict is Verdict.WRONG
+    assert definition(OTHER).verdict is Verdict.MISPRINT

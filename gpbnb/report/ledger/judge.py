@@ -5,8 +5,8 @@ A row of ``checks/<topic>.csv`` judges some statements. Its columns:
 - *statements*: their ids; ``*.eq4`` stands for eq4 of both reports.
 - *domain*: an expression for the true values of the names and labels in the statement: one mapping, or one for each of
   several instances. A statement without a domain is not judged.
-- *mode*: ``exact``; ``bound``, exact, and every bound is attained; ``first order``, the same to first order; ``close``,
-  to the digits that are printed; ``largest errors``, as :mod:`gpbnb.report.ledger.largest` says.
+- *mode*: ``exact``; ``first order``; ``bound`` and ``bound to first order``, where every bound is attained as well;
+  ``close``, to the digits that are printed; ``largest errors``, as :mod:`gpbnb.report.ledger.largest` says.
 - *also*: an expression that must be true besides.
 - *verdict*: what a mismatch is called, or else what the statement is, such as ``given``; *root*: its root error.
 - *recomputed*, *note*, *otherwise*: what the ledger says; *otherwise* replaces the note of a mismatch. Expressions in
@@ -31,12 +31,14 @@ import sympy as sp
 
 from gpbnb.arithmetic.formats import prints_as
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.report.display.tables import scientific
 from gpbnb.report.ledger.agreement import DIGITS, vanishes
 from gpbnb.report.ledger.corrections import intended
 from gpbnb.report.ledger.dotted import DottedMatrix
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare
 from gpbnb.report.ledger.formula import OPERATORS, Link, Number, Part, Relation, Undefined, Words
 from gpbnb.report.ledger.html import chapter
+from gpbnb.report.ledger.largest import allows
 from gpbnb.report.ledger.registry import Checks
 from gpbnb.report.ledger.statements import Statement
 
@@ -45,6 +47,8 @@ SECOND_ORDER = Fraction(1, 10**60)
 """Differences below this value are of second order, since roundings are at most 1e-40 and the data are of order one."""
 ATTAINED, TIGHT = Fraction(99, 100), 1 - Fraction(1, 10**9)
 """A bound counts as attained if the value reaches this share of it, in a tight instance the second one."""
+EPSILON = sp.Symbol("epsilon")
+"""The rounding error of printed terms that are symbols; to first order, its square is dropped."""
 CLOSE, EQUAL = 1e-2, 1e-9
 """Relative differences that ≈ and = allow in the mode ``close``."""
 
@@ -85,8 +89,9 @@ def judge(stated: Statement | Iterable[Part], domain: Names | Iterable[Names], m
     """Judge what is stated in each instance of a domain.
 
     Besides the values of names, an instance may say: ``holds``, False where the statement must not hold; ``part``, the
-    number of the only part that it is about; ``tight``, where the first bound of each relation must be attained; and
-    ``numbers``, the type of printed numbers, Fraction by default.
+    number of the only part that it is about; ``expression``, the value of a part that compares nothing; ``tight``,
+    where the first bound of each relation must be attained; and ``numbers``, the type of printed numbers, Fraction by
+    default.
     """
     parts = stated.parts if isinstance(stated, Statement) else tuple(stated)
     count = violated = 0
@@ -108,7 +113,7 @@ def judge(stated: Statement | Iterable[Part], domain: Names | Iterable[Names], m
     if undefined and len(undefined) == count:
         raise undefined[0]
     loose = {place for place, here in attained.items() if not here} | missed
-    return StatementOutcome(count, violated, len(loose) if mode in ("bound", "first order") else 0)
+    return StatementOutcome(count, violated, len(loose))
 
 
 def _held(parts: tuple[Part, ...], names: Names, mode: str) -> tuple[bool, dict[tuple[int, int], bool]]:
@@ -122,11 +127,15 @@ def _held(parts: tuple[Part, ...], names: Names, mode: str) -> tuple[bool, dict[
                 held &= _is_said(names[part.label], part.printed)
             case Number():
                 held &= _is_printed(names[part.label], part)
+            case Relation() if mode == "largest errors":
+                held &= allows(part, names)
             case Relation() if "*...*" not in part.text:
                 sides = part.sides
+                if len(sides) == 1:
+                    held &= sign(part.value(names, names.get("numbers", Fraction)) - names["expression"]) == 0
                 for j, link in enumerate(part.links(names, names.get("numbers", Fraction))):
                     held &= holds(link, mode, sides[j + 1])
-                    if link.symbol in ("<=", "<", ">=", ">"):
+                    if mode.startswith("bound") and link.symbol in ("<=", "<", ">=", ">"):
                         zero = "0" in (sides[j].text, sides[j + 1].text)
                         reached[i, j] = attains(link, zero, TIGHT if names.get("tight") else ATTAINED)
     return bool(held), reached
@@ -139,7 +148,9 @@ def _is_said(true: Any, phrase: str) -> bool:
 
 def _is_printed(true: Any, number: Number) -> bool:
     """Whether the printed digits are those of the true value, or true by a function."""
-    return bool(true(number.literal)) if callable(true) else prints_as(true, number.literal, *Rounding.documented())
+    if callable(true):
+        return bool(true(number.literal))
+    return bool(true == 0) if number.value == 0 else prints_as(true, number.literal, *Rounding.documented())
 
 
 def holds(link: Link, mode: str = "exact", side: Relation | None = None) -> bool:
@@ -154,7 +165,7 @@ def holds(link: Link, mode: str = "exact", side: Relation | None = None) -> bool
     if mode == "close" and symbol in ("==", "!="):
         close = all(_close(a, b, link.symbol, side) for a, b in zip(left.flat, right.flat, strict=True))
         return close == (symbol == "==")
-    slack = SECOND_ORDER if mode == "first order" or link.symbol == "≈" else 0
+    slack = SECOND_ORDER if mode.endswith("first order") or link.symbol == "≈" else 0
     signs = [sign(a - b, slack) for a, b in zip(left.flat, right.flat, strict=True)]
     match symbol:
         case "==":
@@ -207,10 +218,28 @@ def sign(x: Any, slack: Any = 0) -> int:
     if hasattr(x, "slope"):
         return sign(x.value, slack) or sign(x.slope, slack)
     if isinstance(x, sp.Basic):
+        if slack and EPSILON in x.free_symbols:
+            return sign(x.subs(EPSILON, 0), slack) or sign(x.diff(EPSILON).subs(EPSILON, 0), slack)
         if vanishes(x):
             return 0
+        if x.free_symbols:
+            return _sign_of_terms(x)
+        if not x.is_comparable:
+            raise Undefined(f"got {x}; needed a number")
         x = sp.N(x, DIGITS)
     return 0 if abs(x) <= slack else 1 if x > 0 else -1
+
+
+def _sign_of_terms(x: sp.Expr) -> int:
+    """Return the common sign of all terms of a rational expression in positive symbols."""
+    x = sp.cancel(sp.expand(x))
+    letters = sorted(x.free_symbols, key=str)
+    others = [letter for letter in letters if not letter.is_integer]
+    terms = sp.Poly(sp.numer(x), *others).coeffs() if others else [sp.numer(x)]
+    signs = {sp.sign(term.subs({letter: 2 + i for i, letter in enumerate(letters)})) for term in terms}
+    if len(signs) != 1:
+        raise Undefined(f"got {x}; needed a number, or terms of one sign")
+    return int(signs.pop())
 
 
 # -- rows of data ---------------------------------------------------------------------------------
@@ -234,7 +263,7 @@ class CheckRow:
 
     def __call__(self, printed: Statement) -> Finding:
         """Judge a statement."""
-        names = {"printed": printed, "intended": intended, "judge": judge, "chapter": chapter, **self.topic}
+        names = {**_NAMES, "printed": printed, **self.topic}
         verdict = Verdict(self.verdict or "wrong")
         agrees: bool | None = None
         if self.domain:
@@ -250,7 +279,7 @@ class CheckRow:
         if verdict is Verdict.ANSWERED:
             return answer(bool(agrees), recomputed, note)
         if agrees is False:
-            return compare(False, recomputed, Verdict.WRONG, otherwise_note=otherwise)
+            return compare(False, recomputed, Verdict.MISPRINT, otherwise_note=otherwise)
         return Finding(recomputed if agrees is None else "", None, verdict, note)
 
     @property
@@ -278,6 +307,7 @@ def _ids(place: str) -> tuple[str, ...]:
     return (place,)
 
 
+_NAMES: Names = {"intended": intended, "judge": judge, "chapter": chapter, "scientific": scientific}
 _BUILTINS = {f.__name__: f for f in (abs, all, any, float, int, len, list, map, max, min, range, set, str, sum, tuple)}
 
 

@@ -1,7 +1,8 @@
 """The names of (102)-(125) with the largest errors that roundings can cause.
 
 Each rounding multiplies a result by 1 + ε with an ε of its own. To first order, an error is a sum of these ε with known
-factors, so the largest error is β times the sum of their sizes. Errors of filters in four digits are further instances.
+factors, so the largest error is β times the sum of their sizes. Errors of filters in four digits are further instances,
+which say so by ``emulated``; ``tight`` are those in which every rounding error of the left side can add up.
 """
 
 from __future__ import annotations
@@ -16,15 +17,18 @@ from typing import Any
 import numpy as np
 
 from gpbnb.arithmetic.algebra import EXACT, Algebra, rounded_algebra
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel, gain, predicted, reduction, second_gain, updated
 from gpbnb.report.kalman import report_bounds, smallest
-from gpbnb.report.ledger.checks.kalman.registry import FOUR
 from gpbnb.report.ledger.first_order import FirstOrder
 from gpbnb.report.ledger.tracked import Matrix, largest, rounded, tracked
 
 Names = dict[str, Any]
+
+
+FOUR = FloatFormat(10, 4)
 
 
 # -- one step with a rounding of every operation --------------------------------------------------
@@ -75,13 +79,9 @@ def update(algebra: Algebra, F: Matrix, x: Matrix, u: Matrix) -> Matrix:
 # -- instances ------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Instance:
-    """Values of the printed names; `tight` if every rounding error of the left side can add up."""
-
-    names: Names
-    tight: bool = False
-    emulated: bool = False
+def exact_errors(*groups: Iterable[Names]) -> list[Names]:
+    """Return the instances with first-order errors, without those in four digits."""
+    return [names for group in groups for names in group if not names.get("emulated")]
 
 
 def hat(value: Any, error: Any) -> FirstOrder:
@@ -140,19 +140,19 @@ def cases() -> tuple[smallest.FilterCase, ...]:
 
 
 @cache
-def one_step(gain: str = "K_2") -> tuple[Instance, ...]:
+def one_step(gain: str = "K_2") -> tuple[Names, ...]:
     """Return one step of each case, with first-order errors and in four digits; `gain` gives K_tilde_k its error."""
     found = []
     for case in cases():
         true, *others = _steps(case)
         for errors, emulated in zip(others, (False, True), strict=True):
             names = _names_of_a_step(case, true, errors | {"K_2": errors[gain]})
-            found.append(Instance(names, emulated=emulated))
+            found.append(names | {"emulated": emulated})
     return tuple(found)
 
 
 @cache
-def local_gain() -> tuple[Instance, ...]:
+def local_gain() -> tuple[Names, ...]:
     """Return one step of each case, where the covariance and the inverse of R have no error before the gain."""
     found = []
     for case in cases():
@@ -163,7 +163,7 @@ def local_gain() -> tuple[Instance, ...]:
             error = abs(computed - true.K) / FOUR.unit_roundoff if emulated else largest(computed)
             none = {name: abs(each) * 0 for name, each in vars(true).items()}
             names = _names_of_a_step(case, true, none | {"K_2": error})
-            found.append(Instance(names | {"R_hat_k": FirstOrder(case.R)}, emulated=emulated))
+            found.append(names | {"R_hat_k": FirstOrder(case.R), "emulated": emulated})
     return tuple(found)
 
 
@@ -225,12 +225,12 @@ def _alternating(seed: int, n: int) -> Matrix:
     return (half + half.T) * (2 * exact(np.eye(n, dtype=int)) - 1)
 
 
-def _tight(n: int, m: int, **names: Any) -> Instance:
-    return Instance(letters(n, m) | names, tight=True)
+def _tight(n: int, m: int, **names: Any) -> Names:
+    return letters(n, m) | names | {"tight": True}
 
 
 @cache
-def second_prediction() -> tuple[Instance, ...]:
+def second_prediction() -> tuple[Names, ...]:
     """Return the prediction in the second step of each case, which starts from a covariance with an error."""
     found = []
     for case in cases():
@@ -244,12 +244,12 @@ def second_prediction() -> tuple[Instance, ...]:
                 "phi": at(2, case.Phi), "P": at(2, true.P), "P_tilde": at(2, tilde(errors["P"])), "Q": at(2, case.Q),
                 "P_kp": FirstOrder(value), "P_hat_kp": hat(value, error), "P_tilde_kp": tilde(error),
             }  # fmt: skip
-            found.append(Instance(names, emulated=emulated))
+            found.append(names | {"emulated": emulated})
     return tuple(found)
 
 
 @cache
-def tight_prediction() -> tuple[Instance, ...]:
+def tight_prediction() -> tuple[Names, ...]:
     """Return positive matrices for (102) and (103), with errors of P_{k-1} of any size."""
     found = []
     for n, m in SIZES:
@@ -274,7 +274,7 @@ def tight_prediction() -> tuple[Instance, ...]:
 
 
 @cache
-def tight_covariance() -> tuple[Instance, ...]:
+def tight_covariance() -> tuple[Names, ...]:
     """Return matrices for (104), (105) and the line before (107), with errors of K_k and P_kp of any size."""
     found = []
     for n, m in SIZES:
@@ -302,7 +302,7 @@ def tight_covariance() -> tuple[Instance, ...]:
 
 
 @cache
-def tight_gain(local: bool = False) -> tuple[Instance, ...]:
+def tight_gain(local: bool = False) -> tuple[Names, ...]:
     """Return positive matrices for (106)-(108); without errors of P_k and of the inverse of R if `local`."""
     found = []
     for n, m in SIZES:
@@ -333,7 +333,7 @@ def tight_gain(local: bool = False) -> tuple[Instance, ...]:
 
 
 @cache
-def tight_loop() -> tuple[Instance, ...]:
+def tight_loop() -> tuple[Names, ...]:
     """Return matrices for (112)-(114), with errors of K_k of any size, and of F_k and u_k for (114)."""
     found = []
     for n, m in SIZES:
@@ -433,7 +433,7 @@ def _names_of_a_run(
 
 
 @cache
-def several_steps() -> tuple[Instance, ...]:
+def several_steps() -> tuple[Names, ...]:
     """Return runs of five steps of each case; k is the first or the last step."""
     found = []
     for case, steps, *kinds in _runs():
@@ -448,12 +448,12 @@ def several_steps() -> tuple[Instance, ...]:
                     [error + abs(u) for error, u in zip(of_inputs, inputs, strict=True)],
                     [step.x for step in steps], list(of_states), max(abs(each).max() for each in alone),
                 )  # fmt: skip
-                found.append(Instance(names, emulated=emulated))
+                found.append(names | {"emulated": emulated})
     return tuple(found)
 
 
 @cache
-def tight_steps() -> tuple[Instance, ...]:
+def tight_steps() -> tuple[Names, ...]:
     """Return products of given closed loops and inputs, whose errors have any size; norms of all steps are equal."""
     found = []
     for n, k in itertools.product((1, 2), (1, LAST)):
@@ -475,9 +475,7 @@ def tight_steps() -> tuple[Instance, ...]:
             of_norms.append(largest(same))
         names = _names_of_a_run(1, k, x_0, loops, inputs, of_loops, of_inputs, states, of_states, e)
         alone = _named("x_tilde", map(tilde, of_norms)) | {"x_tilde_k": tilde(of_norms[k - 1])}
-        found.append(
-            Instance(names | {"norm": lambda each, alone=alone, names=names: _norm(each, names, alone)}, tight=True)
-        )
+        found.append(names | {"norm": lambda each, alone=alone, names=names: _norm(each, names, alone), "tight": True})
     return tuple(found)
 
 
