@@ -118,7 +118,7 @@ def integration_reference(given):
         "mu": omega / rate,
         "walk": float(integration.walk_factor(omega / rate)),
         "exact": integration.random_walk(sigma, omega, rate),
-        "printed": integration.printed_random_walk(sigma, omega, rate),
+        "printed": sigma * math.sqrt(omega / 6) / rate,
         "ratio": float(integration.approximation_ratio(omega / rate)),
     }
     return {name: (value, 30 * U * value) for name, value in found.items()}

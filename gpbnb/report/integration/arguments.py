@@ -8,15 +8,11 @@ from numbers import Number
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gpbnb.arithmetic.array import FloatArray
-
 Floats = NDArray[np.float64]
 
 
 def _numbers(name: str, values: ArrayLike) -> Floats:
-    """Return numbers as float64, or as given if they have a format; text and truth values are no numbers."""
-    if isinstance(values, FloatArray):
-        return values  # type: ignore[return-value]  # it computes like an array
+    """Return numbers as float64; text and truth values are no numbers."""
     try:
         given = np.asarray(values)
         if given.dtype.kind in "iuf" or (

@@ -9,7 +9,7 @@ from functools import cache
 
 import sympy as sp
 
-from gpbnb.report.display.derivation import Derivation, Step, over, together, unevaluated
+from gpbnb.report.display.derivation import Derivation, Step, over, together
 
 OMEGA, T, P, TAU, TIME = sp.symbols("omega T P tau t", positive=True)
 MU = sp.Symbol("mu", positive=True)
@@ -46,35 +46,14 @@ def transition_residual(identity: bool) -> sp.Matrix:
     return (printed_transition() - integral - (sp.eye(2) if identity else sp.zeros(2))).applyfunc(sp.simplify)
 
 
-def transition() -> Derivation:
-    """Derive (7) and (9) from (6), with the identity that (6) omits."""
-    ours = transition_matrix()
-    integral = sp.Integral(sp.exp(-OMEGA * TAU), (TAU, 0, T))
-    return Derivation(
-        (
-            Step(
-                "equation (6) with $I$ added, first row: $\\phi_{11}$",
-                together(1, -OMEGA * integral),
-                ours[0, 0],
-            ),
-            Step("second row: $\\phi_{21}$ of (7) and (9)", integral, ours[1, 0]),
-            Step("(9): $\\phi_{21}$ by $\\phi_{11}$", ours[1, 0], over(1 - ours[0, 0], OMEGA)),
-        )
-    )
-
-
 @cache
 def noise(kernel: str = "right") -> sp.ImmutableMatrix:
     r"""Return the covariance of q_n in (6), from white noise of density :math:`N = 2\omega P`.
 
-    Parameters
-    ----------
-    kernel : "right", :math:`\int\Phi(t_n-\tau)n_p(\tau)d\tau`; "reversed", with :math:`\Phi(\tau-t_{n-1})`; "printed",
-        with :math:`\Phi(\tau)`, τ counted from the start of all cycles, t = t_{n-1}.
+    The kernel is "right", :math:`\int\Phi(t_n-\tau)n_p(\tau)d\tau`; "reversed", with :math:`\Phi(\tau-t_{n-1})`; or
+    "printed", with :math:`\Phi(\tau)`, τ counted from the start of all cycles.
     """
     arguments = {"right": T - TAU, "reversed": TAU, "printed": TIME + TAU}
-    if kernel not in arguments:
-        raise ValueError(f"got kernel {kernel!r}; needed one of {', '.join(arguments)}")
     column = printed_transition()[:, 0].subs(T, arguments[kernel])
     density = 2 * OMEGA * P * column * column.T
     return sp.ImmutableMatrix(density.applyfunc(_over_cycle))
@@ -87,32 +66,6 @@ def _over_cycle(entry: sp.Expr) -> sp.Expr:
         rate = sp.expand(sp.diff(term, TAU) / term)
         total += term * T if rate == 0 else (term.subs(TAU, T) - term.subs(TAU, 0)) / rate
     return sp.expand(total)
-
-
-def discretization() -> Derivation:
-    r"""Derive the joint covariance of process and integral over a cycle, which the document does not need."""
-    q = noise()
-    lost = 1 - DECAY
-    kernel = (1 - sp.exp(-OMEGA * TAU)) / OMEGA
-    density = 2 * OMEGA * P
-    walk = (1 + DECAY) / (1 - DECAY) - 2 / (OMEGA * T)
-    bridge = P * T * walk * 2 / OMEGA * over(lost, 1 + DECAY)
-    return Derivation(
-        (
-            Step("$q_{11}$", sp.Integral(density * sp.exp(-2 * OMEGA * TAU), (TAU, 0, T)), P * (1 - DECAY**2)),
-            Step("$q_{12}$", sp.Integral(density * sp.exp(-OMEGA * TAU) * kernel, (TAU, 0, T)), P * lost**2 / OMEGA),
-            Step(
-                "$q_{22}$",
-                sp.Integral(sp.expand(density * kernel**2), (TAU, 0, T)),
-                P * (2 * OMEGA * T - 3 + 4 * DECAY - DECAY**2) / OMEGA**2,
-            ),
-            Step(
-                "$q_{22}$ from positive terms: the parts uncorrelated and correlated with $q_1$",
-                q[1, 1],
-                together(bridge, over(q[0, 1] ** 2, q[0, 0])),
-            ),
-        )
-    )
 
 
 # -- covariances from cycle to cycle, (10)-(18) ---------------------------------------------------
@@ -135,12 +88,6 @@ def expected(expression: sp.Expr) -> sp.Expr:
     return sp.expand(sum(c * moments.get(powers, 0) for powers, c in polynomial.terms()))
 
 
-def after() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """Return the states after a step, (10)."""
-    x1 = PHI11 * X1 + Q1
-    return x1, X2 + PHI21 * X1 + Q2, X3 + (x1 + X1) * T / 2
-
-
 def printed_18(half: bool) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
     """Return P31, P32 and P33 after a step by (18), as printed or with the missing 1/2 in the last term of P32."""
     weight = sp.Rational(1, 2) if half else sp.Integer(1)
@@ -149,23 +96,6 @@ def printed_18(half: bool) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
         PHI11 * P31 + P11N * T / 2 + PHI11 * P11 * T / 2,
         P32 + PHI21 * P31 + P12N * T / 2 + P12 * T / 2 + weight * PHI21 * P11 * T,
         P33 + (1 + PHI11) * P31 * T + quarter * P11N * T**2 + (quarter + PHI11 / 2) * P11 * T**2,
-    )
-
-
-def covariances() -> Derivation:
-    """Derive (16)-(18): products of (10), expected values, and the remaining terms."""
-    x1, x2, x3 = after()
-    printed = printed_18(half=True)
-    names = (
-        "(18), $P_{31_n}=E(x_{3n}x_{1n})$",
-        "(18), $P_{32_n}$, with $\\frac12$ in its last term",
-        "(18), $P_{33_n}$",
-    )
-    products = (x3 * x1, x3 * x2, x3**2)
-    return Derivation(
-        tuple(
-            Step(name, expected(product), right) for name, product, right in zip(names, products, printed, strict=True)
-        )
     )
 
 
@@ -188,29 +118,6 @@ def p22_change(printed: bool) -> sp.Expr:
     return 2 * P / OMEGA * (T - factor * (1 - DECAY) * sp.exp(-OMEGA * TIME))
 
 
-def continuous() -> Derivation:
-    """Derive (19)-(25): the covariance equation in components, and its solution from zero."""
-    a = sp.Matrix([[-OMEGA, 0], [1, 0]])
-    covariance = sp.Matrix([[P11, P12], [P12, P22]])
-    density = sp.Symbol("N_P11")
-    rate = a * covariance + covariance * a.T + sp.Matrix([[density, 0], [0, 0]])
-    return Derivation(
-        (
-            Step("(21), $\\dot P_{11}$", rate[0, 0], -2 * OMEGA * P11 + density),
-            Step("(21), $\\dot P_{12}$", rate[0, 1], P11 - OMEGA * P12),
-            Step("(21), $\\dot P_{22}$", rate[1, 1], 2 * P12),
-            Step("(22) is solved by $P_{12}$ of (23)", sp.Derivative(p12(TIME), TIME) + OMEGA * p12(TIME), P),
-            Step("(22) is solved by $P_{22}$ of (23)", sp.Derivative(p22(TIME), TIME), 2 * p12(TIME)),
-            Step("both start at zero", together(p12(sp.Integer(0)), p22(sp.Integer(0))), sp.Integer(0)),
-            Step(
-                "(25) with the missing $1/\\omega$",
-                together(p22(TIME + T), -p22(TIME)),
-                p22_change(printed=False),
-            ),
-        )
-    )
-
-
 # -- the steady state, (30)-(35) ------------------------------------------------------------------
 
 
@@ -225,34 +132,6 @@ def steady_changes(half: bool = True) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
 def walk() -> sp.Expr:
     """Return the square of (35), divided by P T, as a function of μ."""
     return (1 + sp.exp(-MU)) / (1 - sp.exp(-MU)) - 2 / MU
-
-
-def steady_state() -> Derivation:
-    """Derive (30)-(35), each as printed."""
-    quotient = (1 + DECAY) / (1 - DECAY)
-    phi21 = (1 - DECAY) / OMEGA
-    p31 = P * T / 2 * quotient
-    d32, d33, d22 = steady_changes()
-    last = quotient * T - 2 / OMEGA
-    return Derivation(
-        (
-            Step(
-                "(31) solves (30)",
-                together(DECAY * p31, P * T / 2 * (1 + DECAY)),
-                p31,
-            ),
-            Step("(32), $\\Delta P_{32}$", d32, (phi21 / (1 - DECAY) + 1 / OMEGA) * P * T),
-            Step("(32), $\\Delta P_{33}$", d33, quotient * P * T**2),
-            Step(
-                "(33)",
-                over(together(d33, d22, -2 * d32), T),
-                P * over((1 + DECAY) * T - 2 * phi21, 1 - DECAY),
-            ),
-            Step("(34) with the missing $T$ in its second member", over((1 + DECAY) * T - 2 * phi21, 1 - DECAY), last),
-            Step("(35), squared, in units of $P\\,T$", (last / T).subs(OMEGA, MU / T), walk()),
-            Step("a Langevin function", walk(), sp.coth(MU / 2).rewrite(sp.exp) - 2 / MU),
-        )
-    )
 
 
 def independent() -> Derivation:
@@ -319,131 +198,12 @@ def transient() -> Derivation:
     )
 
 
-# -- other rules ----------------------------------------------------------------------------------
-
-
-def least() -> Derivation:
-    r"""Derive the least error variance of n + 1 weighted samples that integrate a constant exactly; T = P = 1.
-
-    The samples leave n times the variance of one cycle's integral. The best weights minimize the variance of a sum
-    of samples whose weights, beyond those of the expected integral, add up to n(1 - h). They are proportional to
-    w, for which the covariances :math:`\varphi^{|i-j|}` of the samples give 1 in each row.
-    """
-    i = sp.Symbol("i", integer=True, positive=True)
-    n = sp.Symbol("n", integer=True, positive=True)
-    end, inner = 1 / (1 + PHI), (1 - PHI) / (1 + PHI)
-    phi = sp.exp(-MU)
-    walk_rate, th, s = walk(), (1 - phi) / (1 + phi), sp.Symbol("s", positive=True)
-    h = 2 * th / MU
-    along = sp.Integral(sp.exp(-MU * s), (s, 0, 1))
-    own = sp.Integral(2 * (1 - s) * sp.exp(-MU * s), (s, 0, 1))
-
-    def powers(count: sp.Expr) -> sp.Expr:
-        return PHI * (1 - PHI**count) / (1 - PHI)
-
-    return Derivation(
-        (
-            Step(
-                "row $i$ between the ends: $\\sum_j\\varphi^{|i-j|}w_j$",
-                together(end * PHI**i, inner * powers(i - 1), inner, inner * powers(n - i - 1), end * PHI ** (n - i)),
-                sp.S.One,
-            ),
-            Step("the first row, and the last", together(end, inner * powers(n - 1), end * PHI**n), sp.S.One),
-            Step(
-                "the sum of $w$, with $\\tanh\\frac\\mu2=\\frac{1-\\varphi}{1+\\varphi}$",
-                together(2 * end, (n - 1) * inner),
-                1 + n * inner,
-            ),
-            Step("expected integral over a cycle between two samples of size 1", over(2 * along, 1 + phi), h),
-            Step("variance of that integral, given the samples", together(own, -h * along), h * walk_rate),
-            Step("$1-h=L\\tanh\\frac\\mu2$", 1 - h, walk_rate * th),
-            Step(
-                "the least variance",
-                together(n * L * (1 - L * inner), over((n * L * inner) ** 2, 1 + n * inner)),
-                n * L - L**2 + L**2 / (1 + n * inner),
-            ),
-        )
-    )
-
-
-def derivatives() -> Derivation:
-    r"""Derive the two-point rule with two derivatives, and its random walk relative to the trapezoidal rule; T = 1.
-
-    A component with ωT = 2πk is folded to frequency zero; m lags give it a density proportional to :math:`k^{-2m}`
-    for fast sampling.
-    """
-    c, k = sp.symbols("c_0:6"), sp.Symbol("k", integer=True, positive=True)
-    weights = (sp.Rational(1, 2), sp.Rational(1, 10), sp.Rational(1, 120))
-    polynomial = sum(c[d] * TIME**d for d in range(6))
-    slopes = [sp.diff(polynomial, TIME, j) for j in range(3)]
-    rule = [
-        w * (f.subs(TIME, 0) + (-1) ** j * f.subs(TIME, 1))
-        for j, (w, f) in enumerate(zip(weights, slopes, strict=True))
-    ]
-    angle = sp.Symbol("theta", real=True)
-    old, new = (sum(w * (sign * sp.I * angle) ** j for j, w in enumerate(weights)) for sign in (1, -1))
-    kept = 1 - angle**2 / 60
-    steps = [
-        Step("exact for each polynomial of degree 5", sp.Integral(polynomial, (TIME, 0, 1)), together(*rule)),
-        Step(
-            "contribution of a sample to the cycles before and after it, at $\\theta=\\omega T$",
-            together(old, new),
-            kept,
-        ),
-    ]
-    folded = sp.expand(kept.subs(angle, 2 * sp.pi * k) ** 2)
-    for m, ratio in ((3, sp.Rational(3, 10)), (4, sp.Rational(2, 15)), (5, sp.Rational(3, 25))):
-        split = (term.as_independent(k) for term in sp.Add.make_args(folded))
-        sums = together(*(factor * sp.Sum(power * k ** (-2 * m), (k, 1, sp.oo)) for factor, power in split))
-        steps.append(Step(f"share of the variance that remains after {m} lags", over(sums, sp.zeta(2 * m)), ratio))
-    return Derivation(tuple(steps))
-
-
-# -- the expansion for small μ, (36)-(39) ---------------------------------------------------------
-
-
-def expansion(terms: int) -> list[sp.Expr]:
-    """Return coefficients of μ⁻¹, 1, μ, … in the walk, with `terms` of them from μ on, by power series of e^{-μ}."""
-    order = terms + 3
-    numerator = [sp.Rational((-1) ** k, sp.factorial(k)) + int(k == 0) for k in range(order)]
-    denominator = [-sp.Rational((-1) ** (k + 1), sp.factorial(k + 1)) for k in range(order)]
-    quotient: list[sp.Expr] = []
-    for k in range(order):
-        quotient.append((numerator[k] - sum(quotient[j] * denominator[k - j] for j in range(k))) / denominator[0])
-    if quotient[0] != 2 or quotient[1] != 0:
-        raise ArithmeticError(f"got {quotient[:2]} for the terms in 1/μ and 1; needed 2 and 0")
-    return quotient[2 : terms + 2]
-
-
 @cache
 def printed_37(cubic: sp.Expr) -> sp.Expr:
     r"""Return the walk to order μ² from (37) with the numerator :math:`1-\frac12\mu+\frac14\mu^2-c\mu^3`."""
     numerator = 1 - MU / 2 + MU**2 / 4 - cubic * MU**3
     denominator = 1 - MU / 2 + MU**2 / 6 - MU**3 / 24
     return sp.series(2 / MU * (numerator / denominator - 1), MU, 0, 3).removeO()
-
-
-def small_mu() -> Derivation:
-    """Derive (36)-(39), term by term."""
-    cubic = 1 - MU + MU**2 / 2 - MU**3 / 6
-    sigma, f = sp.symbols("sigma_x f_c", positive=True)
-    return Derivation(
-        (
-            Step(
-                "(36): the omitted terms are of higher order",
-                sp.Limit((sp.exp(-MU) - cubic) / MU**3, MU, 0),
-                sp.Integer(0),
-            ),
-            Step(
-                "(37), numerator: the cubic term is $\\frac1{12}\\mu^3$, not $\\frac16\\mu^3$ as printed",
-                together(1, cubic),
-                sp.Mul(2, unevaluated(1 - MU / 2 + MU**2 / 4 - MU**3 / 12), evaluate=False),
-            ),
-            Step("(37), result", sp.Limit(walk() / MU, MU, 0), sp.Rational(1, 6)),
-            Step("the next term", sp.Limit((walk() - MU / 6) / MU**3, MU, 0), sp.Rational(-1, 360)),
-            Step("(38) to (39)", sigma * sp.sqrt(unevaluated(OMEGA / f) / (6 * f)), sp.sqrt(OMEGA / 6) / f * sigma),
-        )
-    )
 
 
 # -- what the misprints would have led to -------------------------------------------------------------

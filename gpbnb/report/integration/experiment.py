@@ -7,81 +7,24 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import mpmath
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, round_, store
 from gpbnb.arithmetic.kernels.tags import Double
-from gpbnb.arithmetic.rounding import Rounding, digit_unit
+from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.report.integration import theory
 from gpbnb.report.integration.arguments import positive_number
-from gpbnb.report.integration.theory import Cycle, Process, Rule
+from gpbnb.report.integration.theory import Cycle, Process
 
 Floats = NDArray[np.float64]
 
 CHUNK = 1 << 20  # normal numbers in memory at a time
 BAR: dict[str, Any] = {"disable": None, "delay": 2, "leave": False}  # progress bar: on a terminal, after two seconds
-
-# -- how exactly the closed form is evaluated -----------------------------------------------------
-
-
-class Accuracy(NamedTuple):
-    """Errors of an evaluation relative to a high-precision reference, in units in the last place of float64."""
-
-    mu: NDArray[np.float64]
-    ulp: NDArray[np.float64]
-
-
-def _exact(name: str, mu: float) -> Any:
-    """Evaluate (35), or a coefficient of the discretization, with enough digits to survive cancellation."""
-    with mpmath.workdps(60 + 3 * max(0, math.ceil(-math.log10(mu)))):
-        m = mpmath.mpf(mu)
-        phi = mpmath.exp(-m)
-        walk = (1 + phi) / (1 - phi) - 2 / m
-        return {
-            "walk": lambda: walk,
-            "phi11": lambda: phi,
-            "phi21": lambda: (1 - phi) / m,
-            "q11": lambda: 1 - phi**2,
-            "q12": lambda: (1 - phi) ** 2 / m,
-            "q22": lambda: (2 * m - 3 + 4 * phi - phi**2) / m**2,
-            "bridge": lambda: walk * mpmath.tanh(m / 2) / (m / 2),
-        }[name]()
-
-
-def accuracy(name: str, mu: ArrayLike, printed: bool = False) -> Accuracy:
-    """Compare an evaluation with mpmath.
-
-    Parameters
-    ----------
-    name : "walk" for (35), or a field of ``Discretization``.
-    mu : (k,), positive. Numbers of BINARY64 are evaluated with every operation correctly rounded, for "walk", so that
-        the errors are the same on every processor; NumPy's exponential function is not.
-    printed : evaluate the form that cancels instead of the stable one; for "walk" and "q22".
-    """
-    if name != "walk" and name not in theory.Discretization._fields:
-        raise ValueError(f"got name {name!r}; needed 'walk' or one of {', '.join(theory.Discretization._fields)}")
-    if printed and name not in ("walk", "q22"):
-        raise ValueError(f"got name {name!r} as printed; needed 'walk' or 'q22'")
-    values = np.atleast_1d(np.asarray(mu, dtype=np.float64))
-    if name == "walk":
-        given = mu if isinstance(mu, FloatArray) else values
-        found = np.asarray((theory.printed_walk_factor if printed else theory.walk_factor)(given), np.float64)
-    else:
-        found = theory.printed_discretization_q22(values) if printed else getattr(theory.discretize(values), name)
-    errors = []
-    for one, value in zip(values.tolist(), found.tolist(), strict=True):
-        exact = _exact(name, one)
-        size = abs(float(exact))
-        away = abs(mpmath.mpf(value) - exact) if math.isfinite(value) else mpmath.inf
-        errors.append(float(away / mpmath.mpf(float(np.spacing(max(size, np.finfo(float).tiny))))))
-    return Accuracy(values, np.array(errors))
 
 
 # -- simulation, exact at the sampling times ------------------------------------------------------
@@ -123,28 +66,16 @@ def _advance_one(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> Non
 
 
 def advance(step: Cycle, state: Floats, normal: Floats) -> tuple[Floats, Floats]:
-    """Compute samples and trapezoid errors, cycle by cycle, from standard normal numbers.
-
-    Parameters
-    ----------
-    step : from ``exact_step``.
-    state : (paths, m), at the start; overwritten with the state at the end.
-    normal : (cycles, paths, m + 1), standard normal numbers.
-
-    Returns
-    -------
-    x, d : (cycles, paths) each.
-    """
+    """Compute samples and trapezoid errors, cycle by cycle, from standard normal numbers."""
     x, d = np.empty(normal.shape[:2]), np.empty(normal.shape[:2])
     (_advance_one if state.shape[1] == 1 else _advance)(step.a, step.b, state, normal, x, d)
     return x, d
 
 
 class Chunk(NamedTuple):
-    """Some cycles of a simulation: `first` is the number of the first one, x and d are (cycles, paths).
+    """Some cycles of a simulation: `first` is the number of the first one.
 
-    x begins `memory` samples before those of d, so that ``x[memory + k]`` is the sample at the end of cycle
-    ``first + k``.
+    d (cycles, paths) holds the errors. x (cycles + 1, paths) holds the samples, from the one before the first cycle on.
     """
 
     first: int
@@ -152,56 +83,23 @@ class Chunk(NamedTuple):
     d: NDArray[np.float64]
 
 
-def chunks(
-    process: Process, f_c: float, cycles: int, rng: np.random.Generator, paths: int = 1, memory: int = 1
-) -> Iterator[Chunk]:
+def chunks(process: Process, f_c: float, cycles: int, rng: np.random.Generator, paths: int = 1) -> Iterator[Chunk]:
     """Simulate a process and the error of the trapezoidal rule, exact in distribution at the sampling times.
 
     No step is subdivided: the sample and the integral over a cycle are drawn from their joint distribution, given the
     previous sample. The simulation starts in the steady state. Its memory is bounded for any number of cycles, and its
     numbers do not depend on the size of the chunks.
-
-    Parameters
-    ----------
-    f_c : iteration rate, Hz.
-    memory : samples before the first of a chunk that come with it.
-
-    Yields
-    ------
-    chunk : the cycles 1, 2, … in order.
     """
-    if min(cycles, paths, memory) < 1:
-        raise ValueError(f"got {cycles} cycles, {paths} paths, a memory of {memory}; needed at least 1 of each")
     step = theory.exact_step(process, f_c)
     m = len(process.drift)
     state = process.sigma * rng.standard_normal((paths, m))
-    before = [state[:, 0].copy()]
-    for _ in range(memory - 1):
-        x, _ = advance(step, state, rng.standard_normal((1, paths, m + 1)))
-        before.append(x[0])
-    past = np.array(before)
+    past = state[np.newaxis, :, 0].copy()
     length = max(1, CHUNK // (paths * (m + 1)))
     for first in range(1, cycles + 1, length):
         x, d = advance(step, state, rng.standard_normal((min(length, cycles + 1 - first), paths, m + 1)))
         x = np.concatenate([past, x])
-        past = x[-memory:]
+        past = x[-1:]
         yield Chunk(first, x, d)
-
-
-def rule_errors(rule: Rule, f_c: float, chunk: Chunk) -> Floats:
-    """Return the error (cycles, paths) that each cycle of a chunk adds if a rule integrates it."""
-    memory, cycles = len(chunk.x) - len(chunk.d), len(chunk.d)
-    if memory < rule.memory:
-        raise ValueError(f"got a memory of {memory} samples; needed {rule.memory} for the rule {rule.name!r}")
-    added = chunk.d.copy()
-    period = 1 / f_c
-    for r, weights in enumerate(rule.weights):
-        rows = np.arange((r + 1 - chunk.first) % rule.period, cycles, rule.period)
-        for j in range(max(2, len(weights))):
-            w = (float(weights[j]) if j < len(weights) else 0.0) - (0.5 if j < 2 else 0.0)
-            if w:
-                added[rows] += period * w * chunk.x[memory + rows - j]
-    return added
 
 
 @dataclass(frozen=True)
@@ -210,7 +108,6 @@ class IntegrationErrors:
 
     process: Process
     f_c: float
-    rule: Rule
     n: tuple[int, ...]
     errors: Floats
 
@@ -236,23 +133,14 @@ def simulate(
     n: Sequence[int],
     rng: np.random.Generator,
     paths: int = 1,
-    rule: Rule = theory.RULES["trapezoidal"],
 ) -> IntegrationErrors:
-    """Simulate the error of an integrator, and record it after the given numbers of cycles.
-
-    Parameters
-    ----------
-    n : increasing numbers of cycles, at least 1. Use multiples of the period of the rule; samples of an unfinished
-        period count as error.
-    """
+    """Simulate the error of the trapezoidal rule, and record it after increasing numbers of cycles."""
     wanted = tuple(int(k) for k in n)
-    if not wanted or wanted[0] < 1 or list(wanted) != sorted(set(wanted)):
-        raise ValueError(f"got n = {tuple(n)}; needed increasing numbers of cycles, at least 1")
     total, kept = np.zeros(paths), []
     bar = tqdm(total=wanted[-1], desc="cycles", unit_scale=True, **BAR)
-    for chunk in chunks(process, f_c, wanted[-1], rng, paths, rule.memory):
+    for chunk in chunks(process, f_c, wanted[-1], rng, paths):
         bar.update(len(chunk.d))
-        added = chunk.d if rule.name == "trapezoidal" else rule_errors(rule, f_c, chunk)
+        added = chunk.d
         last = chunk.first + len(added) - 1
         cuts = [k for k in wanted if chunk.first <= k <= last]
         begin = 0
@@ -263,7 +151,7 @@ def simulate(
             begin = end
         total = total + added[begin:].sum(axis=0)
     bar.close()
-    return IntegrationErrors(process, f_c, rule, wanted, np.array(kept))
+    return IntegrationErrors(process, f_c, wanted, np.array(kept))
 
 
 @dataclass(frozen=True)
@@ -291,13 +179,7 @@ class WalkSweep:
 
 
 def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> WalkSweep:
-    """Simulate the random walk of the trapezoidal rule at many ratios of bandwidth to iteration rate.
-
-    Parameters
-    ----------
-    cycles : number in each run; the variance per cycle is below its steady value by a fraction of at most 1/(2 cycles).
-    paths : number of independent runs; the relative standard error of a variance is √(2/paths).
-    """
+    """Simulate the random walk of the trapezoidal rule at many ratios of bandwidth to iteration rate."""
     values = np.atleast_1d(np.asarray(mu, dtype=np.float64))
     bar = tqdm(values.tolist(), desc="sweep", **BAR)
     runs = [simulate(theory.first_order(1.0, one), 1.0, [cycles], rng, paths) for one in bar]
@@ -339,14 +221,7 @@ def _integrate_rounding(fmt: Any, half: Any, x: Any, total: Any) -> None:
 
 
 class Integrator:
-    """Run the trapezoidal rule (2) in a format, chunk by chunk.
-
-    Parameters
-    ----------
-    fmt : format with compiled loops: base 2, 10 or 16.
-    period : T, s; T/2 is rounded to the format.
-    paths : number of integrals that run in parallel.
-    """
+    """Run the trapezoidal rule (2) in a format, chunk by chunk."""
 
     def __init__(self, fmt: FloatFormat, period: float, paths: int) -> None:
         backend = fmt.backend
@@ -405,10 +280,6 @@ def emulate(
 
     The rounding error is the difference from the same rule in float64 with unrounded samples. The rounding error of
     float64 itself is neglected, so formats may have at most 40 bits or 12 decimal digits.
-
-    Parameters
-    ----------
-    duration : s; rounded to whole cycles.
     """
     for fmt in formats:
         if fmt.precision * math.log2(fmt.base) > 40:
@@ -427,56 +298,3 @@ def emulate(
     return tuple(
         Emulation(one.fmt, omega_bw, f_c, duration, error, np.asarray(one.value - reference)) for one in running
     )
-
-
-@dataclass(frozen=True)
-class RateSweep:
-    """Both observed errors against the iteration rate in several formats, (formats, rates)."""
-
-    omega_bw: float
-    duration: float
-    paths: int
-    formats: tuple[FloatFormat, ...]
-    rates: Floats
-    discretization: Floats
-    rounding: Floats
-    total: Floats
-
-    @property
-    def standard_error(self) -> float:
-        r"""Relative standard error of the rms of a rounding error over the paths.
-
-        For a given path the error is normal, with a variance V proportional to :math:`\int x_3^2dt`. For a random walk,
-        :math:`E(V^2) = \frac73E(V)^2`, so the mean square has the relative variance
-        :math:`(3\cdot\frac73-1)/\mathrm{paths}`.
-        """
-        return math.sqrt(6 / self.paths) / 2
-
-    def theory(self, fmt: FloatFormat, rates: Floats) -> Floats:
-        """Return the theoretical discretization, rounding and total errors, (3, rates)."""
-        found = [theory.two_errors(1.0, self.omega_bw, f, self.duration, fmt) for f in rates.tolist()]
-        return np.array([(e.discretization, e.rounding, e.total) for e in found]).T
-
-    def ratios(self) -> Floats:
-        """Return observed / theoretical rounding error, (formats, rates)."""
-        expected = np.array([self.theory(fmt, self.rates)[1] for fmt in self.formats])
-        return np.asarray(self.rounding / expected)
-
-
-def sweep_rates(
-    omega_bw: float,
-    duration: float,
-    formats: Sequence[FloatFormat],
-    rates: Sequence[float],
-    rng: np.random.Generator,
-    paths: int = 64,
-) -> RateSweep:
-    """Emulate an integrator at several rates in several formats; rates are powers of two, so that T/2 is exact."""
-    bar = tqdm(rates, desc="rates", **BAR)
-    runs = [emulate(omega_bw, f_c, duration, formats, rng, paths) for f_c in bar]
-    table = np.array([[(*run.rms, run.rms_total) for run in at_rate] for at_rate in runs]).transpose(2, 1, 0)
-    return RateSweep(omega_bw, duration, paths, tuple(formats), np.array(rates, dtype=np.float64), *table)
-
-
-#: The formats of the chapter's figure.
-FORMATS = (FloatFormat(2, 11), FloatFormat(2, 16), FloatFormat(2, 16, Rounding.CHOP), FloatFormat(2, 24))

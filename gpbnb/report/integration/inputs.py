@@ -9,7 +9,7 @@ The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -71,74 +71,6 @@ class Process:
             return float(total * period) * self.sigma**2
 
 
-@dataclass(frozen=True)
-class Lags(Process):
-    r"""White noise that has passed `count` first-order filters of equal bandwidth; :func:`lags` creates it.
-
-    It has `count` - 1 derivatives. The entries of z are the input and combinations of its derivatives.
-    """
-
-    count: int
-
-    def autocovariance(self, tau: ArrayLike) -> Floats:
-        """Return the autocovariance R at the lags `tau` in s, a polynomial times an exponential."""
-        a = self.poles[0].real * np.abs(np.asarray(tau, dtype=np.float64))
-        m = self.count - 1
-        total = sum(
-            math.factorial(m + i) // (math.factorial(i) * math.factorial(m - i)) * (2 * a) ** (m - i)
-            for i in range(m + 1)
-        )
-        share = math.factorial(m) / math.factorial(2 * m)
-        return np.asarray(self.sigma**2 * share * total * np.exp(-a))
-
-    def psd(self, omega: ArrayLike) -> Floats:
-        """Return the two-sided spectral density at `omega` in rad/s; integrated over frequency in Hz, it gives σ²."""
-        bandwidth, m = self.poles[0].real, self.count - 1
-        peak = 2 * 4.0**m / math.comb(2 * m, m) / bandwidth
-        ratio = np.asarray(omega, dtype=np.float64) / bandwidth
-        return np.asarray(self.sigma**2 * peak * (1 + ratio * ratio) ** -self.count)
-
-    def folded(self, period: float, theta: Fraction = Fraction(0)) -> float:
-        r"""Sum the density at :math:`2\pi f_c(k+\theta)` over all k, except k = 0 if :math:`\theta = 0`."""
-
-        def density(k: Floats) -> Floats:
-            return self.psd(2 * np.pi * k / period)
-
-        shift = float(theta)
-        total = summed(lambda k: density(k + shift)) + summed(lambda k: density(k - shift))
-        return total + (float(density(np.array(shift))) if theta else 0.0)
-
-
-def summed(term: Callable[[Floats], Floats], most: int = 2**14) -> float:
-    """Sum a term over k = 1, 2, … that falls like a power of k, at least the second, beyond `most`."""
-    k = np.arange(1, most + 1, dtype=np.float64)
-    last, twice = (float(term(np.array([x]))[0]) for x in (most + 0.5, 2 * most + 1.0))
-    # The rest is the integral of a power from the middle of two terms on.
-    return float(np.sum(term(k))) + last * (most + 0.5) / (math.log2(last / twice) - 1)
-
-
-def lags(sigma_x: float, omega_bw: float, count: int) -> Lags:
-    """Return white noise after `count` equal first-order filters, `omega_bw` in rad/s; one gives the input of (1)."""
-    sigma_x, omega_bw = positive_number("sigma_x", sigma_x), positive_number("omega_bw", omega_bw)
-    if not 1 <= count <= 9:
-        raise ValueError(f"got {count} lags; needed 1 to 9")
-    # First column of Routh's array of (s + 1)^count: it gives a drift whose steady state has equal variances.
-    upper, lower = ([Fraction(math.comb(count, k)) for k in range(i, count + 1, 2)] for i in (0, 1))
-    first = [upper[0]]
-    while lower:
-        first.append(lower[0])
-        factor, padded = upper[0] / lower[0], [*lower[1:], Fraction(0)]
-        upper, lower = lower, [a - factor * b for a, b in zip(upper[1:], padded, strict=False)]
-    drift = np.zeros((count, count))
-    for k in range(1, count):
-        i = count - 1 - k
-        drift[i, i + 1] = omega_bw * math.sqrt(first[k + 1] / first[k - 1])
-        drift[i + 1, i] = -drift[i, i + 1]
-    drift[-1, -1] = -omega_bw * count
-    rows = tuple(tuple(map(float, row)) for row in drift)
-    return Lags(f"{count} lags", sigma_x, (complex(omega_bw),) * count, (), rows, count)
-
-
 def first_order(sigma_x: float, omega_bw: float) -> Process:
     r"""Return the input of savage2016, (1): :math:`R = \sigma_x^2e^{-\omega_{bw}|\tau|}`; `omega_bw` in rad/s."""
     sigma_x, omega_bw = positive_number("sigma_x", sigma_x), positive_number("omega_bw", omega_bw)
@@ -146,13 +78,7 @@ def first_order(sigma_x: float, omega_bw: float) -> Process:
 
 
 def resonant(sigma_x: float, omega_0: float, zeta: float) -> Process:
-    r"""Return a resonant input: white noise through :math:`\ddot x + 2\zeta\omega_0\dot x + \omega_0^2x`.
-
-    Parameters
-    ----------
-    omega_0 : natural frequency, rad/s.
-    zeta : damping ratio, above 0 and below 1.
-    """
+    r"""Return a resonant input: white noise through :math:`\ddot x + 2\zeta\omega_0\dot x + \omega_0^2x`."""
     sigma_x, omega_0 = positive_number("sigma_x", sigma_x), positive_number("omega_0", omega_0)
     if not 0 < zeta < 1:
         raise ValueError(f"got zeta = {zeta}; needed 0 < zeta < 1; use first_order for an input without resonance")
@@ -231,25 +157,10 @@ def _moments(process: Process, period: float) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class Rule:
-    r"""An integration rule: at step r of a period it adds :math:`T\sum_j w_{rj}\,x_{n-j}`.
-
-    Parameters
-    ----------
-    weights : a tuple of w for each step of a period; empty if the rule adds nothing at that step.
-    """
+    r"""An integration rule: at step r of a period it adds :math:`T\sum_j w_{rj}\,x_{n-j}`."""
 
     name: str
     weights: tuple[tuple[Fraction, ...], ...]
-
-    def __post_init__(self) -> None:
-        if not self.weights:
-            raise ValueError("got a rule without steps; needed weights for at least one")
-        total = sum((w for step in self.weights for w in step), start=Fraction(0))
-        if total != len(self.weights):
-            raise ValueError(
-                f"got weights that sum to {total} over {len(self.weights)} steps; needed {len(self.weights)}, so "
-                "that a constant is integrated correctly; scale the weights"
-            )
 
     @property
     def period(self) -> int:
@@ -305,10 +216,6 @@ def walk_rate(process: Process, f_c: float, rule: Rule = RULES["trapezoidal"]) -
 
     It is the part of the input's spectrum S that sampling folds down to frequency zero: at multiples of :math:`f_c`
     for every rule, and between them for a rule that weighs the samples unequally.
-
-    Returns
-    -------
-    rate : in the unit of the input squared, times seconds.
     """
     period = 1 / positive_number("f_c", f_c)
     harmonics = rule.harmonics()
@@ -331,25 +238,11 @@ def _exact_modes(process: Process) -> list[tuple[Any, Any]]:
     return [(mpmath.mpc(1, -zeta / damped), omega * mpmath.mpc(zeta, -damped))]
 
 
-def best_possible_rate(process: Process, f_c: float) -> float:
-    r"""Return the smallest random walk for any weights of the samples, :math:`S(0)A/(S(0)+A)`.
-
-    A is :func:`walk_rate` for the trapezoidal rule, the smallest for weights that integrate a constant exactly. Samples
-    scaled by :math:`S(0)/(S(0)+A)` reach this bound, but do not integrate a constant correctly.
-    """
-    walk, low = walk_rate(process, f_c), float(process.psd(0.0))
-    return low * walk / (low + walk)
-
-
 def rule_variance(process: Process, f_c: float, rule: Rule, n: int) -> Floats:
     """Return the error variance of a rule after 0 … n cycles, from the exact covariance recursion of its state.
 
     The state consists of z, the past samples that the rule uses, and the error. Within a period, the error includes
     samples that the rule has not added yet.
-
-    Returns
-    -------
-    variance : (n + 1,), in the unit of the input times seconds, squared.
     """
     n = int(cycle_counts(n))
     step = exact_step(process, f_c)

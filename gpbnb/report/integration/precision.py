@@ -59,10 +59,6 @@ def correlation_factor(change: ArrayLike) -> Floats:
     The accumulator is a multiple of its spacing u, so the error of adding p depends only on the fractional part of p/u.
     If p changes little from cycle to cycle, so does the error. s is the rms change of p from one cycle to the
     next, in spacings; F is 1.05 at s = 0.5, and close to :math:`1/(30s^2)` for smaller s.
-
-    Parameters
-    ----------
-    change : s, positive. The formula holds if p itself varies by more than a spacing.
     """
     s = positive_array("change", change)[..., np.newaxis]
     k = np.arange(1, 65)
@@ -89,10 +85,6 @@ def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt
     With chopping, each addition takes the fraction :math:`\kappa_1` off the accumulator, so the accumulator leaks. With
     :math:`a = \kappa_1f_ct` the error has the variance
     :math:`(2\sigma_x^2t/\omega_{bw})\,(2a-3+4e^{-a}-e^{-2a})/2a`, or :math:`2\sigma_x^2ta^2/3\omega_{bw}` for small a.
-
-    Parameters
-    ----------
-    duration : s; at least two cycles.
     """
     if fmt.rounding not in Rounding.documented():
         raise ValueError(
@@ -149,11 +141,9 @@ def independent_best_rate(omega_bw: float, duration: float, fmt: FloatFormat) ->
 
 
 def best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
-    """Return the iteration rate in Hz that minimizes the total of :func:`two_errors`; it is below :func:`stall_rate`.
+    """Return the iteration rate in Hz, below :func:`stall_rate`, that minimizes the total of :func:`two_errors`.
 
-    Parameters
-    ----------
-    omega_bw : rad/s. `duration` : s, of many correlation times 1/omega_bw.
+    `omega_bw` is in rad/s; the `duration` in s is many correlation times 1/omega_bw.
     """
     guess = independent_best_rate(omega_bw, duration, fmt)
 

@@ -9,10 +9,8 @@ The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input 
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 from typing import NamedTuple
 
-import mpmath
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
@@ -31,14 +29,6 @@ def langevin(x: ArrayLike) -> Floats:
 
     truncated where the remainder is below :math:`10^{-18}` of the result. Beyond x = 2 it uses
     :math:`(1 - 1/x) + 2e^{-2x}/(1 - e^{-2x})`.
-
-    Parameters
-    ----------
-    x : positive, finite.
-
-    Returns
-    -------
-    value : of the shape of `x`, between 0 and 1.
     """
     x = positive_array("x", x)
     low = np.minimum(x, 2.0)
@@ -58,51 +48,12 @@ def walk_factor(mu: ArrayLike) -> Floats:
     return langevin(positive_array("mu", mu) / 2)
 
 
-def printed_walk_factor(mu: ArrayLike) -> Floats:
-    """Evaluate (35) in float64 exactly as printed; infinite where this divides by zero."""
-    mu = positive_array("mu", mu)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return (1 + np.exp(-mu)) / (1 - np.exp(-mu)) - 2 / mu
-
-
-def series(terms: int) -> tuple[Fraction, ...]:
-    r"""Return the exact coefficients of :math:`\mu, \mu^3, \mu^5, \dots` in :func:`walk_factor`, :math:`2B_{2k}/(2k)!`.
-
-    The series converges for :math:`\mu < 2\pi`. Its first coefficient, 1/6, is (37) of savage2016.
-    """
-    if terms < 1:
-        raise ValueError(f"got terms = {terms}; needed at least 1")
-    result = []
-    for k in range(1, terms + 1):
-        p, q = mpmath.bernfrac(2 * k)
-        result.append(Fraction(2 * int(p), int(q) * math.factorial(2 * k)))
-    return tuple(result)
-
-
 def random_walk(sigma_x: float, omega_bw: float, f_c: float) -> float:
-    r"""Return the random walk of the integration error, :math:`\sigma_{e_{rw}} = \sigma_x\sqrt{L(\mu/2)/f_c}`.
+    r"""Return the random walk of the integration error, :math:`\sigma_x\sqrt{L(\mu/2)/f_c}`; savage2016, (35).
 
-    Parameters
-    ----------
-    sigma_x : rms of the input, in a unit u.
-    omega_bw : bandwidth of the input, rad/s.
-    f_c : iteration rate, Hz.
-
-    Returns
-    -------
-    sigma_e_rw : in u s per √s.
-
-    References
-    ----------
-    savage2016, (35).
+    `sigma_x` is in a unit u, `omega_bw` in rad/s and `f_c` in Hz; the walk is in u s per √s.
     """
     return positive_number("sigma_x", sigma_x) * math.sqrt(float(walk_factor(bandwidth_ratio(omega_bw, f_c))) / f_c)
-
-
-def printed_random_walk(sigma_x: float, omega_bw: float, f_c: float) -> float:
-    r"""Approximate the walk for small :math:`\mu`: :math:`\sigma_x\sqrt{\omega_{bw}/6}/f_c`; savage2016, (39)."""
-    bandwidth_ratio(omega_bw, f_c)
-    return math.sqrt(omega_bw / 6) / f_c * positive_number("sigma_x", sigma_x)
 
 
 def approximation_ratio(mu: ArrayLike) -> Floats:
@@ -138,13 +89,7 @@ def exponents(mu: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def required_rate(sigma_x: float, omega_bw: float, limit: float) -> float:
-    r"""Return the iteration rate in Hz at which :func:`random_walk` falls to `limit`.
-
-    Parameters
-    ----------
-    sigma_x : in a unit u; `omega_bw` in rad/s.
-    limit : in u s per √s.
-    """
+    r"""Return the iteration rate in Hz at which :func:`random_walk` falls to `limit`; units as there."""
     sigma_x, omega_bw, limit = (
         positive_number(name, value) for name, value in (("sigma_x", sigma_x), ("omega_bw", omega_bw), ("limit", limit))
     )
@@ -166,12 +111,8 @@ def required_rate(sigma_x: float, omega_bw: float, limit: float) -> float:
 class Discretization(NamedTuple):
     r"""Coefficients of one cycle of (10) in units of :math:`\sigma_x` and T, exact at the sampling times.
 
-    Parameters
-    ----------
-    phi11, phi21 : entries of (9); phi21 is divided by T.
-    q11, q12, q22 : covariances of q, divided by :math:`\sigma_x^2`, :math:`\sigma_x^2T`, :math:`\sigma_x^2T^2`.
-    bridge : variance of the integral over a cycle if the input at both ends is known,
-        :math:`L(\mu/2)\tanh(\mu/2)/(\mu/2)`, over :math:`\sigma_x^2T^2`.
+    `bridge` is the variance of the integral over a cycle if the input at both ends is known,
+    :math:`L(\mu/2)\tanh(\mu/2)/(\mu/2)`.
     """
 
     phi11: NDArray[np.float64]
@@ -201,13 +142,6 @@ def discretize(mu: ArrayLike) -> Discretization:
     )
 
 
-def printed_discretization_q22(mu: ArrayLike) -> Floats:
-    """Evaluate q22 of :func:`discretize` in float64 by the form that cancels."""
-    mu = positive_array("mu", mu)
-    phi = np.exp(-mu)
-    return np.asarray((2 * mu - 3 + 4 * phi - phi * phi) / (mu * mu))
-
-
 # -- before the steady state ----------------------------------------------------------------------
 
 
@@ -216,11 +150,6 @@ def error_variance(n: ArrayLike, mu: float, start: float = 1.0) -> Floats:
 
     .. math:: \frac{P_{ee_n}}{\sigma_x^2T^2} = nL - \tfrac12L^2(1-\varphi^n)
         - (1-s)\,\tfrac14L^2(1-\varphi^n)^2, \qquad L = L(\mu/2),\ \varphi = e^{-\mu}
-
-    Parameters
-    ----------
-    n : cycles, at least 0.
-    start : s, variance of the input at the start, divided by :math:`\sigma_x^2`; savage2016 assumes 1.
     """
     cycles, mu = cycle_counts(n), float(positive_array("mu", mu))
     if not 0 <= start < math.inf:
@@ -249,23 +178,15 @@ def error_variance_recursion(n: int, mu: float) -> Floats:
     return variance
 
 
-def rectangle_error_variance(n: ArrayLike, mu: float) -> Floats:
-    r"""Return :func:`error_variance` for the rectangular rules, :math:`nL + \tfrac12(1-L^2)(1-\varphi^n)`."""
-    cycles, mu = cycle_counts(n), float(positive_array("mu", mu))
-    rate = float(walk_factor(mu))
-    return np.asarray(cycles * rate - (1 - rate**2) / 2 * np.expm1(-cycles * mu))
-
-
-def settling_cycles(mu: float, share: float, rectangle: bool = False) -> float:
+def settling_cycles(mu: float, share: float) -> float:
     r"""Return the number of cycles after which the error variance equals the random walk up to a relative `share`.
 
-    For the trapezoidal rule :math:`L(1-\varphi^n)/2n \le` share, for the rectangular ones
-    :math:`(1/L-L)(1-\varphi^n)/2n \le` share.
+    It is the n at which :math:`L(1-\varphi^n)/2n` falls to `share`.
     """
     rate = float(walk_factor(float(positive_array("mu", mu))))
     if not 0 < share < math.inf:
         raise ValueError(f"got share = {share}; needed a positive number, such as 0.01 for one percent")
-    offset = (1 / rate - rate if rectangle else rate) / 2
+    offset = rate / 2
 
     def excess(n: float) -> float:
         return float(offset * -math.expm1(-n * mu) / n - share)
@@ -290,13 +211,7 @@ class SavageRecursion(NamedTuple):
 
 
 def savage_recursion(n: int, mu: float, p32_weight: float = 0.5, p22_slip: bool = False) -> SavageRecursion:
-    r"""Run the recursion (18) of savage2016 with (25), (27) and (28), from zero initial conditions.
-
-    Parameters
-    ----------
-    p32_weight : weight of :math:`\varphi_{21}P_{11}T` in the second line of (18): 1/2; the note prints 1.
-    p22_slip : omit the second :math:`1/\omega_{bw}` in (25), as printed; T is then 1 second.
-    """
+    r"""Run the recursion (18) of savage2016 with (25), (27) and (28), from zero initial conditions."""
     n, mu = int(cycle_counts(n)), float(positive_array("mu", mu))
     phi, lost = math.exp(-mu), -math.expm1(-mu)
     phi21 = lost / mu
