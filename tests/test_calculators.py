@@ -20,8 +20,9 @@ from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory as rolling
 
 BOOK = Path(__file__).resolve().parents[1] / "book"
-CELLS = json.loads((BOOK / "calculators.ipynb").read_text(encoding="utf-8"))["cells"]
-FORMS = [text for cell in CELLS if (text := "".join(cell["source"])).startswith("<form")]
+NOTEBOOKS = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(BOOK.glob("*.ipynb"))]
+CELLS = ["".join(cell["source"]) for notebook in NOTEBOOKS for cell in notebook["cells"]]
+FORMS = [text for text in CELLS if text.startswith("<form")]
 TRIALS = 500
 U = 2.0**-53
 DAY = 86400
@@ -41,7 +42,7 @@ def browser():
 
 @pytest.fixture
 def page(browser):
-    """The forms of the page, as a reader finds them."""
+    """The forms of the chapters, as a reader finds them."""
     opened = browser.new_page()
     opened.set_content("\n".join(FORMS))
     opened.add_script_tag(path=BOOK / "_static" / "calculators.js")
@@ -297,7 +298,7 @@ def test_sliders_choices_and_examples_fill_the_form(page):
     assert field(page, "rounding", "n").input_value() == "1020"  # a hundredth of a decade
     field(page, "rounding", "chop").select_option("chopped")
     assert cell(page, "rounding", "beta") == "1.000\u00a0×\u00a010⁻¹¹"
-    page.get_by_role("button", name="IEEE double").first.click()
+    page.locator("#calculator-rounding").get_by_role("button", name="IEEE double").click()
     assert field(page, "rounding", "b").input_value() == "2"
     assert cell(page, "rounding", "beta") == "1.110\u00a0×\u00a010⁻¹⁶"
     field(page, "deroll", "drift").fill("\u22121")  # the minus sign of a typesetter

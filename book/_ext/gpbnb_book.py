@@ -29,7 +29,11 @@ REDIRECT = """<!DOCTYPE html>
 <body><main><h1>{title}</h1><p><a href="{target}">Open the book</a></p></main></body>
 </html>
 """
-MOVED = {"open": "errata.html#what-the-documents-leave-undone", "reading": "index.html#run-and-cite"}
+MOVED = {
+    "calculators": "rounding.html#on-your-own-format",
+    "open": "errata.html#what-the-documents-leave-undone",
+    "reading": "index.html#run-and-cite",
+}
 """Pages that are now part of another, in the folder of the book, and where their content is."""
 
 

@@ -11,18 +11,11 @@ from gpbnb.arithmetic.rational import exact, inverse_of
 from gpbnb.report.kalman import derivation, exact_step
 
 DERIVATIONS = steps.Derivations(
-    derivation.forgotten,
     derivation.contraction,
     derivation.recursion,
 )
 
 NAMES = {
-    "forgotten": {
-        "sum of $f^{k-i}$: one more step": "(1 - f**(k + 1))/(1 - f)",
-        "$a_0$ is at least $a_i$, with $i = j+1$": (
-            "(k - j - 1)*(6*n + 3*m + 5) + 4*n + 3*m + 4 + (k*(k - 1)/2 - j*(j - 1)/2)*(3*n + m + 2)"
-        ),
-    },
     "contraction": {
         "the two forms of (99) are one: $AH'-KS$ is zero where $(A-KHA)H'-KR$ is zero": "(A - K*H*A)*HT - K*R",
         "likewise, $HB-TL'$ is zero where $H(B-BH'L')-RL'$ is zero": "H*(B - B*HT*LT) - R*LT",
@@ -51,7 +44,7 @@ def test_each_step_holds_and_is_named_for_what_it_derives(name):
 
 
 def test_the_derivations_are_those_of_the_chapter():
-    assert sum(steps.lengths(DERIVATIONS).values()) == 10
+    assert sum(steps.lengths(DERIVATIONS).values()) == 8
 
 
 def test_what_is_left_out():

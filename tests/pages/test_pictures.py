@@ -26,7 +26,7 @@ from . import browser as tools
 ADDRESSES = {
     "numberline": "book/rounding.html",
     "year": "book/year.html",
-    "roll": "book/calculators.html",
+    "roll": "book/rolling.html",
     "step": "book/guarantee.html",
 }
 PICTURES = pytest.mark.parametrize("picture", views.PICTURES, ids=lambda each: each.id)

@@ -87,22 +87,6 @@ TWICE = (ONCE[0] + N + 1, ONCE[1] + 1)
 GROWTH = 3 * N + M + 2
 
 
-# -- inputs that a filter forgets ------------------------------------------------------------------------------------
-
-
-def forgotten() -> Derivation:
-    r"""Derive the effect of a closed loop of norm f < 1, :math:`\|T_i\| \le f^{k-i}\|u\|`, and a_0 ≥ a_i."""
-    f, j = sp.Symbol("f", positive=True), sp.Symbol("j", integer=True, nonnegative=True)
-    start = count_start(ONCE[0], GROWTH)
-    later = count_input(*ONCE, GROWTH).subs(NTH, j + 1)
-    return Derivation(
-        (
-            Step("sum of $f^{k-i}$: one more step", f * over(1 - f**K, 1 - f) + 1, over(1 - f ** (K + 1), 1 - f)),
-            Step("$a_0$ is at least $a_i$, with $i = j+1$", start, later, sp.expand(start - later)),
-        )
-    )
-
-
 # -- the contraction bound --------------------------------------------------------------------------------------------
 
 
