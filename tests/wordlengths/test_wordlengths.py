@@ -9,7 +9,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import small_filter
-from matplotlib.text import Text
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat
@@ -19,13 +18,12 @@ from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import log_spaced, reference
-from gpbnb.report.display import style
 from gpbnb.report.gravity_probe_b import model as gravity_probe_b
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.guarantees import table as guarantees
 from gpbnb.report.integration.theory import needed_precision
 from gpbnb.report.kalman.report_bounds import coefficients
-from gpbnb.report.wordlengths import figures, study, tables
+from gpbnb.report.wordlengths import study, tables
 from gpbnb.wordlength import examples, ranges
 from gpbnb.wordlength.precision import required_precision, survey
 from gpbnb.wordlength.requirement import Requirement
@@ -410,31 +408,6 @@ def test_integrator():
 
 
 # -- figures ------------------------------------------------------------------------------------------
-
-
-def test_growth(ax):
-    points, line, *rest = figures.growth({"run": [(10, 9), (1000, 24)]}, {"bound": [(10, 20), (1000, 60)]}, ax)
-    assert points.get_xydata().tolist() == [[10, 9], [1000, 24]]
-    assert line.get_xydata().tolist() == [[10, 20], [1000, 60]]
-    assert line.get_color() == style.VALID
-    names = [each.get_text() for each in rest if isinstance(each, Text)]
-    assert names == ["bound", "binary16", "binary32", "binary64"]
-    assert ax.get_xscale() == "log"
-
-
-def test_overview(ax):
-    found = {"tilt": {"emulation": 17, "bound": 32}, "gyro": {"theory": 17}}
-    artists = figures.overview(found, ax)
-    named = {artist.get_label(): artist for artist in artists if artist.get_label() in figures.KINDS}
-    assert {name: each.get_xydata().tolist() for name, each in named.items()} == {
-        "emulation": [[17, 0]],
-        "bound": [[32, 0]],
-        "theory": [[17, 1]],
-    }
-    assert [text.get_text() for text in ax.get_yticklabels()] == ["tilt", "gyro"]
-    assert ax.yaxis_inverted()  # the first on top
-    with pytest.raises(ValueError, match=r"got the kinds \['guess'\]; needed some of emulation"):
-        figures.overview({"tilt": {"guess": 3}}, ax)
 
 
 def test_a_turn_multiplies_the_quaternion_by_its_half_angles():

@@ -150,6 +150,8 @@ def error_variance(n: ArrayLike, mu: float, start: float = 1.0) -> Floats:
 
     .. math:: \frac{P_{ee_n}}{\sigma_x^2T^2} = nL - \tfrac12L^2(1-\varphi^n)
         - (1-s)\,\tfrac14L^2(1-\varphi^n)^2, \qquad L = L(\mu/2),\ \varphi = e^{-\mu}
+
+    `start`, s, is the variance of the input at the start, divided by :math:`\sigma_x^2`; savage2016 assumes 1.
     """
     cycles, mu = cycle_counts(n), float(positive_array("mu", mu))
     if not 0 <= start < math.inf:
@@ -211,7 +213,11 @@ class SavageRecursion(NamedTuple):
 
 
 def savage_recursion(n: int, mu: float, p32_weight: float = 0.5, p22_slip: bool = False) -> SavageRecursion:
-    r"""Run the recursion (18) of savage2016 with (25), (27) and (28), from zero initial conditions."""
+    r"""Run the recursion (18) of savage2016 with (25), (27) and (28), from zero initial conditions.
+
+    `p32_weight` is the weight of :math:`\varphi_{21}P_{11}T` in the second line of (18): 1/2; the note prints 1.
+    With `p22_slip`, the second :math:`1/\omega_{bw}` in (25) is omitted, as printed; T is then 1 second.
+    """
     n, mu = int(cycle_counts(n)), float(positive_array("mu", mu))
     phi, lost = math.exp(-mu), -math.expm1(-mu)
     phi21 = lost / mu

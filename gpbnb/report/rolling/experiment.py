@@ -35,7 +35,11 @@ def derolled_record(
     interval: float = INTERVAL,
     phase_error: Callable[[Any], Any] | None = None,
 ) -> dict[str, NDArray[np.complex128]]:
-    """Simulate one gyro with two readouts through (5)-(7), with x and y as real and imaginary part."""
+    """Simulate one gyro with two readouts through (5)-(7), with x and y as real and imaginary part.
+
+    `phase_error` gives the angle in rad by which the deroll is ahead, for times in s. The stages are "signal",
+    "rolled", "noise", "measured" and "derolled", each in mas.
+    """
     n = np.arange(samples)
     ramp = np.asarray(complex(*drift) * (n * interval / YEAR))
     pair = record(level, samples, 2, rng)
@@ -415,7 +419,11 @@ def roll_rate_errors(
     step: float,
     resets: Sequence[int | None],
 ) -> NDArray[np.float64]:
-    """Fit the cross drift rates of a ramp that is derolled at the nominal rate; mas a year."""
+    """Fit the cross drift rates (resets, trials) of a ramp that is derolled at the nominal rate; mas a year.
+
+    Each trial has deviations of the roll rate in rad/s, one for each step of `step` s. `resets` are steps between
+    resets of the phase by the star sensor; None for never.
+    """
     errors = []
     for rate in rates:
         n = len(rate)

@@ -194,7 +194,12 @@ KINDS = ("like signs", "mixed signs", "far exponents", "cancelling")
 def random_numbers(
     rng: np.random.Generator, fmt: FloatFormat, shape: tuple[int, ...], kind: str = "mixed signs"
 ) -> FloatArray:
-    """Draw numbers of a format with uniformly distributed significands."""
+    """Draw numbers of a format with uniformly distributed significands.
+
+    Of kind "like signs" they are positive and have one exponent. "mixed signs" draws either sign; "far exponents" also
+    draws exponents over a range of twice the precision. "cancelling" draws mixed signs and replaces the last number
+    along the last axis by minus the rounded sum of the others.
+    """
     limit = fmt.base**fmt.precision
     significands = rng.integers(limit // fmt.base, limit, shape)
     if kind != "like signs":
@@ -272,7 +277,7 @@ class Growth:
 
 
 def growth(fmt: FloatFormat, kind: str, lengths: Sequence[int], repeats: int, rng: np.random.Generator) -> Growth:
-    """Add up more and more terms, from left to right."""
+    """Add up more and more terms, from left to right: of a kind of :func:`random_numbers`, or one number n times."""
     longest = max(lengths, default=0)
     if kind == "constant":
         once: Any = random_numbers(rng, fmt, (repeats, 1), "like signs")
