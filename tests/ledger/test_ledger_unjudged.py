@@ -8,7 +8,7 @@ from alterations import altered
 from gpbnb.report.inversion import example as inverse
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.checks import kalman as year
-from gpbnb.report.ledger.checks.rolling.registry import SIX, TEN
+from gpbnb.report.ledger.checks.rolling import SIX, TEN
 from gpbnb.report.ledger.finding import Verdict
 from gpbnb.report.ledger.formula import Number, Undefined, Words
 from gpbnb.report.ledger.html import chapter

@@ -11,7 +11,7 @@ import pytest
 from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.report.ledger.checks.rolling import material
+from gpbnb.report.ledger.checks import rolling as material
 from gpbnb.report.rolling import experiment, theory
 from gpbnb.report.rolling.experiment import SWEEP
 from gpbnb.report.rolling.flicker import record

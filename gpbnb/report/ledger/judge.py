@@ -18,6 +18,7 @@ The functions of the topic give the names of these expressions their values, as 
 from __future__ import annotations
 
 import csv
+import re
 import string
 from collections import ChainMap
 from collections.abc import Iterable, Mapping
@@ -49,6 +50,7 @@ ATTAINED, TIGHT = Fraction(99, 100), 1 - Fraction(1, 10**9)
 """A bound counts as attained if the value reaches this share of it, in a tight instance the second one."""
 EPSILON = sp.Symbol("epsilon")
 """The rounding error of printed terms that are symbols; to first order, its square is dropped."""
+_LITERAL = re.compile(r"-?[\d.]+([eE][+-]?\d+)?")
 CLOSE, EQUAL = 1e-2, 1e-9
 """Relative differences that ≈ and = allow in the mode ``close``."""
 
@@ -90,8 +92,8 @@ def judge(stated: Statement | Iterable[Part], domain: Names | Iterable[Names], m
 
     Besides the values of names, an instance may say: ``holds``, False where the statement must not hold; ``part``, the
     number of the only part that it is about; ``expression``, the value of a part that compares nothing; ``tight``,
-    where the first bound of each relation must be attained; and ``numbers``, the type of printed numbers, Fraction by
-    default.
+    where the first bound of each relation must be attained; ``close``, the share by which equal sides may differ; and
+    ``numbers``, the type of printed numbers, Fraction by default.
     """
     parts = stated.parts if isinstance(stated, Statement) else tuple(stated)
     count = violated = 0
@@ -134,7 +136,7 @@ def _held(parts: tuple[Part, ...], names: Names, mode: str) -> tuple[bool, dict[
                 if len(sides) == 1:
                     held &= sign(part.value(names, names.get("numbers", Fraction)) - names["expression"]) == 0
                 for j, link in enumerate(part.links(names, names.get("numbers", Fraction))):
-                    held &= holds(link, mode, sides[j + 1])
+                    held &= holds(link, mode, sides[j + 1], names.get("close", EQUAL))
                     if mode.startswith("bound") and link.symbol in ("<=", "<", ">=", ">"):
                         zero = "0" in (sides[j].text, sides[j + 1].text)
                         reached[i, j] = attains(link, zero, TIGHT if names.get("tight") else ATTAINED)
@@ -153,8 +155,11 @@ def _is_printed(true: Any, number: Number) -> bool:
     return bool(true == 0) if number.value == 0 else prints_as(true, number.literal, *Rounding.documented())
 
 
-def holds(link: Link, mode: str = "exact", side: Relation | None = None) -> bool:
-    """Whether one comparison holds; matrices are compared entry by entry, and `side` is the printed right side."""
+def holds(link: Link, mode: str = "exact", side: Relation | None = None, equal: float = EQUAL) -> bool:
+    """Whether one comparison holds; matrices are compared entry by entry.
+
+    For the mode ``close``, `side` is the printed right side, and `equal` the share by which equal sides may differ.
+    """
     symbol = {"≈": "=="}.get(link.symbol, link.symbol)
     if DottedMatrix in (type(link.left), type(link.right)):
         compare = next(function for name, function in OPERATORS.values() if name == symbol)
@@ -163,7 +168,8 @@ def holds(link: Link, mode: str = "exact", side: Relation | None = None) -> bool
     if left.shape != right.shape:
         return False
     if mode == "close" and symbol in ("==", "!="):
-        close = all(_close(a, b, link.symbol, side) for a, b in zip(left.flat, right.flat, strict=True))
+        share = CLOSE if link.symbol == "≈" else equal
+        close = all(_close(a, b, share, side) for a, b in zip(left.flat, right.flat, strict=True))
         return close == (symbol == "==")
     slack = SECOND_ORDER if mode.endswith("first order") or link.symbol == "≈" else 0
     signs = [sign(a - b, slack) for a, b in zip(left.flat, right.flat, strict=True)]
@@ -178,15 +184,11 @@ def holds(link: Link, mode: str = "exact", side: Relation | None = None) -> bool
             return set(signs) <= {-1 if symbol == "<" else 1}
 
 
-def _close(left: Any, right: Any, symbol: str, side: Relation | None) -> bool:
-    """Whether a number prints as a literal on the right, or is as near to the right side as the sign asks."""
-    try:
-        literal = Fraction(side.text) if side else None
-    except ValueError:
-        literal = None
-    if literal is not None and side:
-        return prints_as(left, side.text, *Rounding.documented())
-    return abs(left - right) <= (CLOSE if symbol == "≈" else EQUAL) * abs(right)
+def _close(left: Any, right: Any, share: float, side: Relation | None) -> bool:
+    """Whether a number prints as the literal on the right, or differs from the right side by at most a share of it."""
+    if side and _LITERAL.fullmatch(side.text):
+        return bool(left == 0) if right == 0 else prints_as(left, side.text, *Rounding.documented())
+    return bool(abs(left - right) <= share * abs(right))
 
 
 def attains(link: Link, zero: bool = False, share: Fraction = ATTAINED) -> bool:
@@ -308,7 +310,10 @@ def _ids(place: str) -> tuple[str, ...]:
 
 
 _NAMES: Names = {"intended": intended, "judge": judge, "chapter": chapter, "scientific": scientific}
-_BUILTINS = {f.__name__: f for f in (abs, all, any, float, int, len, list, map, max, min, range, set, str, sum, tuple)}
+_BUILTINS = {
+    f.__name__: f
+    for f in (abs, all, any, dict, float, int, len, list, map, max, min, range, round, set, sorted, str, sum, tuple)
+}
 
 
 def _value(expression: str, names: Mapping[str, Any]) -> Any:
