@@ -67,7 +67,11 @@ def kept_in(fmt: Any) -> Iterator[Any]:
 
     Runs may be nested, and other threads are not affected.
     """
-    outer, own = _state.get(), replace(fmt)
+    outer = _state.get()
+    if outer.run is not None and outer.run.fmt is fmt:  # as of a function that calls another one
+        yield fmt
+        return
+    own = replace(fmt)
     run = _Run(own, [])
     token = _state.set(_State(run))
     _running[id(own)] = run

@@ -24,9 +24,23 @@ CODES = {
 # fmt: on
 """Codes of operations, as in :mod:`gpbnb.arithmetic.kernels.machine`."""
 
+NAMES = {code: name for name, code in CODES.items()}
+
+
+def operands_of(name: str, a: int, b: int, c: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the numbers and the truth values that an operation takes."""
+    if name in ("add", "subtract", "multiply", "divide", "compare"):
+        return (a, b), ()
+    if name == "fused":
+        return (a, b, c), ()
+    if name == "choose":
+        return (b, c), (a,)
+    if name == "combine":
+        return (), (a, b)
+    return ((), (a,)) if name == "skip" else ((a,), ())
+
+
 _RANDOM = 6
-_LEAST = 2.0**-480
-"""Least size of numbers that the machine computes with quickly; products and quotients of two stay in float64."""
 
 
 def tables(formats: Sequence[Any]) -> tuple[Any, Any]:
@@ -53,6 +67,8 @@ def tables(formats: Sequence[Any]) -> tuple[Any, Any]:
 
 
 def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float64]) -> str:
+    from gpbnb.arithmetic.kernels import machine
+
     if isinstance(tag, tags.Wide):
         whole[:14] = (*tag[:7], *tag.lowest, *tag.largest, tag.saturates)
         return "words"
@@ -89,7 +105,7 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
     outward = unit - 1
     below, above = (outward if mode == tags.DOWN else nearest), (outward if mode == tags.UP else nearest)
     sticky = even or mode == tags.DOWN, even or mode == tags.UP
-    low, high = max(low, _LEAST), min(high, 1 / _LEAST)
+    low, high = max(low, machine.LEAST), min(high, 1 / machine.LEAST)
     bits_low, bits_high = np.array([low, high]).view(np.int64).tolist()
     whole[3:13] = quick, short, unit, below, above, *sticky, even, bits_low, bits_high - bits_low
     return "masks"
@@ -121,7 +137,7 @@ NEGATIVE_ROOT = "the square root of a negative number"
 
 def fault_of(rows: NDArray[np.int64], values: NDArray[Any], row: int) -> Fault:
     """Say why a row has no result, from the numbers of the machine."""
-    name = _NAMES[int(rows[row, 0])]
+    name = NAMES[int(rows[row, 0])]
     reason = {"divide": ZERO_DIVISOR, "nonzero": ZERO_PIVOT, "sqrt": NEGATIVE_ROOT}.get(name, OVERFLOW)
     if name == "divide" and np.all(np.atleast_1d(values[rows[row, 2]]).reshape(-1, *values.shape[2:])[..., :1] != 0):
         reason = OVERFLOW
@@ -217,6 +233,3 @@ def evaluate(kind: Any, formats: Any, code: Any, values: NDArray[Any], truths: N
         return int(machine.evaluate(kind, formats, code, values, truths))
     except (OverflowError, ZeroDivisionError):
         return 0
-
-
-_NAMES = {code: name for name, code in CODES.items()}

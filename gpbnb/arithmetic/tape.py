@@ -10,17 +10,15 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from functools import partial
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic import machine
-from gpbnb.arithmetic.array import FloatArray, NegativeRootError
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.interpreting import Call, Constants, InLoops, OnIntegers, Segment
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.exact import ExactKernel
-from gpbnb.arithmetic.machine import CODES
+from gpbnb.arithmetic.machine import CODES, NAMES, operands_of
 
 Places = NDArray[np.int64]
 """Numbers or truth values of a tape, of any shape."""
@@ -31,62 +29,12 @@ MOST_OPERATIONS = 1 << 22
 FEW_OPERATIONS = 5_000
 """Shortest tape that runs in compiled code; for fewer operations, integers of Python are fast and need no loading."""
 
-_DIVIDE, _SQRT, _CHOOSE, _COMPARE, _COMBINE, _NONZERO = (
-    CODES[name] for name in ("divide", "sqrt", "choose", "compare", "combine", "nonzero")
-)
-
-
 _SHORTENED = ("add", "subtract", "multiply", "divide")
 _WHOLE = (int, np.int64)
 
 
 class UntraceableError(Exception):
     """A function has done what no tape can repeat."""
-
-
-class Call(NamedTuple):
-    """A function of arrays that is called between two operations of a tape.
-
-    Parameters
-    ----------
-    at : number of operations before it.
-    function : takes arrays of the format, each (n,), and returns another.
-    operands, results : places, each (n,).
-    """
-
-    at: int
-    function: Callable[..., FloatArray]
-    operands: Sequence[NDArray[np.int64]]
-    results: NDArray[np.int64]
-
-    @property
-    def name(self) -> str:
-        """The name of the function, as in NumPy."""
-        return str(self.function.args[0] if isinstance(self.function, partial) else self.function.__name__)
-
-
-class Constants:
-    """Numbers that a function takes from elsewhere, which each run rounds into its format.
-
-    Parameters
-    ----------
-    exactly : whether only numbers that the format holds are allowed.
-    """
-
-    def __init__(self, exactly: bool) -> None:
-        self.exactly = exactly
-        self.places: list[int] = []
-        self.numbers: list[Any] = []
-
-    def rounded(self, fmt: Any) -> FloatArray:
-        """Return the numbers in a format.
-
-        Raises
-        ------
-        TypeError, ValueError, OverflowError : as for ``fmt.array``, or for an operand of an operation.
-        """
-        found: FloatArray = fmt.array([]).operand(self.numbers) if self.exactly else fmt.array(self.numbers)
-        return found
 
 
 class Tape:
@@ -314,104 +262,58 @@ class Tape:
         ArithmeticError, ValueError, TypeError : an operation has no result in the format; a non-numeric constant.
         """
         fmt: Any = inputs.format
-        constants = [each.rounded(fmt) for each in self._constants]
-        given = [inputs, *constants]
-        places = [np.arange(1, 1 + self.inputs), *(np.array(each.places, np.int64) for each in self._constants)]
-        backend = fmt.backend
-        if (
-            isinstance(backend, Compiled)
-            and len(self._instructions) >= 5 * FEW_OPERATIONS
-            and all(each.backend is backend for each in given)
-        ):
-            found = self._compiled(backend, given, places, results)
-            if found is not None:
-                return found
-        return self._exact(given, places, results)
+        own = np.arange(1, 1 + self.inputs)
+        if len(self._instructions) >= 5 * FEW_OPERATIONS and isinstance(fmt.backend, Compiled):
+            loops = InLoops(self, [fmt])
+            if loops.sound and loops.put(own, inputs) and loops.run(loops.ready(self.segments)):
+                return loops.array(results, fmt)
+        integers = OnIntegers(self, fmt)
+        integers.put(own, inputs)
+        integers.run(integers.ready(self.segments))
+        return integers.array(results, fmt)
 
-    def _segments(self) -> list[tuple[int, int, Call | None]]:
-        """Return first and last of the operations that run before each call, and after the last."""
+    @property
+    def segments(self) -> list[Segment]:
+        """The operations before each call, and after the last."""
         ends = [(each.at, each) for each in self._calls] + [(len(self._instructions) // 5, None)]
-        return [(begin, end, each) for begin, (end, each) in zip([0, *(at for at, _ in ends)], ends, strict=False)]
+        rows, formats = self.instructions, self.formats
+        begins = [0, *(at for at, _ in ends)]
+        return [
+            Segment(rows[begin:end], formats[begin:end], call) for begin, (end, call) in zip(begins, ends, strict=False)
+        ]
 
-    def _compiled(
-        self, backend: Compiled, given: Sequence[FloatArray], places: Sequence[Places], results: Places
-    ) -> FloatArray | None:
-        """Run in compiled code; None if a number leaves the range of the backend, or has no value."""
-        first = given[0]
-        kind, formats = machine.tables([first.format])
-        packed = [backend.pack(each.components) for each in given]
-        alone = packed[0].ndim > 1
-        values = np.zeros((self._values, *(1,) * alone, *packed[0].shape[1:]), packed[0].dtype)
-        for place, each in zip(places, packed, strict=True):
-            values[place] = each[:, np.newaxis] if alone else each
-        truths, instructions = np.zeros((self._truths, *(1,) * alone), np.uint8), self.instructions
-        truths[1] = 1
-        for begin, end, call in self._segments():
-            rows = instructions[begin:end]
-            if machine.evaluate(
-                kind, formats, machine.code_of(rows, np.zeros(len(rows), np.int64)), values, truths
-            ) < len(rows):
-                return None
+    def divided(self, varying: Places) -> tuple[list[Segment], list[Segment]]:
+        """Return the operations and calls that depend on no number at some places, and the others."""
+        varies, chosen = np.zeros(self._values, np.bool_), np.zeros(self._truths, np.bool_)
+        varies[varying] = True
+        once, each = list[Segment](), list[Segment]()
+        waiting: list[Segment] = []
+        for rows, formats, call in self.segments:
+            late, guarded = np.zeros(len(rows), np.bool_), 0
+            for o, (code, a, b, c, out) in enumerate(rows.tolist()):
+                name = NAMES[code]
+                numbers, truths = operands_of(name, a, b, c)
+                late[o] = guarded > 0 or name == "skip" or any(varies[list(numbers)]) or any(chosen[list(truths)])
+                guarded = b if name == "skip" else guarded - 1
+                if name not in ("nonzero", "skip"):
+                    (chosen if name in ("compare", "combine") else varies)[out] = late[o]
+            changes = call is not None and any(varies[places].any() for places in call.operands)
             if call is not None:
-                taken = [first.from_packed(_alone(values[each], alone), first.format) for each in call.operands]
-                made = call.function(*taken)
-                if made.backend is not backend:
-                    return None
-                found = backend.pack(made.components)
-                values[call.results] = found[:, np.newaxis] if alone else found
-        return first.from_packed(_alone(values[results], alone), first.format)
+                varies[call.results] = changes
+            once.append(Segment(rows[~late], formats[~late], None if changes else call))
+            waiting.append(Segment(rows[late], formats[late], None))
+            if changes or call is None:
+                rows, formats = (np.concatenate([part[i] for part in waiting]) for i in range(2))
+                each.append(Segment(rows, formats, call))
+                waiting = []
+        return once, each
 
-    def _exact(self, given: Sequence[FloatArray], places: Sequence[Places], results: Places) -> FloatArray:
-        """Run with integers of Python, which hold the numbers of every format."""
-        first, (m, e) = given[0], np.zeros((2, self._values), dtype=object)
-        for place, each in zip(places, given, strict=True):
-            m[place], e[place] = each.on_exact_backend().components
-        significands, exponents, truths = m.tolist(), e.tolist(), [False, True] + [False] * (self._truths - 2)
-        rows, kernel = self.instructions.tolist(), first.format.kernel
+    def equals(self, other: Tape) -> bool:
+        """Whether another tape has the same operations, calls and constants."""
 
-        def numbers(taken: Places) -> FloatArray:
-            listed = taken.tolist()
-            pair = np.array([[each[i] for i in listed] for each in (significands, exponents)], dtype=object)
-            return first.from_pairs(pair[0], pair[1], first.format)
+        def known(tape: Tape) -> Any:
+            calls = [(each.at, each.name, *(at.tolist() for at in each.operands)) for each in tape.calls]
+            constants = [(each.places, each.numbers, list(map(type, each.numbers))) for each in tape.all_constants]
+            return tape.sizes, tape.instructions.tolist(), tape.formats.tolist(), calls, constants
 
-        for begin, end, call in self._segments():
-            _run_exactly(kernel, rows[begin:end], significands, exponents, truths)
-            if call is not None:
-                made = call.function(*map(numbers, call.operands))
-                found = made.on_exact_backend().components
-                for place, *pair in zip(call.results.tolist(), *found, strict=True):
-                    significands[place], exponents[place] = pair
-        return numbers(results)
-
-
-def _run_exactly(
-    kernel: ExactKernel, rows: list[list[int]], significands: list[int], exponents: list[int], truths: list[bool]
-) -> None:
-    m, e = significands, exponents
-    of_two: list[Callable[..., tuple[int, int]]] = [kernel.add, kernel.subtract, kernel.multiply, kernel.divide]
-    of_one: list[Callable[..., tuple[int, int]]] = [kernel.sqrt, kernel.negative, kernel.absolute]
-    compare = kernel.compare
-    for code, a, b, c, out in rows:
-        if code <= _DIVIDE or code == _NONZERO:
-            divisor = {_DIVIDE: b, _NONZERO: a}.get(code)
-            if divisor is not None and m[divisor] == 0:
-                raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
-            if code == _NONZERO:
-                continue
-            m[out], e[out] = of_two[code](m[a], e[a], m[b], e[b])
-        elif code == _CHOOSE:
-            chosen = b if truths[a] else c
-            m[out], e[out] = m[chosen], e[chosen]
-        elif code == _COMPARE:
-            truths[out] = bool(c >> (compare(m[a], e[a], m[b], e[b]) + 1) & 1)
-        elif code == _COMBINE:
-            truths[out] = bool(c >> (2 * truths[a] + truths[b]) & 1)
-        else:
-            if code == _SQRT and m[a] < 0:
-                raise NegativeRootError("got the square root of a negative number; needed x >= 0")
-            m[out], e[out] = of_one[code - _SQRT](m[a], e[a])
-
-
-def _alone(values: NDArray[Any], alone: bool) -> NDArray[Any]:
-    """Take the only lane of numbers that stand in lanes."""
-    return values[..., 0, :] if alone else values
+        return bool(known(self) == known(other))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -29,35 +28,13 @@ from gpbnb.filters.bounded_steps import CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import (
-    HUNG_FORMS,
-    BlockAlgebra,
-    StepModel,
-    by_closed_loop,
-    corrected,
-    measured_in,
-    predicted_in,
-    second_gain,
-)
+from gpbnb.filters.kalman_step import HUNG_FORMS, BlockAlgebra
 from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.opening import double_doubles_of, opening
+from gpbnb.filters.recording import FACTORED, LinearStep
+from gpbnb.filters.repeating import RepeatedStep, StepTaken
 
 ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
-FACTORED = (Form.UD, *ROOTS)
-
-PREDICT: dict[AnyForm, Callable[..., tuple[Any, bool]]] = {
-    Form.UD: array_steps.predict_ud,
-    ArrayForm.POTTER: array_steps.predict_root,
-    ArrayForm.CARLSON: array_steps.predict_root,
-}
-"""How a form predicts factors or roots."""
-
-OBSERVE: dict[AnyForm, Callable[..., tuple[Any, Any, Any, bool]]] = {
-    Form.UD: array_steps.observe_ud,
-    ArrayForm.POTTER: array_steps.observe_potter,
-    ArrayForm.CARLSON: array_steps.observe_carlson,
-}
-"""How a form updates factors or roots by one measurement."""
 
 
 class SteppedRun(ABC):
@@ -71,8 +48,7 @@ class SteppedRun(ABC):
     checkpoint_steps : as for :class:`~gpbnb.filters.run.Run`.
     """
 
-    x: FloatArray
-    P: FloatArray
+    _step: RepeatedStep
     _bound: _BoundTaker | None = None
 
     def __init__(
@@ -85,9 +61,19 @@ class SteppedRun(ABC):
         self.stopped: int | None = None
         self._saved: list[tuple[int, Any, Any, Any]] = []
 
+    @property
+    def x(self) -> FloatArray:
+        """The estimate, (n,)."""
+        return self._step.states[0]
+
+    @property
+    def P(self) -> FloatArray:
+        """The covariance, its factors or its root, (n, n)."""
+        return self._step.states[1]
+
     @abstractmethod
-    def _step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
-        """Take step k + 1; return the gain, or columns for decorrelated measurements, and whether all is definite."""
+    def _take(self, k: int, z: FloatArray) -> bool:
+        """Take step k + 1, and return whether all is definite."""
 
     @abstractmethod
     def _check(self, z: Any) -> None:
@@ -104,17 +90,17 @@ class SteppedRun(ABC):
 
     def states(self, z: Any) -> NDArray[np.float64]:
         """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
-        found = [double_doubles_of(x) for x in self._steps_taken(z)]
+        found = [double_doubles_of(self.x) for _ in self._steps_taken(z)]
         return np.array(found, dtype=np.float64).reshape(-1, self._size[0], 2)
 
-    def _steps_taken(self, z: Any) -> Iterator[FloatArray]:
-        """Take one step after the other, and give the estimate after each."""
+    def _steps_taken(self, z: Any) -> Iterator[int]:
+        """Take one step after the other, and give the number of those done."""
         self._check(z)
         for measured in self._stored(z):
             if self.stopped is not None:
                 return
             try:
-                K, definite = self._step(self.steps, measured)
+                definite = self._take(self.steps, measured)
             except (ZeroDivisionError, OverflowError, DomainError, WholeNumberError) as error:
                 self.stopped = self.steps + 1
                 self.reason = f"{_fault(error)} at step {self.stopped}"
@@ -125,10 +111,10 @@ class SteppedRun(ABC):
             at = len(self._saved)
             saved = at < len(self.checkpoint_steps) and self.checkpoint_steps[at] == self.steps
             if saved:
-                self._saved.append((self.steps, self.x, K, self.P))
+                self._saved.append((self.steps, self.x, self._step.gain, self.P))
             if self._bound is not None:
                 self._bound.take(measured)
-            yield self.x
+            yield self.steps
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""
@@ -196,16 +182,17 @@ class ArrayRun(SteppedRun):
         #: Changes of the covariances, including those of the model.
         self.repairs = list(sound.repairs)
         stored = sound.arrays(fmt)
-        self.x, self.P = stored.pop("x0"), stored.pop("P0")
+        x, P = stored.pop("x0"), stored.pop("P0")
         self._given: dict[str, list[FloatArray]] = {letter: [] for letter in ("B", "u", "b", "d")}
         for letter, each in stored.items():
             self._given[letter] = list(each[np.newaxis] if each.ndim == 1 else each)
-        self._blocks = block_algebra([fmt] * 4, ONE_FORMAT)
+        identity_in(fmt, 1)
         if form is ArrayForm.COMPENSATED:
             self._given["increment"] = [fmt.array(each - np.eye(model.n, dtype=int)) for each in model.Phi]
-            self._carried = self.x * 0
         if form in FACTORED:
-            self._factor()
+            P = self._factored()
+        self._letters = [letter for letter, members in self._given.items() if members]
+        self._step = RepeatedStep(self._stepped, [fmt], (x, P, x * 0))
         self._bound = _BoundTaker(self) if bounded else None
 
     @property
@@ -232,48 +219,15 @@ class ArrayRun(SteppedRun):
 
     # -- one step ---------------------------------------------------------------------------------------
 
-    def _step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
-        if self._given["d"]:
-            z = z - self._at("d", k)
-        return self._factored_step(k, z) if self.form in FACTORED else self._covariance_step(k, z)
+    def _take(self, k: int, z: FloatArray) -> bool:
+        return self._step.take([z, *(self._at(letter, k) for letter in self._letters)])
 
-    def _covariance_step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
-        algebra, model = self._blocks.state, StepModel(*(self._at(letter, k) for letter in ("Phi", "H", "Q", "R")))
-        V = predicted_in(self._blocks, model.Phi, self.P, model.Q)
-        K, P, _, definite = measured_in(self._blocks, self.form, model.H, model.R, V)
-        if self.form is Form.HUNG_SECOND_GAIN:
-            K = second_gain(algebra, model.H, model.R, P)
-        if self.form in HUNG_FORMS:
-            self.x = by_closed_loop(algebra, model, K, self.x, z)
-        elif self.form is ArrayForm.COMPENSATED:
-            self.x = self._compensated(k, model.H, K, z)
-        else:
-            self.x = corrected(algebra, model.H, K, self._predicted_state(k, model.Phi), z)
-        self.P = P
-        return K, bool(definite)
-
-    def _predicted_state(self, k: int, Phi: FloatArray) -> FloatArray:
-        return self._with_inputs(k, Phi @ self.x)
-
-    def _with_inputs(self, k: int, x: FloatArray) -> FloatArray:
-        if self._given["B"]:
-            x = x + self._at("B", k) @ self._at("u", k)
-        return x + self._at("b", k) if self._given["b"] else x
-
-    def _compensated(self, k: int, H: FloatArray, K: FloatArray, z: FloatArray) -> FloatArray:
-        change = self._with_inputs(k, self._at("increment", k) @ self.x)
-        change = change + K @ (z - H @ (self.x + change))
-        change = change - self._carried
-        x = self.x + change
-        self._carried = (x - self.x) - change
-        return x
-
-    def _factored_step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
-        Phi, H, UR = self._at("Phi", k), self._at("H", k), self._at("UR", k)
-        P, definite = PREDICT[self.form](Phi, self.P, self._at("UQ", k))
-        found = array_steps.observed(OBSERVE[self.form], H, UR, z, self._predicted_state(k, Phi), P)
-        self.x, self.P = found.x, found.P
-        return found.gains, bool(definite & found.definite)
+    def _stepped(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
+        x, P, carried = states
+        z, *matrices = given
+        step = LinearStep(self.form, block_algebra([*formats] * 4), dict(zip(self._letters, matrices, strict=True)))
+        found = step.taken(x, P, carried, z)
+        return StepTaken((found.x, found.P, found.carried), found.K, found.definite)
 
     # -- what it needs ----------------------------------------------------------------------------------
 
@@ -281,24 +235,22 @@ class ArrayRun(SteppedRun):
         members = self._given[letter]
         return members[k % len(members)]
 
-    def _factor(self) -> None:
-        """Compute factors of P0, Q and R as the compiled UD form does."""
+    def _factored(self) -> FloatArray:
+        """Compute factors of P0, Q and R as the compiled UD form does, and return those of P0."""
         start = opening(self.model.without_inputs(), self.fmt, Form.UD, self.fmt.run_tag())
         self.repairs += start.raised
         first, Q, R = (FloatArray.from_packed(each, self.fmt) for each in (start.U0, start.UQ, start.UR))
         self._given["UR"] = list(R)
-        if self.form in ROOTS:
-            self.P = array_steps.root_of_factors(first)
-            self._given["UQ"] = [array_steps.root_of_factors(each) for each in Q]
-        else:
-            self.P, self._given["UQ"] = first, list(Q)
+        self._given["UQ"] = [array_steps.root_of_factors(each) for each in Q] if self.form in ROOTS else list(Q)
+        return array_steps.root_of_factors(first) if self.form in ROOTS else first
 
     def _whole_gain(self, k: int, gain: Any) -> NDArray[Any]:
         """Return the gain for all measurements together, from those of the decorrelated measurements one by one."""
-        if not isinstance(gain, list):
-            return np.asarray(gain.to_fractions(), dtype=object)
+        K = np.asarray(gain.to_fractions(), dtype=object)
+        if self.form not in FACTORED:
+            return K
         UR, H = (self._at(letter, k).to_fractions() for letter in ("UR", "H"))
-        return combined_gain([each.to_fractions() for each in gain], UR, H)
+        return combined_gain(list(K.T), UR, H)
 
 
 class _BoundTaker:
@@ -350,13 +302,11 @@ class _BoundTaker:
         return double_doubles_of(self.run.P)
 
 
-def block_algebra(formats: Sequence[FloatFormat], stored: BlockStorage) -> BlockAlgebra:
+def block_algebra(formats: Sequence[Any], stored: BlockStorage = ONE_FORMAT) -> BlockAlgebra:
     """Return how matrices of the formats of state, gain, covariance and innovation covariance are computed."""
-    known = {fmt: _algebra(fmt) for fmt in dict.fromkeys(formats)}
-    state, gain, covariance, innovation = (known[fmt] for fmt in formats)
+    state, gain, covariance, innovation = map(_algebra, formats)
     return BlockAlgebra(state, gain, covariance, innovation, stored)
 
 
-def _algebra(fmt: FloatFormat) -> Algebra:
-    identity_in(fmt, 1)
-    return Algebra(cache(lambda n: identity_in(fmt, n)), operator.matmul)
+def _algebra(fmt: Any) -> Algebra:
+    return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), operator.matmul)

@@ -66,7 +66,8 @@ class NonlinearModel:
         w_k \sim N(0, Q_k),\ v_k \sim N(0, R_k)
 
     The functions receive arrays of the format in which the filter runs, and must compute in it; write constants as
-    ``x.format.array("0.1")``. The extended filter takes the step of a
+    ``x.format.array("0.1")``. A run calls them with placeholders, records their operations, and repeats these in each
+    step. A function that branches on a number is called in each step instead. The extended filter takes the step of a
     :class:`~gpbnb.filters.model.LinearModel` with the matrices :math:`F = \partial f/\partial x` at the last estimate
     and :math:`H = \partial h/\partial x` at the predicted one, in the same order of operations. It predicts the
     estimate :math:`\bar x = f(\hat x)`, and the innovation is :math:`z - h(\bar x)`. If f and h multiply the state by

@@ -15,23 +15,18 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
-from gpbnb.filters.array_run import (
-    FACTORED,
-    OBSERVE,
-    PREDICT,
-    ROOTS,
-    ArrayRun,
-    SteppedRun,
-    block_algebra,
-)
-from gpbnb.filters.array_steps import BlockStorage, observe_ud, observed, root_of_factors
+from gpbnb.filters.array_run import ROOTS, ArrayRun, SteppedRun, block_algebra
+from gpbnb.filters.array_steps import BlockStorage, observed, root_of_factors
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.factors import combined_gain, upper_factors
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import corrected_by, measured_in, predicted_in
+from gpbnb.filters.kalman_step import BlockAlgebra, corrected_by, measured_in, predicted_in
+from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
+from gpbnb.filters.recording import FACTORED
 from gpbnb.filters.reference import Step, agreed
+from gpbnb.filters.repeating import RepeatedStep, StepTaken
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
 from gpbnb.filters.unscented import UnscentedModel, unscented_step
@@ -46,7 +41,7 @@ BLOCK_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 class _Ahead(NamedTuple):
     """A predicted estimate (n,), and its covariance, factors or root (n, n)."""
 
-    x: FloatArray
+    x: Any
     P: Any
 
 
@@ -78,27 +73,29 @@ class NonlinearRun(SteppedRun):
     ) -> None:
         check_form(model, form, isinstance(fmt, BlockFormats))
         each = [getattr(fmt, name) for name in BLOCKS] if isinstance(fmt, BlockFormats) else [fmt] * len(BLOCKS)
-        of_state, of_gain, of_covariance, of_innovation = each
+        of_state, of_covariance = each[0], each[2]
         super().__init__(model.n, model.m, of_state.array, form, checkpoint_steps)
         self.model, self.fmt = model, fmt
-        self._to = BlockStorage(of_state.array, of_gain.array, of_covariance.array, of_innovation.array)
-        self._blocks = block_algebra(each, self._to)
+        for block in each:
+            identity_in(block, 1)
         stored_in = fmt.model if isinstance(fmt, BlockFormats) else fmt
         sound = model.noise.definite_in(stored_in)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(sound.repairs)
         arrays = sound.arrays(stored_in)
-        self.x = of_state.array(arrays["x0"])
         self._R, self._Q = list(arrays["R"]), list(arrays["Q"])
         P = arrays["P0"]
         if form in FACTORED:
             self._R = [stored_in.store(upper_factors(one)) for one in sound.R]
             self._Q = [self._factors(upper_factors(one), stored_in) for one in sound.Q]
             P = self._factors(upper_factors(sound.P0), stored_in)
-        self.P = of_covariance.array(P)
-        if model.method == "unscented":
-            self._weights = [of_state.array(each) for each in model.weights()]
+        self._weights = [of_state.array(each) for each in model.weights()] if model.method == "unscented" else []
         self._u = None if model.u is None else of_state.array(model.u)
+        formats = list(dict.fromkeys([*each, stored_in]))
+        self._blocks_at = [formats.index(block) for block in each]
+        self._present: NDArray[np.bool_] | None = None
+        start = of_state.array(arrays["x0"]), of_covariance.array(P)
+        self._step = RepeatedStep(self._stepped, formats, start)
 
     def _factors(self, factors: NDArray[Any], fmt: FloatFormat) -> FloatArray:
         stored = fmt.store(factors)
@@ -107,72 +104,75 @@ class NonlinearRun(SteppedRun):
     def _check(self, z: Any) -> None:
         self.model.noise.check_measurements(z, self.steps)
 
-    def _step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
-        u = None if self._u is None else self._u[k]
-        step = self._unscented if self.model.method == "unscented" else self._extended
-        K, definite = step(k, z, u)
-        self.x = self.model.normalized(self.x)
-        return K, definite
+    def _take(self, k: int, z: FloatArray) -> bool:
+        known = [] if self._u is None else [self._u[k]]
+        self._present = self.model.seen(k)
+        kind = None if self._present is None else self._present.tobytes()
+        return self._step.take([z, self._member(self._Q, k), self._member(self._R, k), *self._weights, *known], kind)
 
-    def _extended(self, k: int, z: FloatArray, u: FloatArray | None) -> tuple[Any, bool]:
+    def _stepped(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
+        each = [formats[i] for i in self._blocks_at]
+        stored = BlockStorage(*(fmt.array for fmt in each))
+        blocks = block_algebra(each, stored)
+        taken = (self._unscented if self.model.method == "unscented" else self._extended)(blocks, *states, *given)
+        x, *others = taken.states
+        return taken._replace(states=(self.model.normalized(x), *others))
+
+    def _extended(self, blocks: BlockAlgebra, x: Any, P: Any, z: Any, Q: Any, R: Any, u: Any = None) -> StepTaken:
         """Predict, then update once or several times, each time with h and H at the last estimate."""
-        ahead, F = self.model.moved(self.x, u)
-        predicted, definite = self._predicted(k, F)
-        x, K = ahead, None
-        for _ in range(self.model.iterations):
-            expected, H = self.model.measured(x, u)
-            y = self.model.difference(z, expected)
-            if x is not ahead:
-                y = y - H @ (ahead - x)
-            x, P, K, positive = self._updated(k, self._seen(k, H), self._seen(k, y), _Ahead(ahead, predicted))
-        self.x, self.P = x, P
-        return K, bool(definite & positive)
-
-    def _predicted(self, k: int, F: FloatArray) -> tuple[Any, bool]:
-        Q, taken = self._member(self._Q, k), self._to.covariance
-        if self.form in FACTORED:
-            return PREDICT[self.form](taken(F), self.P, taken(Q))
-        return predicted_in(self._blocks, F, self.P, Q), True
-
-    def _updated(self, k: int, H: FloatArray, y: FloatArray, ahead: _Ahead) -> tuple[FloatArray, Any, Any, bool]:
-        """Return estimate, covariance, gain, and whether all variances and pivots are positive."""
-        R = self._member(self._R, k)
-        if self.form in FACTORED:  # what the measurements correct is zero before them
-            observe = partial(observe_ud, stored=self._to) if self.form is Form.UD else OBSERVE[self.form]
-            step = observed(observe, H, R, y, ahead.x * 0, ahead.P, self._to)
-            return ahead.x + step.x, step.P, (step.gains, H, R), bool(step.definite)
-        found = measured_in(self._blocks, self.form, H, R, ahead.P)
-        x = corrected_by(self._blocks.state, self._to.state(found.K), ahead.x, y)
-        return x, found.P, found.K, bool(found.definite)
-
-    def _unscented(self, k: int, z: FloatArray, u: FloatArray | None) -> tuple[Any, bool]:
         model = self.model
+        x, F = model.moved(x, u)
+        predicted, definite = self._predicted(blocks, F, P, Q)
+        ahead, K, positive = _Ahead(x, predicted), None, True
+        for _ in range(model.iterations):
+            expected, H = model.measured(x, u)
+            y = model.difference(z, expected)
+            if x is not ahead.x:
+                y = y - H @ (ahead.x - x)
+            x, P, K, positive = self._updated(blocks, self._seen(H), R, self._seen(y), ahead)
+        return StepTaken((x, P), K, definite & positive)
 
-        def difference(a: FloatArray, b: FloatArray) -> FloatArray:
-            return self._seen(k, model.difference(a, b))
+    def _predicted(self, blocks: BlockAlgebra, F: Any, P: Any, Q: Any) -> tuple[Any, Any]:
+        if self.form in FACTORED:
+            taken = blocks.stored.covariance
+            return FACTORED[self.form][0](taken(F), P, taken(Q))
+        return predicted_in(blocks, F, P, Q), True
 
-        scale, means, covariances = self._weights
+    def _updated(self, blocks: BlockAlgebra, H: Any, R: Any, y: Any, ahead: _Ahead) -> tuple[Any, Any, Any, Any]:
+        """Return estimate, covariance, gain, and whether all variances and pivots are positive."""
+        stored = blocks.stored
+        if self.form in FACTORED:  # what the measurements correct is zero before them
+            observe = FACTORED[self.form][1]
+            observe = partial(observe, stored=stored) if self.form is Form.UD else observe
+            step = observed(observe, H, R, y, ahead.x * 0, ahead.P, stored)
+            return ahead.x + step.x, step.P, (step.gains, H, R), step.definite
+        found = measured_in(blocks, self.form, H, R, ahead.P)
+        return corrected_by(blocks.state, stored.state(found.K), ahead.x, y), found.P, found.K, found.definite
+
+    def _unscented(
+        self, blocks: BlockAlgebra, x: Any, P: Any, z: Any, Q: Any, R: Any, scale: Any, means: Any, covariances: Any,
+        u: Any = None,
+    ) -> StepTaken:  # fmt: skip
+        model = self.model
         step = UnscentedModel(
             lambda x: model.value("f", x, u),
             lambda x: model.value("h", x, u),
-            difference,
+            lambda a, b: self._seen(model.difference(a, b)),
             scale,
             means,
             covariances,
-            self._member(self._Q, k),
-            self._member(self._R, k),
+            Q,
+            R,
         )
-        found = unscented_step(self._blocks.state, step, self.x, self.P, z)
-        self.x, self.P = found.x, found.P
-        return found.K, found.definite
+        found = unscented_step(blocks.state, step, x, P, z)
+        return StepTaken((found.x, found.P), found.K, found.definite)
 
-    def _seen(self, k: int, numbers: FloatArray) -> FloatArray:
-        """Return numbers (m,) or (m, n) with zeros where a measurement of step k + 1 is missing."""
-        seen = self.model.seen(k)
+    def _seen(self, numbers: Any) -> Any:
+        """Return numbers (m,) or (m, n) with zeros where a measurement of this step is missing."""
+        seen = self._present
         if seen is None or seen.all():
             return numbers
-        found: Any = np.where(seen.reshape(-1, *(1,) * (numbers.ndim - 1)), numbers, 0)
-        return found
+        return np.where(seen.reshape(-1, *(1,) * (numbers.ndim - 1)), numbers, 0)
 
     @staticmethod
     def _member(cycle: list[FloatArray], k: int) -> FloatArray:

@@ -19,9 +19,10 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.interpreting import Call
 from gpbnb.arithmetic.machine import CODES
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.tape import Call, Tape
+from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, whole_number

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
-from gpbnb.arithmetic.machine import CODES, packed_one
-from gpbnb.arithmetic.tape import Constants, Tape
-from gpbnb.arithmetic.traced import TracedArray, TracedFormat, TracedTruth
+from gpbnb.arithmetic.interpreting import Constants
+from gpbnb.arithmetic.machine import CODES, NAMES, operands_of, packed_one
+from gpbnb.arithmetic.tape import Tape
+from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_steps import (
     BlockStorage,
@@ -30,7 +31,7 @@ from gpbnb.filters.array_steps import (
     predict_ud,
 )
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import HUNG_FORMS, BlockAlgebra, corrected, measured_in, predicted_in
+from gpbnb.filters.kalman_step import HUNG_FORMS, BlockAlgebra, corrected, measured_in, predicted_in, unnamed
 
 _TRUTHS = (CODES["compare"], CODES["combine"])
 FACTORED: dict[AnyForm, tuple[Callable[..., Any], Callable[..., Any]]] = {
@@ -174,7 +175,8 @@ def recorded_step(kind: StepKind) -> RecordedStep:
         algebra[3],
         BlockStorage(state.array, gain.array, covariance.array, innovation.array),
     )
-    found = _Step(kind, tape, blocks, given).taken(x, covariance.made(P), carried, z)
+    step = LinearStep(kind.form, blocks, given, tape.about, kind.compensated)
+    found = step.taken(x, covariance.made(P), carried, z)
     return _divided(kind, tape, places, found)
 
 
@@ -190,30 +192,48 @@ def _algebra(fmt: TracedFormat, formats: Sequence[TracedFormat], kind: StepKind)
     return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), times, inverse_in_order)
 
 
-class _Taken(NamedTuple):
-    x: TracedArray
-    carried: TracedArray
-    P: TracedArray
-    K: TracedArray
-    S: TracedArray | None
+class LinearTaken(NamedTuple):
+    """What a step gives; in the forms with factors and roots, column i of K is the gain of measurement i."""
+
+    x: Any
+    carried: Any
+    P: Any
+    K: Any
+    S: Any | None
     definite: Any
 
 
-class _Step:
-    """A step on arrays that record their operations."""
+class LinearStep:
+    """A step on arrays of any kind, also of those that record their operations.
 
-    def __init__(self, kind: StepKind, tape: Tape, blocks: BlockAlgebra, given: dict[str, Any]) -> None:
-        self.kind, self.tape, self.blocks, self.given = kind, tape, blocks, given
+    Parameters
+    ----------
+    given : matrices and known inputs of the step, by their letters.
+    about : takes the name of each quantity before it is computed.
+    compensated : whether the estimate is updated by compensated summation in a form that usually is not.
+    """
 
-    def taken(self, x: TracedArray, P: TracedArray, carried: TracedArray, z: TracedArray) -> _Taken:
+    def __init__(
+        self,
+        form: AnyForm,
+        blocks: BlockAlgebra,
+        given: dict[str, Any],
+        about: Callable[[str], None] = unnamed,
+        compensated: bool = False,
+    ) -> None:
+        self.form, self.blocks, self.given, self.about = form, blocks, given, about
+        self.compensated = compensated or form is ArrayForm.COMPENSATED
+
+    def taken(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
+        """Take a step from an estimate (n,), a covariance, factors or a root (n, n), and what compensation carries."""
         if "d" in self.given:
             z = z - self.given["d"]
-        if self.kind.form in FACTORED:
+        if self.form in FACTORED:
             return self._factored(x, P, carried, z)
         return self._covariance(x, P, carried, z)
 
-    def _covariance(self, x: TracedArray, P: TracedArray, carried: TracedArray, z: TracedArray) -> _Taken:
-        blocks, given, form, about = self.blocks, self.given, self.kind.form, self.tape.about
+    def _covariance(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
+        blocks, given, form, about = self.blocks, self.given, self.form, self.about
         stored = blocks.stored
         about("the predicted covariance")
         V = predicted_in(blocks, given["Phi"], P, given["Q"])
@@ -222,20 +242,19 @@ class _Step:
         if form is Form.HUNG_SECOND_GAIN:
             about("the gain")
             of_gain = blocks.gain.times(stored.gain(P), stored.gain(H).T)
-            K = blocks.gain.times(of_gain, stored.gain(given["RI"]))
+            RI = given["RI"] if "RI" in given else blocks.gain.invert(given["R"], blocks.gain.identity(len(H))).matrix
+            K = blocks.gain.times(of_gain, stored.gain(RI))
         own = stored.state(K)
         about("the estimate")
-        if form in HUNG_FORMS and not self.kind.compensated:
-            W = blocks.covariance.identity(self.kind.n) - blocks.covariance.times(
-                stored.covariance(K), stored.covariance(H)
-            )
+        if form in HUNG_FORMS and not self.compensated:
+            W = blocks.covariance.identity(len(P)) - blocks.covariance.times(stored.covariance(K), stored.covariance(H))
             loop = blocks.state.times(stored.state(W), stored.state(given["Phi"]))
             x = (blocks.state.times(loop, x[:, None]) + blocks.state.times(own, z[:, None]))[:, 0]
-        elif self.kind.compensated or form is ArrayForm.COMPENSATED:
+        elif self.compensated:
             x, carried = self._compensated(x, carried, own, z)
         else:
             x = corrected(blocks.state, stored.state(H), own, self._ahead(x)[:, None], z[:, None])[:, 0]
-        return _Taken(x, carried, P, K, S, definite)
+        return LinearTaken(x, carried, P, K, S, definite)
 
     def _ahead(self, x: Any) -> Any:
         return self._with_inputs(self._times(self.blocks.stored.state(self.given["Phi"]), x))
@@ -255,23 +274,23 @@ class _Step:
         after = x + change
         return after, (after - x) - change
 
-    def _factored(self, x: TracedArray, P: TracedArray, carried: TracedArray, z: TracedArray) -> _Taken:
-        stored, given, about = self.blocks.stored, self.given, self.tape.about
-        predict, observe = FACTORED[self.kind.form]
+    def _factored(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
+        stored, given, about = self.blocks.stored, self.given, self.about
+        predict, observe = FACTORED[self.form]
         about("the predicted covariance")
         P, definite = predict(
             stored.covariance(given["Phi"]), P, stored.covariance(given["UQ"]), self.blocks.covariance.times
         )
         about("the update of factors and estimate")
         ahead = self._ahead(x)
-        if self.kind.form is Form.UD:
+        if self.form is Form.UD:
             observe = partial(observe, stored=stored)
         found = observed(observe, given["H"], given["UR"], z, ahead, P, stored)
         K: Any = np.stack(found.gains, axis=1)
-        return _Taken(found.x, carried, found.P, K, None, definite & found.definite)
+        return LinearTaken(found.x, carried, found.P, K, None, definite & found.definite)
 
 
-def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], found: _Taken) -> RecordedStep:
+def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], found: LinearTaken) -> RecordedStep:
     """Divide the operations of a step into those of the gain and those of the estimate."""
     rows, formats = tape.instructions.astype(np.int64), tape.formats
     values, truths = tape.sizes
@@ -280,7 +299,7 @@ def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], f
         late[places.get(letter, [])] = True
     late_truths, later = np.zeros(truths, np.bool_), np.zeros(len(rows), np.bool_)
     for o, (code, a, b, c, out) in enumerate(rows.tolist()):
-        of = _operands(code, a, b, c)
+        of = operands_of(NAMES[code], a, b, c)
         if any(late[each] for each in of[0]) or any(late_truths[each] for each in of[1]):
             later[o] = True
             (late_truths if code in _TRUTHS else late)[out] = True
@@ -298,7 +317,7 @@ def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], f
     made[rows[mine, 4]] = True
     used = np.zeros(values, np.bool_)
     for code, a, b, c, _ in rows[later].tolist():
-        for each in _operands(code, a, b, c)[0]:
+        for each in operands_of(NAMES[code], a, b, c)[0]:
             used[each] = True
     used[np.concatenate([x.ravel(), carried.ravel()])] = True
     shared = np.flatnonzero(made & used)
@@ -309,20 +328,3 @@ def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], f
     return RecordedStep(
         early, rest, (values, truths), tape.all_constants, places, after, K, S, truth, shared, tape.labels
     )
-
-
-def _operands(code: int, a: int, b: int, c: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the numbers and the truth values that an operation takes."""
-    name = _NAMES[code]
-    if name in ("add", "subtract", "multiply", "divide", "compare"):
-        return (a, b), ()
-    if name == "fused":
-        return (a, b, c), ()
-    if name == "choose":
-        return (b, c), (a,)
-    if name == "combine":
-        return (), (a, b)
-    return ((), (a,)) if name == "skip" else ((a,), ())
-
-
-_NAMES = {code: name for name, code in CODES.items()}

@@ -74,6 +74,8 @@ class _Repeated:
                 spread = (np.newaxis,) * (len(lanes) - (self._parts > 0))
                 numbers = packed_constants(formats[0], constants)
                 self.values[constants.places] = numbers[(slice(None), *spread)]
+        self._constants = np.concatenate([self.values[np.array(each.places, np.int64)] for each in step.constants])
+        self._distant = True
         self._states = np.concatenate([step.places[each].ravel() for each in changes])
         self.after = np.concatenate([step.after[each].ravel() for each in changes])
         self._before = np.full((len(self._states), *lanes), -1, self.values.dtype)
@@ -99,6 +101,12 @@ class _Repeated:
             at += members * count
         if flat:
             self.feeds = self._machine.Feeds(np.concatenate(flat), np.array(rows, np.int64))
+        self._distant = self._far(self._constants) or self._far(self.feeds.table)
+
+    def _far(self, numbers: NDArray[Any]) -> bool:
+        """Whether numbers may be too small or too large for quick computation."""
+        sizes, least = np.abs(numbers), self._machine.LEAST
+        return self._parts == 0 and bool(np.any((sizes < least) & (sizes > 0)) or np.any(sizes > 1 / least))
 
     def compare_from(self, states: NDArray[Any], cycle: int) -> None:
         """Begin to look for states that repeat."""
@@ -137,7 +145,7 @@ class _Repeated:
         with contextlib.suppress(OverflowError, ZeroDivisionError):
             self._machine.advance(
                 self._kind,
-                self._machine.Loaded(self._formats, self._code, self.feeds),
+                self._machine.Loaded(self._formats, self._code, self.feeds, self._distant or self._far(own)),
                 first,
                 own,
                 self._machine.Places(at, self._states, self.after, kept_at, self._step.definite),

@@ -19,11 +19,13 @@ Julier & Uhlmann 2004; Wan & van der Merwe 2000.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gpbnb.arithmetic.algebra import Algebra, Matrix
+from gpbnb.filters.array_steps import if_nonzero
 from gpbnb.filters.kalman_step import corrected_by
 
 
@@ -55,7 +57,7 @@ class UnscentedStep(NamedTuple):
     x: Matrix
     K: Matrix
     P: Matrix
-    definite: bool
+    definite: Any
 
 
 def unscented_step(algebra: Algebra, model: UnscentedModel, x: Matrix, P: Matrix, z: Matrix) -> UnscentedStep:
@@ -77,7 +79,9 @@ def unscented_step(algebra: Algebra, model: UnscentedModel, x: Matrix, P: Matrix
     inverse, pivots = algebra.invert(S, algebra.identity(len(S)))
     K = (weighted @ E) @ inverse
     P = V - (K @ S) @ K.T
-    definite = all(bool(each > 0) for each in pivots) and bool(np.all(np.diagonal(P) > 0))
+    definite = np.all(np.diagonal(P) > 0)
+    for each in pivots:
+        definite = definite & np.all(each > 0)
     return UnscentedStep(corrected_by(algebra, K, ahead, model.difference(z, expected)), K, P, definite)
 
 
@@ -105,9 +109,10 @@ def lower_root(P: Matrix) -> Any:
         for column in columns:
             rest = rest - column * column[j]
         pivot = rest[j].sqrt()
-        if pivot == 0:
-            columns.append(rest * 0)
-            continue
-        below = np.where(np.arange(n) > j, rest / pivot, rest * 0)
-        columns.append(np.where(np.arange(n) == j, pivot, below))
+        columns.append(if_nonzero(pivot, partial(_column, rest, pivot, j), rest * 0))
     return np.stack(columns).T
+
+
+def _column(rest: Matrix, pivot: Any, j: int) -> Any:
+    at = np.arange(len(rest))
+    return np.where(at == j, pivot, np.where(at > j, rest / pivot, rest * 0))

@@ -129,6 +129,17 @@ def test_the_first_row_without_a_result_is_named(fmt, name, row, reason):
     assert values[3] == 2
 
 
+@pytest.mark.parametrize(("name", "powers"), [("multiply", (-600, -600)), ("divide", (-600, 600))])
+@pytest.mark.parametrize("lanes", [(), (3,)], ids=["one lane", "lanes"])
+def test_a_result_below_float64_is_no_zero_where_the_format_has_no_end(name, powers, lanes):
+    """The processor's product, or quotient, is zero."""
+    values, truths = np.zeros((3, *lanes)), np.zeros((2, *lanes), np.uint8)
+    values[0], values[1] = (2.0**each for each in powers)
+    rows = np.array([(CODES[name], 0, 1, 0, 2)], np.int64)
+    kind, formats = tables([FloatFormat(2, 24)])
+    assert evaluate(kind, formats, code_of(rows, np.zeros(1, np.int64)), values, truths) == 0
+
+
 def test_rows_are_left_out_where_a_truth_value_does_not_hold():
     skip, divide, add = (CODES[name] for name in ("skip", "divide", "add"))
     kind, formats = tables([FloatFormat(2, 24)])

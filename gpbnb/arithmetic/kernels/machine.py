@@ -111,6 +111,8 @@ class Loaded(NamedTuple):
     formats: Formats
     code: Code
     feeds: Feeds
+    #: whether numbers other than the states may be too small or too large for quick computation.
+    distant: bool
 
 
 # -- float64 with masks ------------------------------------------------------------------------------------------------
@@ -565,28 +567,68 @@ def _run_lanes(fmt: Any, code: Any, begin: int, end: int, values: Any, truths: A
     return o + 1
 
 
-def execute(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
-    """Run all rows for each lane; return how many rows have results in every lane, counted from the first."""
+LEAST = 2.0**-480
+"""Least size of the numbers with which the machine computes quickly, and the inverse of the largest: no product and no
+quotient of two of them leaves float64."""
+
+_LEAST_BITS, _SPAN_BITS = (
+    np.array([LEAST, 1 / LEAST]).view(np.int64)[0],
+    np.uint64(np.diff(np.array([LEAST, 1 / LEAST]).view(np.int64))[0]),
+)
+
+
+def far(kind: Any, values: Any) -> Any:
+    """Whether numbers are too small or too large for quick computation; those of other kinds never are."""
+    raise TypeError("got a call of far from Python; needed one from a function compiled by numba")
+
+
+@overload(far, strict=False, jit_options={"_nrt": False})
+def _overloaded_far(kind: Any, values: Any) -> Any:
+    def alone(kind: Any, values: Any) -> Any:
+        found = False
+        for i in range(values.shape[0]):
+            found |= _outside(bits(values[i]) & _MAGNITUDE, _LEAST_BITS, _SPAN_BITS)
+        return found
+
+    def in_lanes(kind: Any, values: Any) -> Any:
+        found = False
+        for i in range(values.shape[0]):
+            for j in range(values.shape[1]):
+                found |= _outside(bits(values[i, j]) & _MAGNITUDE, _LEAST_BITS, _SPAN_BITS)
+        return found
+
+    if kind.instance_class is not Masks:
+        return lambda kind, values: False
+    return alone if values.ndim == 1 else in_lanes
+
+
+def execute(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
+    """Run all rows for each lane; return how many rows have results in every lane, counted from the first.
+
+    Parameters
+    ----------
+    far : whether numbers may be too small or too large for quick computation.
+    """
     raise TypeError("got a call of execute from Python; needed one from a function compiled by numba")
 
 
 @overload(execute, strict=False, jit_options={"_nrt": False})
-def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
+def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
     tag = kind.instance_class
 
-    def of_one_lane(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
-        if quick_scalars(formats, code, values, truths):
+    def of_one_lane(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
+        if far or quick_scalars(formats, code, values, truths):
             return careful_scalars(formats, code, values, truths)
         return code.rows.shape[0]
 
-    def of_lanes(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
+    def of_lanes(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
         least = code.rows.shape[0]
-        if quick_lanes(formats, code, values, truths):
+        if far or quick_lanes(formats, code, values, truths):
             for i in range(values.shape[1]):
                 least = min(least, careful_scalars(formats, code, values[:, i], truths[:, i]))
         return least
 
-    def of_pairs(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
+    def of_pairs(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
         done = np.int64(0)
         for s in range(code.segments.shape[0]):
             end, given = code.segments[s, 1], formats.whole[code.segments[s, 2]]
@@ -601,7 +643,7 @@ def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths:
                 return ~done
         return code.rows.shape[0]
 
-    def of_two_words(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
+    def of_two_words(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
         given = formats.whole[0]
         lowest, largest = (given[7], given[8], given[9]), (given[10], given[11], given[12])
         fmt = Wide(
@@ -610,7 +652,7 @@ def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths:
         done = _run_lanes(fmt, code, 0, code.rows.shape[0], values, truths)
         return ~done if done < 0 else code.rows.shape[0]
 
-    def of_double_doubles(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
+    def of_double_doubles(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
         done = _run_lanes(kind, code, 0, code.rows.shape[0], values, truths)
         return ~done if done < 0 else code.rows.shape[0]
 
@@ -622,7 +664,7 @@ def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths:
 @compiled
 def evaluate(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
     """Run all rows once for each lane; return how many have results, counted from the first."""
-    return execute(kind, formats, code, values, truths)
+    return execute(kind, formats, code, values, truths, far(kind, values))
 
 
 DONE, ROW, CYCLE, SINCE, LASTS = range(5)
@@ -654,9 +696,11 @@ def advance(
     cycle : number of steps after which the model repeats; 0 if states are not to be compared.
     notes : see :data:`DONE` and the following; brought up to date.
     """
-    formats, code, feeds = loaded
+    formats, code, feeds, distant = loaded
     states_at, outputs, kept_at, before = places.states, places.after, places.kept, kept.before
     after = before.copy()
+    for j in range(outputs.shape[0]):
+        after[j] = values[states_at[j]]
     notes[DONE], notes[ROW] = 0, -1
     for step in range(own.shape[0]):
         for g in range(feeds.feeds.shape[0]):
@@ -668,7 +712,7 @@ def advance(
         for j in range(own.shape[1]):
             values[places.own + j] = own[step, j]
         notes[ROW] = 0
-        done = execute(kind, formats, code, values, truths)
+        done = execute(kind, formats, code, values, truths, distant | far(kind, after))
         if done < code.rows.shape[0]:
             notes[ROW] = done
             return

@@ -1,0 +1,234 @@
+"""Interpreters of a tape: its operations run on the machine, or on integers of Python, and its calls between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic import machine
+from gpbnb.arithmetic.array import FloatArray, NegativeRootError
+from gpbnb.arithmetic.kernels.exact import ExactKernel
+from gpbnb.arithmetic.machine import CODES
+
+_DIVIDE, _SQRT, _CHOOSE, _COMPARE, _COMBINE, _NONZERO, _SKIP = (
+    CODES[name] for name in ("divide", "sqrt", "choose", "compare", "combine", "nonzero", "skip")
+)
+
+
+class Call(NamedTuple):
+    """A function of arrays that is called between two operations of a tape.
+
+    Parameters
+    ----------
+    at : number of operations before it.
+    function : takes arrays of the format, each (n,), and returns another.
+    operands, results : places, each (n,).
+    """
+
+    at: int
+    function: Callable[..., FloatArray]
+    operands: Sequence[NDArray[np.int64]]
+    results: NDArray[np.int64]
+
+    @property
+    def name(self) -> str:
+        """The name of the function, as in NumPy."""
+        return str(self.function.args[0] if isinstance(self.function, partial) else self.function.__name__)
+
+
+class Constants:
+    """Numbers that a function takes from elsewhere, which each run rounds into its format.
+
+    Parameters
+    ----------
+    exactly : whether only numbers that the format holds are allowed.
+    """
+
+    def __init__(self, exactly: bool) -> None:
+        self.exactly = exactly
+        self.places: list[int] = []
+        self.numbers: list[Any] = []
+
+    def rounded(self, fmt: Any) -> FloatArray:
+        """Return the numbers in a format.
+
+        Raises
+        ------
+        TypeError, ValueError, OverflowError : as for ``fmt.array``, or for an operand of an operation.
+        """
+        found: FloatArray = fmt.array([]).operand(self.numbers) if self.exactly else fmt.array(self.numbers)
+        return found
+
+
+class Segment(NamedTuple):
+    """Operations of a tape, (o, 5), the numbers of their formats, (o,), and the call after them, if any."""
+
+    rows: NDArray[Any]
+    formats: NDArray[np.int64]
+    call: Call | None
+
+
+class InLoops:
+    """Numbers of a tape on the machine.
+
+    Parameters
+    ----------
+    tape : its operations.
+    formats : the formats that it names, all with the same kind of numbers.
+
+    Raises
+    ------
+    ValueError : a format without loops, or formats of different kinds.
+    TypeError, OverflowError : a constant that the first format cannot hold.
+    """
+
+    def __init__(self, tape: Any, formats: Sequence[Any]) -> None:
+        self._formats = formats
+        self._kind, self._tables = machine.tables(formats)
+        self._backend = formats[0].backend
+        values, truths = tape.sizes
+        parts = () if self._backend.count == 1 else (1, self._backend.count)
+        self._alone = bool(parts)
+        self._values = np.zeros((values, *parts), self._backend.dtype)
+        self._truths = np.zeros((truths, *parts[:1]), np.uint8)
+        self._truths[1] = 1
+        constants = [each.rounded(formats[0]) for each in tape.all_constants]
+        self._array = type(constants[0])
+        places = (np.array(each.places, np.int64) for each in tape.all_constants)
+        #: Whether the machine holds all constants.
+        self.sound = all(self.put(at, each) for at, each in zip(places, constants, strict=True))
+
+    def put(self, places: NDArray[np.int64], numbers: FloatArray) -> bool:
+        """Set numbers; return whether the machine holds them."""
+        backend = numbers.backend
+        if backend is not numbers.format.backend:
+            return False
+        if self._alone:
+            self._values[places, 0] = backend.pack(numbers.components)  # type: ignore[attr-defined]
+        else:
+            self._values[places] = numbers.components[0]
+        return True
+
+    def move(self, places: NDArray[np.int64], to: NDArray[np.int64]) -> None:
+        """Copy numbers to other places."""
+        self._values[to] = self._values[places]
+
+    def array(self, places: NDArray[np.int64], fmt: Any) -> FloatArray:
+        """Return the numbers at some places."""
+        found = self._values[places, 0] if self._alone else self._values[places]
+        return self._array.from_packed(found, fmt)
+
+    def truth(self, place: int) -> bool:
+        """Return a truth value."""
+        return bool(self._truths[place].all())
+
+    @staticmethod
+    def ready(segments: Iterable[Segment]) -> list[Any]:
+        """Return operations and calls as :meth:`run` takes them."""
+        return [(machine.code_of(each.rows, each.formats), len(each.rows), each.call) for each in segments]
+
+    def run(self, ready: list[Any]) -> bool:
+        """Run operations and calls; return whether the machine holds every result."""
+        for code, count, call in ready:
+            if count and machine.evaluate(self._kind, self._tables, code, self._values, self._truths) < count:
+                return False
+            if call is not None:
+                fmt = self._formats[0]
+                if not self.put(call.results, call.function(*(self.array(each, fmt) for each in call.operands))):
+                    return False
+        return True
+
+
+class OnIntegers:
+    """Numbers of a tape as significands and exponents of Python, which hold the numbers of every format."""
+
+    def __init__(self, tape: Any, fmt: Any) -> None:
+        self._kernel: ExactKernel = fmt.kernel
+        values, truths = tape.sizes
+        self._significands, self._exponents = [0] * values, [0] * values
+        self._truths, self._fmt = [False, True] + [False] * (truths - 2), fmt
+        #: Whether it holds all constants.
+        self.sound = True
+        for each in tape.all_constants:
+            numbers = each.rounded(fmt)
+            self.put(np.array(each.places, np.int64), numbers)
+            self._array = type(numbers)
+
+    def put(self, places: NDArray[np.int64], numbers: FloatArray) -> bool:
+        """Set numbers."""
+        m, e = (part.ravel().tolist() for part in numbers.on_exact_backend().components)
+        for place, significand, exponent in zip(places.ravel().tolist(), m, e, strict=True):
+            self._significands[place], self._exponents[place] = significand, exponent
+        return True
+
+    def move(self, places: NDArray[np.int64], to: NDArray[np.int64]) -> None:
+        """Copy numbers to other places."""
+        for numbers in (self._significands, self._exponents):
+            found = [numbers[i] for i in places.tolist()]
+            for place, number in zip(to.tolist(), found, strict=True):
+                numbers[place] = number
+
+    def array(self, places: NDArray[np.int64], fmt: Any) -> FloatArray:
+        """Return the numbers at some places."""
+        listed = places.ravel().tolist()
+        pair = np.empty((2, len(listed)), dtype=object)
+        pair[0], pair[1] = ([each[i] for i in listed] for each in (self._significands, self._exponents))
+        return self._array.from_pairs(*pair.reshape(2, *places.shape), fmt)
+
+    def truth(self, place: int) -> bool:
+        """Return a truth value."""
+        return self._truths[place]
+
+    @staticmethod
+    def ready(segments: Iterable[Segment]) -> list[Any]:
+        """Return operations and calls as :meth:`run` takes them."""
+        return [(each.rows.tolist(), each.call) for each in segments]
+
+    def run(self, ready: list[Any]) -> bool:
+        """Run operations and calls.
+
+        Raises
+        ------
+        ArithmeticError, ValueError : an operation has no result.
+        """
+        for rows, call in ready:
+            _run_exactly(self._kernel, rows, self._significands, self._exponents, self._truths)
+            if call is not None:
+                self.put(call.results, call.function(*(self.array(each, self._fmt) for each in call.operands)))
+        return True
+
+
+def _run_exactly(
+    kernel: ExactKernel, rows: list[list[int]], significands: list[int], exponents: list[int], truths: list[bool]
+) -> None:
+    m, e = significands, exponents
+    of_two: list[Callable[..., tuple[int, int]]] = [kernel.add, kernel.subtract, kernel.multiply, kernel.divide]
+    of_one: list[Callable[..., tuple[int, int]]] = [kernel.sqrt, kernel.negative, kernel.absolute]
+    compare, after = kernel.compare, 0
+    for o, (code, a, b, c, out) in enumerate(rows):
+        if o < after:
+            continue
+        if code <= _DIVIDE or code == _NONZERO:
+            divisor = {_DIVIDE: b, _NONZERO: a}.get(code)
+            if divisor is not None and m[divisor] == 0:
+                raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+            if code == _NONZERO:
+                continue
+            m[out], e[out] = of_two[code](m[a], e[a], m[b], e[b])
+        elif code == _CHOOSE:
+            chosen = b if truths[a] else c
+            m[out], e[out] = m[chosen], e[chosen]
+        elif code == _COMPARE:
+            truths[out] = bool(c >> (compare(m[a], e[a], m[b], e[b]) + 1) & 1)
+        elif code == _COMBINE:
+            truths[out] = bool(c >> (2 * truths[a] + truths[b]) & 1)
+        elif code == _SKIP:
+            after = 0 if truths[a] else o + 1 + b
+        else:
+            if code == _SQRT and m[a] < 0:
+                raise NegativeRootError("got the square root of a negative number; needed x >= 0")
+            m[out], e[out] = of_one[code - _SQRT](m[a], e[a])

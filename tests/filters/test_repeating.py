@@ -1,0 +1,127 @@
+"""A step that is recorded and repeated gives the digits of the step itself, run operation by operation."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb import BINARY32, BlockFormats, FixedFormat, FloatFormat, Form, NonlinearModel
+from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.array_run import ArrayRun
+from gpbnb.filters.nonlinear_run import NonlinearRun
+from gpbnb.filters.repeating import RepeatedStep
+from gpbnb.wordlength.examples import tracker
+from gpbnb.wordlength.nonlinear_examples import tracked_motion, tracked_sight
+
+Z = [[5.0, 0.93], [5.6, 0.9], [None, 0.88], [6.9, 0.86], [7.5, None], [8.1, 0.83], [8.8, 0.81], [9.4, 0.8]]
+PLANE = {"Q": np.diag([0, 0, 0.01, 0.01]), "R": np.diag([0.01, 0.0001]), "x0": [3, 4, 0.5, 0.5], "P0": np.eye(4)}
+
+
+def sight(method="extended", **options):
+    model = NonlinearModel(tracked_motion, None, tracked_sight, None, **PLANE, angles=[1], method=method, **options)
+    return model.without_missing(np.array(Z, dtype=float))
+
+
+def by_operations(monkeypatch, make, z):
+    """States of a run whose steps are not repeated."""
+    with monkeypatch.context() as patch:
+        patch.setattr(RepeatedStep, "_opened", lambda self, given, kind: None)
+        return make().states(z)
+
+
+def repeats(run) -> bool:
+    return run._step._inside is not None
+
+
+FORMATS = [
+    FloatFormat(2, 24),
+    FloatFormat(2, 20, "chop"),
+    BINARY32,
+    FloatFormat(10, 8, "even"),
+    FloatFormat(16, 8),
+    FloatFormat(2, 100, "even"),
+    FloatFormat(2, 300),
+    FixedFormat(20, 30),
+    FixedFormat(8, 60, "chop", "wrap"),
+]
+FORMS = [Form.INNOVATION, Form.JOSEPH, Form.UD, ArrayForm.SYMMETRIZED, ArrayForm.POTTER, ArrayForm.CARLSON]
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_an_unscented_and_an_iterated_filter_in_each_kind_of_numbers(fmt, monkeypatch):
+    for options in ({"method": "unscented"}, {"iterations": 2}):
+        model, z = sight(**options)
+        run = NonlinearRun(model, fmt)
+        states = run.states(z)
+        assert np.array_equal(states, by_operations(monkeypatch, lambda model=model: NonlinearRun(model, fmt), z))
+        assert len(states) == len(Z)
+        assert repeats(run)
+
+
+@pytest.mark.parametrize("form", FORMS, ids=str)
+def test_each_form(form, monkeypatch):
+    model, z = sight()
+    for fmt in (FloatFormat(2, 24), FloatFormat(10, 9), FloatFormat(2, 300)):
+        run = NonlinearRun(model, fmt, form, [8])
+        states = run.states(z)
+        assert np.array_equal(states, by_operations(monkeypatch, lambda fmt=fmt: NonlinearRun(model, fmt, form), z))
+        assert repeats(run)
+    linear = tracker()
+    z = np.linspace(0, 1, 8 * linear.m).reshape(8, linear.m)
+    run = ArrayRun(linear, FloatFormat(2, 24), form, ())
+    states = run.states(z)
+    assert np.array_equal(states, by_operations(monkeypatch, lambda: ArrayRun(linear, FloatFormat(2, 24), form, ()), z))
+    assert repeats(run)
+
+
+@pytest.mark.parametrize("base", [2, 10])
+def test_formats_of_blocks(base, monkeypatch):
+    state, gain, covariance, innovation = (FloatFormat(base, digits) for digits in (16, 12, 17, 18))
+    blocks = BlockFormats(state, gain, covariance, innovation)
+    model, z = sight()
+    run = NonlinearRun(model, blocks)
+    states = run.states(z)
+    assert np.array_equal(states, by_operations(monkeypatch, lambda: NonlinearRun(model, blocks), z))
+    assert repeats(run)
+
+
+def test_a_function_that_depends_on_more_than_its_arguments_is_called_in_each_step(monkeypatch):
+    calls = []
+
+    def turning(x):
+        calls.append(len(calls))
+        return tracked_motion(x) * (1 + len(calls))
+
+    model, z = NonlinearModel(turning, None, tracked_sight, None, **PLANE), [[5, 1]] * 3
+    run = NonlinearRun(model, FloatFormat(2, 24))
+    states, begin = run.states(z), calls.index(2)
+    assert not repeats(run)
+    assert (len(calls), begin) == (5, 2)  # two of them to record it
+    calls[:] = [0, 1]
+    assert np.array_equal(states, by_operations(monkeypatch, lambda: NonlinearRun(model, FloatFormat(2, 24)), z))
+
+
+def test_a_function_that_branches_on_a_number_is_called_in_each_step():
+    def turning(x):
+        return tracked_motion(x) if x[2] > 0 else x
+
+    run = NonlinearRun(NonlinearModel(turning, None, tracked_sight, None, **PLANE), FloatFormat(2, 24))
+    assert len(run.states([[5, 1]] * 3)) == 3
+    assert not repeats(run)
+
+
+def test_a_step_without_a_result_on_the_machine_runs_by_operations(monkeypatch):
+    """The estimate leaves the range of float64, which the format has not, and comes back."""
+    factors = [2.0**-900, 2.0**-900, 2.0**900, 2.0**900]
+    model = NonlinearModel(
+        lambda x, u: x * u[0], lambda x, u: [[u[0] * 0 + 1]], lambda x, u: x * 0, lambda x, u: [[u[0] * 0 + 1]],
+        Q=[[1]], R=[[1]], x0=[3], P0=[[1]], u=[[each] for each in factors], residual=lambda z, predicted: z,
+    )  # fmt: skip
+    fmt = FloatFormat(2, 24)
+    run = NonlinearRun(model, fmt, checkpoint_steps=range(1, 5))
+    run.take(np.zeros((4, 1)))
+    assert [x[0] for x in run.checkpoints().x] == [3 * Fraction(2) ** e for e in (-900, -1800, -900, 0)]
+    assert run.stopped is None
+    assert repeats(run)
