@@ -116,6 +116,8 @@ def test_every_figure_has_alt_text_and_a_caption(path):
         kinds = [kind for output in cell["outputs"] for kind in output.get("data", {})]
         # nbval compares the pixels of a glued picture, which differ between machines.
         assert not [kind for kind in kinds if kind.startswith("application/papermill.record/image")]
+        # JupyterLab hides SVG until the notebook has run.
+        assert kinds.count("image/svg+xml") == kinds.count("image/png")
         if not set(kinds).isdisjoint(PICTURES):
             settings = cell["metadata"].get("mystnb", {})
             assert settings.get("image", {}).get("alt", "").strip(), "".join(cell["source"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import re
 from xml.etree import ElementTree
@@ -9,6 +10,7 @@ from xml.etree import ElementTree
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from PIL import Image
 
 from gpbnb.report.display import style
 from gpbnb.report.display.vector import DECIMALS, MOST_MARKERS, element, svg
@@ -96,9 +98,13 @@ def test_thousands_of_markers_become_pixels():
     assert len(text) < 100_000
 
 
-def test_a_notebook_shows_svg_alone(monkeypatch):
+def test_a_notebook_shows_svg_and_png(monkeypatch):
     shown = []
     monkeypatch.setattr(style, "show", lambda data, raw: shown.append(data))
     fig, _ = drawn()
     fig._ipython_display_()
-    assert [sorted(data) for data in shown] == [["image/svg+xml", "text/plain"]]
+    (data,) = shown
+    assert sorted(data) == ["image/png", "image/svg+xml", "text/plain"]
+    with Image.open(io.BytesIO(base64.b64decode(data["image/png"]))) as picture:
+        assert picture.size == tuple(round(each * fig.dpi) for each in fig.get_size_inches())
+        assert min(picture.convert("RGBA").getpixel((0, 0))) >= 254  # white, of a palette

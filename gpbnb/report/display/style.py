@@ -43,7 +43,7 @@ from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 from numpy.typing import ArrayLike, NDArray
 
-from gpbnb.report.display.vector import svg
+from gpbnb.report.display.vector import png, svg
 
 OBSERVED = "#0072B2"
 """Colour of errors that were measured or simulated."""
@@ -114,7 +114,7 @@ class BookFigure(Figure):
         picture = svg(self, TEXT)
         self.set_layout_engine("none")  # it is laid out now, which takes most of the time of a drawing
         self.canvas.draw()
-        show({"image/svg+xml": picture, "text/plain": repr(self)}, raw=True)
+        show({"image/svg+xml": picture, "image/png": png(self), "text/plain": repr(self)}, raw=True)
 
     def draw(self, renderer: Any) -> None:
         """Draw the figure after the names at its right edge have found their places."""

@@ -68,6 +68,13 @@ def svg(fig: Figure, size: float) -> str:
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
+def png(fig: Figure) -> str:
+    """Return a drawn figure on white as PNG in base 64, which JupyterLab shows before it trusts a notebook's SVG."""
+    made = io.BytesIO()
+    fig.savefig(made, format="png", facecolor="white", dpi=fig.dpi)
+    return _with_palette(base64.b64encode(made.getvalue()).decode()).removeprefix(_PNG)
+
+
 def address(fig: Figure, size: float) -> str:
     """Return a drawn figure as an address that holds it, for the picture of an HTML page; see :func:`svg`."""
     fig.canvas.draw()
