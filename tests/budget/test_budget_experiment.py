@@ -99,10 +99,3 @@ def test_the_example_has_four_rows_to_be_refused():
     assert [row.line for row in EXAMPLE.refused] == [9, 10, 11, 12]
     assert len(EXAMPLE.budget.sources) == 7
     assert all(not source.unforeseen for source in EXAMPLE.budget.sources)
-
-
-def test_bad_input_is_refused():
-    rng = np.random.default_rng(0)
-    for budget, trials in ((Budget(()), 5), (EXAMPLE.budget, 0)):
-        with pytest.raises(ValueError, match="needed at least one of each"):
-            experiment.draw(budget, trials, rng)

@@ -242,39 +242,6 @@ def test_a_row_over_several_lines_counts_them():
     assert reading.refused[0].line == 4
 
 
-@pytest.mark.parametrize(
-    ("header", "message"),
-    [
-        ("", "line 1: got columns none; needed name, kind, form, error_mas.*name, kind, form, error_mas missing"),
-        ("name,kind,form", "error_mas missing"),
-        ("name,kind,form,error_mas,size", "size unknown or repeated"),
-        ("name,kind,form,error_mas,roll,roll", "roll unknown or repeated"),
-    ],
-)
-def test_a_bad_header_is_refused(header, message):
-    with pytest.raises(ValueError, match=message):
-        theory.parse(header + "\n" + GOOD)
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: Budget(made(1).sources * 2), "got 's0' more than once"),
-        (lambda: Source(" a", Kind.CONSTANT, ErrorForm.BIAS, 1), "got name ' a'; needed a text without"),
-        (lambda: Source("a", "random constant", ErrorForm.BIAS, 1), "needed a Kind and an ErrorForm"),
-        (lambda: theory.equal_error(-1, 3), "got a total of -1 over 3 sources"),
-        (lambda: theory.equal_error(1, 0), "over 0 sources"),
-        (lambda: theory.equal_sources(1, 0), "from errors of 0"),
-        (lambda: theory.cycles_factor(-1), "got -1 cycles"),
-        (lambda: theory.white_factor(0.5), "got 0.5 readings"),
-        (lambda: theory.correlated_factor(1, 0), "got T = 1 and tau = 0"),
-    ],
-)
-def test_bad_input_is_refused(call, message):
-    with pytest.raises(ValueError, match=message):
-        call()
-
-
 @pytest.mark.parametrize("text", ["1_0", "٣", "1e999", "nan", "inf", "0x10", "１"])
 def test_only_plain_finite_numbers_are_read(text):
     """Python's float reads the first two as 10 and 3."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -137,23 +135,3 @@ def test_small_angle_errors_are_the_loss(name):
     # fourth order: the largest angle, 5e-3, against one; and 1e-17 of rounding against errors of 5e-15
     assert np.allclose(errors, theory.small_angle_loss(name, sizes, drift), rtol=6e-3, atol=0)
     assert np.allclose(errors[:2], theory.small_angle_loss(name, sizes[:2], drift), rtol=1e-4, atol=1e-9 * MAS)
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: experiment.year(Misalignments(), 0), "got a roll period of 0 s"),
-        (lambda: experiment.year(Misalignments(), 600, -1), "a step of -1 s; needed both above 0"),
-        (lambda: experiment.year(Misalignments(), 600, math.nan), "needed both above 0"),
-        (lambda: experiment.year(Misalignments(), 600, 1e6), "needed at least a hundred samples per year"),
-        (lambda: experiment.year(Misalignments(), 600.05), "needed multiples of 0.1 s"),
-        (lambda: experiment.parts(Misalignments(), samples=2), "got 2 samples in a roll; needed 3 or more"),
-        (
-            lambda: experiment.year(Misalignments(), 600, 300.0),
-            "got 2 samples in whole rolls of 600 s; needed 3 or more",
-        ),
-    ],
-)
-def test_bad_input_is_refused(call, message):
-    with pytest.raises(ValueError, match=message):
-        call()

@@ -82,19 +82,6 @@ def test_a_filter_that_stops_leaves_no_numbers():
     assert np.isinf(largest).all()
 
 
-def test_what_does_not_fit_is_refused(measured):
-    told = model(MODELS[0], 2)
-    with pytest.raises(ValueError, match="any but UD"):
-        Run(told, REFERENCE, Form.UD, (), records=2)
-    with pytest.raises(ValueError, match="at least one record"):
-        Run(told, REFERENCE, Form.HUNG, (), records=0)
-    many = Run(told, REFERENCE, Form.HUNG, (), records=2)
-    with pytest.raises(ValueError, match=r"needed \(steps, 2, 2\)"):
-        many.carry(measured, 4)
-    with pytest.raises(ValueError, match=r"needed \(p, 2, 10\)"):
-        many.use_measurement_matrices(np.zeros((3, 2, 9)))
-
-
 def test_measurement_matrices_may_be_replaced(measured):
     told = model(MODELS[0], 2)
     H = told.to_float()["H"]

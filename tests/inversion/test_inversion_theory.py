@@ -374,18 +374,6 @@ def test_input_is_left_alone():
     assert [stage.tolist() for stage in before] == STAGES
 
 
-@pytest.mark.parametrize(
-    ("beta", "message"),
-    [
-        (Fraction(1, 20), r"got ‖E‖ = \S+; needed less than 1; .* more digits"),
-        (Fraction(1, 4), "got 4 roundings with unit roundoff 0.25"),
-    ],
-)
-def test_a_bound_that_does_not_exist_is_refused(beta, message):
-    with pytest.raises(ValueError, match=message):
-        theory.strict_bound(MADE_UP, beta)
-
-
 def test_one_by_one():
     """A single number: no elimination, one division."""
     fmt = FloatFormat(10, 3)

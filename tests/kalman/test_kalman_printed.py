@@ -9,7 +9,6 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, max_norm, row_sum_norm
-from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import reference
 from gpbnb.report.kalman import exact_step, printed, report_bounds
@@ -71,14 +70,3 @@ def test_beyond_the_last_step_its_sizes_are_kept(found):
 
 def test_the_powers(found):
     assert 10 ** found.powers() == pytest.approx(found.columns[-1] ** (len(Z) - 1), rel=1e-12)
-
-
-@pytest.mark.parametrize("checkpoint_steps", [(1, 3), (2, 3), ()])
-def test_steps_left_out_are_refused(checkpoint_steps):
-    true = (
-        reference(TWO, Z, checkpoint_steps)
-        if checkpoint_steps
-        else Checkpoints((), *(np.empty((0, 1), dtype=object) for _ in range(3)))
-    )
-    with pytest.raises(ValueError, match=r"got the steps .*; needed 1, 2, 3"):
-        printed.terms(TWO, true)

@@ -58,12 +58,6 @@ def test_the_printed_cases():
     assert (report_bounds.transition_count(n, m), report_bounds.input_count(n, m)) == (38, 29)
 
 
-@pytest.mark.parametrize("numbers", [(0, 1, 1), (1, 0, 1), (1, 1, 0)])
-def test_coefficients_refuse_nothing(numbers):
-    with pytest.raises(ValueError, match="needed each at least 1"):
-        report_bounds.coefficients(*numbers)
-
-
 def test_printed_bounds_of_covariance_and_gain():
     beta = Fraction(1, 1000)
     assert report_bounds.printed_covariance_bound([[2, -1], [-1, 3]], 1, beta).tolist() == [
@@ -96,12 +90,6 @@ def test_required_precision_is_enough_and_the_least(base, rounding, coefficient)
     t = report_bounds.precision_for_coefficient(coefficient, Fraction(1, 3), base, rounding)
     assert coefficient * FloatFormat(base, t, rounding).unit_roundoff <= Fraction(1, 3)
     assert t == 1 or coefficient * FloatFormat(base, t - 1, rounding).unit_roundoff > Fraction(1, 3)
-
-
-@pytest.mark.parametrize(("coefficient", "tolerance"), [(0, 1), (1, 0), (-1, 1)])
-def test_required_precision_needs_positive_numbers(coefficient, tolerance):
-    with pytest.raises(ValueError, match="needed both positive"):
-        report_bounds.precision_for_coefficient(coefficient, tolerance)
 
 
 def test_the_closing_example():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any
 
 import numpy as np
 import pytest
@@ -80,22 +79,6 @@ def test_the_order_of_sums_changes_digits_and_little_else() -> None:
     assert np.abs(np.log2(left / pairwise)).max() < 2
 
 
-@pytest.mark.parametrize(
-    ("fmt", "form", "options", "told"),
-    [
-        (BINARY32, Form.UD, {"order": "pairwise"}, "needed another form"),
-        (BINARY32, Form.HUNG, {"order": "random"}, "needed 'left', 'pairwise' or 'blocked'"),
-        (BINARY32, Form.HUNG, {"order": "blocked", "block": 0}, "needed at least 1"),
-        (BINARY32, Form.HUNG, {"order": "pairwise", "fused": True}, "needed one of the two"),
-        (FloatFormat(10, 8), Form.HUNG, {"order": "pairwise"}, "needed up to 52 bits"),
-    ],
-    ids=["UD", "unknown", "no block", "fused", "decimal"],
-)
-def test_orders_that_are_not_there_are_refused(fmt: FloatFormat, form: Form, options: Any, told: str) -> None:
-    with pytest.raises(ValueError, match=told):
-        Run(examples.tilt(), fmt, form, (1,), Sums(**options))
-
-
 def test_what_does_not_fit_is_refused_and_named() -> None:
     model = examples.tilt()
     narrow = processors.outcome(model, MEASURED, Processor("narrow", FixedFormat(7, 8)))
@@ -145,11 +128,6 @@ def test_variants_differ_in_one_property_each() -> None:
     names = [each.name for each in processors.variants(8)]
     assert len(names) == len(set(names)) == 8
     assert len(processors.variants(24)) == 7
-
-
-def test_the_name_of_a_processor_is_text():
-    with pytest.raises(TypeError, match="got name 5 of type int; needed text"):
-        processors.Processor(5, BINARY32)
 
 
 def test_increments_are_of_a_process_with_the_stated_bandwidth() -> None:

@@ -173,23 +173,3 @@ def test_memory_does_not_grow_with_the_length():
 
 def test_the_longest_record_is_taken():
     assert next(flicker(0.0, LONGEST, 2, rng(), 5)).tolist() == [[0, 0]] * 5
-
-
-@pytest.mark.parametrize(
-    ("function", "arguments", "message"),
-    [
-        (flicker, (-1.0, 10, 1, rng()), "got a noise level of -1.0; needed a finite number"),
-        (flicker, (math.nan, 10, 1, rng()), "got a noise level of nan"),
-        (flicker, (math.inf, 10, 1, rng()), "got a noise level of inf"),
-        (flicker, (1.0, 0, 1, rng()), "got 0 samples, 1 channels, blocks of 32768; needed at least 1 of each"),
-        (flicker, (1.0, 5, 0, rng()), "got 5 samples, 0 channels"),
-        (flicker, (1.0, 5, 1, rng(), 0), "blocks of 0"),
-        (flicker, (1.0, LONGEST + 1, 1, rng()), "needed at most 10000000000; take several records"),
-        (exponentials, (0.5,), "got an accuracy of 0.5; needed 1e-12 to 0.1"),
-        (exponentials, (1e-13,), "got an accuracy of 1e-13"),
-        (exponentials, (1e-6, 0), "got 0 samples; needed 1 to"),
-    ],
-)
-def test_refused_at_once(function, arguments, message):
-    with pytest.raises(ValueError, match=message):
-        function(*arguments)

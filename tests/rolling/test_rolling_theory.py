@@ -269,12 +269,6 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("function", "arguments", "message"), REFUSED)
-def test_refused_with_what_came_and_what_was_needed(function, arguments, message):
-    with pytest.raises(ValueError, match=message):
-        function(*arguments)
-
-
 def test_a_wandering_roll_rate_has_the_derived_coefficients():
     """A unit step of the rate at u moves the phase by t - u; with resets every P it moves it by P/2 on average."""
     t, u = sp.symbols("t u")
