@@ -162,7 +162,7 @@ def compare(row: Row, count: int, seed: int) -> Count:
         if operation == "convert":
             operands: Any = [[_long(draw, fmt, r)] for _ in range(count)]
         else:
-            operands = draw.operands(fmt, operation, count, r)
+            operands = draw.operands(fmt, operation, count, r) + edges(fmt, operation, r)
         values = expected(fmt, operation, operands)
         beyond = [x for x, value in zip(operands, values, strict=True) if isinstance(value, str)]
         within = [(x, value) for x, value in zip(operands, values, strict=True) if not isinstance(value, str)]
@@ -179,6 +179,17 @@ def compare(row: Row, count: int, seed: int) -> Count:
             for (x, value), number in zip(within, found, strict=True) if number != value
         ][:3]  # fmt: skip
     return Count(row, compared, wrong)
+
+
+def edges(fmt: Format, operation: str, r: Callable[[Fraction], Fraction]) -> Any:
+    """Sums of all nines that carry, and of one that borrows a digit, to a tie or just beside it."""
+    if isinstance(fmt, Fixed) or operation not in ("add", "subtract"):
+        return []
+    b, unit = fmt.base, Fraction(fmt.base) ** (1 - fmt.precision)
+    sums = [(b - unit, (1 + Fraction(b, 2) + k * unit) * unit) for k in (-1, 0, 1)]
+    sums += [(Fraction(1), -(1 + k * unit) * unit / (2 * b)) for k in (-1, 0, 1)]
+    sign = 1 if operation == "add" else -1
+    return [[r(x * side), r(y * side * sign)] for x, y in sums for side in (1, -1)]
 
 
 def _found(fmt: Format, operation: str, operands: Any) -> Any:
