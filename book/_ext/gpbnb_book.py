@@ -31,8 +31,10 @@ REDIRECT = """<!DOCTYPE html>
 """
 MOVED = {
     "calculators": "rounding.html#on-your-own-format",
+    "contraction": "kalman.html#measure-each-step-then-add-up",
     "open": "errata.html#what-the-documents-leave-undone",
     "reading": "index.html#run-and-cite",
+    "year": "kalman.html#a-year-at-t-bits",
 }
 """Pages that are now part of another, in the folder of the book, and where their content is."""
 

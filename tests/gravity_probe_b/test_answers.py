@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -12,11 +11,8 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
-from gpbnb.report.display import style
 from gpbnb.report.gravity_probe_b import answers, year
-from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures
-from gpbnb.report.kalman import figures, report_bounds
-from gpbnb.report.wordlengths import study
+from gpbnb.report.kalman import report_bounds
 
 
 def test_the_answers_are_those_of_the_example_and_of_the_years():
@@ -90,27 +86,7 @@ def test_only_the_usual_model_counts():
     assert {run.case.model for run in answers.find_answers().runs} == {year.MODELS[0]}
 
 
-def test_the_picture_shows_each_answer_and_every_run():
-    _, axes = style.figure(height=4.8)
-    found = answers.find_answers()
-    gravity_probe_b_figures.digits_needed(found, axes[0], others=True)
-    shown = {line.get_label(): line for line in axes[0].lines}
-    marked = {
-        "asked for in print": found.printed,
-        "by the printed formula": found.formula,
-        "by the corrected formula": found.corrected,
-    }
-    for name, places in marked.items():
-        assert list(shown[name].get_xdata()) == list(places)
-        # The report grants an error as large as the estimate.
-        assert set(shown[name].get_ydata()) == {6606}
-    drawn = sum(len(shown[f"emulated, {word}"].get_xdata()) for word in ("chopped", "rounded"))
-    assert drawn == sum(run.case.fmt is not None for run in found.runs)
-    axes[0].figure.canvas.draw()
-    assert style.defects(axes[0].figure) == []
-
-
-def test_the_ring_marks_the_fewest_bits_within_the_tolerance():
+def test_the_fewest_bits_are_those_within_the_tolerance():
     found = answers.find_answers()
     usual = {
         run.case.precision: answers.largest(run)
@@ -120,48 +96,5 @@ def test_the_ring_marks_the_fewest_bits_within_the_tolerance():
     within = {precision for precision, error in usual.items() if error <= 1}
     assert found.bits == min(within) == 32
     assert found.error == usual[32]
-    _, axes = style.figure()
-    gravity_probe_b_figures.digits_needed(found, axes[0])
-    (ring,) = (line for line in axes[0].lines if line.get_markersize() == 13)
-    assert ring.get_xdata()[0] == answers.decimal_digits(FloatFormat(2, 32))
-    assert ring.get_ydata()[0] == found.error
     with pytest.raises(ValueError, match="needed one that a run in bits meets"):
         answers._fewest_bits(found.runs, 1e-20)
-
-
-def test_every_figure_draws_the_same_bound(monkeypatch):
-    """Front page, chapter on the filter, its year by steps, and the chapter on wordlength."""
-    drawn = []
-    exact = report_bounds.bound_for_size
-
-    def spy(beta, *arguments, **faults):
-        value = exact(beta, *arguments, **faults)
-        drawn.append((beta, value))
-        return value
-
-    monkeypatch.setattr(report_bounds, "bound_for_size", spy)
-    found = answers.find_answers()
-    counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
-    lines = []
-    for others in (False, True):
-        _, axes = style.figure()
-        drawn.clear()
-        gravity_probe_b_figures.digits_needed(found, axes[0], others)
-        heights = [float(value) for _, value in drawn]
-        assert len(heights) == 100  # two lines of fifty points
-        lines.append(
-            [list(line.get_ydata()) for line in axes[0].lines if list(line.get_ydata()) in (heights[:50], heights[50:])]
-        )
-    assert lines[0] == lines[1]
-    assert len(lines[0]) == 2
-    fmt = FloatFormat(2, 24)
-    drawn.clear()
-    (year_end,) = figures.bound_by_steps([report_bounds.EXAMPLE[0]], fmt, {})
-    assert drawn == [(fmt.unit_roundoff, year_end)]
-    assert year_end == pytest.approx(6606 * 2.0**-24 * (counts.first + counts.second), rel=1e-15)
-    # The chapter on wordlength draws the bits at which the same bound meets the tolerance.
-    drawn.clear()
-    bits = study.printed_precision(*report_bounds.EXAMPLE, Fraction(1), report_bounds.YEAR_SIZE)
-    met = {beta: value <= 1 for beta, value in drawn}
-    assert met[FloatFormat(2, bits).unit_roundoff]
-    assert not met[FloatFormat(2, bits - 1).unit_roundoff]

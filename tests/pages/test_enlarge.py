@@ -7,7 +7,7 @@ import pytest
 from . import axe
 from . import browser as tools
 
-ADDRESS = "book/year.html"
+ADDRESS = "book/geometry.html"
 SHOWN = "() => document.querySelector('dialog.enlarged')?.open ?? false"
 
 

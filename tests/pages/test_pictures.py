@@ -25,7 +25,7 @@ from . import browser as tools
 
 ADDRESSES = {
     "numberline": "book/rounding.html",
-    "year": "book/year.html",
+    "year": "book/kalman.html",
     "roll": "book/rolling.html",
     "step": "book/guarantee.html",
 }

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
@@ -21,7 +21,6 @@ from gpbnb.report.display.style import (
     OBSERVED_OTHERS,
     REFERENCE,
     REFUTED,
-    TEXT,
     VALID,
     bits_colour,
     label,
@@ -30,13 +29,10 @@ from gpbnb.report.display.style import (
     name,
     name_ends,
 )
-from gpbnb.report.gravity_probe_b.answers import Answers, decimal_digits, largest
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS, YEAR_SECONDS
 from gpbnb.report.gravity_probe_b.summary import DRIFT, YearAnswer, binary_digits
 from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.gravity_probe_b.year import Year
-from gpbnb.report.kalman import report_bounds
-from gpbnb.report.kalman.figures import bound_by_digits
 
 _QUANTITIES = {
     "drift": "error of the drift angle (mas)",
@@ -104,47 +100,6 @@ def _name(run: Year) -> str:
     return arithmetic(fmt) + ("" if run.case.form is Form.HUNG else f", {run.case.form}")
 
 
-def digits_needed(found: Answers, ax: Axes, others: bool = False) -> list[Artist]:
-    """Draw the largest error of drift or rate in a year against digits and bits, with (125), and ring the answer.
-
-    Parameters
-    ----------
-    found : printed and observed answers, and the emulated years.
-    others : also mark the digits that the printed formula and the corrected one ask for.
-    """
-    artists: list[Artist] = []
-    for rounding, face, word in (
-        (Rounding.NEAREST, OBSERVED, "emulated, rounded"),
-        (Rounding.CHOP, "none", "emulated, chopped"),
-    ):
-        group = [run for run in found.runs if run.case.rounding is rounding]
-        artists += ax.plot(*zip(*_points(group), strict=True), "o", color=OBSERVED, mfc=face, ms=5, label=word)
-    for word, faults, style, place in (
-        ("(125)\nas printed", {}, "--", (3.3, 1e9)),
-        ("(125), errors corrected", report_bounds.ALL_CORRECTED, "-.", (17.4, 5e9)),
-    ):
-        artists += bound_by_digits(ax, faults, ls=style)
-        artists.append(name(ax, word, place, REFUTED, (0, 0), ha="left"))
-    size = float(report_bounds.YEAR_SIZE)
-    marks = [("o", REFUTED, found.printed, "asked for in print")]
-    if others:
-        marks += [("s", BLACK, found.formula, "by the printed formula")]
-        marks += [("^", BLACK, found.corrected, "by the corrected formula")]
-    for marker, colour, places, word in marks:
-        artists += ax.plot(places, [size] * 2, marker, mfc="none", mec=colour, ms=10, mew=1.5, ls="none", label=word)
-    artists += _standards(ax)
-    artists += _levels(ax, found.tolerance, size)
-    artists += _answer(ax, found)
-    ax.set_yscale("log")
-    ax.set_xlim(3, 23.5)
-    ax.set_ylim(1e-12, 1e24)
-    ax.set_yticks(10.0 ** np.arange(-8, 24, 8))
-    ax.set_xticks(range(4, 24, 2))
-    legend(ax, loc="upper right")
-    label(ax, "decimal digits, $1-\\log_{10} 2\\beta$", "largest error in a year (mas, mas/yr)")
-    return artists
-
-
 def answer_line(found: Sequence[YearAnswer], ax: Axes) -> list[Artist]:
     """Draw the answers of the front page over bits, one line for each tolerance, and ring the answer to the title."""
     own, simulated, formula, years, every = (
@@ -174,51 +129,6 @@ def answer_line(found: Sequence[YearAnswer], ax: Axes) -> list[Artist]:
     legend(ax, loc="upper right", ncols=3)
     label(ax, "bits", "allowed")
     return artists
-
-
-def _standards(ax: Axes) -> list[Artist]:
-    """Draw the two standard formats, and an axis of bits at the top."""
-    bits = ax.secondary_xaxis("top", functions=(_bits, _digits))
-    bits.set_xlabel("bits")
-    bits.set_xticks([16, 24, 32, 40, 53, 64])
-    bits.tick_params(labelsize=TEXT)
-    bits.xaxis.label.set_fontsize(TEXT)
-    artists: list[Artist] = []
-    for word, fmt in (("binary32", BINARY32), ("binary64", BINARY64)):
-        place = decimal_digits(fmt)
-        artists.append(ax.axvline(place, ymax=0.6, color=REFERENCE, ls=":"))
-        artists.append(name(ax, word, (place, 1e-12), REFERENCE, (-4 if fmt is BINARY32 else 4, 3)))
-    return artists
-
-
-def _levels(ax: Axes, tolerance: float, size: float) -> list[Artist]:
-    artists: list[Artist] = []
-    for height, words in ((tolerance, "tolerance"), (size, "drift in\na year")):
-        artists.append(ax.axhline(height, color=REFERENCE, ls=":"))
-        artists += name_ends(ax, {words: (height, REFERENCE)})
-    return artists
-
-
-def _answer(ax: Axes, found: Answers) -> list[Artist]:
-    """Ring the run with the fewest bits that stayed within the tolerance, and write its bits and digits beside it."""
-    place, height = decimal_digits(FloatFormat(2, found.bits)), found.error
-    artists: list[Artist] = [*ax.plot([place], [height], "o", mfc="none", mec=BLACK, ms=13, mew=2)]
-    artists += ax.plot([place, place], [1e-12, height / 30], color=BLACK, lw=1.4)
-    artists.append(name(ax, f"{found.bits} bits or\n{place:.1f} digits", (place, 1e-6), BLACK, (5, 0)))
-    return artists
-
-
-def _bits(digits: ArrayLike) -> NDArray[np.float64]:
-    return 1 + (np.asarray(digits, dtype=np.float64) - 1) * math.log2(10)
-
-
-def _digits(bits: ArrayLike) -> NDArray[np.float64]:
-    return 1 + (np.asarray(bits, dtype=np.float64) - 1) / math.log2(10)
-
-
-def _points(runs: Sequence[Year]) -> list[tuple[float, float]]:
-    """List the digits of each rounded run and its largest error in the year."""
-    return [(decimal_digits(fmt), largest(run)) for run in runs if (fmt := run.case.fmt) is not None]
 
 
 def shares(found: Sequence[Share], ax: Axes, tolerance: float = 1.0) -> list[Artist]:

@@ -5,22 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
-from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.bounds.bounded_run import BoundedHistory
-from gpbnb.filters import contraction
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.display.tables import Table, short
-from gpbnb.report.gravity_probe_b import threshold, year
+from gpbnb.report.gravity_probe_b import threshold
 from gpbnb.report.gravity_probe_b.answers import Moved
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS
 from gpbnb.report.gravity_probe_b.model import STATES
 from gpbnb.report.gravity_probe_b.threshold import Share
-from gpbnb.report.kalman import report_bounds
-from gpbnb.report.kalman.printed import Terms
 from gpbnb.wordlength.requirement import Requirement
 
 
@@ -37,61 +30,6 @@ def states(model: LinearModel) -> Table:
 
 def _root(variance: float) -> str:
     return short(math.sqrt(variance), 3)
-
-
-def year_ends(runs: Sequence[year.Year]) -> Table:
-    """Tabulate errors at the last step, the first non-positive variance, and the model if there are several."""
-    several = len({run.case.model for run in runs}) > 1
-    body = []
-    for run in runs:
-        if run.case.fmt is None:
-            raise ValueError(
-                "got the reference among the runs; needed only rounded runs, because the reference has no error"
-            )
-        found = (np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max(), run.gain[-1], run.covariance[-1])
-        cells = [arithmetic(run.case.fmt), str(run.case.form), *(short(float(each)) for each in found)]
-        lost = f"; first non-positive variance at step {run.indefinite:,}" if run.indefinite else ""
-        body.append((*([run.case.model] if several else []), *cells, short(float(run.least_eigenvalue[-1])) + lost))
-    header = (
-        *(["model"] if several else []),
-        "arithmetic",
-        "form",
-        "error of the drift (mas)",
-        "error of the rate (mas/yr)",
-        "relative error of the gain",
-        "relative error of the covariance",
-        "smallest eigenvalue",
-    )
-    return Table("errors after a year", header, tuple(body))
-
-
-def slack(runs: Sequence[year.Year], bounds: Sequence[year.YearBounds], terms: Terms) -> Table:
-    """Tabulate bound / error of the drift rate after a year, for the smallest value of (125) and the companion bound.
-
-    Parameters
-    ----------
-    runs, bounds : rounded runs, and the bound of the reference for each.
-    terms : terms of the model, the same for all runs.
-    """
-    body = []
-    for run, reference in zip(runs, bounds, strict=True):
-        fmt, k = run.case.fmt, int(run.steps[-1])
-        if fmt is None or reference.steps[-1] != k:
-            raise ValueError(
-                f"got {run.case.name} with a bound up to step {reference.steps[-1]}; needed one up to step {k}"
-            )
-        at = int(np.abs(run.rate[-1]).argmax())
-        error = abs(float(run.rate[-1, at]))
-        companion = float(contraction.companion_bound(run.rate[-1, at], reference.rate[-1, at]))
-        cells = [terms.smallest_bound(fmt, k, **faults) / error for faults in report_bounds.CORRECTIONS.values()]
-        body.append((arithmetic(fmt), short(error), *(short(each) for each in cells), f"{companion / error:.5f}"))
-    header = (
-        "arithmetic",
-        "error of the rate (mas/yr)",
-        *(f"(125), {name}" for name in report_bounds.CORRECTIONS),
-        "companion bound",
-    )
-    return Table(f"bound over error, {len(body)} years", header, tuple(body))
 
 
 def requirements(answers: Sequence[tuple[str, Requirement]]) -> Table:
@@ -200,38 +138,3 @@ def needed_precisions(found: Sequence[Share]) -> Table:
         "99 %, proved with 95 % confidence",
     )  # fmt: skip
     return Table("smallest precision that stays within a milliarcsecond", head, tuple(rows))
-
-
-def bound_costs(
-    found: Sequence[tuple[FloatFormat, BoundedHistory]], terms: Terms, reference: year.YearBounds, time: float
-) -> Table:
-    """Tabulate the cost of each bound of a run, and bound / error of the drift rates at the last step.
-
-    Parameters
-    ----------
-    found : formats and their bounded runs, all with the same measurements and steps.
-    terms : terms of the model for (125).
-    reference : bounds of the run in double-double, which serves as the companion.
-    time : processor time of that run with its bound, over that of a rounded run.
-    """
-    k = int(found[0][1].history.steps[-1])
-    (row,) = np.flatnonzero(np.asarray(reference.steps) == k)
-    ratios: dict[str, list[str]] = {"(125), least $B$": [], "running bound": [], "companion bound": []}
-    for fmt, each in found:
-        error = np.abs(each.history.state[-1, 2:4])
-        at = int(error.argmax())
-        bounds = (
-            terms.smallest_bound(fmt, k),
-            float(each.state[-1, 2 + at]),
-            float(contraction.companion_bound(error[at], reference.rate[row, at])),
-        )
-        for cells, value in zip(ratios.values(), bounds, strict=True):
-            cells.append(f"{value / float(error[at]):.3g}")
-    costs = (
-        ("a formula", "none"),
-        (f"{time:.0f} times the run", "106 bits, to repeat each step"),
-        (f"{time:.0f} times the run", "106 bits, for a second run"),
-    )
-    body = tuple((name, *cost, *cells) for (name, cells), cost in zip(ratios.items(), costs, strict=True))
-    head = ("bound", "processor time", "extra precision", *(f"bound / error, {arithmetic(fmt)}" for fmt, _ in found))
-    return Table(f"what a bound costs, after {k} steps", head, body)

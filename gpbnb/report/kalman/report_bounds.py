@@ -228,17 +228,6 @@ def written_changes(digits: Mapping[str, float]) -> dict[str, tuple[str, str]]:
     }
 
 
-def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction:
-    """Return the second coefficient with × in place of +, k(3n + 1) · 0.5(k - 1)(7n + 3m + 6).
-
-    Parameters
-    ----------
-    k, n, m : as in :func:`coefficients`.
-    loop : another value of 7n + 3m + 6.
-    """
-    return Fraction(k * (3 * n + 1) * (k - 1), 2) * (7 * n + 3 * m + 6 if loop is None else loop)
-
-
 def one_digit_misprints(k: int, n: int, m: int, printed: str) -> list[tuple[int, int, int]]:
     """List every (a, b, c) that differs from (7, 3, 6) in one digit and makes k(an + bm + c) print as `printed`."""
     right = (7, 3, 6)
@@ -264,10 +253,6 @@ def order(second: bool) -> tuple[str, ...] | None:
         return None
 
 
-#: The drift of a year that relativity predicts, in mas, Everitt et al. 2011; the norm of the state and B in figures.
-YEAR_SIZE = Fraction(6606)
-
-
 def bound_for_size(beta: Fraction, k: int, n: int, m: int, size: Fraction, **faults: bool) -> Fraction:
     r"""Return bound (125) with :math:`\|x_k\| = B` = size; every line of (125) in a figure uses this function.
 
@@ -279,15 +264,3 @@ def bound_for_size(beta: Fraction, k: int, n: int, m: int, size: Fraction, **fau
     faults : faults to correct, as for :func:`coefficients`.
     """
     return state_bound(size, size, beta, coefficients(k, n, m, **faults))
-
-
-def gravity_probe_b_bound(beta: Fraction, k: int, **faults: bool) -> float:
-    """Return bound (125) for Gravity Probe B in mas, with n = 10, m = 2, and the drift of a year as size.
-
-    Parameters
-    ----------
-    beta : unit roundoff.
-    k : steps.
-    faults : faults to correct, as for :func:`coefficients`.
-    """
-    return float(bound_for_size(beta, k, *EXAMPLE[1:], YEAR_SIZE, **faults))

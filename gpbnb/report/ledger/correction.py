@@ -60,7 +60,7 @@ def changes() -> tuple[str, str]:
         f"three, (125) demands {digits['covariance errors carried on'][0]} digits. Even then it is not a bound.",
         "In (125), $B$ bounds every input, however many steps ago it entered, so nothing is forgotten. The correction "
         "multiplies an error made $i$ steps ago by $F^i$. If $F<1$, the filter forgets it, and the sum stays below a "
-        f"limit. If row sums exceed 1, the sum grows without limit; the {chapter('contraction')} therefore measures "
+        f"limit. If row sums exceed 1, the sum grows without limit; the {chapter('kalman')} therefore measures "
         f"errors in another norm. An emulated year stays within 1 mas with {year:.1f} "
         f"decimal digits, and the bound for every admissible record, scaled from 53 bits, demands {every:.1f}.",
     )

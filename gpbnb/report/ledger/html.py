@@ -12,8 +12,6 @@ CHAPTERS = {
     "rounding": "Rounding bounds",
     "inversion": "Matrix inversion",
     "kalman": "Why (125) fails",
-    "contraction": "A bound that holds",
-    "year": "One year of Gravity Probe B",
     "rolling": "1/f noise: roll and deroll",
     "integration": "Digital integration error",
     "budget": "Error budget",
