@@ -7,12 +7,7 @@ from pathlib import Path
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Write a file as a whole or not at all: on a full disk, what it held stays.
-
-    Raises
-    ------
-    OSError : the file cannot be written.
-    """
+    """Write a file as a whole or not at all: on a full disk, what it held stays."""
     path = path.resolve()
     draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:

@@ -30,10 +30,6 @@ def gamma(n: int, unit_roundoff: Fraction) -> Fraction:
     n : number of roundings, at least 0.
     unit_roundoff : β, exact.
 
-    Raises
-    ------
-    ValueError : nβ ≥ 1; with so few digits, so many roundings have no such bound.
-
     References
     ----------
     Higham 2002, Lemma 3.1.
@@ -60,10 +56,6 @@ def gamma_probabilistic(n: int, unit_roundoff: Fraction, failure: float = 1e-2) 
     for data with many digits, but wrong for chopping. Then :math:`\sum\log(1+\epsilon_i)` is a
     sum of independent terms of size at most :math:`\beta/(1-\beta)`, and its mean is at most
     :math:`n\beta^2/(1-\beta)`. Hoeffding's inequality bounds its deviation from the mean.
-
-    Raises
-    ------
-    ValueError : `failure` outside (0, 1), or β ≥ 1.
 
     References
     ----------

@@ -55,11 +55,6 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
     Returns
     -------
     p, q, k : integers with value = ``p / q * 10**k``, ``q > 0``.
-
-    Raises
-    ------
-    TypeError : `value` is not a number.
-    ValueError : a string that is not a number; NaN or infinity; a number too long to read.
     """
     if type(value) is Fraction:  # the commonest, and its class is slow to ask
         return value.numerator, value.denominator, 0
@@ -119,13 +114,7 @@ def _of_mpmath_or_flint(value: Any) -> tuple[int, int, int] | None:
 
 
 def exact_fraction(value: Any) -> Fraction:
-    """Read a number without rounding it, as a Fraction.
-
-    Raises
-    ------
-    TypeError : `value` is not a number.
-    ValueError : as for :func:`exact_ratio`; a power of ten beyond :data:`LARGEST_TEXT`.
-    """
+    """Read a number without rounding it, as a Fraction."""
     p, q, power = exact_ratio(value)
     if not p or not power:
         return Fraction(p, q)

@@ -44,12 +44,7 @@ def is_definite(matrix: NDArray[Any], strictly: bool = False) -> bool:
 
 
 def factor(covariance: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return exact L and d of a symmetric matrix L diag(d) L'; L is lower triangular with a unit diagonal.
-
-    Raises
-    ------
-    ValueError : the matrix is not positive semidefinite.
-    """
+    """Return exact L and d of a symmetric matrix L diag(d) L'; L is lower triangular with a unit diagonal."""
     rest, n = covariance.copy(), len(covariance)
     lower = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
     d = np.array([Fraction(0)] * n, dtype=object)

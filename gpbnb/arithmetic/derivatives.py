@@ -60,10 +60,6 @@ class Dual(FloatArray):
     It takes the operations of a :class:`~gpbnb.arithmetic.array.FloatArray` that have a rule above, those that only
     move, join, choose or add up entries, and comparisons of its values.
 
-    Raises
-    ------
-    TypeError : another operation, or a conversion.
-
     Examples
     --------
     >>> import numpy as np
@@ -277,11 +273,6 @@ def jacobian(function: Callable[[Any], Any], x: FloatArray) -> tuple[FloatArray,
     -------
     value : (m,), with the digits of ``function(x)``.
     slopes : (m, n), the derivative of each component with respect to each variable, rounded in the format.
-
-    Raises
-    ------
-    TypeError : an operation without a rule.
-    ZeroDivisionError : a derivative does not exist, such as that of a square root or a range at zero.
     """
     n = x.shape[0]
     found = function(Dual.of(x, x.operand(np.eye(n, dtype=int))))

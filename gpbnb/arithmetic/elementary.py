@@ -83,12 +83,6 @@ def elementary(name: str, *arrays: Any) -> Any:
     :math:`2^{65000}` in size. A larger one is refused, and so is a result that differs from a number or tie of the
     format by less than about :math:`2^{-65000}` of its size.
 
-    Raises
-    ------
-    DomainError : an entry at which the function has no finite real value.
-    ValueError : an entry that is refused.
-    OverflowError : a result beyond the range of the format; the message names the function and the entry.
-
     Examples
     --------
     The product of two quaternions rounds each product and each sum, here from left to right:

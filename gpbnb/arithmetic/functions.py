@@ -24,10 +24,6 @@ def remainder(x: Any, y: Any) -> Any:
     The exact value is ``np.fmod(x, y)``, which needs no rounding, or its sum with y, which is rounded. A small negative
     x may therefore give y itself.
 
-    Raises
-    ------
-    ZeroDivisionError : a divisor is zero.
-
     Examples
     --------
     An angle between -180 and 180 degrees:
@@ -83,12 +79,7 @@ def copysign(x: Any, y: Any) -> Any:
 
 
 def select(x: Any, conditions: Any, choices: Any, default: Any = 0) -> Any:
-    """Return at each place the entry of the first choice whose condition holds, or the default; nothing is rounded.
-
-    Raises
-    ------
-    ValueError : lists of different lengths, or a choice that the format does not hold.
-    """
+    """Return at each place the entry of the first choice whose condition holds, or the default; nothing is rounded."""
     if len(conditions) != len(choices):
         raise ValueError(
             f"select: got {len(conditions)} conditions and {len(choices)} choices; needed one condition for each choice"
@@ -103,10 +94,6 @@ def cross(x: Any, a: Any, b: Any) -> Any:
     """Return the cross products of vectors of length 3 along the last axis.
 
     Each component, such as a[1] b[2] - a[2] b[1], takes two multiplications and one subtraction, each rounded.
-
-    Raises
-    ------
-    ValueError : vectors of another length.
     """
     a, b = x.operand(a), x.operand(b)
     if a.shape[-1:] != (3,) or b.shape[-1:] != (3,):
@@ -116,13 +103,7 @@ def cross(x: Any, a: Any, b: Any) -> Any:
 
 
 def lines(x: Any, axis: int | None) -> Any:
-    """Return the entries with the axis of a reduction moved to the front; all in one row if there is none.
-
-    Raises
-    ------
-    TypeError : several axes, or an axis that is not an int.
-    numpy.exceptions.AxisError : there is no such axis.
-    """
+    """Return the entries with the axis of a reduction moved to the front; all in one row if there is none."""
     if axis is None:
         return x.reshape(-1)
     try:
@@ -219,12 +200,7 @@ def everywhere(answer: bool, x: Any) -> Any:
 
 
 def sign(x: Any) -> Any:
-    """Return -1, 0 or 1 for each entry, in the format.
-
-    Raises
-    ------
-    ValueError : 1 is not a number of the format, as in fixed point without integer bits.
-    """
+    """Return -1, 0 or 1 for each entry, in the format."""
     return np.where(x > 0, 1, np.where(x < 0, -1, x.operand(0)))
 
 
@@ -247,12 +223,7 @@ def diff(x: Any, times: int = 1, axis: int = -1) -> Any:
 
 @stays
 def isclose(a: Any, b: Any, rtol: Any = 1e-5, atol: Any = 1e-8) -> Any:
-    r"""Whether :math:`|a-b| \le \text{atol} + \text{rtol}\,|b|` at each place, computed exactly from any numbers.
-
-    Raises
-    ------
-    TypeError, ValueError : entries that are not finite numbers.
-    """
+    r"""Whether :math:`|a-b| \le \text{atol} + \text{rtol}\,|b|` at each place, computed exactly from any numbers."""
     first, second, relative, absolute = map(exact, (a, b, rtol, atol))
     return np.asarray(abs(first - second) <= absolute + relative * abs(second), dtype=bool)[()]
 
@@ -307,11 +278,6 @@ def power(x: Any, exponent: Any) -> Any:
     divided by the positive power. All other exponents, one number or an array, give the exact power rounded once, as
     ``np.float_power`` does for each exponent; for the range of arguments, see
     :func:`~gpbnb.arithmetic.elementary.elementary`.
-
-    Raises
-    ------
-    TypeError : an exponent that is not a number.
-    ValueError : a single whole number beyond 1000 in size, or a power that is not finite and real.
     """
     if isinstance(exponent, (bool, np.bool_, str)):
         raise TypeError(f"got the exponent {exponent!r}; needed a number, or an array of numbers")
@@ -347,10 +313,6 @@ def norm(x: Any, order: Any = None, axis: int | None = None, keepdims: bool = Fa
 
     With `order` 1 or infinity, the norm of a vector is the sum or the largest of the absolute values; that of a matrix
     is the largest column sum or row sum. Sums run from left to right.
-
-    Raises
-    ------
-    ValueError : an unknown order.
     """
     along = x.ndim == 1 or axis is not None
     if order is None or (order == 2 and along):
@@ -374,10 +336,6 @@ def einsum(x: Any, subscripts: Any, *operands: Any) -> Any:
     A letter that occurs twice in an operand selects its diagonal: ``"ii"`` is a trace. Products are formed in the order
     of the operands. The sum runs over the indices that do not appear in the result, in the order in which they first
     appear; the last index runs fastest.
-
-    Raises
-    ------
-    ValueError : subscripts without letters for each axis, a diagonal of axes of different lengths, or an ellipsis.
     """
     if not isinstance(subscripts, str) or "." in subscripts:
         raise ValueError(f"einsum: got subscripts {subscripts!r}; needed text such as 'ij,jk->ik', without an ellipsis")

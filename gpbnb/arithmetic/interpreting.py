@@ -54,12 +54,7 @@ class Constants:
         self.numbers: list[Any] = []
 
     def rounded(self, fmt: Any) -> FloatArray:
-        """Return the numbers in a format.
-
-        Raises
-        ------
-        TypeError, ValueError, OverflowError : as for ``fmt.array``, or for an operand of an operation.
-        """
+        """Return the numbers in a format."""
         found: FloatArray = fmt.array([]).operand(self.numbers) if self.exactly else fmt.array(self.numbers)
         return found
 
@@ -79,11 +74,6 @@ class InLoops:
     ----------
     tape : its operations.
     formats : the formats that it names, all with the same kind of numbers.
-
-    Raises
-    ------
-    ValueError : a format without loops, or formats of different kinds.
-    TypeError, OverflowError : a constant that the first format cannot hold.
     """
 
     def __init__(self, tape: Any, formats: Sequence[Any]) -> None:
@@ -189,12 +179,7 @@ class OnIntegers:
         return [(each.rows.tolist(), each.call) for each in segments]
 
     def run(self, ready: list[Any]) -> bool:
-        """Run operations and calls.
-
-        Raises
-        ------
-        ArithmeticError, ValueError : an operation has no result.
-        """
+        """Run operations and calls."""
         for rows, call in ready:
             _run_exactly(self._kernel, rows, self._significands, self._exponents, self._truths)
             if call is not None:

@@ -18,13 +18,7 @@ from gpbnb.arithmetic.conversion import exact_fraction
 
 
 def exact(values: Any) -> NDArray[Any]:
-    """Return entries as exact Fractions, in an object array of the same shape.
-
-    Raises
-    ------
-    ValueError : an entry is NaN or infinite, or too long; see :func:`gpbnb.arithmetic.conversion.exact_fraction`.
-    TypeError : an entry is not a number, or is masked.
-    """
+    """Return entries as exact Fractions, in an object array of the same shape."""
     if hasattr(values, "to_fractions"):
         values = values.to_fractions()
     if np.ma.is_masked(values):
@@ -70,12 +64,7 @@ def rationals(a: Any) -> Any:
 
 
 def true_inverse(a: Any) -> Any:
-    """Return the exact inverse of a square matrix (n, n), as a matrix of python-flint's rationals.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError : `a` is singular.
-    """
+    """Return the exact inverse of a square matrix (n, n), as a matrix of python-flint's rationals."""
     try:
         return rationals(a).inv()
     except ZeroDivisionError:
@@ -85,12 +74,7 @@ def true_inverse(a: Any) -> Any:
 
 
 def inverse_of(a: Any) -> NDArray[Any]:
-    """Return the exact inverse of a square matrix (n, n), as Fractions.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError : `a` is singular.
-    """
+    """Return the exact inverse of a square matrix (n, n), as Fractions."""
     found = true_inverse(a)
     entries = [Fraction(int(entry.p), int(entry.q)) for entry in found.entries()]
     return np.array(entries, dtype=object).reshape(found.nrows(), found.ncols())

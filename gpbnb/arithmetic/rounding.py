@@ -60,10 +60,6 @@ ALIASES = {"floor": Rounding.DOWN, "ceil": Rounding.UP, "ceiling": Rounding.UP, 
 def rounding_named(rounding: object) -> Rounding:
     """Return a rounding, or the rounding with this name; case is ignored.
 
-    Raises
-    ------
-    ValueError : no such rounding.
-
     Examples
     --------
     >>> rounding_named("nearest")

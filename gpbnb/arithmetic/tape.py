@@ -69,12 +69,7 @@ class Tape:
             self.one = self.constant(1, exactly=False)
 
     def refuse(self, reason: str) -> NoReturn:
-        """Stop recording, also if the function handles the error.
-
-        Raises
-        ------
-        UntraceableError : always.
-        """
+        """Stop recording, also if the function handles the error."""
         self.refusal = self.refusal or reason
         raise UntraceableError(reason)
 
@@ -231,12 +226,7 @@ class Tape:
         return self._constants
 
     def constants_in(self, fmt: Any) -> dict[int, Fraction]:
-        """Return the constants as a format stores them, by their places.
-
-        Raises
-        ------
-        TypeError, ValueError, OverflowError : as for :meth:`Constants.rounded`.
-        """
+        """Return the constants as a format stores them, by their places."""
         found: dict[int, Fraction] = {0: Fraction(0)}
         for each in self._constants:
             found.update(zip(each.places, np.ravel(each.rounded(fmt).to_fractions()).tolist(), strict=True))
@@ -256,10 +246,6 @@ class Tape:
         ----------
         inputs : (inputs,).
         results : (m,), places.
-
-        Raises
-        ------
-        ArithmeticError, ValueError, TypeError : an operation has no result in the format; a non-numeric constant.
         """
         fmt: Any = inputs.format
         own = np.arange(1, 1 + self.inputs)

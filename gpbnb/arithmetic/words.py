@@ -88,13 +88,7 @@ class FixedLayout(NamedTuple):
 
 
 def words(values: Any, width: int) -> NDArray[Any]:
-    """Return words of `width` bits as an object array of ints.
-
-    Raises
-    ------
-    TypeError : an entry is not a whole number.
-    ValueError : an entry is negative, or too long.
-    """
+    """Return words of `width` bits as an object array of ints."""
     given = np.asarray(values)
     entries = given.ravel().tolist()
     if not all(type(each) is int for each in entries):

@@ -372,10 +372,6 @@ def random_errors(found: Guarantee, steps: int, center: Any = None) -> NDArray[n
     Parameters
     ----------
     center : see :func:`attack`.
-
-    Raises
-    ------
-    ArithmeticError : the exact filter left its limits.
     """
     given, rng = found.schedule, np.random.default_rng([0, 1])
     n, m = given.program.n, given.program.m

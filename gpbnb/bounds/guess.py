@@ -215,10 +215,6 @@ def gains(F: Array, G: Array, rows: Array, steps: int | None, lags: int) -> Arra
     """Return the sums of the sizes of r F^l G over l, (n + rows, columns), for unit rows and others.
 
     Sums over more than some lags follow from squares of powers of the loop, as in :mod:`gpbnb.bounds.check`.
-
-    Raises
-    ------
-    ValueError : squares are far above these sums.
     """
     start, count = np.vstack([np.eye(len(F)), rows]), lags if steps is None else min(lags, steps)
     sums, C = np.zeros((len(start), G.shape[1])), start

@@ -57,10 +57,6 @@ def wilkinson(factors: LU, x: FloatArray) -> float:
     factors : the factors of A from :func:`gpbnb.arithmetic.linalg.lu`.
     x : (n, n), the computed inverse.
 
-    Raises
-    ------
-    ValueError : g ≥ 1, or 3nβ ≥ 1: more digits are needed; or overflow raises no error.
-
     References
     ----------
     Wilkinson 1961; Higham 2002, Theorem 9.5.
@@ -90,10 +86,6 @@ def higham(factors: LU, x: FloatArray) -> float:
     ----------
     factors, x : as in :func:`wilkinson`.
 
-    Raises
-    ------
-    ValueError : ‖G‖ ≥ 1, or 3nβ ≥ 1: more digits are needed; or overflow raises no error.
-
     References
     ----------
     Higham 2002, Theorem 9.4.
@@ -106,10 +98,6 @@ def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> f
 
     If rounding errors are independent with mean zero, the bound fails at most with the probability `failure`. This
     probability is shared equally by the 3n³ products in the inner products, n² of the factors and 2n² of the solutions.
-
-    Raises
-    ------
-    ValueError : ‖G‖ ≥ 1; or the format chops, so that roundings do not have mean zero; or its overflow raises no error.
 
     References
     ----------
@@ -178,10 +166,6 @@ def ball(a: Any, x: FloatArray, preconditioned: bool = False, bits: int | None =
         so that elimination starts near the identity; otherwise A itself is eliminated with partial pivoting.
     bits : precision of the balls' midpoints; by default that of the format.
 
-    Raises
-    ------
-    ValueError : the balls are too wide to distinguish A from a singular matrix.
-
     References
     ----------
     Johansson 2017; A is inverted by python-flint.
@@ -211,10 +195,6 @@ def a_posteriori(a: Any, x: FloatArray, bits: int | None = None) -> float:
     a : (n, n), a FloatArray, or exact numbers.
     x : (n, n), its computed inverse, or any other guess of it.
     bits : precision of the balls' midpoints; by default four times that of the format plus 64, so that A X fits.
-
-    Raises
-    ------
-    ValueError : ‖R‖ < 1 could not be proved, so X may have no correct digit.
 
     References
     ----------
@@ -370,12 +350,7 @@ def smallest_precision(
 
 
 def check_relative(tolerance: Any) -> None:
-    """Reject a tolerance that is not a relative error, a finite number above 0.
-
-    Raises
-    ------
-    ValueError : text, a truth value, NaN, infinity, or a number that is not above 0.
-    """
+    """Reject a tolerance that is not a relative error, a finite number above 0."""
     number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
     if not number or not 0 < tolerance < math.inf:
         raise ValueError(f"got tolerance {tolerance!r}; needed a relative error above 0, such as 1e-6")

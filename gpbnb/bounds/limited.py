@@ -40,10 +40,6 @@ def limited_errors(
     ----------
     largest : (m,), limits on the size of the inputs. The system starts from rest.
     count : number of steps for which the bound holds; by default all time.
-
-    Raises
-    ------
-    ValueError : no bound follows, because a state keeps its errors and nothing limits it.
     """
     made, steps = system.as_filter(), _Steps(system, fmt, largest)
     n = made.program.n

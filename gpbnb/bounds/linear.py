@@ -50,12 +50,6 @@ def peak_gain(A: Any, B: Any, C: Any, D: Any = None, terms: int | None = None, a
     ----------
     terms : number of terms of the sum, for the gain over a finite time; by default all. The system may then grow.
     accuracy : largest distance of the two ends, as a share of the gain.
-
-    Raises
-    ------
-    ValueError : the rest after 2**22 terms is not negligible, in balls of up to 2**13 bits; more than 2**20 terms, or
-        terms that balls of up to 2**15 bits do not enclose.
-    OverflowError : a gain is beyond the range of float64.
     """
     found = _gains((A, B, C, D), terms, accuracy)
     n = len(found.low) - len(exact(C))
@@ -218,10 +212,6 @@ def error_coefficients(A: Any, B: Any, C: Any, D: Any, largest_input: float) -> 
     Returns
     -------
     coefficients : (n + 1,), the output last.
-
-    Raises
-    ------
-    ArithmeticError : the enclosure of a largest state contains a power of two.
 
     References
     ----------

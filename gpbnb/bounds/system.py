@@ -73,11 +73,6 @@ def output_errors(
     largest : limits on the size of the inputs before they are stored; one number, or (m,).
     steps : number of steps for which the bound holds; by default all time.
 
-    Raises
-    ------
-    ValueError : no bound follows; the message says why. Or a first state other than zero.
-    OverflowError : a number may be beyond the range of float64.
-
     Examples
     --------
     A clock that adds a tenth in each step, for 200 steps in 17 bits:

@@ -67,12 +67,7 @@ def _twos(n: int) -> int:
 
 
 def bounded_rounding(made: LinearFilter, words: WordFormats) -> NDArray[np.float64]:
-    """Bound the error of each state, (n,), due to rounding, for ever and for all inputs, as long as nothing overflows.
-
-    Raises
-    ------
-    ValueError : the filter is not stable.
-    """
+    """Bound the error of each state, (n,), due to rounding, for ever and for all inputs, while nothing overflows."""
     stored = integer_program(made, words)
     A, _ = matrices(made.program, stored.coefficients)
     if not is_stable(A):
@@ -137,10 +132,6 @@ class WordGuarantee:
     system : a linear system that starts from rest.
     largest : (m,), limits on the size of the inputs.
     steps : number of steps for which the bounds hold; by default all time.
-
-    Raises
-    ------
-    ValueError : a first state other than zero, or a system that limits its values.
     """
 
     def __init__(self, system: LinearSystem, largest: Any, steps: int | None = None) -> None:
@@ -153,13 +144,7 @@ class WordGuarantee:
             raise ValueError(f"got {self._made.name}, which limits its values; needed a linear system for a bound")
 
     def errors(self, words: WordFormats) -> NDArray[np.float64]:
-        """Bound the error of each output, (p,), from the system as given, due to rounding and storing.
-
-        Raises
-        ------
-        OverflowError : a result may overflow; the message names it, and its largest possible size.
-        ValueError : the system as stored is not stable, or the bound is not proved.
-        """
+        """Bound the error of each output, (p,), from the system as given, due to rounding and storing."""
         return self.proof(words).bound[self.system.n :]
 
     def guessed(self, words: WordFormats) -> NDArray[np.float64]:

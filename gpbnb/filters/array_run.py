@@ -154,11 +154,6 @@ class ArrayRun(SteppedRun):
     model, fmt, checkpoint_steps : as for :class:`~gpbnb.filters.run.Run`.
     form : any form; Hung's forms only without known inputs, which the report does not have.
     bounded : whether to compute the contraction bound of the estimate, too.
-
-    Raises
-    ------
-    ValueError : a format without compiled loops; Hung's forms with known inputs; covariances that lose their
-        definiteness when their factors are computed in this format.
     """
 
     @stays

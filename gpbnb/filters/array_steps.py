@@ -105,10 +105,6 @@ def observe_ud(
     -------
     x, U, gain : values after the update.
     definite : whether variances stay positive.
-
-    Raises
-    ------
-    ZeroDivisionError : the variance of the innovation is zero.
     """
     n = len(x)
     y, c = z, stored.state(h)

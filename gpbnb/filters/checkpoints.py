@@ -94,13 +94,7 @@ class Checkpoints:
         return _nearest(self._kept["xKP".index(letter)])
 
     def minus(self, true: Checkpoints) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return x, K and P minus those of a reference with at least as many checkpoints, correctly rounded.
-
-        Raises
-        ------
-        ValueError : the reference has other steps.
-        OverflowError : a difference is beyond the range of float64.
-        """
+        """Return x, K and P minus those of a reference with at least as many checkpoints, correctly rounded."""
         count = len(self.steps)
         if self.steps != true.steps[:count]:
             raise ValueError(
@@ -178,12 +172,7 @@ def _rounded_difference(
     true_high: NDArray[np.float64],
     true_low: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return high + low - (true_high + true_low), and where it is certainly the nearest float64.
-
-    Parameters
-    ----------
-    error : bounds how much high + low may be wrong.
-    """
+    """Return high + low - (true_high + true_low), and where it is certainly the nearest float64."""
     with np.errstate(all="ignore"):
         s, e = _two_sum(high, -true_high)
         t, f = _two_sum(low, -true_low)

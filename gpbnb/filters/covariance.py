@@ -95,10 +95,6 @@ def repaired(
     matrix : (n, n), exact.
     strictly : whether it must be positive definite; its variances are then not raised.
     tolerance : the largest change, relative to the variances.
-
-    Raises
-    ------
-    ValueError : the covariance needs a larger change than the tolerance, or its error is not due to rounding.
     """
     symmetric, asymmetry, shift = matrix, 0.0, 0.0
     try:
@@ -198,12 +194,7 @@ def raised_until(
 
 
 def check_covariance(letter: str, matrix: NDArray[Any], strictly: bool) -> None:
-    """Reject a matrix that is not exactly symmetric and semidefinite or, with `strictly`, definite.
-
-    Raises
-    ------
-    ValueError : the matrix fails the test; the message names the entry or the eigenvalue, and the cure.
-    """
+    """Reject a matrix that is not exactly symmetric and semidefinite or, with `strictly`, definite."""
     if np.any(matrix != matrix.T):
         i, j = np.argwhere(matrix != matrix.T)[0]
         raise ValueError(

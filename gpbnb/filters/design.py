@@ -47,10 +47,6 @@ class FilterDesign:
     input_names, output_names : lists with one name each, perhaps with a unit, as of
         :class:`gpbnb.filters.system.LinearSystem`.
 
-    Raises
-    ------
-    ValueError, TypeError : neither or both of b and sos are given; or for a reason given in these methods.
-
     Examples
     --------
     >>> design = FilterDesign(b=[1], a=[1, "-0.9"])
@@ -86,12 +82,7 @@ class FilterDesign:
         return USUAL if self.sos is None else f"cascade of {USUAL}"
 
     def system(self, structure: str | None = None) -> LinearSystem:
-        """Return the filter in a structure, by default the usual one.
-
-        Raises
-        ------
-        ValueError : the structure is unknown, or this filter does not have it.
-        """
+        """Return the filter in a structure, by default the usual one."""
         chosen = structure_named(self.usual if structure is None else structure)
         check_of_cascade(chosen, pairing=self.pairing, order=self.order, scale=self.scale or None)
         return self._built(chosen)
@@ -119,10 +110,6 @@ class FilterDesign:
         Parameters
         ----------
         structures : names, or "all".
-
-        Raises
-        ------
-        ValueError : a structure is unknown, or the filter has none of them.
         """
         return self.compared(structures).systems
 
@@ -137,12 +124,7 @@ class FilterDesign:
         return self._tried(structures).lacking
 
     def compared(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> Structures:
-        """Return what :meth:`systems` and :meth:`lacking` return, each structure tried once.
-
-        Raises
-        ------
-        ValueError : as for :meth:`systems`.
-        """
+        """Return what :meth:`systems` and :meth:`lacking` return, each structure tried once."""
         found = self._tried(structures)
         if not found.systems:
             raise ValueError("; ".join(f"{name}: {reason}" for name, reason in found.lacking.items()))

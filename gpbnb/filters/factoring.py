@@ -68,12 +68,7 @@ class _Recorded:
         self._places, self._truth = result.components[0], truth.components[0]
 
     def run(self, fmt: Any, given: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Run the function on each of some packed arrays.
-
-        Raises
-        ------
-        OverflowError, ZeroDivisionError : an operation has no result in the format.
-        """
+        """Run the function on each of some packed arrays."""
         kind, formats = tables([fmt])
         tape, lanes = self._tape, len(given)
         rows = tape.instructions.astype(np.int64)
@@ -104,12 +99,7 @@ def factors_of_each(fmt: Any, matrices: NDArray[Any], found: NDArray[Any]) -> bo
 
 
 def inverses_of_each(fmt: Any, matrices: NDArray[Any], found: NDArray[Any]) -> bool:
-    """Fill in the inverses of packed covariances (p, n, n, ...); return whether all are definite.
-
-    Raises
-    ------
-    ZeroDivisionError : a pivot is zero.
-    """
+    """Fill in the inverses of packed covariances (p, n, n, ...); return whether all are definite."""
     return _of_each(inverse, fmt, matrices, found)
 
 

@@ -13,12 +13,7 @@ from gpbnb.arithmetic.rational import exact, inverse_of
 
 
 def upper_factors(covariance: NDArray[Any]) -> NDArray[Any]:
-    """Return exact factors U D U' of a covariance (n, n): D is the diagonal, U the unit triangle above it.
-
-    Raises
-    ------
-    ValueError : the covariance is not positive semidefinite.
-    """
+    """Return exact factors U D U' of a covariance (n, n): D is the diagonal, U the unit triangle above it."""
     lower, d = factor(covariance[::-1, ::-1])
     return np.triu(lower[::-1, ::-1], 1) + np.diag(d[::-1])
 

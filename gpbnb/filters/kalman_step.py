@@ -181,11 +181,6 @@ def kalman_step(algebra: Algebra, form: Form, model: StepModel, x: Matrix, P: Ma
     algebra : how numbers of this kind are computed.
     form : any form except UD, whose steps are in :mod:`gpbnb.filters.array_steps`.
     x (n, 1), P (n, n) : estimate and covariance before the step. z (m, 1) : measurement.
-
-    Raises
-    ------
-    ValueError : the UD form.
-    ZeroDivisionError : a pivot of the innovation covariance is zero, and the numbers refuse to divide by zero.
     """
     if form is Form.UD:
         raise ValueError(

@@ -489,12 +489,7 @@ def _arrays_once(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[str
 
 
 def identity_in(fmt: FloatFormat | FixedFormat, n: int) -> FloatArray:
-    """Return the identity matrix (n, n), which every form needs.
-
-    Raises
-    ------
-    ValueError : the format does not hold the number 1.
-    """
+    """Return the identity matrix (n, n), which every form needs."""
     if fmt.limits is not None and not fmt.smallest <= 1 <= fmt.largest:
         cure = "at least 1 integer bit and 0 fraction bits or more" if isinstance(fmt, FixedFormat) else "a wider range"
         raise ValueError(
@@ -505,12 +500,7 @@ def identity_in(fmt: FloatFormat | FixedFormat, n: int) -> FloatArray:
 
 
 def stored_measurements(z: Any, fmt: FloatFormat | FixedFormat | BlockFormats) -> FloatArray:
-    """Round measurements into a format.
-
-    Raises
-    ------
-    OverflowError : a measurement beyond the range of the format.
-    """
+    """Round measurements into a format."""
     try:
         return fmt.array(z)
     except OverflowError as error:
@@ -518,13 +508,7 @@ def stored_measurements(z: Any, fmt: FloatFormat | FixedFormat | BlockFormats) -
 
 
 def real_numbers(values: Any) -> NDArray[Any]:
-    """Return measurements as an array of float64 or whole numbers, or of Fractions if those cannot hold them exactly.
-
-    Raises
-    ------
-    ValueError, TypeError : an entry is masked, or is not a real number; rows have different lengths; a longdouble that
-        float64 does not hold, beside one that is NaN or infinite.
-    """
+    """Return measurements as an array of float64 or whole numbers, or of Fractions if those cannot hold them."""
     if np.ma.is_masked(values):
         raise ValueError("got measurements of which some are masked; needed a number for each")
     try:

@@ -16,10 +16,6 @@ from gpbnb.filters.forms import Form, plain_name
 def form_named(form: AnyForm | str) -> AnyForm:
     """Return a form, or the form with this name; case, blanks and hyphens are ignored.
 
-    Raises
-    ------
-    ValueError : no such form.
-
     Examples
     --------
     >>> form_named("ud")
@@ -42,12 +38,7 @@ def form_named(form: AnyForm | str) -> AnyForm:
 
 
 def compiled_form(form: AnyForm | str) -> Form:
-    """Return a form that has compiled loops, or the one with this name.
-
-    Raises
-    ------
-    ValueError : no such form, or an :class:`~gpbnb.filters.array_forms.ArrayForm`.
-    """
+    """Return a form that has compiled loops, or the one with this name."""
     found = form_named(form)
     if isinstance(found, ArrayForm):
         raise ValueError(f"got the {found} form; needed one with compiled loops: {', '.join(map(str, Form))}")
@@ -55,12 +46,7 @@ def compiled_form(form: AnyForm | str) -> Form:
 
 
 def whole_number(name: str, value: Any, least: int = 1, most: int | None = None) -> int:
-    """Return a whole number from `least` to `most`; True and False are not numbers.
-
-    Raises
-    ------
-    ValueError : anything else.
-    """
+    """Return a whole number from `least` to `most`; True and False are not numbers."""
     if not isinstance(value, bool):
         try:
             number = operator.index(value)
@@ -74,12 +60,7 @@ def whole_number(name: str, value: Any, least: int = 1, most: int | None = None)
 
 
 def checked_name(name: Any) -> str:
-    """Check that the name of a model is text, and return it.
-
-    Raises
-    ------
-    TypeError : anything else.
-    """
+    """Check that the name of a model is text, and return it."""
     if isinstance(name, str):
         return name
     raise TypeError(f"got name {name!r} of type {type(name).__name__}; needed text")
@@ -89,11 +70,6 @@ def checked_names(what: str, given: Any, count: int) -> tuple[str, ...]:
     """Check the names of the states, measurements, inputs or outputs of a model, and return them as a tuple.
 
     A name may end with a unit, as in "rate (°/s)".
-
-    Raises
-    ------
-    TypeError : the names are not a list of texts.
-    ValueError : another number of names than `count`, or a name that is empty or occurs twice.
     """
     if given is None:
         return ()

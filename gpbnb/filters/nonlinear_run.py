@@ -56,11 +56,6 @@ class NonlinearRun(SteppedRun):
     form : one of ``NONLINEAR_FORMS``. The factors and roots of Q, R and P0 are computed exactly from the model as
         given, before a format stores them.
     checkpoint_steps : as for ``Run``.
-
-    Raises
-    ------
-    ValueError : a form that nonlinear filters, the unscented filter or blocks do not have.
-    OverflowError : the model has entries beyond the range of the format.
     """
 
     @stays
@@ -186,12 +181,7 @@ class NonlinearRun(SteppedRun):
 
 
 def check_form(model: NonlinearModel, form: AnyForm, blocks: bool = False) -> None:
-    """Reject a form that a nonlinear filter, or its blocks, do not have.
-
-    Raises
-    ------
-    ValueError : another form.
-    """
+    """Reject a form that a nonlinear filter, or its blocks, do not have."""
     if model.method == "unscented":
         if form is not Form.INNOVATION or blocks:
             raise ValueError(
@@ -216,15 +206,7 @@ def opened(
     sums: Sums = LEFT_TO_RIGHT,
     compensated: bool = False,
 ) -> Run | ArrayRun | NonlinearRun:
-    """Return a run of a filter: in compiled loops if the form has them and a linear model has no inputs.
-
-    Raises
-    ------
-    ValueError : the run has no compiled loops, but other sums, compensated summation or formats of blocks are required;
-        or for a reason given in :class:`~gpbnb.filters.run.Run`, :class:`~gpbnb.filters.array_run.ArrayRun` or
-        :class:`NonlinearRun`.
-    OverflowError : the model has entries beyond the range of the format.
-    """
+    """Return a run of a filter: in compiled loops if the form has them and a linear model has no inputs."""
     if isinstance(model, NonlinearModel):
         if compensated or sums != LEFT_TO_RIGHT:
             raise ValueError("got sums or compensated estimates for a nonlinear model; needed neither: it has no loops")
@@ -248,10 +230,6 @@ def true_states(model: AnyModel, z: Any) -> NDArray[np.float64]:
     """Return the estimates after every step without rounding, (steps, n, 2), as double-double.
 
     Those of a nonlinear filter are computed in bits that agree with twice as many.
-
-    Raises
-    ------
-    ArithmeticError : as for :func:`~gpbnb.filters.run.reference`; results that depend on the number of bits.
     """
     if not isinstance(model, NonlinearModel):
         return reference_states(model, z)
@@ -259,12 +237,7 @@ def true_states(model: AnyModel, z: Any) -> NDArray[np.float64]:
 
 
 def nonlinear_reference(model: NonlinearModel, z: Any) -> list[Step]:
-    """Return estimate, gain and covariance after every step, as Fractions, in bits that agree with twice as many.
-
-    Raises
-    ------
-    ArithmeticError : results that depend on the number of bits; too many steps.
-    """
+    """Return estimate, gain and covariance after every step, as Fractions, in bits that agree with twice as many."""
     measured = exact(z)
     return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
 
@@ -289,10 +262,6 @@ def simulated(model: AnyModel, steps: int, seed: int = 0) -> NDArray[np.float64]
 
     Those of a nonlinear process are computed in binary64, with every operation correctly rounded, and are rounded to
     :func:`gpbnb.filters.simulation.fine_resolution`; they are the same on every machine.
-
-    Raises
-    ------
-    ValueError : more steps than the model describes.
     """
     if not isinstance(model, NonlinearModel):
         return simulated_measurements(model, steps, seed)

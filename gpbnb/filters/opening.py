@@ -98,11 +98,6 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
     model : the model as given, not as stored, because the UD factors are computed from the variances as given.
     fmt : None for double-double.
     tag : arithmetic of the compiled loops, which computes factors and inverses.
-
-    Raises
-    ------
-    ValueError : the form needs factors or inverses of covariances, which are not definite in this arithmetic.
-    OverflowError : the model has entries beyond the range of the format's backend.
     """
     stored = model if fmt is None else model.definite_in(fmt)
     Phi, H, Q, R, x0, P0 = (each.copy() for each in (_double_doubles(stored) if fmt is None else _packed(stored, fmt)))
@@ -175,13 +170,7 @@ def step_arrays(start: Opening, identity: NDArray[Any], increment: NDArray[Any] 
 
 
 def as_packed(fmt: FloatFormat | FixedFormat | None, values: Any) -> NDArray[Any]:
-    """Round numbers into a format, None for double-double, and return them as the compiled loops expect them.
-
-    Raises
-    ------
-    ValueError : NaN or infinity.
-    OverflowError : numbers beyond the range of the format or its compiled loops.
-    """
+    """Round numbers into a format, None for double-double, and return them as the compiled loops expect them."""
     if fmt is None:
         if hasattr(values, "to_fractions"):
             return double_doubles_of(values)
@@ -195,12 +184,7 @@ def as_packed(fmt: FloatFormat | FixedFormat | None, values: Any) -> NDArray[Any
 
 
 def stored_start(fmt: FloatFormat | FixedFormat, x0: Any) -> FloatArray:
-    """Round a first state into a format.
-
-    Raises
-    ------
-    OverflowError : an entry is beyond the range of the format.
-    """
+    """Round a first state into a format."""
     try:
         return fmt.store(x0)
     except OverflowError as error:
@@ -215,13 +199,7 @@ def double_doubles_of(array: FloatArray) -> NDArray[np.float64]:
 
 
 def packed_array(array: FloatArray) -> NDArray[Any]:
-    """Convert an array to the form that the compiled loops of its format expect.
-
-    Raises
-    ------
-    ValueError : the format has no compiled loops.
-    OverflowError : an entry is beyond their range.
-    """
+    """Convert an array to the form that the compiled loops of its format expect."""
     if not isinstance(array.backend, Compiled):
         array.format.check_compiled()
         cure = "" if array.format.base == 10 else ", or use base 10"

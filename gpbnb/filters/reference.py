@@ -51,10 +51,6 @@ def precise_steps(model: LinearModel, z: Any) -> list[Step]:
     Returns
     -------
     steps : exact values of high-precision results, as Fractions.
-
-    Raises
-    ------
-    ArithmeticError : results that depend on the number of bits, up to :data:`MOST_BITS`; too many steps.
     """
     measured = exact(z)
     return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
@@ -68,10 +64,6 @@ def agreed(name: str, count: int, steps: Callable[[int], list[Step] | str]) -> l
     name : name of the model.
     count : number of steps.
     steps : function that returns all steps in a number of bits, or why they cannot be computed in them.
-
-    Raises
-    ------
-    ArithmeticError : results that depend on the number of bits, up to :data:`MOST_BITS`; too many steps.
     """
     if count > MOST_STEPS:
         raise ArithmeticError(

@@ -92,16 +92,6 @@ class Run:
     records : number of measurement records. Covariance and gain do not depend on the measurements and are computed
         once; the estimates of all records are the columns of one matrix, and have the same digits as in separate runs.
         Many records need :meth:`carry` and a form other than UD, which computes gain and estimate together.
-
-    Raises
-    ------
-    ValueError : a format or form without compiled loops; a bound in a format whose overflow raises no error; checkpoint
-        steps that do not ascend; formats of blocks with other sums, compensation, a bound or many records;
-        compensation or another order of additions in a form that does not have it; covariances that lose their
-        definiteness when they are factored or inverted in this format, see :mod:`gpbnb.filters.opening`; many records
-        with the UD form, a bound or checkpoints.
-    TypeError : the format in `sums` is not a format.
-    OverflowError : the model has entries beyond the range of the format's backend.
     """
 
     def __init__(
@@ -505,12 +495,7 @@ def widened_estimates(packed: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
-    """Return steps from 1 to the last one, each larger than the one before by about the same factor.
-
-    Raises
-    ------
-    ValueError : the number of steps, or of steps per decade, is less than 1.
-    """
+    """Return steps from 1 to the last one, each larger than the one before by about the same factor."""
     if steps < 1 or per_decade < 1:
         raise ValueError(f"got {steps} steps, {per_decade} per decade; needed both at least 1")
     grid = np.rint(10 ** (np.arange(0, int(math.log10(steps) * per_decade) + 1) / per_decade))
@@ -529,10 +514,6 @@ def reference(
     model : also with known inputs and offsets.
     z : (steps, m), measurements; float64 or Fractions.
     checkpoint_steps : steps whose results are saved.
-
-    Raises
-    ------
-    ArithmeticError : the model is degenerate, or more digits are necessary for too many steps.
     """
     run = Run(model.without_inputs(), None, form, checkpoint_steps)
     start = run.P.copy()
@@ -557,11 +538,6 @@ def _loses_digits(model: LinearModel, at: NDArray[np.int64], P: NDArray[np.float
 
     Scale innovations to unit variances, so that S has ones on its diagonal. The relative error of the covariance is
     then roughly that of one operation over :math:`\lambda(R)\,\lambda(S)`, the least eigenvalues.
-
-    Parameters
-    ----------
-    at : (k,), numbers of steps done.
-    P : (k, n, n, 2), the covariances after them.
     """
     given = model.to_float()
     Phi, H, Q, R = (given[letter][at % len(given[letter])] for letter in ("Phi", "H", "Q", "R"))
@@ -576,12 +552,7 @@ def _loses_digits(model: LinearModel, at: NDArray[np.int64], P: NDArray[np.float
 
 
 def reference_states(model: LinearModel, z: Any) -> NDArray[np.float64]:
-    """Run the filter as :func:`reference` does, and return the estimates after every step, (steps, n, 2).
-
-    Raises
-    ------
-    ArithmeticError : as for :func:`reference`.
-    """
+    """Run the filter as :func:`reference` does, and return the estimates after every step, (steps, n, 2)."""
     run = Run(model.without_inputs(), None, Form.INNOVATION, range(1, len(z) + 1) if model.has_inputs else ())
     if model.has_inputs:
         start = run.x.copy()[np.newaxis], run.P.copy()[np.newaxis]

@@ -53,10 +53,6 @@ def factored(
     ----------
     b, a : b0 … bM and a1 … aN, without the leading 1.
     pairing : one of :data:`PAIRINGS`; order : see :func:`ordered`.
-
-    Raises
-    ------
-    ValueError : coefficients b that are all zero; an unknown pairing or order.
     """
     if not any(b):
         raise ValueError("got coefficients b that are all zero; needed one that is not, to factor the filter")
@@ -66,12 +62,7 @@ def factored(
 
 
 def sections_from_zeros(z: Any, p: Any, k: Any, pairing: str = "nearest", order: Any = "up") -> list[Coefficients]:
-    """Return sections from zeros, poles and gain, as in ``scipy.signal``; for pairing and order, see :func:`factored`.
-
-    Raises
-    ------
-    ValueError : no pole; a complex number without its conjugate, NaN or infinity; an unknown pairing or order.
-    """
+    """Sections from zeros, poles and gain, as in ``scipy.signal``; for pairing and order see :func:`factored`."""
     gain = exact([k])[0]
     zeros, poles = (_factors_from_roots(given, name) for name, given in (("zeros", z), ("poles", p)))
     if not poles and not zeros:
@@ -83,12 +74,7 @@ def sections_from_zeros(z: Any, p: Any, k: Any, pairing: str = "nearest", order:
 
 
 def repaired(sections: Sequence[Coefficients], pairing: str, order: Any) -> list[Coefficients]:
-    """Return sections with another pairing and order; see :func:`factored`.
-
-    Raises
-    ------
-    ValueError : an unknown pairing or order.
-    """
+    """Return sections with another pairing and order; see :func:`factored`."""
     if _one_of("pairing", pairing, PAIRINGS) == "given":
         return ordered(list(sections), order)
     b, a = expanded(sections)
@@ -101,10 +87,6 @@ def ordered(sections: list[Coefficients], order: Any) -> list[Coefficients]:
     Parameters
     ----------
     order : one of :data:`ORDERS`, or the numbers of the sections from 0, each once.
-
-    Raises
-    ------
-    ValueError : neither an order nor a permutation.
     """
     if isinstance(order, str):
         if _one_of("order", order, ORDERS) == "given":
@@ -132,10 +114,6 @@ def scaled(sections: Sequence[Coefficients], form: str) -> list[Coefficients]:
     ----------
     form : the direct form of the sections; in the direct form II, the gain to the delayed values of the next section
         counts as well.
-
-    Raises
-    ------
-    ValueError : the filter does not decay within 2**20 steps.
     """
     found, moved = list[Coefficients](), 0
     response = np.zeros(_length(sections))

@@ -23,12 +23,7 @@ LONGEST = 100_000
 
 
 def settled_gain(model: LinearModel) -> NDArray[Any]:
-    """Return the gain that a filter approaches, (n, m), exact, from a run in double-double.
-
-    Raises
-    ------
-    ValueError : the model changes from step to step, has known inputs, or its gain does not settle.
-    """
+    """Return the gain that a filter approaches, (n, m), exact, from a run in double-double."""
     if model.cycle != 1:
         raise ValueError(f"got {model.name}, which changes from step to step; needed a model that never changes")
     model.refuse_inputs("a filter with constant gain")
@@ -55,10 +50,6 @@ def settled_filter(model: LinearModel) -> LinearSystem:
     """Return the innovation form of a filter with the gain that it approaches; inputs are the measurements.
 
     The outputs are the estimates.
-
-    Raises
-    ------
-    ValueError : as for :func:`settled_gain`.
     """
     given = np.concatenate([each.ravel() for each in (model.Phi[0], model.H[0], settled_gain(model))])
     made = LinearFilter(innovation_program(model.n, model.m, model.n), given, f"{model.name}, {CONSTANT_GAIN}")

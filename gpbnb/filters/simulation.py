@@ -112,10 +112,6 @@ def simulated_measurements(model: LinearModel, steps: int, seed: int = 0) -> NDA
 
     They are rounded to :func:`fine_resolution`. The response to inputs and offsets is added to
     measurements that are simulated without them.
-
-    Raises
-    ------
-    ValueError : more steps than :data:`MOST_SIMULATED`, or than the model describes.
     """
     if steps > MOST_SIMULATED:
         raise ValueError(
@@ -155,10 +151,6 @@ def simulated_inputs(kind: str, level: Any, steps: int, m: int, seed: int = 0) -
     kind : "step", constant from the first step on; "sine", with a period of :data:`SINE_PERIOD` steps; or "noise",
         white and normal.
     level : height of the step or sine, or standard deviation of the noise; one number, or (m,).
-
-    Raises
-    ------
-    ValueError : an unknown kind; a level that is not finite or not above 0, or not one for each input; too many steps.
     """
     if kind not in ("step", "sine", "noise"):
         raise ValueError(f'got inputs {kind!r}; needed "step", "sine" or "noise"')

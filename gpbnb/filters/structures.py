@@ -198,12 +198,7 @@ _DOUBLINGS = 64
 
 
 def check_of_cascade(structure: str, **options: Any) -> None:
-    """Reject options, each None if not given, that only a cascade has.
-
-    Raises
-    ------
-    ValueError : one of them is given for another structure.
-    """
+    """Reject options, each None if not given, that only a cascade has."""
     given = [name for name, value in options.items() if value is not None]
     if given and structure not in CASCADES:
         raise ValueError(
@@ -216,10 +211,6 @@ def structure_named(name: Any, among: Sequence[str] = WITH_FIR) -> str:
     """Return the name of a structure as this module writes it; case and spaces do not matter.
 
     "cascade" alone stands for a cascade of sections in the transposed direct form II.
-
-    Raises
-    ------
-    ValueError : no such structure.
 
     Examples
     --------
@@ -244,11 +235,6 @@ def transfer_function(b: Any, a: Any) -> tuple[list[Fraction], list[Fraction]]:
     Returns
     -------
     b, a : b0 … bM, at least b0, and a1 … aN, without the leading 1.
-
-    Raises
-    ------
-    ValueError : no coefficients, not one row of them, ``a[0] = 0``, or a filter without any delay.
-    TypeError : entries that are not numbers.
     """
     rows = []
     for letter, given in (("b", b), ("a", a)):
@@ -279,11 +265,6 @@ def sections_of(sos: Any) -> list[tuple[list[Fraction], list[Fraction]]]:
     Parameters
     ----------
     sos : (sections, 6), rows b0, b1, b2, a0, a1, a2, as in ``scipy.signal``.
-
-    Raises
-    ------
-    ValueError : a wrong shape, ``a0 = 0``, or a section without any delay; the message names the section from 0.
-    TypeError : entries that are not numbers.
     """
     entries = exact(sos)
     if entries.ndim != 2 or entries.shape[1:] != (6,) or not len(entries):
@@ -354,12 +335,7 @@ def cascade(sections: Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]], n
 
 
 def lattice(b: Sequence[Fraction], a: Sequence[Fraction]) -> Structure:
-    """Return the lattice and ladder of a filter, with two products for each reflection coefficient.
-
-    Raises
-    ------
-    ValueError : a reflection coefficient of size 1, so that the filter is not stable and has no lattice.
-    """
+    """Return the lattice and ladder of a filter, with two products for each reflection coefficient."""
     K = max(len(b) - 1, len(a))
     k, v = reflections([*b, *[Fraction(0)] * (K + 1 - len(b))], [Fraction(1), *a, *[Fraction(0)] * (K - len(a))])
     build = Builder(K + 1, 1)
@@ -380,10 +356,6 @@ def reflections(b: Sequence[Fraction], a: Sequence[Fraction]) -> tuple[list[Frac
     Parameters
     ----------
     b, a : (K + 1,), a with its leading 1.
-
-    Raises
-    ------
-    ValueError : a reflection coefficient of size 1.
     """
     a, b = [*a], [*b]
     k, v = [Fraction(0)] * (len(a) - 1), [Fraction(0)] * len(a)
@@ -416,10 +388,6 @@ def steady_covariance(A: NDArray[np.float64], Q: NDArray[np.float64]) -> NDArray
     r"""Return :math:`X = AXA^T + Q`, the covariance of a stable system in its steady state.
 
     The sum of :math:`A^kQ(A^k)^T` over all k is added up by doubling: 2, 4, 8, … terms.
-
-    Raises
-    ------
-    ValueError : the sum does not converge, because an eigenvalue of A has at least size 1.
     """
     X, power = Q, A
     with np.errstate(over="ignore", invalid="ignore"):
@@ -437,10 +405,6 @@ def balanced(matrices: Sequence[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
     """Return A, B, C and D in balanced states: their matrices of reachability and of observability are near equal.
 
     The change of states is computed in float64 and then applied exactly, so the filter stays the same.
-
-    Raises
-    ------
-    ValueError : the filter is not stable, or its states are too far from reachable or observable in float64.
     """
     A, B, C, D = matrices
     a, b, c = (each.astype(np.float64) for each in (A, B, C))

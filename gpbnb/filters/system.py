@@ -73,11 +73,6 @@ class LinearFilter:
     coefficients : (c,), the exact design values; they are rounded when a format stores them.
     name : name in tables.
     cascade : its sections, if it is a cascade.
-
-    Raises
-    ------
-    TypeError : a name that is not text.
-    ValueError : a program with products or quotients of values.
     """
 
     program: Program
@@ -97,10 +92,6 @@ class LinearFilter:
         """Return the coefficients as a run in a format stores them, exact, (c,).
 
         Stochastic rounding begins with its first random number, as in a run.
-
-        Raises
-        ------
-        OverflowError : a coefficient beyond the range of the format; the message names it.
         """
         fmt.restart()
         try:
@@ -109,12 +100,7 @@ class LinearFilter:
             raise self._beyond(fmt) from None
 
     def packed(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
-        """Return the coefficients, rounded into a format, as the compiled loops expect them.
-
-        Raises
-        ------
-        OverflowError : a coefficient beyond the range of the format; the message names it.
-        """
+        """Return the coefficients, rounded into a format, as the compiled loops expect them."""
         try:
             return packed_array(fmt.store(self.coefficients))
         except OverflowError:
@@ -133,12 +119,7 @@ class LinearFilter:
 
 
 def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a state-space filter") -> LinearFilter:
-    """Return a filter from its matrices; with C and D, its last states are the outputs.
-
-    Raises
-    ------
-    ValueError : shapes that do not fit.
-    """
+    """Return a filter from its matrices; with C and D, its last states are the outputs."""
     A, B = exact(A), exact(B)
     n, m = B.shape
     outputs = 0 if C is None else len(exact(C))
@@ -713,12 +694,7 @@ def _ascending(name: str, given: Any) -> tuple[Fraction, Fraction] | None:
 
 
 def system_inputs(system: LinearSystem, u: Any, steps: int | None = None) -> NDArray[Any]:
-    """Check the inputs of a system, (steps, m), and return them.
-
-    Raises
-    ------
-    ValueError, TypeError : a shape that does not fit; entries that are not numbers.
-    """
+    """Check the inputs of a system, (steps, m), and return them."""
     given = real_numbers(u)
     if given.ndim != 2 or given.shape[1] != system.m or not len(given) or steps not in (None, len(given)):
         column = "; write u.reshape(-1, 1)" if given.ndim == system.m == 1 else ""
@@ -773,13 +749,7 @@ def unobserved(Phi: NDArray[Any], H: NDArray[Any], names: tuple[str, ...] = ()) 
 
 
 def _eigenvalue(A: NDArray[Any], names: tuple[str, ...], basis: NDArray[Any] | None = None) -> str:
-    """Name the size of the largest eigenvalue of a matrix that is not stable, and the state that it moves most.
-
-    Parameters
-    ----------
-    names : names of the states; may be empty.
-    basis : (n, k), columns of which the rows of A are the coordinates; by default those of the states.
-    """
+    """Name the size of the largest eigenvalue of a matrix that is not stable, and the state that it moves most."""
     with np.errstate(all="ignore"):
         entries = A.astype(np.float64)
         if not np.isfinite(entries).all():

@@ -61,13 +61,7 @@ class UnscentedStep(NamedTuple):
 
 
 def unscented_step(algebra: Algebra, model: UnscentedModel, x: Matrix, P: Matrix, z: Matrix) -> UnscentedStep:
-    """Take one step.
-
-    Raises
-    ------
-    ValueError : P is not positive semidefinite, so that its Cholesky factor needs the root of a negative number.
-    ZeroDivisionError : a pivot of the innovation covariance is zero.
-    """
+    """Take one step."""
     root = lower_root(model.scale * P).T
     Y = [model.f(each) for each in (x, *(x + column for column in root), *(x - column for column in root))]
     Z = [model.h(each) for each in Y]
@@ -96,12 +90,7 @@ def _mean(weights: Matrix, points: list[Matrix], difference: Callable[[Matrix, M
 
 
 def lower_root(P: Matrix) -> Any:
-    """Return the lower Cholesky factor of a covariance (n, n), column by column; a zero pivot gives a zero column.
-
-    Raises
-    ------
-    ValueError : the square root of a negative number.
-    """
+    """Return the lower Cholesky factor of a covariance (n, n), column by column; a zero pivot gives a zero column."""
     columns: list[Matrix] = []
     n = len(P)
     for j in range(n):

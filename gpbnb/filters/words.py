@@ -163,12 +163,7 @@ class IntegerProgram(NamedTuple):
 
 
 def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
-    """Store the coefficients of a filter in words.
-
-    Raises
-    ------
-    OverflowError : a coefficient beyond the range of its format; the message names it.
-    """
+    """Store the coefficients of a filter in words."""
     program = made.program
     limits = {a for code, a, _ in program.operations.tolist() if code >= AT_LEAST}
     stored = np.empty(len(made.coefficients), dtype=object)
@@ -226,11 +221,6 @@ def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats) ->
     ----------
     given : the filter, which starts from zeros; a system starts from its own x0.
     u : (steps, m), inputs; each is rounded into the format of the data.
-
-    Raises
-    ------
-    OverflowError : a result overflows in a format that neither saturates nor wraps; the message names operation and
-        step. Or a coefficient or an input beyond its range.
     """
     if isinstance(given, LinearSystem):
         start = np.concatenate([given.x0, exact([0] * given.p)])
@@ -243,12 +233,7 @@ def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats) ->
 
 
 def first_integers(x0: Any, fmt: FixedFormat) -> NDArray[Any]:
-    """Round a first state as :func:`integers_of` does.
-
-    Raises
-    ------
-    OverflowError : an entry is beyond the range, whatever the format does with a result there.
-    """
+    """Round a first state as :func:`integers_of` does."""
     try:
         return integers_of(np.asarray(x0)[None], fmt.strict)[0]
     except OverflowError as error:
@@ -256,12 +241,7 @@ def first_integers(x0: Any, fmt: FixedFormat) -> NDArray[Any]:
 
 
 def integers_of(values: Any, fmt: FixedFormat) -> NDArray[Any]:
-    """Round numbers into a format, and return them in its units, as int64, or as Python integers if those are longer.
-
-    Raises
-    ------
-    OverflowError : a number beyond the range of a format that neither saturates nor wraps.
-    """
+    """Round numbers into a format, in its units, as int64, or as Python integers if those are longer."""
     given = np.asarray(values)
     if given.dtype.kind == "f" and fmt.precision <= 52 and -900 < fmt.fraction_bits < 900:
         scaled = given.astype(np.float64) * 2.0**fmt.fraction_bits
@@ -373,10 +353,6 @@ def run_integers(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -> NDAr
     Parameters
     ----------
     u, x : (steps, m) and (n,), inputs and first state in units of the data.
-
-    Raises
-    ------
-    OverflowError : a result overflows in a format that neither saturates nor wraps.
     """
     if made.is_short and u.dtype != object and x.dtype != object:
         states = np.zeros((len(u), made.program.n), np.int64)
@@ -405,10 +381,6 @@ def successors(
     u : (m,), the constant input in units of the data.
     low, counts : (n,), the lowest integer and the number of integers of each state. A state with a count of 0 is never
         read; it counts as one integer, and its own value does not matter.
-
-    Raises
-    ------
-    ValueError : words too long for compiled loops.
     """
     if not made.is_short:
         raise ValueError(f"got words too long for compiled loops: {made.words}; needed products of up to {_FITS} bits")

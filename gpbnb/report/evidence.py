@@ -25,10 +25,6 @@ def operations(file: Path) -> Checked:
     Parameters
     ----------
     file : a table with the columns `all` and `different`.
-
-    Raises
-    ------
-    ValueError : the table has other columns.
     """
     rows = _rows(file)
     if not rows or not {"all", "different"} <= rows[0].keys():

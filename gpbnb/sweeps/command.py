@@ -28,12 +28,7 @@ def pool(processes: int) -> Iterator[Executor | None]:
 
 
 def verify(sweeps: Sequence[Sweep[Any]], count: int, seed: int, progress: bool = False) -> list[str]:
-    """Read every sweep, recompute a sample of its cells, and describe each difference.
-
-    Raises
-    ------
-    DamagedFileError : a file is not as it was written.
-    """
+    """Read every sweep, recompute a sample of its cells, and describe each difference."""
     found = []
     for sweep in sweeps:
         for cell, stored, computed in sweep.verify(count, seed, progress):

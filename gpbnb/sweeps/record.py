@@ -30,10 +30,6 @@ def read_record(file: Path, cure: str) -> dict[str, Any]:
     Parameters
     ----------
     cure : the command that computes the file again; it appears in every error message.
-
-    Raises
-    ------
-    DamagedFileError : the file is not as it was written; the message names the line if there is one.
     """
     damaged = partial(damaged_file, file, cure)
     text = text_of(file, cure)

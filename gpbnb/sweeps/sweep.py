@@ -106,10 +106,6 @@ class Sweep(Generic[C]):
         executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
         chunk : number of cells that are sent at once.
         cells : some of the cells; all by default.
-
-        Raises
-        ------
-        RuntimeError : workers died ten times while computing one chunk.
         """
         if chunk < 1:
             raise ValueError(f"got chunks of {chunk} cells; needed at least 1")
@@ -148,11 +144,6 @@ class Sweep(Generic[C]):
         count : compute only this number of cells, the first ones; by default all cells.
         only : words, one of which must be in the text of a cell; the table keeps the stored rows of other cells.
         store : whether to write the table from the finished cells without computing more.
-
-        Raises
-        ------
-        ValueError : no cell contains one of the words; or words are given for a sweep with rows that combine all
-            cells.
         """
         if only and self.summary is not None:
             raise ValueError(
@@ -202,12 +193,7 @@ class Sweep(Generic[C]):
     # -- reading ----------------------------------------------------------------------------------------
 
     def load(self, file: Path | None = None) -> StoredTable:
-        """Read the stored table.
-
-        Raises
-        ------
-        DamagedFileError : the file is not as it was written; the message names the line and the cure.
-        """
+        """Read the stored table."""
         return read(file or self.file, self.columns, self.command)
 
     def verify(self, count: int, seed: int, progress: bool = False) -> list[Difference]:

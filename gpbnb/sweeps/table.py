@@ -86,12 +86,7 @@ class StoredTable:
 
 
 def write(file: Path, columns: Sequence[Column], rows: Iterable[Record], provenance: Mapping[str, str]) -> None:
-    """Write a table, either completely or not at all.
-
-    Raises
-    ------
-    ValueError : a row that the columns do not accept, or a provenance of several lines.
-    """
+    """Write a table, either completely or not at all."""
     lines, count = [], 0
     for row in rows:
         fault = _fault(columns, row)
@@ -119,12 +114,7 @@ def damaged_file(file: Path, cure: str, line: int, problem: str) -> DamagedFileE
 
 
 def text_of(file: Path, cure: str) -> str:
-    """Return the text of a stored file.
-
-    Raises
-    ------
-    DamagedFileError : the file is missing, cannot be read, or is not UTF-8.
-    """
+    """Return the text of a stored file."""
     try:
         return file.read_bytes().decode("utf-8")
     except FileNotFoundError:
@@ -142,10 +132,6 @@ def read(file: Path, columns: Sequence[Column], cure: str) -> StoredTable:
     ----------
     columns : the columns that the file must have.
     cure : the command that recomputes the file; it appears in every error message.
-
-    Raises
-    ------
-    DamagedFileError : the file is not as it was written; the message names the line and the cure.
     """
     damaged = partial(damaged_file, file, cure)
     text = text_of(file, cure)

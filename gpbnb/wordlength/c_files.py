@@ -55,12 +55,7 @@ WRITTEN = "Written by gpbnb."
 
 
 def refuse_others(folder: Path, name: str) -> None:
-    """Reject a folder in which files of the names of a filter's code were not written by gpbnb.
-
-    Raises
-    ------
-    ValueError : there is such a file.
-    """
+    """Reject a folder in which files of the names of a filter's code were not written by gpbnb."""
     test = f"test_{name}.c"
     marked = {each: each for each in (f"{name}.h", f"{name}.c", test, "Makefile")} | {f"{name}_vectors.txt": test}
     others = [each for each, marks in marked.items() if (folder / each).exists() and not _is_written(folder / marks)]

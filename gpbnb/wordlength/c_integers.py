@@ -79,12 +79,7 @@ def word_bits(fmt: FixedFormat) -> int | None:
 
 
 def radicand_bits(fmt: FixedFormat) -> int:
-    """Return the bits of a word shifted left by its fraction bits; the integer square root of this is the word's root.
-
-    Raises
-    ------
-    ValueError : too many bits, or a binary point beyond the last bit.
-    """
+    """The bits of a word shifted left by its fraction bits; the integer square root of this is the word's root."""
     bits = fmt.precision + fmt.fraction_bits
     if fmt.fraction_bits < 0 or bits > LONGEST_RADICAND:
         raise ValueError(

@@ -290,13 +290,7 @@ def _shift(step: CodeStep, o: int, words: WordFormats) -> int:
 
 
 def word_arithmetic(step: CodeStep, words: WordFormats) -> CodeWords:
-    """Return how a step is written with integers.
-
-    Raises
-    ------
-    ValueError : words longer than C's types, products with more bits than two of the longest, or square roots of words
-        with an unusual binary point.
-    """
+    """Return how a step is written with integers."""
     for name, fmt in (("data", words.data), ("sums", words.accumulator)):
         if word_bits(fmt) is None:
             raise ValueError(
@@ -370,12 +364,7 @@ def declared(name: str, shape: tuple[int, ...]) -> str:
 
 
 def checked_identifier(name: str) -> str:
-    """Return a name that C and file systems take.
-
-    Raises
-    ------
-    ValueError : another name.
-    """
+    """Return a name that C and file systems take."""
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name) or name in _KEYWORDS:
         raise ValueError(f"got name {name!r}; needed a name of C with up to 31 letters, digits and _, such as 'filter'")
     return name

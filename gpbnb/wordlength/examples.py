@@ -136,12 +136,7 @@ def turns(steps: int) -> NDArray[np.float64]:
 
 
 def normal_matrix(degree: int, times: Sequence[int]) -> NDArray[Any]:
-    r"""Exact normal matrix :math:`A^TA`, :math:`A_{ij} = t_i^j`, of a polynomial fit; (degree + 1, degree + 1).
-
-    Raises
-    ------
-    ValueError : fewer distinct times than coefficients, so the matrix is singular.
-    """
+    r"""Exact normal matrix :math:`A^TA`, :math:`A_{ij} = t_i^j`, of a polynomial fit; (degree + 1, degree + 1)."""
     if degree < 0 or len(set(times)) <= degree:
         raise ValueError(
             f"got degree {degree} and {len(set(times))} different times; needed at least {degree + 1} different times "

@@ -54,10 +54,6 @@ class ExactKernel:
 
     Results are first rounded as if the exponent had no upper limit; a rounded result beyond the largest number
     overflows. In a format without subnormal numbers, rounded results below the smallest normal number become zero.
-
-    Raises
-    ------
-    OverflowError : a result overflows, and the format neither saturates nor wraps around.
     """
 
     def __init__(self, rules: Rules) -> None:
@@ -102,12 +98,7 @@ class ExactKernel:
         return self._round_quotient(p, q, e)
 
     def from_decimal(self, p: int, q: int, k: int) -> Pair:
-        """Round ``p / q * 10**k``; ``q`` must be positive.
-
-        Raises
-        ------
-        OverflowError : the base is not 10 and ``10**k`` is too long an integer to write out.
-        """
+        """Round ``p / q * 10**k``; ``q`` must be positive."""
         if k == 0 or self.base == 10:
             return self.from_ratio(p, q, k)
         if p == 0:
@@ -211,12 +202,7 @@ class ExactKernel:
     # -- to other number types -----------------------------------------------------------------
 
     def to_fraction(self, m: int, e: int) -> Fraction:
-        """The exact value.
-
-        Raises
-        ------
-        OverflowError : the value is too long an integer to write out.
-        """
+        """The exact value."""
         if abs(e) > self._largest_exponent:
             raise OverflowError(
                 f"got a number of about {self.about(e)}; needed an exponent of at most "
@@ -225,12 +211,7 @@ class ExactKernel:
         return Fraction(m * self.base**e) if e >= 0 else Fraction(m, self.base**-e)
 
     def to_float(self, m: int, e: int) -> float:
-        """Round to the nearest float64, ties to the even significand.
-
-        Raises
-        ------
-        OverflowError : the result would be infinite, or a nonzero number would become zero.
-        """
+        """Round to the nearest float64, ties to the even significand."""
         if m == 0:
             return 0.0
         if abs(e) <= self._largest_exponent + self.precision and abs(e * self._bits + m.bit_length()) < 1200:

@@ -181,13 +181,7 @@ def _longest(base: int, rounding: Rounding, limited: bool) -> int:
 
 
 def check_order(order: Order, fused: bool, block: int) -> None:
-    """Check the options for computing sums of products.
-
-    Raises
-    ------
-    ValueError : an unknown order, pairwise sums with fused multiply-add, blocks of less than one product, or `fused`
-        that is neither true nor false.
-    """
+    """Check the options for computing sums of products."""
     if order not in get_args(Order):
         raise ValueError(f"order: got {order!r}; needed 'left', 'pairwise' or 'blocked'")
     if fused not in (True, False):
@@ -199,13 +193,7 @@ def check_order(order: Order, fused: bool, block: int) -> None:
 
 
 def compiled_tag(rules: Rules) -> tags.Tag:
-    """Return the tag of a format's arithmetic, as :func:`tag_of`; reject a format without compiled loops.
-
-    Raises
-    ------
-    ValueError : the format has no compiled loops; the message names the setting that prevents them, and what to set
-        instead.
-    """
+    """Return the tag of a format's arithmetic, as :func:`tag_of`; reject a format without compiled loops."""
     if (tag := tag_of(rules)) is not None:
         return cast(tags.Tag, tag)
     base, precision, rounding, limits, _ = rules
@@ -262,12 +250,7 @@ def fusing_tag(rules: Rules) -> tags.Limited | None:
 
 
 def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:
-    """Return the tag for numbers in one arithmetic whose sums of products are accumulated in another.
-
-    Raises
-    ------
-    ValueError : one of the two does not use float64, or the sums have fewer digits than the numbers.
-    """
+    """Return the tag for numbers in one arithmetic whose sums of products are accumulated in another."""
     for tag in (stored, sums):
         if not isinstance(tag, tags.FLOATS) or isinstance(tag, tags.Mixed):
             raise ValueError(f"got sums kept in {sums} with numbers in {stored}; needed base 2 or 16 for both")

@@ -42,10 +42,6 @@ def owners(statements: Iterable[Statement], topics: Mapping[str, Checks] = TOPIC
     Returns
     -------
     owners : statement id → name of the topic.
-
-    Raises
-    ------
-    ValueError : a check belongs to no statement, or two topics check the same one.
     """
     known = {statement.id for statement in statements}
     found: dict[str, str] = {}

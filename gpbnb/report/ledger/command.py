@@ -20,12 +20,7 @@ COMPLETE, INCOMPLETE, BROKEN = 0, 1, 3  # argparse uses 2 for wrong arguments
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit status.
-
-    Raises
-    ------
-    SystemExit : with status 2 for bad arguments, 0 after ``--help``.
-    """
+    """Run the command and return its exit status."""
     parser = ledger_parser()
     arguments = parser.parse_args(argv)
     try:

@@ -22,10 +22,6 @@ class Correction:
     form : the corrected form, in the notation of :mod:`gpbnb.report.ledger.formula`; empty if there is only a reason.
     text : the text around the corrected form; empty if the text of the statement stays.
     reason : why no text can correct the statement; empty if there is a form.
-
-    Raises
-    ------
-    ValueError : there are both a form and a reason, or neither, or a text without a form.
     """
 
     id: str
@@ -52,12 +48,7 @@ def load_corrections() -> dict[str, Correction]:
 
 
 def intended(key: str) -> Statement:
-    """Return a statement as it should read: corrected, where text can correct it.
-
-    Raises
-    ------
-    KeyError : there is no statement with this id.
-    """
+    """Return a statement as it should read: corrected, where text can correct it."""
     printed = statement(key)
     return (load_corrections()[key].applied(printed) or printed) if key in load_corrections() else printed
 
@@ -69,10 +60,6 @@ def read_corrections(source: Traversable, statements: Mapping[str, Statement]) -
     ----------
     source : a CSV file with the columns id, form, text, reason.
     statements : the statements that it may correct, by id.
-
-    Raises
-    ------
-    ValueError : a row is not the correction of a statement; the message names the id.
     """
     found: dict[str, Correction] = {}
     for row in csv.DictReader(source.read_text(encoding="utf-8").splitlines(), strict=True):

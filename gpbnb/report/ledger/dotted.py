@@ -23,10 +23,6 @@ class DottedMatrix:
     ----------
     cells : rows of cells, all of the same length; a cell is a number or the `Ellipsis` ``...``.
 
-    Raises
-    ------
-    ValueError : the rows differ in length.
-
     Examples
     --------
     >>> import sympy as sp

@@ -69,11 +69,6 @@ class Finding:
     verdict : the judgement of the statement; it must fit `agrees`.
     note : reason or place, in the same markup. Required for `UNVERIFIABLE`, `GIVEN` and `ANSWERED`.
     root : id of the root error in ``roots.csv`` that makes the statement disagree; empty if it agrees.
-
-    Raises
-    ------
-    TypeError : a field is not of its type; a NumPy or SymPy truth value is not a bool.
-    ValueError : `verdict` does not fit `agrees`, a needed text is blank, or a text has an unpaired dollar sign.
     """
 
     recomputed: str
@@ -140,11 +135,6 @@ def compare(
     Returns
     -------
     finding : verified if `agrees`, otherwise `otherwise`.
-
-    Raises
-    ------
-    TypeError : `agrees` is not a bool.
-    ValueError : `otherwise` is not one of `DISAGREEMENTS`.
     """
     if otherwise not in DISAGREEMENTS:
         came = otherwise.value if isinstance(otherwise, Verdict) else otherwise
@@ -167,11 +157,6 @@ def answer(holds: bool, recomputed: str, note: str) -> Finding:
     Returns
     -------
     finding : answered if `holds`, otherwise open.
-
-    Raises
-    ------
-    TypeError : `holds` is not a bool.
-    ValueError : `note` is blank.
     """
     _require_bool("holds", holds)
     answered = Finding(recomputed, True, Verdict.ANSWERED, note)
@@ -185,10 +170,6 @@ def unverifiable(recomputed: str, note: str) -> Finding:
     ----------
     recomputed : what can still be said; may be empty.
     note : which data is missing.
-
-    Raises
-    ------
-    ValueError : `note` is blank.
     """
     return Finding(recomputed, None, Verdict.UNVERIFIABLE, note)
 
@@ -199,10 +180,6 @@ def given(note: str) -> Finding:
     Parameters
     ----------
     note : what it defines or gives.
-
-    Raises
-    ------
-    ValueError : `note` is blank.
     """
     return Finding("", None, Verdict.GIVEN, note)
 

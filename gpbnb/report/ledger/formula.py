@@ -72,12 +72,7 @@ class Link:
 
     @property
     def holds(self) -> bool:
-        """Whether the comparison holds exactly; matrices are compared entry by entry.
-
-        Raises
-        ------
-        ValueError : the symbol is ``≈``; the check must say how close is close enough.
-        """
+        """Whether the comparison holds exactly; matrices are compared entry by entry."""
         if self.symbol == "≈":
             raise ValueError(
                 f"got {self.left} ≈ {self.right}; needed a relation without ≈; compare the two sides in the check"
@@ -158,10 +153,6 @@ class Relation:
         Returns
         -------
         links : one for each comparison; a part without a comparison has none.
-
-        Raises
-        ------
-        Undefined : an expression has no value with these names.
         """
         tree = self.tree
         if not isinstance(tree, ast.Compare):
@@ -247,12 +238,7 @@ _NUMBER = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?|[+-]?\d+/\
 
 
 def read(form: str) -> tuple[Part, ...]:
-    """Read the parts of a form.
-
-    Raises
-    ------
-    ValueError : a part is neither a relation nor a number nor words with an alternative.
-    """
+    """Read the parts of a form."""
     return tuple(_part(text.strip()) for text in form.split(";")) if form.strip() else ()
 
 

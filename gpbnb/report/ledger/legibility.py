@@ -31,10 +31,6 @@ class Damage:
     id : id of the statement.
     scan : the characters of the scan at the damaged places.
     witness : id of the statement that shows what was printed at the judged place; empty if there is none.
-
-    Raises
-    ------
-    ValueError : `scan` is blank.
     """
 
     id: str

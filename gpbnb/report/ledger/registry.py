@@ -41,14 +41,7 @@ class Checks(Mapping[str, Check]):
         self._checks: dict[str, Check] = {}
 
     def add(self, *ids: str) -> Callable[[_C], _C]:
-        """Register the decorated function as the check of each of `ids`.
-
-        Raises
-        ------
-        TypeError : an id is not a str, there is none (``@CHECKS.add`` without parentheses gives this too), or the
-            function takes more than the statement.
-        ValueError : an id is blank or has its check already.
-        """
+        """Register the decorated function as the check of each of `ids`."""
         if not ids:
             raise TypeError("got add() without an id; needed @CHECKS.add('document.chapter.item')")
         for key in ids:
@@ -77,13 +70,7 @@ class Checks(Mapping[str, Check]):
         return register
 
     def run(self, statement: Statement) -> Finding:
-        """Run the check of a statement, and decide by the rule of :mod:`gpbnb.report.ledger.legibility` who is charged.
-
-        Raises
-        ------
-        KeyError : no check is registered for its id.
-        TypeError : the check returned something other than a Finding.
-        """
+        """Run a check and decide, by the rule of :mod:`gpbnb.report.ledger.legibility`, who is charged."""
         check = self[statement.id]
         finding = check(statement) if inspect.signature(check).parameters else check()
         if not isinstance(finding, Finding):

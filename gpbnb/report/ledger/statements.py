@@ -58,12 +58,7 @@ class Statement:
         return _PLACE.sub(lambda place: self.parts[int(place[1]) - 1].markdown(), self.text)
 
     def relation(self, number: int = 1) -> Relation:
-        """Return the relation with this number among the relations of the form, counted from 1.
-
-        Raises
-        ------
-        LookupError : the form has no relation with this number.
-        """
+        """Return the relation with this number among the relations of the form, counted from 1."""
         relations = [part for part in self.parts if isinstance(part, Relation)]
         if not 1 <= number <= len(relations):
             raise LookupError(f"got relation number {number} of {self.id}; needed a number from 1 to {len(relations)}")
@@ -82,21 +77,11 @@ class Statement:
         return tuple(link for relation in relations for link in relation.links(names, number))
 
     def number(self, label: str) -> Number:
-        """Return the printed number with this label.
-
-        Raises
-        ------
-        LookupError : the form has no such number.
-        """
+        """Return the printed number with this label."""
         return self._labelled(Number, label)
 
     def says(self, label: str) -> str:
-        """Return the phrase that the document prints for this label.
-
-        Raises
-        ------
-        LookupError : the form has no such phrase.
-        """
+        """Return the phrase that the document prints for this label."""
         return self._labelled(Words, label).printed
 
     def claims(self, label: str, meanings: Mapping[str, bool]) -> bool:
@@ -105,10 +90,6 @@ class Statement:
         Parameters
         ----------
         meanings : every phrase that could be printed, and whether it would be right.
-
-        Raises
-        ------
-        LookupError : the form has no phrase with this label, or prints one that is not in `meanings`.
         """
         return meanings[self.says(label)]
 
@@ -134,11 +115,6 @@ def load_statements(source: Traversable | None = None) -> tuple[Statement, ...]:
     Returns
     -------
     entries : in the order of the file.
-
-    Raises
-    ------
-    OSError : the file cannot be read.
-    ValueError : the file is not a valid inventory; the message names the line.
     """
     return _stored() if source is None else _read(source)
 
@@ -179,12 +155,7 @@ def _by_id() -> dict[str, Statement]:
 
 
 def statement(key: str) -> Statement:
-    """Return the statement with the id `key`.
-
-    Raises
-    ------
-    KeyError : there is no statement with this id.
-    """
+    """Return the statement with the id `key`."""
     if key not in _by_id():
         raise KeyError(f"got {key!r}; needed the id of a statement in statements.csv")
     return _by_id()[key]
@@ -215,12 +186,7 @@ def _entry(record: list[str]) -> Statement:
 
 
 def check_text(entry: Statement) -> None:
-    """Check that the form of a statement can be read and that its text can be typeset with the parts of the form.
-
-    Raises
-    ------
-    ValueError : it cannot.
-    """
+    """Check that the form of a statement can be read and that its text can be typeset with the parts of the form."""
     if entry.text.count("$") % 2 or "$$" in entry.text:
         raise ValueError(f"got text={entry.text!r} with an unpaired or doubled dollar sign; needed math as $...$")
     for place in _PLACE.findall(entry.text):
@@ -245,10 +211,6 @@ def select(
     entries : the entries to choose from.
     document, chapter : all by default.
     sections : numbers or names; ``9`` includes 9.1 and 9.2. All by default.
-
-    Raises
-    ------
-    ValueError : there are no entries of this document, of this chapter, or of one of the sections.
     """
     found = tuple(entries)
     if document is not None:

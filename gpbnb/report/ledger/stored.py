@@ -50,12 +50,7 @@ def rows(
 
 
 def to_table(rows: Iterable[Row]) -> str:
-    """Write rows as ``findings.csv`` stores them.
-
-    Raises
-    ------
-    ExceptionGroup : checks raised errors.
-    """
+    """Write rows as ``findings.csv`` stores them."""
     rows = tuple(rows)
     if errors := [row.error for row in rows if row.error is not None]:
         raise ExceptionGroup("checks failed", errors)
