@@ -115,11 +115,16 @@ def glued(page: str, key: str) -> float:
     raise KeyError(f"{page} glues no {key}")
 
 
+def output(page: str, code: str) -> str:
+    """The text that the cell with this code printed or returned."""
+    cell = next(each for each in cells(page) if each["cell_type"] == "code" and code in "".join(each["source"]))
+    texts = [each.get("text", "") or each.get("data", {}).get("text/markdown", "") for each in cell["outputs"]]
+    return "".join("".join(each) for each in texts)
+
+
 def printed(page: str, code: str) -> list[float]:
     """The numbers with a point that the cell with this code printed."""
-    cell = next(each for each in cells(page) if each["cell_type"] == "code" and code in "".join(each["source"]))
-    text = "".join("".join(output.get("text", "")) for output in cell["outputs"])
-    return [float(each) for each in re.findall(r"\d+\.\d+", text)]
+    return [float(each) for each in re.findall(r"\d+\.\d+", output(page, code))]
 
 
 def decades_a_digit() -> float:
@@ -164,7 +169,9 @@ COMPUTED: dict[tuple[str, str], Callable[[], Any]] = {
         and FloatFormat(10, 11).unit_roundoff < Fraction(2) ** -int(glued("mission", "mission_bits"))
     ),
     ("mission", "than two bits"): lambda: glued("mission", "timing_bits") < 2,
-    ("processors", "far more than sixteen bits"): lambda: glued("wordlength", "span") > 32,
+    ("processors", "far more than sixteen bits"): lambda: (
+        int(re.findall(r"\d+", output("wordlength", "span ="))[0]) > 32
+    ),
     ("kalman", "about four units"): lambda: round(6606 / YEAR * 2**11) == 4,
     ("integration", r"\mu^2/120"): lambda: (
         float(integration.approximation_ratio(0.01)) - 1 == pytest.approx(0.01**2 / 120, rel=1e-4)
@@ -185,6 +192,32 @@ def test_a_typed_quantity_is_what_is_computed(page, phrase):
     formulas = re.sub(r"\s+", " ", " ".join(re.findall(r"\$\$.*?\$\$|\$[^$]*\$", source(page), re.DOTALL)))
     assert phrase in prose(page) or phrase in formulas, "drop it from COMPUTED"
     assert COMPUTED[page, phrase]()
+
+
+def test_the_principles_state_what_the_page_on_wordlength_prints():
+    def bits(code: str, pattern: str) -> list[int]:
+        return [int(each) for each in re.findall(pattern, output("wordlength", code), re.MULTILINE)]
+
+    def column(k: int) -> list[int]:
+        return bits("a minute, chopped", "[a-zD)] +" + r"\d+ +" * k + r"(\d+)")
+
+    near, *_, far = bits("for origin in", r"away: (\d+) bits")
+    cubic = [bits("inverse_precisions", rf"degree 3, {name} .*?(\d+) \|$")[0] for name in ("centred", "from 100")]
+    records = bits("for seed in range(20)", r"\d+")
+    (usual,), (ud,) = (bits("precise, 100", rf"^{form} +(\d+) bits") for form in ("innovation", "UD"))
+    first, *_, last = bits("required_precision_by_steps", r"steps: (\d+) bits")
+    lost = [after - before for before, after in zip(column(0), column(2), strict=True)]
+    text = prose("principles")
+    for phrase in (
+        f"A tracker needs {near} bits with coordinates from its starting point, and {far} with coordinates from",
+        f"saves {cubic[1] - cubic[0]} bits in the normal matrix",
+        f"costs the tilt filter {min(lost)} to {max(lost)} bits",
+        f"costs {column(1)[0] - column(1)[2]} bits over ten minutes",
+        f"the UD form needs {ud} bits where the innovation form needs {usual}",
+        f"need from {min(records)} to {max(records)} bits",
+        f"needs {first} bits for its first ten steps, {last} for ten thousand",
+    ):
+        assert phrase in text
 
 
 @pytest.mark.parametrize("phrase", README)

@@ -18,11 +18,9 @@ from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import log_spaced, reference
-from gpbnb.report.gravity_probe_b import model as gravity_probe_b
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.guarantees import table as guarantees
 from gpbnb.report.integration.theory import needed_precision
-from gpbnb.report.kalman.report_bounds import coefficients
 from gpbnb.report.wordlengths import study, tables
 from gpbnb.wordlength import examples, ranges
 from gpbnb.wordlength.precision import required_precision, survey
@@ -83,15 +81,6 @@ def test_normal_matrix():
 # -- study --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("base", [2, 10])
-def test_printed_precision_is_the_least_that_meets_125(base):
-    tolerance, size = Fraction(1, 100), Fraction(40)
-    t = study.printed_precision(6000, 3, 2, tolerance, size, base)
-    total = sum(coefficients(6000, 3, 2)) * size
-    assert total * FloatFormat(base, t).unit_roundoff <= tolerance < total * FloatFormat(base, t - 1).unit_roundoff
-    assert study.printed_precision(6000, 3, 2, tolerance, size, base, carried=True) > t
-
-
 def test_growth_answers_for_the_first_steps():
     model = year.model(year.MODELS[0], 2)
     z = year.simulation(year.MODELS[0]).measurements(12)
@@ -118,31 +107,6 @@ def test_growth_grows():
     assert [each.steps for each in found] == [10, 300]
     assert found[0].fmt.precision < found[1].fmt.precision
     assert {each.basis for each in found} == {"bound"}
-
-
-def test_years_needed_against_each_run():
-    kind = year.YearCase(year.MODELS[0], 2, 0, Rounding.NEAREST, Form.HUNG)
-    runs = [run for run in year.load() if run.case == kind._replace(precision=run.case.precision)]
-    found = dict(study.precision_by_step(runs, 1.0))
-    for run in runs:
-        worst = 0.0
-        for i, step in enumerate(run.steps.tolist()):
-            worst = max(worst, *np.abs(run.drift[i]), *np.abs(run.rate[i]))
-            assert (run.case.precision >= found[step]) >= (worst <= 1)
-            if run.case.precision == found[step]:
-                assert worst <= 1
-    assert list(found.values()) == sorted(found.values())
-    assert found[gravity_probe_b.YEAR] == 32
-    with pytest.raises(ValueError, match="got runs of 2 kinds; needed runs of one"):
-        study.precision_by_step([runs[0], replace(runs[0], case=runs[0].case._replace(base=10))], 1.0)
-
-
-def test_a_run_that_left_the_tolerance_does_not_come_back():
-    (first, *_) = year.load()
-    one = first.steps.tolist()[:3]
-    drift = np.array([[0.5, 0.0], [0.0, -2.0], [0.5, 0.0]])
-    run = replace(first, steps=first.steps[:3], drift=drift, rate=np.zeros((3, 2)))
-    assert study.precision_by_step([run], 1.0) == ((one[0], run.case.precision),)
 
 
 def test_spans_hold_every_number():
@@ -175,28 +139,17 @@ def test_update_stagnation_is_that_of_the_runs():
     for last in (next(k for k in range(1, 300) if steady[-k]), 299):
         (found,) = study.update_stagnation(TILT, Z, 2, [fmt], last=last)
         assert found.unchanged == sum(steady[-last:]) / last
-    assert study.bits_hiding_process_noise(TILT, Z, 2) == pytest.approx(
-        math.log2(float(true.P[-1, 2, 2]) / 1e-10), rel=1e-12
-    )
 
 
 def test_what_the_watch_of_a_state_refuses():
     for state in (-1, 3):
         with pytest.raises(ValueError, match="needed an index from 0 to 2"):
             study.update_stagnation(TILT, Z, state, [FloatFormat(2, 12)])
-        with pytest.raises(ValueError, match="needed an index from 0 to 2"):
-            study.bits_hiding_process_noise(TILT, Z, state)
     for last in (0, 300):
         with pytest.raises(ValueError, match=f"got {last} steps to watch of 300"):
             study.update_stagnation(TILT, Z, 2, [FloatFormat(2, 12)], last=last)
-    assert study.bits_hiding_process_noise(TILT, Z, 0) == math.inf
     with pytest.raises(ValueError, match="NaN or infinity"):
         ranges.binary_ranges(TILT, Z * math.nan)
-
-
-def test_largest_estimate():
-    checkpoints = reference(TILT, Z, log_spaced(300, 16))
-    assert study.largest_estimate(TILT, Z) == max(abs(x) for x in checkpoints.x.ravel())
 
 
 def test_a_companion_bounds_closely():
@@ -309,15 +262,6 @@ def test_units_change_the_estimates_and_nothing_else():
 
 
 # -- tables -------------------------------------------------------------------------------------------
-
-
-def test_answers():
-    table = tables.answers({"report": [("a minute", FOUND), ("an hour", NONE)]})
-    assert table.header == ("form", "a minute", "an hour")
-    assert table.body == (("report", "17", "none"),)
-    assert table.title == "1 lines of answers"
-    with pytest.raises(ValueError, match="got rows with 2 different sets"):
-        tables.answers({"a": [("x", FOUND)], "b": [("y", FOUND)]})
 
 
 def test_cells():

@@ -14,7 +14,6 @@ from gpbnb.report.gravity_probe_b.answers import Moved
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS
 from gpbnb.report.gravity_probe_b.model import STATES
 from gpbnb.report.gravity_probe_b.threshold import Share
-from gpbnb.wordlength.requirement import Requirement
 
 
 def states(model: LinearModel) -> Table:
@@ -30,17 +29,6 @@ def states(model: LinearModel) -> Table:
 
 def _root(variance: float) -> str:
     return short(math.sqrt(variance), 3)
-
-
-def requirements(answers: Sequence[tuple[str, Requirement]]) -> Table:
-    """Tabulate answers of :func:`gpbnb.wordlength.precision.required_precision`."""
-    body = []
-    for name, answer in answers:
-        ratio = f"{dict(answer.tried)[answer.fmt.precision]:.2g}" if answer.fmt else ""
-        smallest_format = arithmetic(answer.fmt) if answer.fmt else "none"
-        body.append((name, answer.basis, str(answer.steps), smallest_format, ratio))
-    header = ("filter", "found by", "steps", "smallest precision", "error or bound / tolerance")
-    return Table(f"{len(body)} answers", header, tuple(body))
 
 
 def shares(found: Sequence[Share]) -> Table:

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic import search
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
 from gpbnb.arithmetic.rounding import Rounding
@@ -23,38 +22,12 @@ from gpbnb.filters.emulation import compare_runs
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
-from gpbnb.report.gravity_probe_b.year import Year
 from gpbnb.report.kalman import report_bounds
 from gpbnb.wordlength.precision import required_precision
 from gpbnb.wordlength.requirement import Requirement
 
 Curve = Sequence[tuple[int, float]]
 """Steps, and a number at each."""
-
-
-def printed_precision(
-    k: int, n: int, m: int, tolerance: Fraction, size: Fraction, base: int = 2, **faults: bool
-) -> int:
-    r"""Return the digits that (125) requires if :math:`\|x_k\| = B` = size, for an error of `tolerance`.
-
-    Parameters
-    ----------
-    tolerance, size : in the same unit.
-    faults : options of :func:`gpbnb.report.kalman.report_bounds.coefficients` that
-        correct (125).
-
-    References
-    ----------
-    hung1984, ch. II, eq. (125) and the example of section 12.
-    """
-
-    def meets(fmt: FloatFormat) -> bool:
-        return report_bounds.bound_for_size(fmt.unit_roundoff, k, n, m, size, **faults) <= tolerance
-
-    found = search.smallest_precision(meets, base, Rounding.NEAREST, monotone=True)
-    if found is None:
-        raise ArithmeticError("got no sufficient precision, although the unit roundoff can be arbitrarily small")
-    return found.precision
 
 
 def required_precision_by_steps(
@@ -78,20 +51,6 @@ def _first(model: LinearModel, steps: int) -> LinearModel:
     if model.u is not None and model.u.ndim == 2:
         cut["u"] = model.u[:steps]
     return replace(model, **cut, steps=None if model.steps is None else steps)
-
-
-def precision_by_step(runs: Sequence[Year], tolerance: float) -> tuple[tuple[int, int], ...]:
-    """For each step, find the fewest digits that keep drift (mas) and rate (mas/yr) within `tolerance` so far."""
-    kinds = {(run.case.model, run.case.base, run.case.rounding, run.case.form) for run in runs}
-    if len(kinds) != 1:
-        raise ValueError(f"got runs of {len(kinds)} kinds; needed runs of one model, base, rounding and form")
-    found: dict[int, int] = {}
-    for run in runs:
-        errors = np.maximum.accumulate(np.abs(np.hstack([run.drift, run.rate])).max(axis=1))
-        for step, error in zip(run.steps.tolist(), errors.tolist(), strict=True):
-            if error <= tolerance:
-                found[step] = min(found.get(step, run.case.precision), run.case.precision)
-    return tuple(sorted(found.items()))
 
 
 class UpdateStagnation(NamedTuple):
@@ -163,24 +122,9 @@ def update_stagnation(
     return tuple(found)
 
 
-def bits_hiding_process_noise(model: LinearModel, z: NDArray[Any], state: int) -> float:
-    r"""Return :math:`\log_2 P_{ii}/Q_{ii}` after the last step; with roughly fewer bits, adding Q has no effect.
-
-    The value is infinite if the state has no process noise.
-    """
-    _check_state(model, state)
-    checkpoints, noise = reference(model, z, (len(z),)), float(model.Q[0, state, state])
-    return math.log2(float(checkpoints.P[-1, state, state]) / noise) if noise else math.inf
-
-
 def _check_state(model: LinearModel, state: int) -> None:
     if state not in range(model.n):
         raise ValueError(f"got state {state!r}; needed an index from 0 to {model.n - 1}")
-
-
-def largest_estimate(model: LinearModel, z: NDArray[Any]) -> Fraction:
-    """Return the largest entry of the estimates at the steps of :func:`gpbnb.filters.run.log_spaced`."""
-    return Fraction(np.abs(reference(model, z, log_spaced(len(z), 16)).x).max())
 
 
 def companion_run(

@@ -12,23 +12,6 @@ from gpbnb.report.integration.theory import best_rate, needed_precision, stall_r
 from gpbnb.report.wordlengths.study import InversePrecision, UpdateStagnation
 from gpbnb.wordlength.examples import NORMAL_RANGE
 from gpbnb.wordlength.ranges import BinaryRange
-from gpbnb.wordlength.requirement import Requirement
-
-
-def bits(answer: Requirement) -> str:
-    """Return the precision of an answer for a cell, or "none"."""
-    return str(answer.fmt.precision) if answer.fmt else "none"
-
-
-def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
-    """Compare answers, with one row for each name and one column for each question."""
-    questions = {tuple(question for question, _ in line) for line in found.values()}
-    if len(questions) != 1:
-        raise ValueError(
-            f"got rows with {len(questions)} different sets of questions; needed the same questions in each row"
-        )
-    body = tuple((name, *(bits(answer) for _, answer in line)) for name, line in found.items())
-    return Table(f"{len(body)} lines of answers", ("form", *questions.pop()), body)
 
 
 def update_stagnation(found: Sequence[UpdateStagnation], tolerance: float) -> Table:
