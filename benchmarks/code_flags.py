@@ -95,7 +95,7 @@ def changes(steps: int = STEPS) -> Iterator[Change]:
         expected = system.outputs(u, BINARY32)[:, 0, 0]
         for compiler, flags in product(installed(), BUILDS):
             with tempfile.TemporaryDirectory() as folder:
-                write_code(design, BINARY32, structure, folder)
+                write_code(design, BINARY32, folder, form=structure)
                 (Path(folder) / "main.c").write_text(MAIN)
                 command = [compiler, "-std=c99", "-O2", *flags.split(), "-DFILTER_FAST_MATH", "-o", "run"]
                 subprocess.run([*command, "main.c", "filter.c"], cwd=folder, check=True)

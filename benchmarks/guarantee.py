@@ -76,7 +76,7 @@ def measure(case: Case) -> Measured:
     """Compute a guarantee in this process."""
     given = cyclic(case.n, case.m, case.cycle, case.decay)
     begin = time.process_time()
-    found = guarantee(given, FloatFormat(2, 24), limits(case.n, case.m, state=100, innovation=10), case.form)
+    found = guarantee(given, FloatFormat(2, 24), limits(state=100, innovation=10), form=case.form)
     seconds = time.process_time() - begin
     if not found.for_ever:
         raise RuntimeError(f"{given.name}: {found.why}")

@@ -10,16 +10,14 @@ The public interface::
     NonlinearModel             functions of a state for an extended or unscented Kalman filter
     NonlinearSystem            a step of your own, from state and inputs to the next state and outputs
     LinearSystem               a digital filter in any structure, a controller or an observer
-    required_precision         the smallest precision that keeps a filter, or your own function, within a tolerance
-    required_block_precisions  the same for each block of a Kalman filter; BlockFormats: a format for each block
-    required_fraction_bits     the same in fixed point
-    required_word_formats      the same for data, coefficients and sums of a digital filter, each in its WordFormats
+    required_precision         the format with the fewest digits that keeps any model within a tolerance, in floating or
+                               fixed point, in words of a digital filter or in blocks of a Kalman filter
     limit_cycles               every limit cycle of a filter in fixed point with a constant input
     limits, guarantee          limits on a filter, and a bound for every measurement within them, for ever
-    emulate, Form              one run of a filter with every operation rounded, in one of the forms of its update
+    emulate                    one run of any model with every operation rounded; Form: the forms of a Kalman filter
     FixedIntervalSmoother      a Rauch-Tung-Striebel smoother of a record, as a function of a format
     survey_records             many measurement records in many formats at once
-    write_code                 the filter as C99, with results that agree with the emulation digit for digit
+    write_code                 the model as C99, with results that agree with the emulation digit for digit
     TracedFunction             your own function of arrays, run in compiled code
     peek                       show intermediate values of a function whose precision is being searched
     read_model                 a model from a TOML file, SciPy, python-control or FilterPy
@@ -38,11 +36,11 @@ __version__ = "0.2.0"
 __all__ = [
     "BFLOAT16", "BINARY16", "BINARY32", "BINARY64", "BINARY128", "DECIMAL32", "DECIMAL64", "DECIMAL128", "FP4_E2M1",
     "FP6_E2M3", "FP6_E3M2", "FP8_E4M3", "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32",
-    "BlockFormats", "FixedFormat", "FixedIntervalSmoother", "FloatArray", "FloatFormat", "Form",
-    "LinearModel", "LinearSystem", "NonlinearModel", "NonlinearSystem", "Rounding",
-    "TracedFunction", "WordFormats", "emulate", "guarantee", "limit_cycles", "limits", "linalg",
-    "peek", "read_model", "required_block_precisions", "required_fraction_bits",
-    "required_precision", "required_word_formats", "survey_records", "write_code",
+    "BlockFormats", "EmulatedRun", "FixedFormat", "FixedIntervalSmoother", "FloatArray", "FloatFormat", "Form",
+    "Guarantee", "LimitCycles", "LinearModel", "LinearSystem", "NonlinearModel", "NonlinearSystem", "OutputGuarantee",
+    "RecordSurvey", "Requirement", "Rounding", "SmoothedRecord", "TracedFunction", "WordFormats",
+    "emulate", "guarantee", "limit_cycles", "limits", "linalg",
+    "peek", "read_model", "required_precision", "survey_records", "write_code",
 ]
 # fmt: on
 

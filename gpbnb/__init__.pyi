@@ -56,25 +56,29 @@ from gpbnb.arithmetic.named import (
 )
 from gpbnb.arithmetic.rounding import Rounding as Rounding
 from gpbnb.arithmetic.traced import TracedFunction as TracedFunction
-from gpbnb.bounds.guarantee import guarantee as guarantee
+from gpbnb.bounds.guarantee import Guarantee as Guarantee
 from gpbnb.bounds.guarantee import limits as limits
-from gpbnb.bounds.limit_cycles import limit_cycles as limit_cycles
+from gpbnb.bounds.limit_cycles import LimitCycles as LimitCycles
 from gpbnb.filters.blocks import BlockFormats as BlockFormats
-from gpbnb.filters.emulation import emulate as emulate
 from gpbnb.filters.forms import Form as Form
 from gpbnb.filters.model import LinearModel as LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel as NonlinearModel
 from gpbnb.filters.nonlinear_system import NonlinearSystem as NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother as FixedIntervalSmoother
+from gpbnb.filters.smoothing import SmoothedRecord as SmoothedRecord
 from gpbnb.filters.system import LinearSystem as LinearSystem
 from gpbnb.filters.words import WordFormats as WordFormats
 from gpbnb.names import NAMED_FORMATS as NAMED_FORMATS
-from gpbnb.wordlength.blocks import required_block_precisions as required_block_precisions
-from gpbnb.wordlength.blocks import required_word_formats as required_word_formats
+from gpbnb.wordlength.answer import Requirement as Requirement
+from gpbnb.wordlength.bounding import OutputGuarantee as OutputGuarantee
+from gpbnb.wordlength.bounding import guarantee as guarantee
+from gpbnb.wordlength.bounding import limit_cycles as limit_cycles
 from gpbnb.wordlength.code import write_code as write_code
-from gpbnb.wordlength.fixed_point import required_fraction_bits as required_fraction_bits
+from gpbnb.wordlength.emulation import EmulatedRun as EmulatedRun
+from gpbnb.wordlength.emulation import emulate as emulate
 from gpbnb.wordlength.models import read_model as read_model
-from gpbnb.wordlength.precision import required_precision as required_precision
+from gpbnb.wordlength.records import RecordSurvey as RecordSurvey
 from gpbnb.wordlength.records import survey_records as survey_records
+from gpbnb.wordlength.required import required_precision as required_precision
 
 __version__: str

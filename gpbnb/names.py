@@ -20,29 +20,33 @@ ALIASES = {
 
 HOMES = {
     "BlockFormats": "gpbnb.filters.blocks",
+    "EmulatedRun": "gpbnb.wordlength.emulation",
     "FixedFormat": "gpbnb.arithmetic.fixed",
     "FixedIntervalSmoother": "gpbnb.filters.smoothing",
     "FloatArray": "gpbnb.arithmetic.array",
     "FloatFormat": "gpbnb.arithmetic.formats",
     "Form": "gpbnb.filters.forms",
+    "Guarantee": "gpbnb.bounds.guarantee",
+    "LimitCycles": "gpbnb.bounds.limit_cycles",
     "LinearModel": "gpbnb.filters.model",
     "LinearSystem": "gpbnb.filters.system",
     "NonlinearModel": "gpbnb.filters.nonlinear",
     "NonlinearSystem": "gpbnb.filters.nonlinear_system",
+    "OutputGuarantee": "gpbnb.wordlength.bounding",
+    "RecordSurvey": "gpbnb.wordlength.records",
+    "Requirement": "gpbnb.wordlength.answer",
     "Rounding": "gpbnb.arithmetic.rounding",
+    "SmoothedRecord": "gpbnb.filters.smoothing",
     "TracedFunction": "gpbnb.arithmetic.traced",
     "WordFormats": "gpbnb.filters.words",
-    "emulate": "gpbnb.filters.emulation",
-    "guarantee": "gpbnb.bounds.guarantee",
-    "limit_cycles": "gpbnb.bounds.limit_cycles",
+    "emulate": "gpbnb.wordlength.emulation",
+    "guarantee": "gpbnb.wordlength.bounding",
+    "limit_cycles": "gpbnb.wordlength.bounding",
     "limits": "gpbnb.bounds.guarantee",
     "linalg": "gpbnb.arithmetic.linalg",
     "peek": "gpbnb.arithmetic.exits",
     "read_model": "gpbnb.wordlength.models",
-    "required_block_precisions": "gpbnb.wordlength.blocks",
-    "required_fraction_bits": "gpbnb.wordlength.fixed_point",
-    "required_precision": "gpbnb.wordlength.precision",
-    "required_word_formats": "gpbnb.wordlength.blocks",
+    "required_precision": "gpbnb.wordlength.required",
     "survey_records": "gpbnb.wordlength.records",
     "write_code": "gpbnb.wordlength.code",
 }
@@ -55,7 +59,7 @@ _FIXED = re.compile(r"FIXED[ _-]?(-?\d+)\.(-?\d+)|Q(?:(-?\d+)\.)?(-?\d+)", re.AS
 def format_parts(name: str) -> str | tuple[int, int]:
     """Return what the name of a format means: one of ``NAMED_FORMATS``, or integer and fraction bits.
 
-    Names of C and NumPy, such as "float32" and "double", are known, too. In "fixed 4.12" and "Q4.12", the first number
+    Names of C and NumPy, such as "float32" and "double", are known, too. In "Q3.12" and "fixed 3.12", the first number
     counts the bits before the binary point without the sign, and the second those after it; "Q15" has none before it.
     Case, blanks, hyphens and underscores do not matter.
 
@@ -65,8 +69,8 @@ def format_parts(name: str) -> str | tuple[int, int]:
 
     Examples
     --------
-    >>> format_parts("bfloat16"), format_parts("Q15"), format_parts("fixed 4.12")
-    ('BFLOAT16', (0, 15), (4, 12))
+    >>> format_parts("bfloat16"), format_parts("Q15"), format_parts("Q3.12")
+    ('BFLOAT16', (0, 15), (3, 12))
     """
     wanted = name.strip().upper()
     wanted = ALIASES.get(wanted, wanted)
@@ -76,4 +80,6 @@ def format_parts(name: str) -> str | tuple[int, int]:
     if match := _FIXED.fullmatch(wanted):
         integer, fraction = (match[1], match[2]) if match[2] else (match[3] or "0", match[4])
         return int(integer), int(fraction)
-    raise ValueError(f'got format {name!r}; needed one of {", ".join(NAMED_FORMATS)}, or "Q15", or "fixed 4.12"')
+    raise ValueError(
+        f'got format {name!r}; needed one of {", ".join(NAMED_FORMATS)}, or fixed point as "Q15" or "Q3.12"'
+    )

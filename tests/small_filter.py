@@ -12,7 +12,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.kalman.exact_step import exact_step
-from gpbnb.wordlength.fixed_point import ScaledFilter
+from gpbnb.report.processors.scaled import ScaledFilter
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = (

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, linalg, required_precision
+from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Requirement, Rounding, linalg, required_precision
 from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.bounds.guarantee import guarantee
 from gpbnb.filters.emulation import emulate
@@ -24,7 +24,6 @@ from gpbnb.report.rounding import theory
 from gpbnb.sweeps import plain_integer, plain_number
 from gpbnb.wordlength.models import read_model
 from gpbnb.wordlength.records import survey_records
-from gpbnb.wordlength.requirement import Requirement
 
 # GPBNB_EXAMPLES=20000 tries more.
 EXAMPLES = int(os.environ.get("GPBNB_EXAMPLES", "400"))
@@ -154,7 +153,7 @@ def test_questions(name, value):
     assert isinstance(found, Requirement)
     assert found.tried
     assert not isinstance(value, bool) or name not in ("steps", "tolerance", "base", "form")
-    assert found.fmt is None or dict(found.tried)[found.precision] <= 1
+    assert found.format is None or dict(found.tried)[found.digits] <= 1
 
 
 @MANY
@@ -208,8 +207,8 @@ def test_measurements_that_are_none(given, message):
 
 @pytest.mark.parametrize("model", [MODEL, LinearSystem([["0.3"]], [["0.1"]])])
 def test_a_tolerance_that_no_precision_meets_gives_no_warning(model):
-    found = required_precision(model, 3, 5e-324, z=Z)
-    assert found.fmt is None
+    found = required_precision(model, Z, 5e-324)
+    assert found.format is None
     assert found.tried[-1][1] > 1
 
 

@@ -29,16 +29,16 @@ import gpbnb
 from gpbnb.bounds.guarantee import guarantee, limits
 assert all(hasattr(gpbnb, name) for name in gpbnb.__all__)
 model = read_model("nile.toml")
-print(required_precision(model, 50, 1.0).fmt.precision)
+print(required_precision(model, 50, 1.0).digits)
 z = np.round(np.random.default_rng(1).standard_normal((3, 20, 1)) * 100)
 print(len(survey_records(model, z, 1.0, [FloatFormat(2, 24)]).ratios))
-within = limits(1, 1, innovation=1000.0, state=2000.0)
+within = limits(innovation=1000.0, state=2000.0)
 print(guarantee(model, FloatFormat(2, 24), within).for_ever)
-print(required_precision(model, 20, 1.0, basis="probable", within=within).fmt.precision)
+print(required_precision(model, 20, 1.0, basis="probable", within=within).digits)
 for structure in ("balanced state space", "cascade of direct form II"):
     scale = structure.startswith("cascade")
     system = LinearSystem.from_sections([[1, 2, 1, 1, -1, 0.5], [1, 2, 1, 1, -1, 0.25]], structure, scale=scale)
-    print(required_precision(system, 20, 0.01, z=np.ones((20, 1))).fmt.precision)
+    print(required_precision(system, np.ones((20, 1)), 0.01).digits)
 """
 COMMAND = "import runpy\nsys.argv = ['gpbnb', *{}]\nrunpy.run_module('gpbnb', run_name='__main__')\n"
 

@@ -36,13 +36,13 @@ cart = LinearModel(
     state_names=["position (m)", "speed"],
 )
 answer = required_precision(cart, 3, [0.01, np.inf], rounding="chop", form="UD", basis="bound")
-if answer.fmt is not None and answer.precision is not None:
-    print(FloatFormat(2, answer.precision + 2).unit_roundoff, answer.fmt.largest)
+if isinstance(answer.format, FloatFormat) and answer.digits is not None:
+    print(FloatFormat(2, answer.digits + 2).unit_roundoff, answer.format.largest)
 system = LinearSystem([["0.9"]], [["0.1"]], name="smoother", input_names=("u",))
-print(required_precision(system, 4, 0.01, z=[[1], [2], [3], [4]]), required_precision("model.toml", 4, 0.01))
+print(required_precision(system, [[1], [2], [3], [4]], 0.01), required_precision("model.toml", 4, 0.01))
 walk = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-print(guarantee(walk, BINARY32, limits(1, 1, 10, 5), form="UD").bound)
-print(emulate(walk, np.ones((3, 1)), BINARY32, Form.UD))
+print(guarantee(walk, BINARY32, limits(state=10, innovation=5), form="UD").bound)
+print(emulate(walk, np.ones((3, 1)), "float32", form=Form.UD).errors)
 print(survey_records(walk, 3, 0.01, [FloatFormat(2, 4), BINARY32], steps=20).shares)
 print(read_model({"A": [[1]], "B": [[1]]}))
 print(FixedFormat(0, 15, "floor", "saturate").zeros((2, 2)).to_bits(), BINARY32.from_bits([0, 1]).to_float())

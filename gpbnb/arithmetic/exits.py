@@ -173,7 +173,7 @@ def peek(what: Any, see: Callable[[Any], Any]) -> None:
     ...     peek(z[0] / 3, lambda x: seen.append((x.format.precision, float(x.to_float()))))
     ...     return z / 2
     >>> seen: list[tuple[int, float]] = []
-    >>> required_precision(halved, 3, 0.01, z=[1, 2, 3]).precision
+    >>> required_precision(halved, [1, 2, 3], 0.01).digits
     2
     >>> min(seen)
     (2, 0.375)

@@ -17,11 +17,13 @@ Operation, 24-6661.
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.rounding import Rounding, digits_text
+from gpbnb.names import format_parts
 
 
 def _ieee(base: int, precision: int, emax: int) -> FloatFormat:
@@ -76,6 +78,19 @@ NAMED = {
     "IBM_HEX64": IBM_HEX64,
     "IBM_704": IBM_704,
 }
+
+
+def format_named(given: Any) -> Any:
+    """Return the format that a name means, such as "float32", "Q15" or "Q3.12"; anything else as it is.
+
+    Raises
+    ------
+    ValueError : no such format.
+    """
+    if not isinstance(given, str):
+        return given
+    found = format_parts(given)
+    return NAMED[found] if isinstance(found, str) else FixedFormat(*found)
 
 
 def digits(fmt: NumberFormat) -> str:

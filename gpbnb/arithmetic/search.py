@@ -122,10 +122,11 @@ def least_from_which_on(met: Mapping[int, bool]) -> int | None:
 
 
 class Outcome(NamedTuple):
-    """What a precision gives: error / tolerance, and why it is infinite."""
+    """What a precision gives: error / tolerance, and why it is infinite; and whether a number overflowed."""
 
     ratio: float
     why: str = ""
+    overflow: bool = False
 
 
 class Search(Generic[Kind]):
@@ -181,14 +182,14 @@ class Search(Generic[Kind]):
 
         def meets(digits: int) -> bool:
             if digits not in self._ratios:
-                self._ratios[digits], self._why[digits] = error(_with_digits(like, digits))
+                self._ratios[digits], self._why[digits], _ = error(_with_digits(like, digits))
                 tick()
             return self._ratios[digits] <= 1
 
         for top in sorted({min(fast, self.largest), self.largest}):
             answer = self._answer(meets, least, top, checks, bounds)
             while answer is not None and proof is not None:
-                self._ratios[answer], self._why[answer] = proof(_with_digits(like, answer))
+                self._ratios[answer], self._why[answer], _ = proof(_with_digits(like, answer))
                 if self._ratios[answer] <= 1:
                     break
                 answer = self._answer(meets, least, top, checks, bounds)
@@ -223,7 +224,7 @@ class Search(Generic[Kind]):
     def limit(self) -> str:
         """Return what sets the highest precision that may be tried."""
         if self._given:
-            return f"where largest={self.largest} ends the search"
+            return f"where highest={self.largest} ends the search"
         return f"the most with compiled loops in base {self._like.base}, rounded {self._like.rounding.value}"
 
     @property

@@ -72,6 +72,9 @@ class TracedFunction:
         #: Why the last run was one of the function itself; empty if it was one of its operations.
         self.reason = ""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return TracedFunction, (self.__wrapped__,)
+
     @property
     def refusal(self) -> str:
         """Why the function cannot be traced; empty if it can be, or if it has not run yet."""

@@ -57,7 +57,7 @@ def contributions(found: Guarantee) -> Contributions:
     >>> from gpbnb import FloatFormat
     >>> from gpbnb.bounds.guarantee import guarantee, limits
     >>> from gpbnb.wordlength.examples import tracker
-    >>> found = guarantee(tracker(), FloatFormat(2, 24), limits(n=2, m=1, state=[1000, 30], innovation=8))
+    >>> found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1000, 30], innovation=8))
     >>> of_position = contributions(found).sums[0]
     >>> [int(o) for o in of_position.argsort()[-2:]], round(float(of_position[[2, 12]].sum() / found.bound[0]), 2)
     ([2, 12], 0.97)

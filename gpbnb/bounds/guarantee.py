@@ -33,14 +33,10 @@ from gpbnb.bounds.guess import FilterLimits, Guess, constant_guess, filter_guess
 from gpbnb.bounds.units import stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LARGEST_EXPONENT, LinearModel
-from gpbnb.filters.named import whole_number
 from gpbnb.filters.system import LinearFilter
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain")
 """Names of the parts of a bound, in the order in which a guarantee lists them."""
-
-MOST_LIMITS = 2**16
-"""Largest number of states, and of measurements, that have limits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,30 +95,32 @@ class Guarantee:
     __repr__ = __str__  # the fields have thousands of numbers
 
 
-def limits(
-    n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, measurement: Any = math.inf
-) -> FilterLimits:
+def limits(*, state: Any = math.inf, innovation: Any = math.inf, measurement: Any = math.inf) -> FilterLimits:
     """Set limits on the states, innovations or measurements of the exact filter.
 
     Each limit is one number for all entries, or one number per entry; those that float64 does not hold are rounded up.
 
     Raises
     ------
-    ValueError : a limit is negative or NaN; a limit is neither one number nor one number per entry; or too few limits
-        are finite.
+    ValueError : a limit is negative, NaN, or neither one number nor a list of numbers; or too few limits are finite.
     """
     found = []
-    n, m = (whole_number(name, size, most=MOST_LIMITS) for name, size in (("states", n), ("measurements", m)))
-    for name, each, size in (("state", state, n), ("innovation", innovation, m), ("measurement", measurement, m)):
+    for name, each in (("state", state), ("innovation", innovation), ("measurement", measurement)):
         try:
-            given = all_above(each)
+            given = np.atleast_1d(all_above(each))
         except (TypeError, ValueError):
-            raise ValueError(f"got {each!r} on the {name}; needed numbers, one or {size}") from None
-        if given.shape not in ((), (1,), (size,)):
-            raise ValueError(f"got limits {given} on the {name}; needed one number, or {size}")
-        found.append(np.array(np.broadcast_to(given, (size,))))
-    X, V, Z = found
-    for name, each in (("state", X), ("innovation", V), ("measurement", Z)):
+            raise ValueError(f"got {each!r} on the {name}; needed one number for all, or a list of numbers") from None
+        if given.ndim > 1 or not given.size:
+            raise ValueError(f"got limits of shape {given.shape} on the {name}; needed one number, or a list of them")
+        found.append(given)
+    _check_numbers(FilterLimits(*found))
+    return FilterLimits(*found)
+
+
+def _check_numbers(within: FilterLimits) -> None:
+    """Reject limits that are negative, too large or too small for sums in float64, or too few."""
+    X, V, Z = within
+    for name, each in zip(within._fields, within, strict=True):
         if np.isnan(each).any() or (each < 0).any():
             raise ValueError(f"got a limit {each} on the {name}; needed numbers that are not negative")
     if not np.isfinite(Z).all() and not (np.isfinite(X).all() and np.isfinite(V).all()):
@@ -131,21 +129,19 @@ def limits(
             "each measurement, or for each state and each innovation"
         )
     least, most = 2.0**-LARGEST_EXPONENT, 2.0**LARGEST_EXPONENT
-    for name, each in (("state", X), ("innovation", V), ("measurement", Z)):
+    for name, each in zip(within._fields, within, strict=True):
         if (((each > 0) & (each < least)) | (np.isfinite(each) & (each > most))).any():
             raise ValueError(
                 f"got a limit {each} on the {name}; needed 0, infinity, or 2**-{LARGEST_EXPONENT} to "
                 f"2**{LARGEST_EXPONENT}, or sums leave the range of float64; scale the model by powers of two"
             )
-    return FilterLimits(X, V, Z)
 
 
-def check_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] = ()) -> None:
-    """Reject limits that are for another filter, or that the first estimate exceeds.
+def sized_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] = ()) -> FilterLimits:
+    """Return limits with one entry for each of n states, m innovations and m measurements.
 
     Parameters
     ----------
-    n, m : number of states and of measurements.
     x0 : (n,), the exact first estimate; the exact filter must be within its limits from the beginning.
 
     Raises
@@ -155,20 +151,22 @@ def check_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] =
     """
     if not isinstance(within, FilterLimits):
         raise TypeError(f"got within={within!r}; needed the result of limits(...)")
-    for name, size in (("state", n), ("innovation", m), ("measurement", m)):
-        shape = np.shape(getattr(within, name))
-        if shape != (size,):
+    _check_numbers(within)
+    found = []
+    for name, each, size in zip(within._fields, within, (n, m, m), strict=True):
+        if np.shape(each) not in ((1,), (size,)):
             raise ValueError(
-                f"got limits of shape {shape} on the {name}; needed ({size},): this filter has {n} states and {m} "
-                f"measurements, so write limits({n}, {m}, ...)"
+                f"got {len(each)} limits on the {name}; needed one, or {size}: this filter has {n} "
+                f"state{'s' * (n != 1)} and {m} measurement{'s' * (m != 1)}"
             )
-    limits(n, m, *within)
-    for i, (value, most) in enumerate(zip(x0, within.state, strict=False)):
+        found.append(np.array(np.broadcast_to(each, (size,))))
+    for i, (value, most) in enumerate(zip(x0, found[0], strict=False)):
         if abs(value) > most:
             raise ValueError(
                 f"got a first estimate {float(value)!r} of state {i}, beyond its limit {float(most)!r}; needed a first "
                 "estimate within its limit, from which the exact filter starts; raise the limit, or change x0"
             )
+    return FilterLimits(*found)
 
 
 def check_within(within: Any, basis: str) -> None:
@@ -237,7 +235,7 @@ def guessed(
     if not isinstance(fmt, (FloatFormat, FixedFormat)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
     model.refuse_inputs("a guarantee")
-    check_limits(within, model.n, model.m)
+    within = sized_limits(within, model.n, model.m)
     if model.steps is not None:
         most, horizon = min(MOST if most is None else most, model.steps), min(horizon, model.steps)
     found = from_guess(schedule(model, fmt, form, most, horizon), within, horizon)
@@ -251,14 +249,14 @@ def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000) -
 
     Raises
     ------
-    TypeError, ValueError : for a reason given in :func:`check_limits`.
+    TypeError, ValueError : for a reason given in :func:`sized_limits`.
     """
     return _answered(from_guess(given, within, horizon))
 
 
 def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000) -> Guarantee:
     """Return what :func:`from_schedule` is going to prove, without a proof."""
-    check_limits(within, given.program.n, given.program.m, given.x0)
+    within = sized_limits(within, given.program.n, given.program.m, given.x0)
     radius = loop_radius(given) if given.settled else math.nan
     why, for_ever = given.why, given.settled and radius < 1
     if given.settled and not for_ever:

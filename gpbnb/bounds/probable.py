@@ -88,5 +88,5 @@ def probable_output_errors(
     ValueError, OverflowError : as for :func:`gpbnb.bounds.system.output_errors`.
     """
     whole, made, n = guessed_errors(system, fmt, largest), system.as_filter(), system.n
-    found = from_guess(filter_schedule(made, fmt), limits(made.program.n, system.m, measurement=largest))
+    found = from_guess(filter_schedule(made, fmt), limits(measurement=largest))
     return np.asarray(whole - found.bound[n:] + 3 * probable_error(found)[n:])

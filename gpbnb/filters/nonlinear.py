@@ -126,7 +126,7 @@ class NonlinearModel:
     ...     f, None, h, None, Q=np.diag([0, 2**-10]), R=np.diag([2**-4, 2**-10]), x0=[0, 1], P0=np.eye(2), angles=[1]
     ... )
     >>> z = [[4.5, 1.1], [4.1, 1.3], [4.0, 1.57], [4.1, 1.8]]
-    >>> print(required_precision(model, 4, 0.01, z=z))
+    >>> print(required_precision(model, z, 0.01))
     10 bits (binary32 is enough): 0.38 of the tolerance, observed in 4 steps
     """
 

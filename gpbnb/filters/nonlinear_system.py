@@ -61,7 +61,7 @@ class NonlinearSystem:
     r"""A system with known inputs whose step is a function: :math:`(x_{k+1}, y_k) = s(x_k, u_k)`.
 
     A system is a function of a format and of inputs, ``system(fmt, u)``, which returns the outputs (steps, p).
-    :func:`~gpbnb.wordlength.precision.required_precision` and other searches of functions accept it as it is, and
+    :func:`gpbnb.required_precision` and other verbs accept it as it is, and
     :func:`~gpbnb.wordlength.code.write_code` writes its step in C.
 
     Parameters
@@ -92,7 +92,7 @@ class NonlinearSystem:
     >>> controller = NonlinearSystem(step, [0], name="a PI controller")
     >>> controller(BINARY32, [0.5, 1, 1]).to_float().ravel()
     array([0.42500001, 0.875     , 0.92500001])
-    >>> print(required_precision(controller, 3, 0.01, z=[0.5, 1, 1]))
+    >>> print(required_precision(controller, [0.5, 1, 1], 0.01))
     6 bits (binary32 is enough): 0.31 of the tolerance, observed in 3 steps
     """
 

@@ -175,8 +175,8 @@ def _joint_root(model: RootModel, S: Matrix, identity: Matrix) -> tuple[Matrix, 
 class FixedIntervalSmoother:
     r"""A Rauch–Tung–Striebel smoother for one measurement record, which can run in any format.
 
-    A smoother is a function of a format, so :func:`gpbnb.wordlength.precision.required_precision` and
-    :func:`gpbnb.wordlength.fixed_point.required_fraction_bits` can find the digits that it needs. They compare each run
+    A smoother is a function of a format, so :func:`gpbnb.required_precision` can find the digits that it needs, in
+    floating or fixed point. It compares each run
     with a reference run that has 37 bits more than the highest precision to try. A second reference run with half as
     many extra bits again checks the first. Only errors of the estimates count; they include the errors of storing the
     model.
@@ -207,7 +207,7 @@ class FixedIntervalSmoother:
     >>> FixedIntervalSmoother(walk, z).run(BINARY32).x.to_float().round(3).tolist()
     [[2.993], [2.993], [3.003], [3.013]]
     >>> for form in ("innovation", "square root"):
-    ...     print(required_precision(FixedIntervalSmoother(walk, z, form), 4, 0.001).precision)
+    ...     print(required_precision(FixedIntervalSmoother(walk, z, form), 4, 0.001).digits)
     22
     11
     """

@@ -52,7 +52,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             print(f"certificate: {given.certificate}, for {format_text(proof.fmt)}", flush=True)
         option = f"--code {given.code}"
         if given.code and report.met:
-            code = write_code_of(asked, report.structure)
+            code = write_code_of(asked, report)
             print("code:", *code.files)
             if other := uncovered(proof, code):
                 print(other)

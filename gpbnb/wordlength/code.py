@@ -22,15 +22,16 @@ from gpbnb.arithmetic.array import NegativeRootError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.named import BINARY32, BINARY64, format_text, rounding_text
+from gpbnb.arithmetic.named import BINARY32, BINARY64, format_named, format_text, rounding_text
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.bounds.guarantee import check_limits, guarantee
+from gpbnb.bounds.guarantee import guarantee, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.system import output_errors
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.files import replace_file
+from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.design import FilterDesign
-from gpbnb.filters.forms import CONSTANT_GAIN, Form
+from gpbnb.filters.forms import CONSTANT_GAIN, Form, plain_name
 from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.nonlinear_system import NonlinearSystem
@@ -43,7 +44,10 @@ from gpbnb.filters.tracing import kalman_program, without_exact
 from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_checked, run_words
 from gpbnb.wordlength.c_files import Described, Vectors, refuse_others, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeStep, checked_identifier, word_arithmetic
-from gpbnb.wordlength.system import largest_inputs
+from gpbnb.wordlength.emulation import longest
+from gpbnb.wordlength.models import ModelSource
+from gpbnb.wordlength.strategies import largest_inputs
+from gpbnb.wordlength.tasks import admitted, data_of
 
 VECTORS = 100
 """Steps of the test vectors."""
@@ -81,32 +85,34 @@ class Prepared(NamedTuple):
 
 
 def write_code(
-    given: Filter,
-    fmt: AnyFormat,
-    form_or_structure: Form | str | None,
+    model: Filter | ModelSource,
+    fmt: AnyFormat | str,
     folder: str | Path,
+    *,
+    form: AnyForm | str | None = None,
     name: str = "filter",
     inputs: Any = None,
     within: FilterLimits | None = None,
-    structure: str | None = None,
+    overwrite: bool = False,
 ) -> tuple[Path, ...]:
     """Write a filter as C99 without dependencies; its results agree with the emulation digit for digit.
 
     Parameters
     ----------
-    given : a linear system in its structure, a design, a model of a Kalman filter, or a nonlinear system, whose step is
-        a function of your own.
-    fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; or a :class:`~gpbnb.filters.words.WordFormats`.
-    form_or_structure : for a design, its structure; for a Kalman filter, a form with compiled loops, or "constant
-        gain"; None for a linear system, which already has a structure, for a nonlinear system, or for the default.
-        The UD form accepts no words of more than 52 bits and no words that wrap around.
+    model : a linear system in its structure, a design, a Kalman filter, or a nonlinear system, whose step is a function
+        of your own; or what :func:`gpbnb.read_model` reads.
+    fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; a :class:`~gpbnb.filters.words.WordFormats`; or the name
+        of a format, such as "float32" or "Q15".
     folder : folder for the files, which is created if necessary. Files that gpbnb has written are replaced, others not.
+    form : for a Kalman filter, a form with compiled loops, or "constant gain"; for a
+        :class:`gpbnb.filters.design.FilterDesign`, its structure. The UD form accepts no words of more than 52 bits and
+        no words that wrap around.
     name : name of the files, and prefix of every name that the header declares.
     inputs : (steps, m), inputs or measurements of the test vectors; by default 100 steps of noise, or of simulated
         measurements.
     within : limits from :func:`gpbnb.bounds.guarantee.limits`; the header states the error bound that holds
         within them.
-    structure : the name of the structure of a linear system in the header; by default the header names none.
+    overwrite : whether to replace files of these names that gpbnb has not written.
 
     Returns
     -------
@@ -114,36 +120,34 @@ def write_code(
 
     Raises
     ------
-    TypeError : `given` or `fmt` is of another type.
-    ValueError : a format without a type in C99; a structure or form that the filter does not have; a model with known
-        inputs; limits for another filter; a step with a function, such as np.sin, that C's library does not round as
-        the emulation does; inputs that do not fit; a name that is not an identifier in C; a file of another origin in
-        the way.
+    TypeError : `model` or `fmt` is of another type.
+    ValueError : a format without a type in C99; a structure or form that the filter does not have; a model that cannot
+        be written in C, where the message says what to use; limits for another filter; a step with a function, such as
+        np.sin, that C's library does not round as the emulation does; inputs that do not fit; a name that is not an
+        identifier in C; a file of another origin in the way.
     OverflowError : a coefficient or an initial state is beyond the range of the format.
     OSError : a file cannot be written.
 
     Examples
     --------
     >>> import tempfile
-    >>> from gpbnb import BINARY32, LinearSystem
+    >>> from gpbnb import LinearSystem
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     paths = write_code(LinearSystem.smoother("1/8"), BINARY32, None, folder)
+    ...     paths = write_code(LinearSystem.smoother("1/8"), "float32", folder)
     ...     print(*(path.name for path in paths))
     filter.h filter.c test_filter.c filter_vectors.txt Makefile
     """
+    given, target = admitted(model, "be written in C"), Path(folder)
+    chosen: Any = format_named(fmt)
     checked_identifier(name)
-    target = Path(folder)
-    refuse_others(target, name)
-    found = prepared(given, fmt, form_or_structure)
-    vectors = found.emulate(found.inputs(VECTORS) if inputs is None else inputs)
+    if not overwrite:
+        refuse_others(target, name)
+    found = prepared(given, chosen, form)
+    vectors = found.emulate(found.inputs(VECTORS) if inputs is None else data_of(given, inputs).z)
     bound = found.bound(within) if within is not None else ""
+    bounded = not isinstance(given, NonlinearSystem)
     described = Described(
-        found.title,
-        structure or found.structure,
-        format_words(fmt),
-        bound,
-        isinstance(fmt, FloatFormat),
-        not isinstance(given, NonlinearSystem),
+        found.title, found.structure, format_words(chosen), bound, isinstance(chosen, FloatFormat), bounded
     )
     files = written_files(found.step, found.arithmetic, name, described, vectors)
     target.mkdir(parents=True, exist_ok=True)
@@ -152,29 +156,23 @@ def write_code(
     return tuple(target / file for file in files)
 
 
-def prepared(given: Filter, fmt: AnyFormat, form_or_structure: Form | str | None) -> Prepared:
+def prepared(given: Filter, fmt: AnyFormat, form: AnyForm | str | None) -> Prepared:
     """Return a filter with what is needed to write its code; for the arguments, see :func:`write_code`."""
     if isinstance(given, LinearModel):
-        if form_or_structure == CONSTANT_GAIN:
+        if isinstance(form, str) and plain_name(form) == plain_name(CONSTANT_GAIN):
             found = _of_system(settled_filter(given), fmt, CONSTANT_GAIN)
             return found._replace(inputs=lambda steps: simulated_measurements(given, steps), title=given.name)
-        return _of_model(given, fmt, Form.INNOVATION if form_or_structure is None else form_or_structure)
+        return _of_model(given, fmt, Form.INNOVATION if form is None else form)
     if isinstance(given, FilterDesign):
-        structure = None if form_or_structure is None else str(form_or_structure)
+        structure = None if form is None else str(form)
         return _of_system(given.system(structure), fmt, given.usual if structure is None else structure)
-    if not isinstance(given, LinearSystem | NonlinearSystem):
-        raise TypeError(
-            f"got a {type(given).__name__}; needed a LinearSystem, a FilterDesign, a LinearModel or a NonlinearSystem"
-        )
-    if form_or_structure is not None:
+    if form is not None:
         order = "choose the structure in LinearSystem.from_coefficients or from_sections"
         raise ValueError(
-            f"got {form_or_structure!r} for a {type(given).__name__}, which has its structure; needed None; "
+            f"got {form!r} for a {type(given).__name__}, which has its structure; needed None; "
             f"{order if isinstance(given, LinearSystem) else 'its step is its structure'}"
         )
-    if isinstance(given, NonlinearSystem):
-        return _of_nonlinear(given, fmt)
-    return _of_system(given, fmt, "")
+    return _of_nonlinear(given, fmt) if isinstance(given, NonlinearSystem) else _of_system(given, fmt, "")
 
 
 def format_words(fmt: AnyFormat) -> str:
@@ -273,21 +271,6 @@ def _noise(fmt: AnyFormat, m: int) -> Callable[[int], NDArray[np.float64]]:
     return lambda steps: np.random.default_rng(0).uniform(-level, level, (steps, m))
 
 
-def _longest(run: Callable[[int], Any], steps: int) -> tuple[int, Any]:
-    """Return the most steps that a run takes without an overflow, and what it returns."""
-    try:
-        return steps, run(steps)
-    except OverflowError:
-        low, high, found = 0, steps, None
-    while high - low > 1:
-        middle = (low + high) // 2
-        try:
-            found, low = run(middle), middle
-        except OverflowError:
-            high = middle
-    return low, found
-
-
 def _ended(inputs: NDArray[Any], start: NDArray[Any], states: NDArray[Any], status: NDArray[np.int64]) -> Vectors:
     """Return the vectors of a run; if it has fewer steps than inputs, it ends in the step after its last."""
     done = len(states)
@@ -300,7 +283,7 @@ def _ended(inputs: NDArray[Any], start: NDArray[Any], states: NDArray[Any], stat
 def _float_vectors(system: LinearSystem, u: NDArray[Any], fmt: FloatFormat) -> Vectors:
     # float64 holds the numbers of these formats exactly
     stored, start = fmt.array(u).to_float(), np.append(fmt.array(system.x0).to_float(), np.zeros(system.p))
-    done, pairs = _longest(lambda steps: system.states(u[:steps], fmt), len(u))
+    done, pairs, _ = longest(lambda steps: system.states(u[:steps], fmt), len(u))
     states = np.zeros((0, len(start))) if pairs is None else pairs[..., 0]
     return _ended(stored, start, states, np.zeros(done, np.int64))
 
@@ -308,7 +291,7 @@ def _float_vectors(system: LinearSystem, u: NDArray[Any], fmt: FloatFormat) -> V
 def _word_vectors(system: LinearSystem, u: NDArray[Any], words: WordFormats) -> Vectors:
     stored, first = integers_of(u, words.data), integers_of(system.x0[None], words.data)[0]
     start = np.append(first, np.zeros(system.p, np.int64))
-    done, run = _longest(lambda steps: run_words(system, u[:steps], words), len(u))
+    done, run, _ = longest(lambda steps: run_words(system, u[:steps], words), len(u))
     states = np.zeros((0, len(start)), np.int64) if run is None else run.states
     return _ended(stored, start, states, np.zeros(done, np.int64))
 
@@ -365,7 +348,7 @@ def _nonlinear_vectors(system: NonlinearSystem, u: Any, fmt: FloatFormat | Fixed
 # -- Kalman filters ---------------------------------------------------------------------------------------------------
 
 
-def _of_model(model: LinearModel, fmt: AnyFormat, form: Form | str) -> Prepared:
+def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepared:
     _checked(fmt)
     chosen = compiled_form(form)
     if isinstance(fmt, WordFormats):
@@ -382,7 +365,7 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: Form | str) -> Prepared:
     arithmetic = word_arithmetic(step, _words(fmt)) if isinstance(fmt, FixedFormat) else CodeFloats(kind)
 
     def bound(within: FilterLimits) -> str:
-        check_limits(within, model.n, model.m, model.x0)
+        sized_limits(within, model.n, model.m, model.x0)
         try:
             found = guarantee(model, fmt, within, chosen)
         except (ValueError, OverflowError) as error:

@@ -7,11 +7,11 @@ import io
 import math
 import tomllib
 import unicodedata
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol, TypeAlias, cast
+from typing import Any, NamedTuple, Protocol, TypeAlias, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
+from gpbnb.filters.nonlinear_system import NonlinearSystem
+from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.structures import structure_named
 from gpbnb.filters.system import LinearSystem
 from gpbnb.sweeps import plain_number
@@ -66,9 +68,20 @@ ModelSource: TypeAlias = str | Path | Mapping[str, Any] | LinearModel | LinearSy
 """What a model is read from."""
 
 
+Own = TypeVar("Own", NonlinearModel, NonlinearSystem, FixedIntervalSmoother)
+
+
+@overload
 def read_model(
-    source: ModelSource, u: Numbers | None = None, structure: str | None = None
-) -> LinearModel | LinearSystem:
+    source: ModelSource, u: Numbers | None = ..., structure: str | None = ...
+) -> LinearModel | LinearSystem: ...
+
+
+@overload
+def read_model(source: Own) -> Own: ...
+
+
+def read_model(source: Any, u: Numbers | None = None, structure: str | None = None) -> Any:
     """Read a model from a TOML file, a mapping of its matrices, or an object of another library.
 
     The model that is read computes the same estimates or outputs as the object of the other library. An object with
@@ -83,7 +96,7 @@ def read_model(
         ``scipy.signal`` or python-control, or a ZerosPolesGain of ``scipy.signal``; it is read as a linear system that
         starts at rest. Or a KalmanFilter, SquareRootKalmanFilter or FadingKalmanFilter of FilterPy; its current
         estimate becomes the first estimate, and a step means ``predict()`` or ``predict(u)``, then ``update(z)``,
-        without other arguments.
+        without other arguments. A model of this package is returned as it is.
     u : (steps, p), known inputs of a Kalman filter, in place of those in `source`; the source must have B.
     structure : structure of a digital filter, or of a TransferFunction or ZerosPolesGain of ``scipy.signal``; one of
         :data:`gpbnb.filters.structures.STRUCTURES`. By default, the structure that the file names; for an object, state
@@ -106,7 +119,8 @@ def read_model(
     if isinstance(source, (str, Path, Mapping)):
         return _from_mapping(*_read(source), u, structure)
     library, kind = type(source).__module__.partition(".")[0], type(source).__name__
-    of_filter = isinstance(source, (LinearModel, LinearSystem)) or (library == "filterpy" and kind in FILTERS)
+    own = isinstance(source, LinearModel | LinearSystem | NonlinearModel | NonlinearSystem | FixedIntervalSmoother)
+    of_filter = own or (library == "filterpy" and kind in FILTERS)
     if structure is not None and of_filter:
         raise ValueError(
             f"got structure {structure!r} for a {kind}, which is computed as it is; needed none; give b and a, or sos, "
@@ -116,7 +130,7 @@ def read_model(
         return _from_filterpy(source, u)
     if u is not None:
         raise ValueError(f"got inputs for a {kind}; needed a TOML file, a mapping or a filter of FilterPy with B")
-    if isinstance(source, (LinearModel, LinearSystem)):
+    if own:
         return source
     if kind.removesuffix("Continuous").removesuffix("Discrete") in SYSTEMS.get(library, ()):
         return _from_system(source, library, structure)
@@ -180,12 +194,14 @@ class FilterSource(NamedTuple):
         filter has. Empty for another model.
     lacking : structures that the filter does not have, by name, each with the reason.
     compares_all : whether the source has ``structure = "all"``, so that none of its structures is the given one.
+    design : a digital filter before it has a structure; None for another model.
     """
 
     model: LinearModel | LinearSystem
     structures: Mapping[str, LinearSystem] = MappingProxyType({})
     lacking: Mapping[str, str] = MappingProxyType({})
     compares_all: bool = False
+    design: FilterDesign | None = None
 
 
 def read_filter(source: str | Path | Mapping[str, Any], u: Numbers | None = None) -> FilterSource:
@@ -203,12 +219,13 @@ def read_filter(source: str | Path | Mapping[str, Any], u: Numbers | None = None
     design, named = _design(given, where, u)
     try:
         if named == "all":
-            return FilterSource(design.system(), *design.compared("all"), compares_all=True)
+            return FilterSource(design.system(), *design.compared("all"), True, design)
         first = structure_named(design.usual if named is None else named)
         model, (others, lacking) = design.system(first), design.compared()
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None
-    return FilterSource(model, {first: model} | {name: each for name, each in others.items() if name != first}, lacking)
+    structures = {first: model} | {name: each for name, each in others.items() if name != first}
+    return FilterSource(model, structures, lacking, design=design)
 
 
 def _read(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
@@ -269,21 +286,6 @@ def _in_structure(given: Any, kind: str, library: str, structure: str) -> Linear
         f"got structure={structure!r} for a {kind} of {library}; needed a TransferFunction or a ZerosPolesGain of "
         "scipy.signal; or use LinearSystem.from_coefficients"
     )
-
-
-def model_or_function(
-    given: ModelSource | NonlinearModel | Callable[..., Any],
-) -> LinearModel | NonlinearModel | LinearSystem | Callable[..., Any]:
-    """Return a model, an object of another library read as one, or a function as it is.
-
-    Raises
-    ------
-    ValueError, TypeError, OSError : as for :func:`read_model`.
-    """
-    if isinstance(given, NonlinearModel):
-        return given
-    library = type(given).__module__.partition(".")[0]
-    return given if callable(given) and library not in SYSTEMS else read_model(cast(ModelSource, given))
 
 
 MOST_BYTES = 2**28

@@ -18,7 +18,7 @@ from gpbnb.names import NAMED_FORMATS, WITHOUT_LOOPS, format_parts
 from gpbnb.sweeps.numbers import plain_integer, plain_number
 
 BASES = ("emulation", "bound", "guarantee", "probable")
-"""What an answer may be based on, as in ``gpbnb.wordlength.requirement.Basis``."""
+"""What an answer may be based on, as in ``gpbnb.wordlength.answer.Basis``."""
 
 FIXED_BASES = ("emulation", "guarantee")
 """What an answer in fixed point may be based on."""

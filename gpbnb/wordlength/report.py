@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,26 +17,20 @@ from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.array_forms import AnyForm
+from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_named
+from gpbnb.filters.named import form_named, whole_number
 from gpbnb.filters.poles import stored_response
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.sweeps import machine
-from gpbnb.wordlength.blocks import (
-    BlockRequirement,
-    WordRequirement,
-    required_block_precisions,
-    required_word_formats,
-)
-from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
-from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.judging import Judgement, format_in_words, judge
-from gpbnb.wordlength.precision import largest_errors, required_precision
+from gpbnb.wordlength.answer import PROOFS, Basis, Requirement, format_in_words
+from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.ranges import binary_ranges
-from gpbnb.wordlength.requirement import PROOFS, Basis, WordlengthAnswer
+from gpbnb.wordlength.required import judge, required_precision
+from gpbnb.wordlength.strategy import tolerances_of
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms that a report compares; the requested form comes first."""
@@ -87,6 +81,7 @@ class Report:
     stored : what storing the coefficients does to a linear system at the answer; empty for another model.
     shortest : structure that needs fewer digits than the answer, or that meets the tolerance where there is no answer,
         and how to ask for it; empty if there is none.
+    formats : the format, or the formats of words, of the answer; not in the files.
     """
 
     name: str
@@ -116,6 +111,7 @@ class Report:
     lacking: dict[str, str] = field(default_factory=dict)
     stored: str = ""
     shortest: str = ""
+    formats: Any = None
 
     @property
     def limiting(self) -> int | None:
@@ -125,7 +121,8 @@ class Report:
 
     def to_json(self) -> str:
         """Return the report as JSON, with the limiting state and without NaN or infinity."""
-        return json.dumps({**asdict(self), "limiting": self.limiting}, indent=1, ensure_ascii=False, allow_nan=False)
+        entries = {key: value for key, value in asdict(self).items() if key != "formats"}
+        return json.dumps({**entries, "limiting": self.limiting}, indent=1, ensure_ascii=False, allow_nan=False)
 
     def to_html(self) -> str:
         """Return the report as one HTML page that needs no other file."""
@@ -138,17 +135,17 @@ class Question:
 
     Parameters
     ----------
-    tolerance : as in :func:`gpbnb.wordlength.precision.required_precision`, as are base, rounding and form.
+    tolerance : as in :func:`gpbnb.required_precision`, as are base, rounding and form.
     z : (steps, m), measurements or inputs; by default simulated, for a Kalman filter.
     steps : number of steps to simulate; by default the number of measurements, or :data:`DEFAULT_STEPS`.
-    bases : as in :func:`gpbnb.wordlength.precision.required_precision`; the first gives the answer.
+    bases : as in :func:`gpbnb.required_precision`; the first gives the answer.
     within : result of :func:`gpbnb.bounds.guarantee.limits`, for the bases "guarantee" and "probable".
     emin, emax : range of the formats, as in ``FloatFormat``; by default unlimited.
     fmt : the one format to judge, in place of a search; it replaces base, rounding and range.
     structures : structures of a digital filter to compare, by their names; the first gives the answer, in place of the
         model. See :func:`gpbnb.wordlength.models.read_filter`.
     mixed : whether to find the digits of each block of a Kalman filter as well; see
-        :func:`gpbnb.wordlength.blocks.required_block_precisions`. In fixed point, the formats of data, coefficients
+        :func:`gpbnb.required_precision`. In fixed point, the formats of data, coefficients
         and sums of a linear system.
     fixed : whether to count fraction bits of fixed point, of a linear system.
     coefficient_bits : significant bits of each coefficient in fixed point.
@@ -172,7 +169,7 @@ class Question:
     structures: Mapping[str, LinearSystem] = field(default_factory=dict)
     mixed: bool = False
     fixed: bool = False
-    coefficient_bits: int = COEFFICIENT_BITS
+    coefficient_bits: int | None = None
     choose: bool = False
     lacking: Mapping[str, str] = field(default_factory=dict)
 
@@ -214,7 +211,7 @@ class Question:
         if isinstance(self.model, LinearSystem):
             return self.z
         if self.z is None:
-            return simulated_measurements(self.model, self.count)
+            return simulated_measurements(self.model, whole_number("steps", self.count))
         if {*self.bases} & {"guarantee", "probable"} and self.model.without_missing(self.z)[0] is not self.model:
             raise ValueError(
                 "got measurements of which some are missing, and a basis that holds for ever; needed measurements "
@@ -222,41 +219,49 @@ class Question:
             )
         return self.z
 
-    def answer(self, part: _Part, z: Any, progress: bool = False) -> WordlengthAnswer:
+    def answer(self, part: _Part, z: Any, progress: bool = False) -> Requirement:
         """Answer one of the single questions, by a search or by judging the one format."""
-        if self.fixed and isinstance(part.model, LinearSystem):
-            basis = cast(FixedBasis, part.basis)
-            return required_fraction_bits(part.model, z, self.tolerance, basis, self.rounding, self.coefficient_bits)
+        data: Any = self.count if z is None else z
+        form = part.form if isinstance(part.model, LinearModel) else None
+        if self.fixed:
+            bits = self.coefficient_bits
+            return required_precision(
+                part.model,
+                data,
+                self.tolerance,
+                kind="fixed",
+                basis=part.basis,
+                rounding=self.rounding,
+                coefficient_bits=bits,
+            )
         within = self.within if part.basis in ("guarantee", "probable") else None
-        if within is not None and isinstance(part.model, LinearSystem) and np.isinf(within.state).all():
-            within = within._replace(state=np.full(part.model.n, np.inf))  # structures differ in their states
         if self.fmt is not None:
-            return judge(part.model, self.fmt, self.count, self.tolerance, part.form, part.basis, z, within)
+            return judge(part.model, self.fmt, data, self.tolerance, form=form, basis=part.basis, within=within)
         return required_precision(
             part.model,
-            self.count,
+            data,
             self.tolerance,
-            self.base,
-            self.rounding,
-            part.form,
-            part.basis,
-            z,
+            basis=part.basis,
             within=within,
+            form=form,
             progress=progress,
-            emin=self.emin,
-            emax=self.emax,
+            **self.formats,
         )
 
-    def blocks(self, z: Any, structure: str = "") -> BlockRequirement | WordRequirement | None:
+    @property
+    def formats(self) -> dict[str, Any]:
+        """The options that describe the formats of a search in floating point."""
+        limits = None if self.emin is None or self.emax is None else (self.emin, self.emax)
+        return {"base": self.base, "rounding": self.rounding, "range": limits}
+
+    def blocks(self, z: Any, structure: str = "") -> Requirement | None:
         """Find the digits of each block of a Kalman filter, or of words in fixed point, if they are asked for."""
         if not self.mixed:
             return None
         if isinstance(self.model, LinearSystem):
-            system = self.structures.get(structure, self.model)
-            basis = cast(FixedBasis, self.bases[0])
-            return required_word_formats(system, z, self.tolerance, basis, self.rounding)
-        given = (self.model, self.count, self.tolerance, self.base, self.rounding, self.form, z)
-        return required_block_precisions(*given, emin=self.emin, emax=self.emax)
+            system, basis = self.structures.get(structure, self.model), self.bases[0]
+            return required_precision(system, z, self.tolerance, kind="words", basis=basis, rounding=self.rounding)
+        return required_precision(self.model, z, self.tolerance, kind="blocks", form=self.form, **self.formats)
 
 
 class _Part(NamedTuple):
@@ -292,12 +297,12 @@ def study(
 
     Raises
     ------
-    ValueError : for a reason given in :func:`gpbnb.wordlength.precision.required_precision`; missing measurements
+    ValueError : for a reason given in :func:`gpbnb.required_precision`; missing measurements
         with a basis that holds for all of them.
     OverflowError : for a reason given there.
     """
     parts, z = asked.parts(), asked.measured()
-    found: list[tuple[_Part, WordlengthAnswer]] = []
+    found: list[tuple[_Part, Requirement]] = []
     for part in parts:
         tell(f"{part.label} …")
         answer = asked.answer(part, z, progress)
@@ -315,7 +320,7 @@ def study(
     model, fmt, within = asked.model, asked.fmt, asked.within
     is_filter = isinstance(model, LinearModel)
     width = model.p if isinstance(model, LinearSystem) else model.n
-    tolerances = np.broadcast_to(np.asarray(asked.tolerance, dtype=np.float64), (width,))
+    tolerances = tolerances_of(asked.tolerance, width, "outputs")
     origin = "given" if asked.z is not None else "simulated by the model, seed 0" if z is not None else "none"
     return Report(
         name=model.name,
@@ -328,7 +333,7 @@ def study(
         tolerance=tuple(_finite(float(each)) for each in tolerances),
         source=source or origin,
         answers=tuple(_plain(part.label, answer) for part, answer in found),
-        errors=_errors(model, z, main.fmt if met else None, form_named(asked.form), tolerances),
+        errors=_errors(model, z, main.format if met else None, asked.form, tolerances),
         ranges=_ranges(model, z),
         command=command,
         versions=machine(),
@@ -340,18 +345,23 @@ def study(
         exponents=_exponents(fmt, asked.emin, asked.emax),
         fixed=asked.fixed,
         mixed="" if blocks is None else str(blocks),
-        blocks=_digits_of_blocks(blocks) if isinstance(blocks, BlockRequirement) else (),
+        blocks=() if blocks is None else _digits_of_blocks(blocks),
         structure=first.structure,
         lacking=dict(asked.lacking),
         stored=stored,
-        shortest=_shorter(found, main),
+        shortest=_shorter(found, main, fmt is not None),
+        formats=(main if blocks is None or not asked.fixed else blocks).format,
     )
 
 
-def _stored(system: LinearSystem | None, answer: WordlengthAnswer) -> str:
+def _stored(system: LinearSystem | None, answer: Requirement) -> str:
     """Return in words what storing the coefficients does to a linear system at an answer; empty for another model."""
-    fmt = answer.stored
-    if system is None or fmt is None or not system.as_filter().program.is_linear:
+    fmt = answer.format
+    if (
+        system is None
+        or not isinstance(fmt, FloatFormat | FixedFormat | WordFormats)
+        or not system.as_filter().program.is_linear
+    ):
         return ""
     kept = fmt if not isinstance(fmt, WordFormats) else fmt.coefficients or fmt.data
     words = digits_text(kept, kind="significant") if isinstance(kept, int) else format_in_words(kept)
@@ -362,8 +372,8 @@ def _stored(system: LinearSystem | None, answer: WordlengthAnswer) -> str:
 
 
 def _fewest(
-    found: Sequence[tuple[_Part, WordlengthAnswer]],
-) -> tuple[_Part, WordlengthAnswer]:
+    found: Sequence[tuple[_Part, Requirement]],
+) -> tuple[_Part, Requirement]:
     """Return the answer with the fewest digits on the first basis, in fixed point with the shortest word.
 
     Among equals, it is the one with the smallest error; the first of all if none is met.
@@ -371,33 +381,32 @@ def _fewest(
     of_basis = [(part, each) for part, each in found if part.basis == found[0][0].basis]
     met = [(part, each) for part, each in of_basis if each.met]
 
-    def cost(pair: tuple[_Part, WordlengthAnswer]) -> tuple[float, ...]:
-        answer = pair[1]
-        if answer.fmt is None or answer.digits is None:
-            return ()
-        return answer.fmt.precision, dict(answer.tried)[answer.digits]
-
-    return min(met or of_basis[:1], key=cost)
+    return min(met or of_basis[:1], key=lambda pair: (_length(pair[1]), pair[1].ratio))
 
 
-def _shorter(found: Sequence[tuple[_Part, WordlengthAnswer]], answer: WordlengthAnswer) -> str:
+def _length(answer: Requirement) -> int:
+    """Return the digits of a format, or the bits of a word without its sign."""
+    fmt = answer.format.data if isinstance(answer.format, WordFormats) else answer.format
+    return 0 if fmt is None or isinstance(fmt, BlockFormats) else int(fmt.precision)
+
+
+def _shorter(found: Sequence[tuple[_Part, Requirement]], answer: Requirement, judged: bool) -> str:
     """Name the structure that needs fewer digits than an answer, or that meets the tolerance where it does not."""
     part, best = _fewest(found)
-    if not (part.structure and best.met and best.fmt is not None and best is not answer):
-        return ""
-    if answer.met and answer.fmt is not None and best.fmt.precision >= answer.fmt.precision:
+    if not (part.structure and best.met and best is not answer) or (answer.met and _length(best) >= _length(answer)):
         return ""
     named = f'{part.structure}, {{}} (structure = "{part.structure}", or "all")'
-    if isinstance(best, Judgement):
-        return named.format(f"which meets the tolerance in {format_text(best.fmt)}")
-    if isinstance(best.fmt, FixedFormat):
-        return "shortest: " + named.format(f"word of {1 + best.fmt.precision} bits")
-    return "fewest digits: " + named.format(digits_text(best.fmt.precision, best.fmt.base))
+    fmt: Any = best.format
+    if judged:
+        return named.format(f"which meets the tolerance in {format_in_words(fmt)}")
+    if isinstance(fmt, WordFormats):
+        return "shortest: " + named.format(f"word of {1 + _length(best)} bits")
+    return "fewest digits: " + named.format(digits_text(_length(best), fmt.base))
 
 
-def _digits_of_blocks(found: BlockRequirement) -> tuple[tuple[str, int | None, int | None], ...]:
+def _digits_of_blocks(found: Requirement) -> tuple[tuple[str, int | None, int | None], ...]:
     """Return the digits of each block, together with the others and alone."""
-    formats = found.formats
+    formats = found.format
     return tuple(
         (name, None if formats is None else getattr(formats, name).precision, digits)
         for name, digits in found.alone.items()
@@ -413,17 +422,12 @@ def _ranges(model: LinearModel | LinearSystem, z: Any) -> tuple[tuple[str, int, 
 
 
 def _errors(
-    model: LinearModel | LinearSystem,
-    z: Any,
-    fmt: FloatFormat | FixedFormat | None,
-    form: AnyForm,
-    tolerances: np.ndarray,
+    model: LinearModel | LinearSystem, z: Any, fmt: Any, form: str, tolerances: np.ndarray
 ) -> tuple[float | None, ...]:
     """Return the largest error / tolerance of each state of a Kalman filter at the answer."""
     if fmt is None or isinstance(model, LinearSystem):
         return ()
-    sound, filled = model.without_missing(z)
-    largest = largest_errors(sound, filled, cast(FloatFormat, fmt), form)
+    largest = emulate(model, z, fmt, form=form).largest
     return tuple(_finite(float(e / t)) if math.isfinite(t) else None for e, t in zip(largest, tolerances, strict=True))
 
 
@@ -440,7 +444,7 @@ def _finite(number: float) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _plain(label: str, answer: WordlengthAnswer) -> Answer:
+def _plain(label: str, answer: Requirement) -> Answer:
     tried = tuple((digits, _finite(ratio)) for digits, ratio in answer.tried)
     return Answer(label, answer.basis, answer.digits if answer.met else None, str(answer), tried)
 

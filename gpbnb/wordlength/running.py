@@ -15,27 +15,23 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED, format_text
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.bounds.guarantee import limits
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.bounds.system import output_proof
 from gpbnb.files import replace_file
 from gpbnb.filters.forms import CONSTANT_GAIN
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_named
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_inputs, simulated_measurements
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.blocks import required_word_formats
+from gpbnb.wordlength.answer import Basis
+from gpbnb.wordlength.bounding import guarantee
 from gpbnb.wordlength.c_files import refuse_others
-from gpbnb.wordlength.code import VECTORS, AnyFormat, write_code
-from gpbnb.wordlength.fixed_point import COEFFICIENT_BITS, required_fraction_bits
-from gpbnb.wordlength.fixed_point import Basis as FixedBasis
-from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.code import VECTORS, write_code
 from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
 from gpbnb.wordlength.options import QUANTITIES
 from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, part_label, study
-from gpbnb.wordlength.requirement import Basis
+from gpbnb.wordlength.required import judge
 
 
 class CommandInput(NamedTuple):
@@ -117,7 +113,7 @@ def answer(asked: CommandInput, command: str, tell: Callable[[str], Any]) -> Rep
         source.structures,
         given.mixed,
         given.fixed,
-        given.coefficients or COEFFICIENT_BITS,
+        given.coefficients,
         source.compares_all,
         source.lacking if len(source.structures) > 1 else {},
     )
@@ -228,18 +224,12 @@ def certificate(asked: CommandInput, report: Report) -> Certified:
     if fmt is None:
         fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
     chosen = source.structures.get(report.structure, source.model)
-    if isinstance(chosen, LinearModel):
-        within = limits(chosen.n, chosen.m, **_sizes(given))
-        form = form_named(_form(given))
-        return Certified(guarantee(chosen, fmt, within, form, horizon=report.steps).certificate(), fmt)
-    within = limits(chosen.n, chosen.m, **_sizes(given))
-    if not chosen.as_filter().program.is_linear:
-        raise ValueError(f"got {chosen.name}, which limits its values; needed a linear system for a certificate")
-    steps = report.steps if chosen.unstable() else None
-    return Certified(output_proof(chosen, fmt, within.measurement, steps).text, fmt)
+    form = _form(given) if isinstance(chosen, LinearModel) else None
+    found = guarantee(chosen, fmt, limits(**_sizes(given)), form=form, horizon=report.steps)
+    return Certified(found.certificate(), fmt)
 
 
-def write_code_of(asked: CommandInput, structure: str = "") -> WrittenCode:
+def write_code_of(asked: CommandInput, report: Report) -> WrittenCode:
     """Write the filter of a command line as C, into the folder of its option ``--code``.
 
     The format is the one that is judged, or the answer in fixed point, or else the first of binary32 and binary64 that
@@ -248,59 +238,34 @@ def write_code_of(asked: CommandInput, structure: str = "") -> WrittenCode:
     Raises
     ------
     ValueError : neither meets the tolerance; no type of C for the format; or for a reason given in
-        :func:`gpbnb.wordlength.code.write_code`.
+        :func:`gpbnb.write_code`.
     OSError : a file cannot be written.
     """
-    given = asked.options
-    model = asked.source.structures.get(structure, asked.source.model)
-    if given.fixed and isinstance(model, LinearSystem):
-        words, largest = _words_within_tolerance(asked, model)
-        return _written(asked, model, words, largest, structure or None)
-    within = _limits(asked, model)
-    fmt = _format(given) or _type_within_tolerance(asked, model, within)
-    return _written(asked, model, fmt, within, structure or None)
-
-
-def _written(
-    asked: CommandInput,
-    model: LinearModel | LinearSystem,
-    fmt: AnyFormat,
-    within: FilterLimits | None,
-    structure: str | None,
-) -> WrittenCode:
-    """Write the code of a filter; vectors of a Kalman filter are its first measurements, if none of them is missing."""
-    given, own, z = asked.options, asked.own, asked.z
+    given, source, own, z = asked.options, asked.source, asked.own, asked.z
+    fmt: Any
+    within: FilterLimits | None
+    if given.fixed:
+        fmt, within = report.formats, limits(measurement=np.abs(z).max(axis=0))
+    else:
+        fmt, within = _format(given) or _type_within_tolerance(asked, report), _limits(asked, source.model)
     if not isinstance(own, LinearModel):
-        return WrittenCode(write_code(model, fmt, None, given.code, within=within, structure=structure), fmt)
+        model: Any = source.design or source.structures.get(report.structure) or source.model
+        form = report.structure if source.design else None
+        return WrittenCode(write_code(model, fmt, given.code, form=form, within=within), fmt)
     if z is None:
         z = simulated_measurements(own, given.steps or DEFAULT_STEPS)
     vectors = None if np.isnan(z[:VECTORS]).any() else z[:VECTORS]
-    return WrittenCode(write_code(own, fmt, given.form, given.code, inputs=vectors, within=within), fmt)
+    return WrittenCode(write_code(own, fmt, given.code, form=given.form, inputs=vectors, within=within), fmt)
 
 
-def _words_within_tolerance(asked: CommandInput, system: LinearSystem) -> tuple[WordFormats, FilterLimits]:
-    """Return the formats that a search in fixed point finds on the first basis, and the largest inputs as limits."""
-    given, basis = asked.options, cast(FixedBasis, asked.bases[0])
-    question = (system, asked.z, given.tolerance, basis, given.rounding or "nearest")
-    bits = given.coefficients or COEFFICIENT_BITS
-    words = (required_word_formats(*question) if given.mixed else required_fraction_bits(*question, bits)).words
-    if words is None:
-        raise ValueError(f"got --code {given.code}, and no format meets the tolerance; needed a larger tolerance")
-    return words, limits(system.n, system.m, measurement=np.abs(asked.z).max(axis=0))
-
-
-def _type_within_tolerance(
-    asked: CommandInput, model: LinearModel | LinearSystem, within: FilterLimits | None
-) -> FloatFormat:
+def _type_within_tolerance(asked: CommandInput, report: Report) -> FloatFormat:
     """Return binary32 if it meets the tolerance of a command line, else binary64."""
-    given, z = asked.options, asked.z
-    steps = given.steps or (DEFAULT_STEPS if z is None else len(z))
-    if z is None and isinstance(model, LinearModel):
-        z = simulated_measurements(model, steps)
-    basis = asked.bases[0]
-    used = within if basis in ("guarantee", "probable") else None
+    given, model = asked.options, asked.source.structures.get(report.structure, asked.source.model)
+    basis, data = asked.bases[0], report.steps if asked.z is None else asked.z
+    within = _limits(asked, model) if basis in ("guarantee", "probable") else None
+    form = _form(given) if isinstance(model, LinearModel) else None
     for fmt in (BINARY32, BINARY64):
-        if judge(model, fmt, steps, given.tolerance, _form(given), basis, z, used).met:
+        if judge(model, fmt, data, given.tolerance, form=form, basis=basis, within=within).met:
             return fmt
     raise ValueError(
         f"got --code {given.code}, and neither binary32 nor binary64 meets the tolerance; needed a larger tolerance, "
@@ -361,4 +326,4 @@ def _limits(asked: CommandInput, model: LinearModel | LinearSystem) -> FilterLim
     if not sizes or (of_system and set(sizes) != {"measurement"}):
         options = ", ".join(f"--{each}" for each in sizes)
         raise ValueError(f"got --basis {bounds[0]} with {options or 'no limits'}; needed {needed}")
-    return limits(model.n, model.m, **sizes)
+    return limits(**sizes)

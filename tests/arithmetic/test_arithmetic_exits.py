@@ -339,9 +339,9 @@ def filtered(fmt, z):
 
 def test_a_filter_of_scipy_is_refused_and_its_recursion_needs_more_bits_than_its_rounded_output():
     with pytest.raises(TypeError, match="got a NumPy array of a FloatArray in a function whose precision is searched"):
-        required_precision(lambda fmt, z: fmt.array(scipy.signal.lfilter(B, A, z)), 400, 1e-4, z=Z)
+        required_precision(lambda fmt, z: fmt.array(scipy.signal.lfilter(B, A, z)), Z, 1e-4)
     # Half a unit of the last place of the outputs, below 1, is within the tolerance in 13 bits and more.
-    assert required_precision(filtered, 400, 1e-4, z=Z).precision > 16
+    assert required_precision(filtered, Z, 1e-4).digits > 16
 
 
 def test_a_running_sum_needs_24_bits_and_is_refused_in_numpy():
@@ -359,8 +359,8 @@ def test_a_running_sum_needs_24_bits_and_is_refused_in_numpy():
         lambda fmt, z: FloatFormat(fmt.base, fmt.precision).array(np.cumsum(z.to_fractions())),
     ):
         with pytest.raises(TypeError, match="in a function whose precision is searched"):
-            required_precision(leave, 1000, 1e-3, z=[0.1] * 1000)
-    assert required_precision(in_format, 1000, 1e-3, z=[0.1] * 1000).precision == 24
+            required_precision(leave, [0.1] * 1000, 1e-3)
+    assert required_precision(in_format, [0.1] * 1000, 1e-3).digits == 24
 
 
 def test_a_function_that_peeks_gets_the_answer_of_the_function_itself():
@@ -371,8 +371,8 @@ def test_a_function_that_peeks_gets_the_answer_of_the_function_itself():
         peek(found[-1], lambda x: seen.append((x.format.precision, float(x.to_float()))))
         return found
 
-    answer = required_precision(with_peek, 400, 1e-4, z=Z)
-    assert answer.tried == required_precision(filtered, 400, 1e-4, z=Z).tried
+    answer = required_precision(with_peek, Z, 1e-4)
+    assert answer.tried == required_precision(filtered, Z, 1e-4).tried
     last = dict(seen)
     assert len(seen) == len(answer.tried) + len(answer.processors) + 2  # and two references
-    assert abs(last[answer.precision] - last[max(last)]) <= 1e-4
+    assert abs(last[answer.digits] - last[max(last)]) <= 1e-4

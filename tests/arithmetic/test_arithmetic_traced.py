@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, FixedFormat, FloatFormat, peek, required_fraction_bits, required_precision
+from gpbnb import BINARY32, FixedFormat, FloatFormat, peek, required_precision
 from gpbnb.arithmetic import linalg, tape
 from gpbnb.arithmetic.traced import TracedFunction
 from tests.plain_structures import fixed, floating, limited
@@ -396,18 +396,18 @@ def test_a_trace_belongs_to_shapes_and_takes_new_numbers():
 
 
 def test_the_search_says_whether_it_was_traced():
-    found = required_precision(pi_controller, 100, 1e-3, z=Z)
+    found = required_precision(pi_controller, Z, 1e-3)
     assert found.untraced == ""
-    assert found.precision > 5
+    assert found.digits > 5
 
     def branching(fmt, z):
         return [x if x > 0 else x / 3 for x in z]
 
-    found = required_precision(branching, 100, 1e-2, z=Z)
+    found = required_precision(branching, Z, 1e-2)
     assert found.untraced.startswith("it branches on a comparison")
     assert "; the function ran operation by operation: it branches on a comparison" in str(found)
-    bits = required_fraction_bits(pi_controller, Z, 1e-3, like=FixedFormat(4, 1))
-    assert bits.fmt.fraction_bits > 5
+    bits = required_precision(pi_controller, Z, 1e-3, kind="fixed", like=FixedFormat(4, 1))
+    assert bits.digits > 5
 
 
 def test_a_controller_of_1000_steps_takes_less_than_a_tenth_of_a_second():

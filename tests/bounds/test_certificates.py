@@ -44,12 +44,12 @@ def small(**changes: Any) -> LinearModel:
 
 
 def written(model: Any, fmt: Any, within: Any, form: Form | str = Form.INNOVATION, **options: Any) -> Content:
-    return dict(json.loads(guarantee(model, fmt, within, form, **options).certificate()))
+    return dict(json.loads(guarantee(model, fmt, within, form=form, **options).certificate()))
 
 
 def section(fmt: Any) -> Content:
     made = biquad("0.01", "0.02", "0.01", "-1.6", "0.7")
-    found = from_schedule(filter_schedule(made, fmt), limits(3, 1, measurement=1.0))
+    found = from_schedule(filter_schedule(made, fmt), limits(measurement=1.0))
     return dict(json.loads(found.certificate()))
 
 
@@ -84,9 +84,9 @@ FORMATS = [
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
 def test_the_checker_covers_formats_forms_and_limits(fmt: Any, form: Form) -> None:
     """In fixed point, sums of a step may leave the range for one kind of limits."""
-    within = limits(2, 1, state=6, innovation=6)
+    within = limits(state=6, innovation=6)
     prove(written(small(), fmt, within, form))
-    prove(written(small(), fmt, limits(2, 1, measurement=4), form))
+    prove(written(small(), fmt, limits(measurement=4), form))
 
 
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
@@ -97,17 +97,17 @@ def test_the_checker_covers_linear_structures(fmt: Any) -> None:
 def test_models_of_cycles_and_of_some_steps_are_proved() -> None:
     model = small(Phi=[[["1/2", 0], ["1/4", "1/3"]], [["1/4", 0], ["1/8", "1/2"]]], R=[[["0.75"]], [["0.5"]], [["2"]]])
     for form in (Form.INNOVATION, Form.UD):
-        content = written(model, FloatFormat(2, 11), limits(2, 1, measurement=4), form)
+        content = written(model, FloatFormat(2, 11), limits(measurement=4), form)
         assert content["period"] % 6 == 0
         prove(content)
-    content = written(small(steps=7), FORMAT, limits(2, 1, measurement=4))
+    content = written(small(steps=7), FORMAT, limits(measurement=4))
     assert content["steps"] == 7
     assert "after 7 steps" in prove(content)
 
 
 def test_a_long_cycle_is_proved() -> None:
     """An ellipsoid for errors of all but five steps once lost too much, after 700 steps and before the gain settles."""
-    found = guarantee(cyclic(2, 1, cycle=250, decay=0.8), FORMAT, limits(2, 1, state=100, innovation=10), Form.UD)
+    found = guarantee(cyclic(2, 1, cycle=250, decay=0.8), FORMAT, limits(state=100, innovation=10), form=Form.UD)
     content = json.loads(found.certificate())
     assert content["first"] > 700
     prove(content)
@@ -116,7 +116,7 @@ def test_a_long_cycle_is_proved() -> None:
 def test_a_filter_that_settles_slowly_is_proved() -> None:
     """In a far wider interval of covariances, gains are too far apart."""
     model = small(Phi=[["0.9", "0.1"], [0, 1]], H=[[1, 0]], Q=[["0.01", 0], [0, "1e-4"]], R=[["0.01"]], x0=[0, 0])
-    content = written(model, FORMAT, limits(2, 1, state=[10, 1], innovation=1))
+    content = written(model, FORMAT, limits(state=[10, 1], innovation=1))
     assert content["first"] > 1_000
     prove(content)
     wide = content | {"width": [[factor(each, "1e9") for each in row] for row in content["width"]]}
@@ -130,7 +130,7 @@ def test_random_filters_are_proved(seed: int) -> None:
     """Every form, rounding, base and kind of limits; some of the filters have no bound, or no filter."""
     drawn = draw(seed)
     try:
-        found = guarantee(drawn.model, drawn.fmt, drawn.within, drawn.form, most=300, horizon=20)
+        found = guarantee(drawn.model, drawn.fmt, drawn.within, form=drawn.form, most=300, horizon=20)
     except ValueError:
         assert seed in REFUSED
         return
@@ -149,7 +149,7 @@ def test_an_error_that_peaks_within_a_block_of_steps_counts(peak: int) -> None:
     cycle = [[["1"]] for _ in range(12)]
     cycle[peak - 1], cycle[peak] = [["64"]], [["1/64"]]
     model = LinearModel(cycle, [["1/1024"]], [["1/64"]], [["1"]], ["1"], [["1"]], steps=12)
-    content = written(model, FloatFormat(2, 11), limits(1, 1, state=100, innovation=1))
+    content = written(model, FloatFormat(2, 11), limits(state=100, innovation=1))
     prove(content)
     scale_bound("0.999")(content)
     assert f"may exceed its bound after step {peak}" in refused(content)
@@ -169,7 +169,7 @@ def test_a_row_is_bounded_by_rows_near_it() -> None:
 def test_a_running_sum_is_proved_for_its_steps() -> None:
     """It keeps its errors, so only a number of steps has a bound."""
     made = LinearSystem([["1"]], [["1"]]).as_filter()
-    found = from_schedule(filter_schedule(made, FloatFormat(2, 11)), limits(2, 1, measurement=1.0), 50)
+    found = from_schedule(filter_schedule(made, FloatFormat(2, 11)), limits(measurement=1.0), 50)
     content = dict(json.loads(found.certificate()))
     assert content["steps"] == 50
     assert "after 50 steps" in prove(content)
@@ -178,7 +178,7 @@ def test_a_running_sum_is_proved_for_its_steps() -> None:
 
 
 def test_a_certificate_holds_the_model_as_given() -> None:
-    content = written(tracker(), FORMAT, limits(2, 1, state=[1000, 30], innovation=8))
+    content = written(tracker(), FORMAT, limits(state=[1000, 30], innovation=8))
     assert content["filter"]["Phi"] == [[["1", "1/10"], ["0", "1"]]]
     assert content["limits"] == {"state": ["1000", "30"], "innovation": ["8"], "measurement": [None]}
     assert (content["repeat"], content["period"], content["steps"]) == (173, 1, None)
@@ -197,7 +197,7 @@ def run(folder: Path, content: Content | str) -> subprocess.CompletedProcess[str
 
 
 def test_a_copy_of_the_checker_runs_anywhere(tmp_path: Path) -> None:
-    content = written(small(), FloatFormat(2, 11), limits(2, 1, state=6, innovation=6))
+    content = written(small(), FloatFormat(2, 11), limits(state=6, innovation=6))
     done = run(tmp_path, content)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.endswith("\nproved\n")
@@ -232,14 +232,16 @@ def test_the_checker_needs_only_the_standard_library() -> None:
 def original(name: str) -> str:
     """Certificates of some kinds."""
     contents = {
-        "tracker": lambda: written(tracker(), FORMAT, limits(2, 1, state=[1000, 30], innovation=8)),
-        "joseph": lambda: written(small(), FloatFormat(2, 11), limits(2, 1, measurement=4), Form.JOSEPH),
-        "ud": lambda: written(small(), FloatFormat(10, 4, "up"), limits(2, 1, state=6, innovation=6), Form.UD),
-        "hung": lambda: written(small(), FloatFormat(2, 9, emin=-14, emax=15), limits(2, 1, 6, 6), Form.HUNG),
+        "tracker": lambda: written(tracker(), FORMAT, limits(state=[1000, 30], innovation=8)),
+        "joseph": lambda: written(small(), FloatFormat(2, 11), limits(measurement=4), Form.JOSEPH),
+        "ud": lambda: written(small(), FloatFormat(10, 4, "up"), limits(state=6, innovation=6), Form.UD),
+        "hung": lambda: written(
+            small(), FloatFormat(2, 9, emin=-14, emax=15), limits(state=6, innovation=6), Form.HUNG
+        ),
         "section": lambda: section(FORMAT),
         "fixed": lambda: section(FixedFormat(6, 12)),
         "cycle": lambda: written(
-            small(R=[[["0.75"]], [["0.5"]]]), FloatFormat(2, 11), limits(2, 1, measurement=4), Form.JOSEPH
+            small(R=[[["0.75"]], [["0.5"]]]), FloatFormat(2, 11), limits(measurement=4), Form.JOSEPH
         ),
     }
     return json.dumps(contents[name]())
@@ -477,7 +479,7 @@ def test_a_filter_that_must_not_be_repaired_is_rejected() -> None:
 def test_stochastic_rounding_is_not_covered() -> None:
     """Bound "for ever" of 4.82, but an error of 5.217 at the third step: the covariance occurs again by chance."""
     model = LinearModel([[0]], [[1]], [[1]], [["0.4375"]], [0], [[1]])
-    content = written(model, FloatFormat(2, 5), limits(1, 1, state=100, innovation=100, measurement=100))
+    content = written(model, FloatFormat(2, 5), limits(state=100, innovation=100, measurement=100))
     prove(content)
     content["format"]["rounding"] = "stochastic"
     content["bound"] = ["4.82"]
@@ -487,7 +489,7 @@ def test_stochastic_rounding_is_not_covered() -> None:
 
 def test_measurements_that_are_stored_beyond_their_limit_count(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three bits store 0.95 as 1; a bound for 0.95 once forgot the roundings of results above 1."""
-    fmt, within = FloatFormat(2, 3), limits(2, 1, measurement=0.95)
+    fmt, within = FloatFormat(2, 3), limits(measurement=0.95)
     made = filter_schedule(LinearSystem([["0.5"]], [["1"]]).as_filter(), fmt)
     prove(json.loads(from_schedule(made, within).certificate()))
     monkeypatch.setattr(guess, "stored_sizes", lambda _, sizes: sizes)
@@ -499,7 +501,7 @@ def test_measurements_that_are_stored_beyond_their_limit_count(monkeypatch: pyte
 def test_underflow_counts(subnormal: bool) -> None:
     """A bound that holds for any exponents does not hold where results underflow."""
     made = biquad("0.01", "0.02", "0.01", "-1.6", "0.7")
-    within = limits(3, 1, measurement=2.0**-9)
+    within = limits(measurement=2.0**-9)
     content = json.loads(from_schedule(filter_schedule(made, FloatFormat(2, 11)), within).certificate())
     prove(content)
     content["format"] |= {"emin": -14, "emax": 15, "subnormal": subnormal}
@@ -540,13 +542,13 @@ def test_signs_of_a_first_estimate_count() -> None:
 
 def test_limits_of_zero_are_numbers() -> None:
     """An input that is zero moves nothing; its limit, a Fraction, once met an operation of integers."""
-    content = written(small(), FloatFormat(2, 11), limits(2, 1, measurement=0))
+    content = written(small(), FloatFormat(2, 11), limits(measurement=0))
     assert content["limits"]["measurement"] == ["0"]
     prove(content)
 
 
 def test_a_first_estimate_beyond_its_limit_is_rejected() -> None:
-    content = written(small(), FORMAT, limits(2, 1, state=6, innovation=6))
+    content = written(small(), FORMAT, limits(state=6, innovation=6))
     content["filter"]["x0"] = ["1", "-11"]
     assert "the first estimate is beyond its limit" in refused(content)
 
@@ -554,16 +556,16 @@ def test_a_first_estimate_beyond_its_limit_is_rejected() -> None:
 def test_innovations_of_correlated_measurements_are_limited() -> None:
     """The UD form decorrelates them, which makes the first row of H smaller; its limit is that of the measurement."""
     model = small(H=[[1, 1], [1, "0.5"]], R=[[2, 1], [1, 1]])
-    content = written(model, FloatFormat(2, 11), limits(2, 2, measurement=4), Form.UD)
+    content = written(model, FloatFormat(2, 11), limits(measurement=4), Form.UD)
     prove(content)
     content["derived"]["innovation"][0] = factor(content["derived"]["innovation"][0], "0.9")
     assert "an innovation may exceed its limit" in refused(content)
 
 
 def test_what_has_no_certificate_says_so() -> None:
-    slow = guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(10, 2, state=100, innovation=10), most=1000)
+    slow = guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(state=100, innovation=10), most=1000)
     assert "did not settle" in slow.why
-    none = guarantee(small(), FloatFormat(2, 11, emin=-14, emax=15), limits(2, 1, measurement=1e6))
+    none = guarantee(small(), FloatFormat(2, 11, emin=-14, emax=15), limits(measurement=1e6))
     with pytest.raises(ValueError, match="without a bound"):
         none.certificate()
 

@@ -17,7 +17,7 @@ from gpbnb.report.guarantees import published
 from gpbnb.wordlength.examples import cyclic, tracker
 from tests.plain_program import steps_in_python
 
-TRACKER = tracker(), limits(n=2, m=1, state=[1000, 30], innovation=8)
+TRACKER = tracker(), limits(state=[1000, 30], innovation=8)
 
 
 def cases():
@@ -27,14 +27,14 @@ def cases():
     yield (
         "a period",
         cyclic(2, 1, cycle=3, decay=0.6),
-        limits(2, 1, state=100, innovation=10),
+        limits(state=100, innovation=10),
         FloatFormat(2, 24),
         Form.UD,
     )
     yield (
         "Nile",
         published.nile_local_level(),
-        limits(1, 1, state=1500, innovation=1200),
+        limits(state=1500, innovation=1200),
         FloatFormat(2, 24),
         Form.INNOVATION,
     )
@@ -43,7 +43,7 @@ def cases():
 @pytest.fixture(scope="module", params=cases(), ids=lambda case: case[0])
 def found(request):
     _, model, within, fmt, form = request.param
-    return guarantee(model, fmt, within, form)
+    return guarantee(model, fmt, within, form=form)
 
 
 def followed(found, operation, steps):
@@ -99,6 +99,6 @@ def test_an_error_is_half_a_unit_of_the_largest_result():
 
 
 def test_a_filter_that_never_settles_is_refused():
-    ended = guarantee(published.elaenia_gold(), FloatFormat(2, 24), limits(1, 1, state=2000, innovation=100))
+    ended = guarantee(published.elaenia_gold(), FloatFormat(2, 24), limits(state=2000, innovation=100))
     with pytest.raises(ValueError, match=r"got a guarantee for .* steps: .*; needed one that holds for ever"):
         contributions(ended)

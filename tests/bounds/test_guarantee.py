@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, Rounding
+from gpbnb import FloatFormat, Rounding, required_precision
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds import adversary
 from gpbnb.bounds.adversary import attack, ceiling, random_errors
@@ -29,7 +29,6 @@ from gpbnb.filters.system import biquad, controller, state_space
 from gpbnb.report.guarantees import derivation
 from gpbnb.report.guarantees.published import fixif_longitudinal, nile_local_level
 from gpbnb.report.kalman.exact_step import exact_step
-from gpbnb.wordlength.precision import required_precision
 from tests.plain_program import steps_in_python
 
 FORMATS = [
@@ -118,7 +117,7 @@ def test_the_error_is_what_its_terms_add_up_to(form: Form) -> None:
     model, fmt = rolling(), FloatFormat(2, 12)
     stored, given = model.rounded(fmt), schedule(model, fmt, form, 60)
     program, n = given.program, model.n
-    within = limits(2, 2, state=100, innovation=100, measurement=100)
+    within = limits(state=100, innovation=100, measurement=100)
     found = linear_steps(given, np.arange(7))
     h = rounding_errors(program, fmt, found, value_sizes(found, within), np.full(2, 101.0), np.ones(2))
     rng, x, true, P = np.random.default_rng(3), [Fraction(0)] * n, [Fraction(0)] * n, stored.P0
@@ -195,7 +194,7 @@ def test_sums_by_squares_are_those_of_balls(radius: float, steps: int | None, la
 @pytest.mark.parametrize("form", Form)
 def test_an_adversary_comes_near_but_not_above(form: Form, rounding: Rounding) -> None:
     """Measured with these seeds: 0.33 to 0.73."""
-    found = guarantee(tracker(), FloatFormat(2, 24, rounding), limits(2, 1, state=[1000, 30], innovation=8), form)
+    found = guarantee(tracker(), FloatFormat(2, 24, rounding), limits(state=[1000, 30], innovation=8), form=form)
     assert found.for_ever
     outcome = attack(found, 1500, 100, center=[750, 0], plans=1)
     assert outcome.admissible
@@ -203,7 +202,7 @@ def test_an_adversary_comes_near_but_not_above(form: Form, rounding: Rounding) -
 
 
 def test_a_periodic_model() -> None:
-    found = guarantee(rolling(), FloatFormat(2, 16), limits(2, 2, measurement=[100, 50]), Form.UD)
+    found = guarantee(rolling(), FloatFormat(2, 16), limits(measurement=[100, 50]), form=Form.UD)
     assert found.for_ever
     assert found.schedule.period % 3 == 0
     outcome = attack(found, 300, 60, plans=4)
@@ -221,7 +220,7 @@ def test_the_computed_covariance_repeats_digit_for_digit() -> None:
 
 def test_the_error_of_the_gain_matters() -> None:
     """The first gain of the Nile filter cancels: without its part, an admissible run violates the bound."""
-    found = guarantee(nile_local_level(), FloatFormat(2, 24), limits(1, 1, state=1500, innovation=1200))
+    found = guarantee(nile_local_level(), FloatFormat(2, 24), limits(state=1500, innovation=1200))
     outcome = attack(found, 300, 100, center=[1000], plans=2)
     assert outcome.admissible
     assert found.bound[0] - found.parts[0, GAIN] < outcome.errors[0] <= found.bound[0]
@@ -231,14 +230,14 @@ def test_roundings_of_the_stored_loop_matter() -> None:
     """Hung's form stores (I - KH)Φ rounded: their errors act on the state at every step."""
     model = LinearModel(*(exact([[v]]) for v in ("1", "1", "0.01", "1")), exact(["0"]), exact([["1"]]))
     fmt = FloatFormat(2, 12)
-    found = guarantee(model, fmt, limits(1, 1, state=100, innovation=100), Form.HUNG)
+    found = guarantee(model, fmt, limits(state=100, innovation=100), form=Form.HUNG)
     assert found.parts[0, LOOP] > 0.05 * found.bound[0]
-    other = guarantee(model, fmt, limits(1, 1, state=100, innovation=100), Form.INNOVATION)
+    other = guarantee(model, fmt, limits(state=100, innovation=100), form=Form.INNOVATION)
     assert other.parts[0, LOOP] == 0
 
 
 def test_limits_on_measurements_bound_state_and_innovation() -> None:
-    found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, measurement=1000))
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(measurement=1000))
     outcome = attack(found, 400, 30)
     assert outcome.admissible
     assert (np.abs(outcome.z) <= 1000).all()
@@ -258,7 +257,7 @@ def test_limits_on_measurements_bound_state_and_innovation() -> None:
     ],
 )
 def test_where_there_is_no_bound_for_ever_it_says_why(model: LinearModel, fmt: FloatFormat, says: str) -> None:
-    found = guarantee(model, fmt, limits(model.n, model.m, state=10, innovation=10), most=300, horizon=50)
+    found = guarantee(model, fmt, limits(state=10, innovation=10), most=300, horizon=50)
     assert not found.for_ever
     assert found.steps is not None
     assert found.steps > 0
@@ -267,7 +266,7 @@ def test_where_there_is_no_bound_for_ever_it_says_why(model: LinearModel, fmt: F
 
 def test_a_covariance_that_loses_definiteness_ends_the_bound() -> None:
     model = tracker(R=exact([["1e-12"]]), P0=exact([["1e4", "0"], ["0", "1e4"]]), H=exact([["1", "0.5"]]))
-    found = guarantee(model, FloatFormat(2, 11), limits(2, 1, state=10, innovation=10))
+    found = guarantee(model, FloatFormat(2, 11), limits(state=10, innovation=10))
     assert not found.for_ever
     assert "lost definiteness" in found.why or "singular" in found.why
     stored = model.rounded(FloatFormat(2, 11))
@@ -278,18 +277,14 @@ def test_a_covariance_that_loses_definiteness_ends_the_bound() -> None:
 
 
 def test_an_integrator_has_no_bound_for_all_time() -> None:
-    found = from_schedule(
-        filter_schedule(controller("1", "0.01", "2", "5"), FloatFormat(2, 24)), limits(3, 1, measurement=1)
-    )
+    found = from_schedule(filter_schedule(controller("1", "0.01", "2", "5"), FloatFormat(2, 24)), limits(measurement=1))
     assert not found.for_ever
     assert "not stable" in found.why
 
 
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8), FloatFormat(2, 12, Rounding.CHOP)], ids=str)
 def test_a_second_order_section(fmt: FloatFormat) -> None:
-    found = from_schedule(
-        filter_schedule(biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), fmt), limits(3, 1, measurement=1)
-    )
+    found = from_schedule(filter_schedule(biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), fmt), limits(measurement=1))
     outcome = attack(found, 1000, 100)
     assert 0.3 < outcome.ratio <= 1
 
@@ -310,17 +305,17 @@ def test_a_largest_state_that_may_be_a_power_of_two_has_no_coefficients() -> Non
 @pytest.mark.parametrize("given", [{}, {"state": 1}, {"measurement": -1}, {"measurement": float("nan")}])
 def test_limits_that_are_none_are_refused(given: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="needed"):
-        limits(2, 1, **given)
+        limits(**given)
 
 
 def test_the_smallest_precision_by_guarantee_and_by_probable_error() -> None:
     """Each answer holds, one bit fewer does not, and a worst case asks for more than noise."""
-    within, answers = limits(2, 1, state=[1000, 30], innovation=8), {}
+    within, answers = limits(state=[1000, 30], innovation=8), {}
     for basis in ("guarantee", "probable"):
         found = required_precision(tracker(), 1, 0.01, basis=basis, within=within)
         tried = dict(found.tried)
-        answers[basis] = found.fmt.precision
-        assert tried[found.fmt.precision] <= 1 < tried[found.fmt.precision - 1]
+        answers[basis] = found.digits
+        assert tried[found.digits] <= 1 < tried[found.digits - 1]
     assert answers["probable"] < answers["guarantee"]
     # Four bits more divide both by sixteen: the error of the gain and the binades change little.
     finer = guarantee(tracker(), FloatFormat(2, answers["guarantee"] + 4), within)
@@ -329,7 +324,7 @@ def test_the_smallest_precision_by_guarantee_and_by_probable_error() -> None:
 
 def test_the_probable_error_is_that_of_independent_roundings() -> None:
     """Against a simulation of the same noise: to four standard errors, with noise correlated over 20 steps."""
-    found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1000, 30], innovation=8))
     rng, count = np.random.default_rng(6), len(found.schedule.program.operations)
     F, G, h = (each[-1] for each in separate_roundings(found))
     e, total, steps = np.zeros((2, 200)), np.zeros(2), 400
@@ -340,7 +335,7 @@ def test_the_probable_error_is_that_of_independent_roundings() -> None:
 
 
 def test_the_probable_error_of_a_periodic_model_is_the_largest_of_its_steps() -> None:
-    found = guarantee(rolling(), FloatFormat(2, 24), limits(2, 2, state=100, innovation=10))
+    found = guarantee(rolling(), FloatFormat(2, 24), limits(state=100, innovation=10))
     F, effects, errors = separate_roundings(found)
     G = effects * errors[:, None, :] / math.sqrt(3)
     covariance, steps = np.zeros((2, 2)), []
@@ -357,7 +352,7 @@ def test_the_probable_error_is_the_scatter_of_an_emulated_run() -> None:
 
     Errors are correlated over 20 steps, so that 10,000 steps give the scatter to 3 %; the test allows three times that.
     """
-    found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1000, 30], innovation=8))
     scatter = random_errors(found, 20_000, [750, 0])[10_000:].std(axis=0)
     assert (0.9 * probable_error(found) < scatter).all()
     assert (scatter < 1.1 * probable_error(found)).all()
@@ -372,7 +367,7 @@ def test_the_algebra(name: str) -> None:
 def test_the_ceiling_of_a_run_lies_between_its_error_and_the_guarantee():
     """A constant is measured: only the rounding of one product in each step, of known size, has an effect."""
     model = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-    found = guarantee(model, FloatFormat(2, 11), limits(1, 1, state=100, innovation=10))
+    found = guarantee(model, FloatFormat(2, 11), limits(state=100, innovation=10))
     outcome = attack(found, 200, 50)
     z = outcome.z[: outcome.step]
     most = ceiling(found, z, outcome.state)
@@ -383,7 +378,7 @@ def test_the_ceiling_of_a_run_lies_between_its_error_and_the_guarantee():
 def test_the_ceiling_adds_up_roundings_by_the_size_of_their_results():
     """x = 0.5625 x + 0.4375 z in five bits, with z = 0.75."""
     schedule = filter_schedule(state_space([["0.5625"]], [["0.4375"]], [[1]], [[0]]), FloatFormat(2, 5))
-    found = from_schedule(schedule, limits(2, 1, measurement=1.0))
+    found = from_schedule(schedule, limits(measurement=1.0))
     z = np.full((3, 1), 0.75)
     x, total = 0.0, 0.0
     half = {k: 2.0 ** (k - 6) for k in range(-8, 2)}  # largest error of results below 2**k
@@ -399,7 +394,7 @@ def test_the_ceiling_adds_up_roundings_by_the_size_of_their_results():
 def test_the_ceiling_includes_the_errors_of_gain_and_closed_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without roundings, it is the distance of the filter with stored coefficients from the exact one."""
     model = LinearModel([[1]], [[1]], [["0.3"]], [[1]], [0], [[1]])
-    found = guarantee(model, FloatFormat(2, 7), limits(1, 1, state=100, innovation=10), Form.HUNG)
+    found = guarantee(model, FloatFormat(2, 7), limits(state=100, innovation=10), form=Form.HUNG)
     monkeypatch.setattr(adversary, "largest_errors", lambda _, sizes: 0 * sizes)
     given, z = found.schedule, np.array([[5.0], [-3.0], [7.0], [9.0]])
     parts = linear_steps(given, np.arange(given.steps))
@@ -435,7 +430,7 @@ def test_outputs_and_delays_have_a_guarantee():
     """A delayed copy of a state has no disturbance of its own, nor has an output without a direct term."""
     A, B = [["0.5625", 0, 0], [1, 0, 0], [0, 1, 0]], [["0.4375"], [0], [0]]
     schedule = filter_schedule(state_space(A, B, [[0, 0, 1]], [[0]]), FloatFormat(2, 11))
-    found = from_schedule(schedule, limits(4, 1, measurement=1.0))
+    found = from_schedule(schedule, limits(measurement=1.0))
     assert found.for_ever
     assert found.limits.state == pytest.approx(np.ones(4), rel=1e-6)
     assert found.bound == pytest.approx(np.full(4, found.bound[0]), rel=1e-6)

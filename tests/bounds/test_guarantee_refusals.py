@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
+from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, required_precision
 from gpbnb.bounds.adversary import attack
 from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
@@ -20,7 +20,6 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.filters.system import state_space
 from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
-from gpbnb.wordlength.precision import required_precision
 
 FORMAT = FloatFormat(2, 11)
 Asked = Callable[[LinearModel, Any, FloatFormat], Any]
@@ -70,7 +69,7 @@ def test_a_filter_that_computes_its_gain_must_not_round_at_random(asked: Asked) 
     model = scalar(Phi=[[0]], R=[["0.4375"]])
     fmt = FloatFormat(2, 5, Rounding.STOCHASTIC)
     with pytest.raises(ValueError, match="got stochastic rounding for a Kalman filter; needed another"):
-        asked(model, limits(1, 1, state=100, innovation=100, measurement=100), fmt)
+        asked(model, limits(state=100, innovation=100, measurement=100), fmt)
 
 
 def test_fixed_coefficients_may_be_rounded_at_random() -> None:
@@ -83,7 +82,7 @@ def test_fixed_coefficients_may_be_rounded_at_random() -> None:
         assert [*made.packed[0]] == [*fmt.array(system.as_filter().coefficients).to_float()]
         again = filter_schedule(system.as_filter(), fmt)
         assert np.array_equal(made.packed, again.packed)
-        found = from_schedule(made, limits(2, 1, measurement=4))
+        found = from_schedule(made, limits(measurement=4))
         z = np.random.default_rng(seed).choice([-4.0, 4.0, 3.9375], (300, 1))
         A, B = made.packed[0, :2]
         x, exactly, worst = system.outputs(z, fmt)[:, 0, 0], 0.0, 0.0
@@ -91,10 +90,8 @@ def test_fixed_coefficients_may_be_rounded_at_random() -> None:
             exactly = A * exactly + B * z[k, 0]
             worst = max(worst, abs(x[k + 1] - exactly))
         assert 0.01 * found.bound[0] < worst <= found.bound[0]
-    found = required_precision(
-        system, 300, 0.1, rounding="stochastic", basis="guarantee", within=limits(1, 1, measurement=4)
-    )
-    assert found.fmt is not None
+    found = required_precision(system, 300, 0.1, rounding="stochastic", basis="guarantee", within=limits(measurement=4))
+    assert found.format is not None
 
 
 # -- limits -----------------------------------------------------------------------------------------------------------
@@ -103,7 +100,7 @@ def test_fixed_coefficients_may_be_rounded_at_random() -> None:
 @pytest.mark.parametrize("asked", ASKED)
 def test_a_first_estimate_beyond_its_limit_is_refused(asked: Asked) -> None:
     model = two_states(x0=[1, -11])
-    within = limits(2, 1, state=10, innovation=30)
+    within = limits(state=10, innovation=30)
     with pytest.raises(ValueError, match=r"got a first estimate -11.0 of state 1, beyond its limit 10.0"):
         asked(model, within, FORMAT)
     asked(two_states(x0=[10, -10]), within, FORMAT)
@@ -113,12 +110,11 @@ def test_a_first_estimate_beyond_its_limit_is_refused(asked: Asked) -> None:
 @pytest.mark.parametrize(
     ("within", "says"),
     [
-        (limits(1, 1, state=10, innovation=30), r"shape \(1,\) on the state; needed \(2,\)"),
-        (limits(3, 1, state=10, innovation=30), r"shape \(3,\) on the state; needed \(2,\)"),
-        (limits(2, 2, state=10, innovation=30), r"shape \(2,\) on the innovation; needed \(1,\)"),
+        (limits(state=[10, 10, 10], innovation=30), "got 3 limits on the state; needed one, or 2"),
+        (limits(state=10, innovation=[30, 30]), "got 2 limits on the innovation; needed one, or 1"),
         (
             FilterLimits(np.ones(2), np.ones(1), np.ones(2)),
-            r"shape \(2,\) on the measurement; needed \(1,\).*write limits\(2, 1, ...\)",
+            "got 2 limits on the measurement; needed one, or 1: this filter has 2 states and 1 measurement",
         ),
     ],
 )
@@ -137,9 +133,9 @@ def test_limits_that_were_not_checked_are(asked: Asked) -> None:
 
 def test_limits_of_a_system_have_one_entry_for_each_input() -> None:
     system = LinearSystem([["0.5"]], [["0.5", "0.25"]])
-    with pytest.raises(ValueError, match=r"shape \(1,\) on the .*; needed \(2,\): this filter has 1 states and 2"):
-        required_precision(system, 10, 0.1, basis="guarantee", within=limits(1, 1, measurement=3))
-    assert required_precision(system, 10, 0.1, basis="guarantee", within=limits(1, 2, measurement=3)).fmt
+    with pytest.raises(ValueError, match="needed one, or 2: this filter has 1 state and 2"):
+        required_precision(system, 10, 0.1, basis="guarantee", within=limits(measurement=[3, 3, 3]))
+    assert required_precision(system, 10, 0.1, basis="guarantee", within=limits(measurement=3)).format
 
 
 @pytest.mark.parametrize("basis", ["bound", "guarantee"])
@@ -147,21 +143,21 @@ def test_limits_of_a_system_have_one_entry_for_each_input() -> None:
 def test_errors_that_never_decay_have_a_bound_for_the_steps_asked_for(A: Any, basis: Any) -> None:
     """The largest pole may be 1 - 1e-16 in float64, from which a sum over all time would take 2e16 terms."""
     system = LinearSystem(A, [[1], [0]], [[1, 0]])
-    given: dict[str, Any] = {"z": np.ones((100, 1))} if basis == "bound" else {"within": limits(2, 1, measurement=1)}
-    assert 5 < required_precision(system, 100, 0.01, basis=basis, **given).precision < 24
+    z, within = (np.ones((100, 1)), None) if basis == "bound" else (100, limits(measurement=1))
+    assert 5 < required_precision(system, z, 0.01, basis=basis, within=within).digits < 24
 
 
 @pytest.mark.parametrize("size", [2.0**-451, 2.0**451])
 def test_limits_whose_squares_float64_cannot_store_are_refused(size: float) -> None:
     with pytest.raises(ValueError, match=r"needed 0, infinity, or 2\*\*-450 to 2\*\*450"):
-        limits(2, 1, state=[1, size], innovation=1)
+        limits(state=[1, size], innovation=1)
 
 
 def test_bounds_in_blocks_need_limits_on_state_and_innovation() -> None:
     with pytest.raises(ValueError, match="needed finite ones: bounds in blocks"):
-        next(bounds_in_blocks(scalar(), FORMAT, [limits(1, 1, measurement=10)], [[1]], 5))
+        next(bounds_in_blocks(scalar(), FORMAT, [limits(measurement=10)], [[1]], 5))
     with pytest.raises(ValueError, match=r"assumed errors of shape \(2,\); needed \(1,\)"):
-        next(bounds_in_blocks(scalar(), FORMAT, [limits(1, 1, 10, 10)], [[1, 1]], 5))
+        next(bounds_in_blocks(scalar(), FORMAT, [limits(state=10, innovation=10)], [[1, 1]], 5))
 
 
 # -- nothing measured, nothing allowed --------------------------------------------------------------------------------
@@ -175,9 +171,9 @@ DETERMINISTIC = [each for each in Rounding if each is not Rounding.STOCHASTIC]
 def test_a_filter_that_measures_nothing(rounding: Rounding, x0: list[Any]) -> None:
     """Its estimate is the first one, predicted: from zero it stays zero, otherwise only roundings of that decay."""
     model, fmt = two_states(H=[[0, 0]], x0=x0), FloatFormat(2, 7, rounding)
-    for within in (limits(2, 1, measurement=10), limits(2, 1, state=1, innovation=10)):
+    for within in (limits(measurement=10), limits(state=1, innovation=10)):
         for form in Form:
-            found = guarantee(model, fmt, within, form)
+            found = guarantee(model, fmt, within, form=form)
             assert found.for_ever
             run = Run(model, fmt, form, ())
             z = fmt.array(np.full((30, 1), 10.0))
@@ -188,20 +184,20 @@ def test_a_filter_that_measures_nothing(rounding: Rounding, x0: list[Any]) -> No
 
 
 def test_a_filter_that_measures_nothing_is_attacked_in_vain() -> None:
-    found = guarantee(scalar(H=[[0]]), FORMAT, limits(1, 1, measurement=10))
+    found = guarantee(scalar(H=[[0]]), FORMAT, limits(measurement=10))
     outcome = attack(found, 20, 5)
     assert outcome.admissible
     assert (outcome.errors.tolist(), outcome.ratio) == ([0.0], 0.0)
 
 
 def test_limits_of_zero_allow_no_error() -> None:
-    assert (guarantee(two_states(), FORMAT, limits(2, 1, measurement=0)).bound < 1e-9).all()
+    assert (guarantee(two_states(), FORMAT, limits(measurement=0)).bound < 1e-9).all()
 
 
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 11, emin=-14, emax=15), FixedFormat(3, 8)], ids=str)
 def test_numbers_beyond_the_range_have_no_bound(fmt: Any) -> None:
     """Columns of infinite limits, some of which have no effect: 0 times infinity is not used."""
-    found = guarantee(scalar(), fmt, limits(1, 1, measurement=1e6))
+    found = guarantee(scalar(), fmt, limits(measurement=1e6))
     assert not found.for_ever
     assert np.isinf(found.bound).all()
     assert "may exceed the largest" in found.why
@@ -211,7 +207,7 @@ def test_numbers_beyond_the_range_have_no_bound(fmt: Any) -> None:
 
 
 def test_a_model_of_some_steps_has_a_bound_for_these() -> None:
-    within = limits(1, 1, measurement=10)
+    within = limits(measurement=10)
     whole = guarantee(scalar(), FORMAT, within)
     for steps in (3, 50, 500):
         found = guarantee(scalar(steps=steps), FORMAT, within)
@@ -230,14 +226,16 @@ def test_a_model_of_some_steps_has_a_bound_for_these() -> None:
 
 def test_blocks_end_with_the_model() -> None:
     with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
-        next(bounds_in_blocks(scalar(steps=5), FORMAT, [limits(1, 1, 10, 20)], [[1]], 6))
-    done = [count for count, _ in bounds_in_blocks(scalar(steps=5), FORMAT, [limits(1, 1, 10, 20)], [[1]], 5)]
+        next(bounds_in_blocks(scalar(steps=5), FORMAT, [limits(state=10, innovation=20)], [[1]], 6))
+    done = [
+        count for count, _ in bounds_in_blocks(scalar(steps=5), FORMAT, [limits(state=10, innovation=20)], [[1]], 5)
+    ]
     assert done == [1, 2, 3, 4, 5]
 
 
 def test_outputs_that_depend_on_nothing() -> None:
     schedule_of = filter_schedule(state_space([["1/2"]], [[0]], [[0]], [[0]]), FORMAT)
-    assert (from_schedule(schedule_of, limits(2, 1, measurement=1)).bound < 1e-9).all()
+    assert (from_schedule(schedule_of, limits(measurement=1)).bound < 1e-9).all()
 
 
 # -- inputs of a linear system as a format stores them ----------------------------------------------------------------
@@ -247,22 +245,21 @@ def test_outputs_that_depend_on_nothing() -> None:
 def test_inputs_that_underflow_count_among_the_errors_of_storing(basis: Any) -> None:
     """A delay line: 6e-5 is below the least normal number and stored as 0, whatever the precision."""
     delay = LinearSystem([[0]], [[1]], [[1]])
-    ranged: dict[str, Any] = {"emin": -14, "emax": 15, "subnormal": False}
-    u, within = np.full((5, 1), 0.05), limits(1, 1, measurement=0.05) if basis == "guarantee" else None
+    u, within = np.full((5, 1), 0.05), limits(measurement=0.05) if basis == "guarantee" else None
     lost = np.full((3, 1), 6e-5)
     for rounding in ("nearest", "chop", "up", "stochastic"):
-        asked = {"z": u, "basis": basis, "within": within, "rounding": rounding} | ranged
-        refused = required_precision(delay, 5, 3e-5, **asked)
-        assert refused.fmt is None
-        found = required_precision(delay, 5, 7e-5, **asked)
-        assert found.fmt is not None
-        error = abs(6e-5 - delay.outputs(lost, found.fmt)[-1, 0, 0])
+        like = FloatFormat(2, 2, rounding, -14, 15, subnormal=False)
+        refused = required_precision(delay, u, 3e-5, basis=basis, within=within, like=like)
+        assert refused.format is None
+        found = required_precision(delay, u, 7e-5, basis=basis, within=within, like=like)
+        assert found.format is not None
+        error = abs(6e-5 - delay.outputs(lost, found.format)[-1, 0, 0])
         assert error == 6e-5 or rounding == "up"
-        assert error <= 7e-5 * dict(found.tried)[found.fmt.precision]
+        assert error <= 7e-5 * dict(found.tried)[found.digits]
     # With subnormal numbers, their spacing is the least error.
-    gradual = required_precision(delay, 5, 2e-6, basis=basis, z=u, within=within, emin=-14, emax=15)
-    assert gradual.fmt is not None
-    precision = gradual.fmt.precision
+    gradual = required_precision(delay, u, 2e-6, basis=basis, within=within, range=(-14, 15))
+    assert gradual.format is not None
+    precision = gradual.digits
     assert 2.0 ** (-14 - precision + 1) / 2 <= 2e-6 * dict(gradual.tried)[precision]
 
 
@@ -294,22 +291,22 @@ def test_limits_of_measurements_are_for_those_before_storing(rounding: Rounding)
     assert stored_sizes(fmt, np.array([np.inf]))[0] == np.inf
     assert stored_sizes(FloatFormat(2, 3, rounding, -3, 3), np.array([99.0]))[0] == 99.0
     system = LinearSystem([["0.5"]], [["1"]]).as_filter()
-    wide, narrow = (from_schedule(filter_schedule(system, fmt), limits(2, 1, measurement=size)) for size in (1.0, 0.95))
+    wide, narrow = (from_schedule(filter_schedule(system, fmt), limits(measurement=size)) for size in (1.0, 0.95))
     if rounding in (Rounding.NEAREST, Rounding.EVEN, Rounding.STOCHASTIC):
         assert np.array_equal(narrow.bound, wide.bound)
 
 
 def test_inputs_beyond_the_range_are_refused() -> None:
-    system, within = LinearSystem([["0.5"]], [["0.5"]]), limits(1, 1, measurement=1e6)
-    found = required_precision(system, 10, 0.1, basis="guarantee", within=within, emin=-14, emax=15)
-    assert found.fmt is None
+    system, within = LinearSystem([["0.5"]], [["0.5"]]), limits(measurement=1e6)
+    found = required_precision(system, 10, 0.1, basis="guarantee", within=within, range=(-14, 15))
+    assert found.format is None
     assert "needed inputs within the range" in found.why
 
 
 def test_a_filter_whose_roundings_grow_with_its_error_has_no_bound() -> None:
     """In two bits, the products and sums of a slow filter add more than it forgets."""
     filter_ = state_space([["0.75", "0.5"], ["-0.5", "0.5"]], [[1], [1]])
-    found = from_schedule(filter_schedule(filter_, FloatFormat(2, 2, Rounding.CHOP)), limits(2, 1, measurement=1))
+    found = from_schedule(filter_schedule(filter_, FloatFormat(2, 2, Rounding.CHOP)), limits(measurement=1))
     assert found.radius < 1
     assert not found.for_ever
     assert found.steps == 0
@@ -324,8 +321,8 @@ def test_a_filter_whose_roundings_grow_with_its_error_has_no_bound() -> None:
 def test_limits_that_do_not_follow_from_the_measurements_are_infinite() -> None:
     """An unstable state that is never measured grows with every rounding: no number is infinite times zero."""
     model = two_states(Phi=[["5/4", 0], ["1/4", "1/3"]], H=[[0, 1]], x0=[1, 0])
-    found = guarantee(model, FloatFormat(2, 5), limits(2, 1, measurement=10), most=2000, horizon=300)
+    found = guarantee(model, FloatFormat(2, 5), limits(measurement=10), most=2000, horizon=300)
     assert found.bound[0] > 0
     drifting = two_states(Phi=[["5/4", 0], [0, "1/3"]], H=[[0, 1]], x0=[1, 0])
-    found = guarantee(drifting, FloatFormat(2, 5), limits(2, 1, measurement=10), most=2000, horizon=300)
+    found = guarantee(drifting, FloatFormat(2, 5), limits(measurement=10), most=2000, horizon=300)
     assert not found.for_ever

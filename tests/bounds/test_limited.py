@@ -35,7 +35,7 @@ def test_wide_limits_change_nothing():
     free = LinearSystem.pid("0.8", "0.1", "0.3", "0.9")
     limited = LinearSystem.pid("0.8", "0.1", "0.3", "0.9", limits=(-100, 100))
     e = np.ones((10, 1))
-    ratios = [dict(required_precision(each, 10, 0.001, z=e, basis="bound").tried) for each in (free, limited)]
+    ratios = [dict(required_precision(each, e, 0.001, basis="bound").tried) for each in (free, limited)]
     both = set(ratios[0]) & set(ratios[1])
     assert all(ratios[0][t] <= 1.001 * ratios[1][t] <= 2.5 * ratios[0][t] for t in both if ratios[0][t] < 100)
     assert len(both) > 3
@@ -53,14 +53,14 @@ def test_an_integral_without_limits_or_leak_has_no_bound_for_ever():
     system = LinearSystem.pid("0.5", "0.1", limits=(-1, 1))
     with pytest.raises(ValueError, match="whose states may grow without end; needed limits on them"):
         limited_errors(system, FloatFormat(2, 24), np.ones(1))
-    found = required_precision(system, 10, 0.01, z=e, basis="bound")
-    assert found.ends
+    found = required_precision(system, e, 0.01, basis="bound")
+    assert found.steps == 10
     assert str(found).endswith("proved for this run of 10 steps")
-    found = required_precision(system, 10, 0.01, basis="probable", within=limits(1, 1, measurement=1))
-    assert 'which limits its values, and basis "probable"; needed "bound"' in str(found)
+    with pytest.raises(ValueError, match="a linear system with limits, cannot have a probable error; use"):
+        required_precision(system, 10, 0.01, basis="probable", within=limits(measurement=1))
 
 
 def test_a_guarantee_takes_its_limits_from_the_question():
     system = LinearSystem.pid("0.8", "0.1", leak="0.9", limits=(-1, 1))
-    found = required_precision(system, 10, 0.01, basis="guarantee", within=limits(1, 1, measurement=1))
-    assert found.tried == required_precision(system, 10, 0.01, z=np.ones((10, 1)), basis="bound").tried
+    found = required_precision(system, 10, 0.01, basis="guarantee", within=limits(measurement=1))
+    assert found.tried == required_precision(system, np.ones((10, 1)), 0.01, basis="bound").tried

@@ -172,7 +172,7 @@ def raised_while_factored(**changes: Any) -> LinearModel:
 
 
 NINE = FloatFormat(2, 9)
-WITHIN = limits(3, 1, state=[19.6905, 1.21509, 19.40933], innovation=59.8751)
+WITHIN = limits(state=[19.6905, 1.21509, 19.40933], innovation=59.8751)
 
 
 def test_the_guarantee_of_factors_that_were_raised_is_for_the_run_of_the_model_as_given() -> None:
@@ -190,7 +190,7 @@ def test_the_guarantee_of_factors_that_were_raised_is_for_the_run_of_the_model_a
     )  # fmt: skip
     sizes = np.abs(np.array(true, dtype=float))
     assert (sizes.max(axis=0) <= WITHIN.state).all()
-    found = guarantee(model, NINE, WITHIN, Form.UD)
+    found = guarantee(model, NINE, WITHIN, form=Form.UD)
     assert found.for_ever
     assert errors[:, 1].max() == pytest.approx(0.011478, abs=5e-7)
     assert (errors.max(axis=0) <= found.bound).all()
@@ -261,7 +261,7 @@ def test_bounds_in_blocks_and_companions_are_for_the_run_of_the_model_as_given(m
     (model,) = _raised_models(NINE, 1)
     user = Run(model, NINE, Form.UD, ())
     monkeypatch.setattr(Run, "__init__", noted)
-    next(bounds_in_blocks(model, NINE, [limits(model.n, model.m, 1e3, 1e3)], [np.full(model.n, 1e6)], 1, Form.UD))
+    next(bounds_in_blocks(model, NINE, [limits(state=1e3, innovation=1e3)], [np.full(model.n, 1e6)], 1, Form.UD))
     companion_run(model, np.zeros((2, model.m)), NINE, Form.UD)
     assert len(opened) == 2
     for UQ, P in opened:
@@ -277,7 +277,7 @@ def test_a_covariance_that_must_not_be_raised_has_neither_run_nor_guarantee() ->
     with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
         Run(model, NINE, Form.UD, ())
     with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
-        guarantee(model, NINE, WITHIN, Form.UD)
+        guarantee(model, NINE, WITHIN, form=Form.UD)
     with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
         next(bounds_in_blocks(model, NINE, [WITHIN], [[1, 1, 1]], 10, Form.UD))
-    assert guarantee(model, NINE, WITHIN, Form.INNOVATION).for_ever
+    assert guarantee(model, NINE, WITHIN, form=Form.INNOVATION).for_ever

@@ -170,13 +170,11 @@ def test_an_adversary_comes_within_a_factor_of_four_of_a_guarantee_at_60_hertz()
 @pytest.mark.parametrize(("order", "frequency", "rate"), [(2, 20, 48_000), (2, 20, 192_000), (4, 60, 96_000)])
 def test_low_frequencies_have_a_guarantee_that_the_checker_proves(order: int, frequency: float, rate: float) -> None:
     _, system = cascade(order, frequency, rate)
-    found = required_precision(
-        system, 100, 1e-3, basis="guarantee", within=limits(system.n, 1, measurement=1), z=np.ones((100, 1))
-    )
-    assert found.fmt is not None
+    found = required_precision(system, np.ones((100, 1)), 1e-3, basis="guarantee", within=limits(measurement=1))
+    assert found.format is not None
     assert str(found).endswith("guaranteed for ever")
-    made = filter_schedule(system.as_filter(), found.fmt)
-    proof = from_schedule(made, limits(system.n + 1, 1, measurement=1.0), 1).certificate()
+    made = filter_schedule(system.as_filter(), found.format)
+    proof = from_schedule(made, limits(measurement=1.0), 1).certificate()
     assert "after any number of steps" in prove(json.loads(proof))
 
 

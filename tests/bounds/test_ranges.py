@@ -8,6 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from gpbnb import required_precision
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
@@ -21,12 +22,12 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.filters.system import LinearSystem
-from gpbnb.wordlength.precision import required_precision, survey
 from gpbnb.wordlength.records import survey_records
+from tests.surveying import survey
 
-HALF = {"emin": -14, "emax": 15, "rounding": "even"}
+HALF = {"range": (-14, 15), "rounding": "even"}
 WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-WITHIN = limits(1, 1, state=100, innovation=10)
+WITHIN = limits(state=100, innovation=10)
 # Filters in other rounding modes take long to compile; tests/arithmetic compares every mode with Fractions.
 EVEN = Rounding.EVEN
 
@@ -37,9 +38,9 @@ def uncertain(variance, h=1):
 
 def test_a_range_that_suffices_changes_nothing():
     z = np.round(np.random.default_rng(5).standard_normal((50, 1)) * 2**20) / 2**20
-    ranged = required_precision(WALK, 50, 0.01, rounding="even", emin=-126, emax=127, z=z)
-    assert ranged.tried == required_precision(WALK, 50, 0.01, rounding="even", z=z).tried
-    assert (ranged.fmt.emin, ranged.fmt.emax, ranged.fmt.rounding) == (-126, 127, EVEN)
+    ranged = required_precision(WALK, z, 0.01, rounding="even", range=(-126, 127))
+    assert ranged.tried == required_precision(WALK, z, 0.01, rounding="even").tried
+    assert (ranged.format.emin, ranged.format.emax, ranged.format.rounding) == (-126, 127, EVEN)
     digits = [7, 9]
     assert survey(WALK, z, 0.01, digits, rounding="even", emin=-126, emax=127) == survey(
         WALK, z, 0.01, digits, rounding="even"
@@ -48,13 +49,13 @@ def test_a_range_that_suffices_changes_nothing():
 
 def test_an_answer_names_the_quantity_and_the_step_that_overflow():
     found = required_precision(uncertain("4e4", 2), 20, 0.01, **HALF)
-    assert found.fmt is None
+    assert found.format is None
     assert "the run is refused: overflow in the innovation covariance at step 1" in str(found)
     found = required_precision(uncertain("1e5"), 20, 0.01, **HALF)
     assert "overflow: P0: entry [0, 0]" in str(found)
     growing = LinearModel([[2]], [["1e-3"]], [["0.01"]], [[1]], [1], [["0.01"]])
-    found = required_precision(growing, 30, 0.01, **HALF | {"emax": 6}, z=np.zeros((30, 1)))
-    assert found.fmt is None
+    found = required_precision(growing, np.zeros((30, 1)), 0.01, **HALF | {"range": (-14, 6)})
+    assert found.format is None
     assert "overflow in " in found.why
     assert "at step " in found.why
 
@@ -90,7 +91,7 @@ def test_the_ud_form_needs_range_for_products_of_variances():
 
 
 def test_more_range_gives_an_answer():
-    assert required_precision(uncertain("1e5"), 20, 0.01, emin=-126, emax=127, rounding="even").precision < 53
+    assert required_precision(uncertain("1e5"), 20, 0.01, rounding="even", range=(-126, 127)).digits < 53
 
 
 def test_many_records_in_named_formats():
@@ -110,21 +111,21 @@ def test_a_history_says_why_it_ended():
 
 def test_a_linear_system_and_a_function_have_ranges():
     smoother, ten = LinearSystem([["0.9"]], [["0.1"]]), np.full((50, 1), 10.0)
-    assert required_precision(smoother, 50, 0.01, z=ten, **HALF).precision < 20
-    found = required_precision(smoother, 50, 0.01, z=ten, **HALF | {"emax": 2})
-    assert found.fmt is None
+    assert required_precision(smoother, ten, 0.01, **HALF).digits < 20
+    found = required_precision(smoother, ten, 0.01, **HALF | {"range": (-14, 2)})
+    assert found.format is None
     assert "needed at most" in str(found)
 
     def squares(fmt, z):
         return [x * x for x in z]
 
-    assert required_precision(squares, 50, 0.5, z=ten, emin=-14, emax=15).precision < 20
-    found = required_precision(squares, 50, 0.5, z=ten, emin=-14, emax=4)
-    assert found.fmt is None
+    assert required_precision(squares, ten, 0.5, range=(-14, 15)).digits < 20
+    found = required_precision(squares, ten, 0.5, range=(-14, 4))
+    assert found.format is None
     assert "the function stops: multiplication at [0]" in found.why
 
 
-@pytest.mark.parametrize("given", [{"emin": 1}, {"emin": 5, "emax": 1}, {"subnormal": False}])
+@pytest.mark.parametrize("given", [{"range": (5, 1)}, {"range": (None, 1)}])
 def test_half_a_range_is_refused(given):
     with pytest.raises(ValueError, match="needed"):
         required_precision(WALK, 5, 0.1, **given)
@@ -142,20 +143,20 @@ def test_a_guarantee_within_the_range_is_that_without_limits():
 
 
 def test_a_number_beyond_the_range_has_no_guarantee():
-    found = guarantee(WALK, BINARY16, limits(1, 1, state=7e4, innovation=10))
+    found = guarantee(WALK, BINARY16, limits(state=7e4, innovation=10))
     assert not found.for_ever
     assert found.bound[0] == math.inf
     assert "a number may exceed the largest" in str(found)
-    answer = required_precision(WALK, 1, 0.01, basis="guarantee", within=WITHIN, **HALF | {"emax": 5})
-    assert answer.fmt is None
+    answer = required_precision(WALK, 1, 0.01, basis="guarantee", within=WITHIN, **HALF | {"range": (-14, 5)})
+    assert answer.format is None
     assert "a number may exceed the largest" in str(answer)
-    assert required_precision(WALK, 1, 0.01, basis="guarantee", within=WITHIN, **HALF).precision == 17
+    assert required_precision(WALK, 1, 0.01, basis="guarantee", within=WITHIN, **HALF).digits == 17
 
 
 @pytest.mark.parametrize(("subnormal", "size"), [(True, 2.0**-9), (False, 2.0**-5)])
 def test_underflow_is_part_of_the_guarantee(subnormal, size):
     """The errors of small numbers exceed the bound for an unlimited range."""
-    small = limits(1, 1, state=2 * size, innovation=2 * size)
+    small = limits(state=2 * size, innovation=2 * size)
     fmt = FloatFormat(2, 11, EVEN, -6, 15, subnormal)
     model = LinearModel([["0.9"]], [[1]], [["0.03125"]], [["0.125"]], [0], [[1]])
     z = np.random.default_rng(0).uniform(-size, size, (4000, 1))
@@ -180,18 +181,18 @@ def test_no_rounding_error_exceeds_its_unit(fmt):
 
 
 CAR = LinearModel([[1, "0.5"], [0, 1]], [[1, 0]], [["0.01", 0], [0, "0.01"]], [["0.25"]], [0, 0], np.eye(2, dtype=int))
-ROAD = limits(2, 1, state=(100, 20), innovation=10)
+ROAD = limits(state=(100, 20), innovation=10)
 
 
 @pytest.mark.parametrize("form", ["innovation", "Joseph", "UD"])
 def test_a_filter_in_fixed_point_has_a_guarantee(form):
     """Covariance and gain are computed in fixed point, too."""
-    found = guarantee(CAR, FixedFormat(8, 12, EVEN), ROAD, form)
+    found = guarantee(CAR, FixedFormat(8, 12, EVEN), ROAD, form=form)
     against = attack(found, 300, 20)
     assert found.for_ever
     assert against.admissible
     assert 0.1 < against.ratio <= 1
-    finer = guarantee(CAR, FixedFormat(8, 20, EVEN), ROAD, form)
+    finer = guarantee(CAR, FixedFormat(8, 20, EVEN), ROAD, form=form)
     assert (finer.bound < found.bound / 50).all()
 
 
@@ -242,7 +243,7 @@ def test_units_too_far_from_one_are_refused(exponent):
         required_precision(in_units(exponent), 30, 0.01)
     with pytest.raises(OverflowError, match="scale the model"):
         survey(in_units(exponent), np.ones((3, 1)), 0.01, [24])
-    wide = required_precision(in_units(exponent), 30, 0.01 * 2.0**exponent, emin=-1000, emax=1000)
+    wide = required_precision(in_units(exponent), 30, 0.01 * 2.0**exponent, range=(-1000, 1000))
     assert wide.tried
 
 

@@ -27,10 +27,7 @@ from gpbnb import (
     guarantee,
     limits,
     linalg,
-    required_block_precisions,
-    required_fraction_bits,
     required_precision,
-    required_word_formats,
     survey_records,
     write_code,
 )
@@ -286,7 +283,9 @@ def coded(given: tuple[str, Any], fmt: Any, form: str | None, inputs: Any, setti
     chosen = fmt_of(fmt) if isinstance(fmt, Float | Fixed) else words_of(*fmt)
     with tempfile.TemporaryDirectory() as folder:
         try:
-            write_code(source, chosen, form, folder, inputs=np.array([[float(each) for each in row] for row in inputs]))
+            write_code(
+                source, chosen, folder, form=form, inputs=np.array([[float(each) for each in row] for row in inputs])
+            )
         except STOPS as error:
             yield {"end": ended(error)}
             return
@@ -316,16 +315,16 @@ def searched(kind: str, given: tuple[str, Any], z: Any, tolerance: str, **option
     measured = np.array([[float(each) for each in row] for row in z])
     accepted = Fraction(tolerance)
     if kind == "precision":
-        found: Any = required_precision(source, len(z), accepted, z=measured, **options)
+        found: Any = required_precision(source, measured, accepted, **options)
     elif kind == "fraction bits":
-        found = required_fraction_bits(source, measured, float(accepted), **options)
+        found = required_precision(source, measured, accepted, kind="fixed", **options)
     elif kind == "blocks":
-        found = required_block_precisions(source, len(z), accepted, z=measured, **options)
-        yield {"formats": str(found.formats)}
+        found = required_precision(source, measured, accepted, kind="blocks", **options)
+        yield {"formats": str(found.format)}
         return
     else:
-        found = required_word_formats(source, measured, float(accepted), **options)
-        yield {"words": str(found.words)}
+        found = required_precision(source, measured, accepted, kind="words", **options)
+        yield {"words": str(found.format)}
         return
     for digits, ratio in sorted(found.tried):
         yield {"digits": str(digits), "ratio": ratio}
@@ -343,5 +342,5 @@ def surveyed(model: Model, records: Any, tolerance: str, formats: Any) -> Steps:
 def guaranteed(model: Model, fmt: Format, measurement: int, form: str) -> Steps:
     """A bound of the errors for every measurement within a limit."""
     source = model_of(model)
-    found = guarantee(source, fmt_of(fmt), limits(model.n, model.m, measurement=measurement), form)
+    found = guarantee(source, fmt_of(fmt), limits(measurement=measurement), form=form)
     yield {"steps": str(found.steps), "bound": found.bound.tolist()}

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from plain_blocks import Filter, Rounds
 
-from gpbnb import BINARY32, BINARY64, FixedFormat, FloatFormat, Form, LinearModel, emulate
+from gpbnb import BINARY32, BINARY64, FixedFormat, FloatFormat, Form, LinearModel
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
+from gpbnb.filters.emulation import emulate
 from gpbnb.filters.run import Run, Sums
 from tests.plain_structures import floating
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gpbnb import required_precision
 from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -18,7 +19,6 @@ from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, Sums
-from gpbnb.wordlength.precision import required_precision
 from tests.array_filter import estimates
 
 STEPS = 40
@@ -108,6 +108,6 @@ def test_sums_need_as_many_digits_as_numbers() -> None:
 
 
 def test_a_precision_without_range_is_never_refused() -> None:
-    answer = required_precision(model(), STEPS, 0.01, z=MEASURED)
-    assert answer.fmt is not None
-    assert not math.isinf(dict(answer.tried)[answer.fmt.precision])
+    answer = required_precision(model(), MEASURED, 0.01)
+    assert answer.format is not None
+    assert not math.isinf(answer.ratio)

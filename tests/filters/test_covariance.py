@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from gpbnb import required_precision
 from gpbnb.arithmetic.definiteness import factor
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.covariance import REPAIR_TOLERANCE, in_floats
 from gpbnb.filters.model import LinearModel
-from gpbnb.wordlength.precision import required_precision
 
 
 def white_noise(n, dt, size):

@@ -27,12 +27,10 @@ def impulse(steps):
 )
 def test_silence_after_a_record_changes_no_answer(options):
     """The errors are largest while the estimate is large, so that a short record has the same answer."""
-    long, short = (
-        required_precision(MODEL, steps, 1e-3, z=impulse(steps), largest=12, **options) for steps in (STEPS, 100)
-    )
+    long, short = (required_precision(MODEL, impulse(steps), 1e-3, highest=12, **options) for steps in (STEPS, 100))
     assert long.met
-    assert long.fmt == short.fmt
-    assert dict(long.tried)[long.precision] == pytest.approx(dict(short.tried)[long.precision], rel=1e-9)
+    assert long.format == short.format
+    assert dict(long.tried)[long.digits] == pytest.approx(dict(short.tried)[long.digits], rel=1e-9)
 
 
 def test_an_estimate_has_its_digits_until_it_becomes_zero():
@@ -82,13 +80,13 @@ def test_many_records_that_end_in_silence_are_surveyed():
 
 def test_a_covariance_that_decays_beyond_the_loops_is_not_called_an_overflow():
     still = LinearModel([["0.9"]], [["1"]], [[0]], [["1"]], ["0"], [["1"]])
-    found = required_precision(still, STEPS, 1e-3, z=np.ones((STEPS, 1)), largest=12)
+    found = required_precision(still, np.ones((STEPS, 1)), 1e-3, highest=12)
     assert not found.met
     assert "a number beyond the range of the compiled loops in the " in found.why
     assert "overflow" not in str(found)
 
 
 def test_a_decimal_format_with_subnormal_numbers_says_that_they_have_no_loops():
-    found = required_precision(MODEL, 3000, 1e-3, base=10, emin=-95, emax=96, z=impulse(3000), largest=8)
+    found = required_precision(MODEL, impulse(3000), 1e-3, base=10, range=(-95, 96), highest=8)
     assert not found.met
     assert "a subnormal number, which has no compiled loops in base 10, in the estimate" in found.why

@@ -16,12 +16,12 @@ from gpbnb import (
     LinearSystem,
     NonlinearSystem,
     WordFormats,
-    emulate,
     limit_cycles,
-    required_fraction_bits,
+    required_precision,
     write_code,
 )
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.emulation import emulate
 from gpbnb.filters.words import run_words
 
 SHORT = [
@@ -61,7 +61,7 @@ def test_a_model_beyond_the_range_is_refused_by_its_letter(fmt, letter, tmp_path
                 emulate(model, Z, fmt, form)
     if isinstance(fmt, FixedFormat) and fmt.rounding is not Rounding.STOCHASTIC:
         with pytest.raises(OverflowError, match=rf"^{letter}: "):
-            write_code(model, fmt, None, tmp_path)
+            write_code(model, fmt, tmp_path)
     with pytest.raises(OverflowError):
         FixedIntervalSmoother(model, Z).run(fmt)
 
@@ -83,13 +83,13 @@ def test_no_word_stores_another_coefficient(overflow, tmp_path):
     words = WordFormats(FixedFormat(0, 15, overflow=overflow))
     for question in (
         lambda: limit_cycles(system(), words),
-        lambda: write_code(system(), words, None, tmp_path),
-        lambda: write_code(system(), words.data, None, tmp_path),
+        lambda: write_code(system(), words, tmp_path),
+        lambda: write_code(system(), words.data, tmp_path),
     ):
         with pytest.raises(OverflowError, match="a1"):
             question()
     assert not list(tmp_path.iterdir())
-    found = required_fraction_bits(system(), Z, 0.01, like=words)
+    found = required_precision(system(), Z, 0.01, kind="fixed", like=words)
     assert not found.met
     assert "a1" in found.why
 
@@ -100,7 +100,7 @@ def test_no_code_has_another_first_state(tmp_path):
         return y, y
 
     with pytest.raises(OverflowError, match="x0: "):
-        write_code(NonlinearSystem(step, [3], 1), FixedFormat(1, 14, overflow="saturate"), None, tmp_path)
+        write_code(NonlinearSystem(step, [3], 1), FixedFormat(1, 14, overflow="saturate"), tmp_path)
     assert not list(tmp_path.iterdir())
 
 

@@ -17,7 +17,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel as Model
 from gpbnb.filters.run import Run, Sums, reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
-from gpbnb.wordlength.precision import survey
+from tests.surveying import survey
 
 FORMS = (*Form, *ArrayForm)
 STEPS = 40
@@ -154,8 +154,8 @@ def test_answers_with_inputs(basis):
     u = np.sin(np.arange(60) / 7).reshape(-1, 1)
     cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=u, d=["0.5"])
     answer = required_precision(cart, 60, [1e-3, 1e-2], basis=basis)
-    assert answer.fmt is not None
-    assert dict(answer.tried)[answer.precision] <= 1 < dict(answer.tried)[answer.precision - 1]
+    assert answer.format is not None
+    assert answer.ratio <= 1 < dict(answer.tried)[answer.digits - 1]
 
 
 @pytest.mark.parametrize("basis", ["emulation", "bound"])
@@ -196,7 +196,7 @@ def test_functions_of_the_step_are_cycles():
     z = simulated_measurements(varying, 30)
     assert varying.Phi.shape == (30, 2, 2)
     for basis in ("emulation", "bound"):
-        a, b = (required_precision(each, 30, 1e-2, z=z, basis=basis).tried for each in (varying, cycle))
+        a, b = (required_precision(each, z, 1e-2, basis=basis).tried for each in (varying, cycle))
         assert a == b
 
 
@@ -213,7 +213,7 @@ def test_answers_of_the_forms_without_compiled_loops(form):
     cart = LinearModel(**CART)
     for basis in ("emulation", "bound"):
         answer = required_precision(cart, 20, 1e-3, form=form, basis=basis)
-        assert answer.fmt is not None
+        assert answer.format is not None
         assert isinstance(answer.form, ArrayForm)
 
 
@@ -228,8 +228,8 @@ def test_square_roots_survive_where_the_innovation_form_loses_its_variance():
         P0=[["1e4", 0], [0, "1e4"]],
     )
     z = simulated_measurements(precise, 30)
-    needed = {form: required_precision(precise, 30, 0.1, z=z, form=form) for form in ("innovation", "Carlson")}
-    assert needed["Carlson"].precision < needed["innovation"].precision
+    needed = {form: required_precision(precise, z, 0.1, form=form) for form in ("innovation", "Carlson")}
+    assert needed["Carlson"].digits < needed["innovation"].digits
 
 
 REFUSED = [
@@ -257,15 +257,15 @@ def test_what_does_not_fit_is_refused(given, message):
 
 def test_inputs_are_refused_where_they_would_be_ignored():
     cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=[[1]] * 5)
-    fmt, within = FloatFormat(2, 24), limits(2, 1, state=1, innovation=1)
+    fmt, within = FloatFormat(2, 24), limits(state=1, innovation=1)
     z = np.zeros((5, 1))
     for call in (
         lambda: Run(cart, fmt, Form.INNOVATION, ()),
         lambda: Run(cart, fmt, Form.INNOVATION, (), bounded=True),
         lambda: Simulation(cart, (0.0, 0.0), 0, 0.1),
         lambda: guarantee(cart, fmt, within),
-        lambda: required_precision(cart, 5, 0.1, z=z, basis="guarantee", within=within),
-        lambda: required_precision(cart, 5, 0.1, z=z, basis="probable", within=within),
+        lambda: required_precision(cart, z, 0.1, basis="guarantee", within=within),
+        lambda: required_precision(cart, z, 0.1, basis="probable", within=within),
     ):
         with pytest.raises(ValueError, match="got a linear model with known inputs or offsets; needed none"):
             call()
@@ -287,15 +287,15 @@ def test_inputs_are_refused_where_they_would_be_ignored():
 def test_a_run_is_not_longer_than_its_model():
     cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=[[1]] * 5)
     with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
-        required_precision(cart, 6, 0.1, z=np.zeros((6, 1)))
+        required_precision(cart, np.zeros((6, 1)), 0.1)
     with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
         required_precision(cart, 6, 0.1)
     short = LinearModel(**CART, steps=5)
     for basis in ("emulation", "bound"):
         with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
-            required_precision(short, 6, 0.1, z=np.zeros((6, 1)), basis=basis)
+            required_precision(short, np.zeros((6, 1)), 0.1, basis=basis)
     with pytest.raises(ValueError, match="got a model of 5 steps"):
-        required_precision(short, 5, 0.1, basis="guarantee", within=limits(2, 1, state=1, innovation=1))
+        required_precision(short, 5, 0.1, basis="guarantee", within=limits(state=1, innovation=1))
 
 
 def test_a_rounded_model_keeps_its_inputs():

@@ -16,16 +16,13 @@ from gpbnb import (
     Form,
     LinearModel,
     NonlinearModel,
-    emulate,
-    required_fraction_bits,
     required_precision,
 )
 from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.emulation import emulate
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, opened, simulated, true_states
 from gpbnb.filters.run import Run
-from gpbnb.wordlength.blocks import required_block_precisions
-from gpbnb.wordlength.precision import survey
 from gpbnb.wordlength.records import survey_records
 from tests.plain_nonlinear import (
     MOTIONS,
@@ -37,6 +34,7 @@ from tests.plain_nonlinear import (
     plain_estimates,
     rounding,
 )
+from tests.surveying import survey
 
 
 @pytest.mark.parametrize(
@@ -103,9 +101,9 @@ def largest_error(form, r):
 @pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD])
 def test_fraction_bits_are_those_of_plain_loops(form):
     model, z, *_ = case(MOTIONS[3], seed=3)
-    found = required_fraction_bits(model, z[:20], 0.01, like=FixedFormat(8, 1), form=str(form))
-    bits = found.fmt.fraction_bits
-    assert found.fmt == FixedFormat(8, bits)
+    found = required_precision(model, z[:20], 0.01, kind="fixed", like=FixedFormat(8, 1), form=str(form))
+    bits = found.digits
+    assert found.format == FixedFormat(8, bits)
     ratios = dict(found.tried)
     for each in (bits - 1, bits, bits + 1):  # the reference has twice 53 bits or more
         assert ratios[each] == pytest.approx(largest_error(form, words(each)) / 0.01, rel=1e-9)
@@ -121,11 +119,13 @@ def test_fraction_bits_of_a_linear_filter_are_those_of_its_functions(form):
     alike = NonlinearModel(lambda x: x.format.array(Phi) @ x, None, lambda x: x.format.array(H) @ x, None, *noises)
     z = np.ma.masked_equal(np.round(simulated(linear, 40, seed=1), 3), 100)
     z[7] = np.ma.masked
-    one, other = (required_fraction_bits(each, z, 0.01, like=FixedFormat(8, 1), form=form) for each in (linear, alike))
-    assert one.fmt is not None
-    assert one.fmt == other.fmt
+    one, other = (
+        required_precision(each, z, 0.01, kind="fixed", like=FixedFormat(8, 1), form=form) for each in (linear, alike)
+    )
+    assert one.format is not None
+    assert one.format == other.format
     # Compiled loops limit the search of the linear filter, so the two searches try different numbers of bits.
-    bits, tried, others = one.fmt.fraction_bits, dict(one.tried), dict(other.tried)
+    bits, tried, others = one.digits, dict(one.tried), dict(other.tried)
     both = tried.keys() & others.keys()
     assert {bits - 1, bits} <= both
     assert [tried[each] for each in both] == [others[each] for each in both]
@@ -133,8 +133,8 @@ def test_fraction_bits_of_a_linear_filter_are_those_of_its_functions(form):
 
 def test_fraction_bits_name_the_overflow_of_a_nonlinear_filter():
     model, z, *_ = case(MOTIONS[3], seed=3)
-    found = required_fraction_bits(model, z, 0.01, like=FixedFormat(3, 1))
-    assert found.fmt is None
+    found = required_precision(model, z, 0.01, kind="fixed", like=FixedFormat(3, 1))
+    assert found.format is None
     assert "59 fraction bits fail: overflow: measurements: entry" in str(found)
 
 
@@ -325,16 +325,16 @@ def test_new_estimates_are_normalized():
 
 def test_a_search_a_survey_and_records_answer_for_a_nonlinear_filter():
     model = by_functions()
-    found = required_precision(model, 20, 0.01, z=RECORD[:20])
-    assert found.precision == required_precision(linear(), 20, 0.01, z=RECORD[:20]).precision
-    ratios = dict(survey(model, RECORD[:20], 0.01, [found.precision - 1, found.precision, 70]))
-    assert ratios[found.precision] <= 1 < ratios[found.precision - 1]
+    found = required_precision(model, RECORD[:20], 0.01)
+    assert found.digits == required_precision(linear(), RECORD[:20], 0.01).digits
+    ratios = dict(survey(model, RECORD[:20], 0.01, [found.digits - 1, found.digits, 70]))
+    assert ratios[found.digits] <= 1 < ratios[found.digits - 1]
     assert ratios[70] < 2**-50
-    formats = [FloatFormat(2, found.precision - 1), FloatFormat(2, 30)]
+    formats = [FloatFormat(2, found.digits - 1), FloatFormat(2, 30)]
     assert survey_records(model, [RECORD[:20], RECORD[20:40]], 0.01, formats).shares[1] == 1
-    blocks = required_block_precisions(model, 20, 0.01, z=RECORD[:20])
-    assert blocks.uniform.precision == found.precision
-    assert blocks.alone == required_block_precisions(linear(), 20, 0.01, z=RECORD[:20]).alone
+    blocks = required_precision(model, RECORD[:20], 0.01, kind="blocks")
+    assert blocks.uniform.digits == found.digits
+    assert blocks.alone == required_precision(linear(), RECORD[:20], 0.01, kind="blocks").alone
 
 
 def test_simulated_measurements_are_repeatable_and_scatter_as_the_noise_says():
@@ -438,7 +438,7 @@ def test_a_function_that_leaves_the_format_is_refused(function, error, message):
 )
 def test_a_reference_that_stops_says_why(function, why):
     with pytest.raises(ArithmeticError, match=f"is not determined in 4096 bits; {why}"):
-        required_precision(NonlinearModel(function, None, lambda x: x, None, **NOISE), 60, 0.01, z=RECORD)
+        required_precision(NonlinearModel(function, None, lambda x: x, None, **NOISE), RECORD, 0.01)
 
 
 def test_a_constant_that_changes_changes_the_reference():
@@ -448,7 +448,7 @@ def test_a_constant_that_changes_changes_the_reference():
         return x * constants["growth"] / 4
 
     model = NonlinearModel(f, None, lambda x: x, None, **NOISE)
-    required_precision(model, 60, 0.01, z=RECORD)
+    required_precision(model, RECORD, 0.01)
     constants["growth"] = 2
     alike = NonlinearModel(lambda x: x / 2, None, lambda x: x, None, **NOISE)
     first, second = (nonlinear_reference(each, RECORD)[-1][0] for each in (model, alike))
@@ -461,7 +461,7 @@ def test_forms_that_a_nonlinear_filter_does_not_have_are_refused():
         with pytest.raises(ValueError, match="closed loops and compensated estimates need a linear model"):
             NonlinearRun(by_functions(), fmt, form)
     with pytest.raises(ValueError, match="UD form for an unscented filter"):
-        required_precision(by_functions(method="unscented"), 60, 0.01, z=RECORD, form="UD")
+        required_precision(by_functions(method="unscented"), RECORD, 0.01, form="UD")
     with pytest.raises(ValueError, match="formats of blocks in the Potter form"):
         NonlinearRun(by_functions(), BlockFormats.uniform(fmt), ArrayForm.POTTER)
     with pytest.raises(TypeError, match="needed a LinearModel"):

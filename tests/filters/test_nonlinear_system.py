@@ -8,15 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import (
-    BINARY32,
-    BINARY64,
-    FixedFormat,
-    FloatFormat,
-    NonlinearSystem,
-    required_fraction_bits,
-    required_precision,
-)
+from gpbnb import BINARY32, BINARY64, FixedFormat, FloatFormat, NonlinearSystem, required_precision
 from tests.plain_nonlinear import drawn
 from tests.plain_program import steps_in_python
 from tests.plain_structures import fixed, floating, limited
@@ -106,13 +98,13 @@ def loop(fmt, u):
 
 def test_searches_take_a_system():
     u = inputs(SYSTEMS[0], 60).ravel()
-    found, expected = (required_precision(each, 60, 1e-3, z=u) for each in (SYSTEMS[0], loop))
-    assert found.precision == expected.precision > 5
+    found, expected = (required_precision(each, u, 1e-3) for each in (SYSTEMS[0], loop))
+    assert found.digits == expected.digits > 5
     assert found.tried == expected.tried
-    assert found.untraced == ""
+    assert not found.notes
     assert (
-        required_fraction_bits(SYSTEMS[0], u, 1e-3, like=FixedFormat(2, 1)).fmt
-        == required_fraction_bits(loop, u, 1e-3, like=FixedFormat(2, 1)).fmt
+        required_precision(SYSTEMS[0], u, 1e-3, kind="fixed", like=FixedFormat(2, 1)).format
+        == required_precision(loop, u, 1e-3, kind="fixed", like=FixedFormat(2, 1)).format
     )
 
 

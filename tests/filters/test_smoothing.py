@@ -11,14 +11,7 @@ import pytest
 from plain_smoothing import Plain
 from small_filter import measurements, model
 
-from gpbnb import (
-    FixedFormat,
-    FixedIntervalSmoother,
-    FloatFormat,
-    LinearModel,
-    required_fraction_bits,
-    required_precision,
-)
+from gpbnb import FixedFormat, FixedIntervalSmoother, FloatFormat, LinearModel, required_precision
 from gpbnb.arithmetic.algebra import EXACT
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
@@ -160,7 +153,7 @@ def test_the_search_is_right_by_the_exact_smoother(form, bits):
     z = simulated_measurements(given, steps)
     read = FixedIntervalSmoother(given, z, form)
     found = required_precision(read, steps, 0.01)
-    assert found.precision == bits
+    assert found.digits == bits
     assert "operation by operation" not in str(found)
     true = exact_track()
     for digits, ratio in dict(found.tried).items():
@@ -177,7 +170,7 @@ def test_missing_measurements_are_searched():
     z = measurements()
     z[2] = math.nan
     given = model()
-    assert required_precision(FixedIntervalSmoother(given, z), len(z), 0.01).precision == 9
+    assert required_precision(FixedIntervalSmoother(given, z), len(z), 0.01).digits == 9
     masked = np.ma.masked_invalid(z)
     by_mask, by_nan = (FixedIntervalSmoother(given, each)(FloatFormat(10, 7)).to_fractions() for each in (masked, z))
     assert (by_mask == by_nan).all()
@@ -188,8 +181,8 @@ def test_fixed_point(form, bits):
     """Estimates are multiples of the last place, and the answer counts fraction bits."""
     z = measurements(5, 1)
     read = FixedIntervalSmoother(scalar(), z, form)
-    found = required_fraction_bits(read, None, 0.001, like=FixedFormat(5, 8))
-    assert found.fmt.fraction_bits == bits
+    found = required_precision(read, 5, 0.001, kind="fixed", like=FixedFormat(5, 8))
+    assert found.digits == bits
     x, _ = least_squares(scalar(), z, ~np.isnan(z))
     errors = [float(np.abs(read(FixedFormat(5, each)).to_fractions() - x).max()) for each in (bits - 1, bits, bits + 1)]
     assert max(errors[1:]) <= 0.001 < errors[0]

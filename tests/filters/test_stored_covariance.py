@@ -8,6 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from gpbnb import required_precision
 from gpbnb.arithmetic.definiteness import is_definite
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -26,7 +27,6 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import double_doubles_of
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import simulated_measurements
-from gpbnb.wordlength.precision import required_precision
 
 STEPS = ("0.001", "0.005", "0.01", "0.02", "0.04", "0.05", "0.1", "0.2", "0.3", "0.7")
 FORMATS = (FloatFormat(2, 8), FloatFormat(2, 24), FloatFormat(2, 24, Rounding.CHOP), FloatFormat(10, 5))
@@ -128,9 +128,9 @@ def test_answers_exist_for_every_precision_and_name_the_change():
     """Without the change, a bound existed for some precisions and not for others."""
     for model in MODELS[:10]:
         found = required_precision(model, 50, 0.01, basis="bound", form="UD")
-        assert found.precision < 24
+        assert found.digits < 24
         assert found.advice == ""
-        stored = model.definite_in(found.fmt).repairs
+        stored = model.definite_in(found.format).repairs
         assert found.repairs[: len(stored)] == tuple(map(str, stored))
 
 
@@ -200,7 +200,7 @@ def test_a_covariance_of_rank_one_has_positive_variances_in_every_form(form):
     found = emulate(ALIKE, z, FloatFormat(2, 24), form)
     assert (found.indefinite, found.stopped) == (None, None)
     assert np.abs(found.state).max() < 2.0**-20  # 20 steps, each with a few roundings of numbers below 1
-    assert 5 <= required_precision(ALIKE, 20, 0.01, z=z, form=form).precision <= 9
+    assert 5 <= required_precision(ALIKE, z, 0.01, form=form).digits <= 9
 
 
 @pytest.mark.parametrize("zero", [0, 1])

@@ -14,7 +14,7 @@ from gpbnb import BINARY16, FixedFormat, FloatFormat, LinearSystem, required_pre
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.sections import _filtered, factored
 from gpbnb.filters.structures import STRUCTURES, balanced, companion, reflections, steady_covariance
-from gpbnb.wordlength.system import BoundedSystem
+from gpbnb.wordlength.strategies import BoundedSystem
 
 FORMATS = [
     (FloatFormat(2, 11), plain.floating(2, 11, "nearest")),
@@ -201,7 +201,7 @@ def test_two_equal_sections_need_thirty_bits_at_once_and_twenty_in_a_row(basis):
     u[0] = 100
     whole = LinearSystem.from_coefficients(*signal.sos2tf(sos))
     parts = LinearSystem.from_sections(sos)
-    found = [required_precision(each, 1000, 0.001, z=u, basis=basis).precision for each in (whole, parts)]
+    found = [required_precision(each, u, 0.001, basis=basis).digits for each in (whole, parts)]
     assert found == ([30, 20] if basis == "emulation" else [39, 30])
 
 
@@ -216,7 +216,7 @@ def test_a_response_decays_to_zero(structure):
         expected = [100 * (8 * 0.3**k - 7 * 0.2**k) for k in range(60)]
         assert found[:60] == pytest.approx(expected, rel=1e-4)
         assert abs(found[-1]) < 2.0**-700
-    assert required_precision(system, 2000, 0.001, z=impulse).precision < 24
+    assert required_precision(system, impulse, 0.001).digits < 24
 
 
 def test_a_number_that_grows_is_still_refused():

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from gpbnb import required_precision
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.gains import filter_schedule
@@ -17,7 +18,6 @@ from gpbnb.bounds.guarantee import from_schedule, limits
 from gpbnb.bounds.linear import peak_gain
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.system import LinearSystem, biquad, controller, is_stable, state_space
-from gpbnb.wordlength.precision import required_precision
 
 BUTTERWORTH = LinearSystem(*signal.tf2ss(*signal.butter(4, 0.05)), name="Butterworth")
 SMALL = LinearSystem([["0.9", "0.2"], [0, "-0.5"]], [["0.1"], [1]], [[1, "0.3"]], [["0.25"]])
@@ -55,7 +55,7 @@ def test_outputs_are_those_of_the_recursion_with_every_operation_rounded(fmt):
 
 
 def test_an_answer_is_the_smallest_precision_of_the_recursion():
-    found = required_precision(SMALL, len(U), 1e-3, z=U)
+    found = required_precision(SMALL, U, 1e-3)
     exactly = slowly(SMALL, U, Fraction)
     for digits, ratio in found.tried:
         if digits < 30:
@@ -66,13 +66,13 @@ def test_an_answer_is_the_smallest_precision_of_the_recursion():
 
 def test_bounds_hold_and_are_not_far_above():
     """A bound proved for every input as large as these, against the errors of these."""
-    observed = dict(required_precision(SMALL, 80, 1e-3, z=U).tried)
-    found = required_precision(SMALL, 80, 1e-3, z=U, basis="bound")
+    observed = dict(required_precision(SMALL, U, 1e-3).tried)
+    found = required_precision(SMALL, U, 1e-3, basis="bound")
     bounded = dict(found.tried)
     both = set(observed) & set(bounded)
     assert len(both) >= 3
     assert all(observed[t] <= bounded[t] <= 300 * observed[t] for t in both)
-    within = limits(2, 1, measurement=float(np.abs(U).max()))
+    within = limits(measurement=float(np.abs(U).max()))
     assert required_precision(SMALL, 1, 1e-3, basis="guarantee", within=within).tried == found.tried
 
 
@@ -81,30 +81,30 @@ def test_a_bound_counts_inputs_that_float64_does_not_hold(basis):
     """An input just above 1 is rounded up to the next number of a format, twice as far as one just below."""
     u = 1 + Fraction(1, 10**20)
     delay = LinearSystem([[0]], [[1]], [[1]])
-    question = {"z": [[u]] * 5} if basis == "bound" else {"within": limits(1, 1, measurement=u)}
-    found = required_precision(delay, 5, 0.0008, basis=basis, rounding="up", **question)
-    outputs = delay.outputs([[u]] * 5, FloatFormat(2, found.fmt.precision, "up"))[1:, 0]
+    z, within = ([[u]] * 5, None) if basis == "bound" else (5, limits(measurement=u))
+    found = required_precision(delay, z, 0.0008, basis=basis, rounding="up", within=within)
+    outputs = delay.outputs([[u]] * 5, FloatFormat(2, found.digits, "up"))[1:, 0]
     error = max(abs(exact(y).sum() - u) for y in outputs)
-    assert 0.999 < error / Fraction(dict(found.tried)[found.fmt.precision] * 0.0008) <= 1
+    assert 0.999 < error / Fraction(dict(found.tried)[found.digits] * 0.0008) <= 1
 
 
 def test_a_tolerance_that_float64_does_not_hold_is_not_exceeded():
     """The bound of storing an input of 1 in t bits is 2**-t: one digit less does not meet a tolerance just below."""
-    delay, within = LinearSystem([[0]], [[1]], [[1]]), limits(1, 1, measurement=1)
+    delay, within = LinearSystem([[0]], [[1]], [[1]]), limits(measurement=1)
     largest = required_precision(delay, 5, 2.0**-12, basis="guarantee", within=within)
-    bound = Fraction(dict(largest.tried)[largest.fmt.precision]) / 2**12
+    bound = Fraction(dict(largest.tried)[largest.digits]) / 2**12
     for tolerance, more in ((bound, 0), (bound - Fraction(1, 10**30), 1)):
         asked = required_precision(delay, 5, tolerance, basis="guarantee", within=within)
-        assert asked.fmt.precision == largest.fmt.precision + more
+        assert asked.digits == largest.digits + more
 
 
 @pytest.mark.parametrize("basis", ["emulation", "bound"])
 def test_units_of_states_inputs_and_outputs_do_not_matter(basis):
     x, u, y = Fraction(2) ** -40, Fraction(2) ** 30, Fraction(2) ** -10
     other = LinearSystem(SMALL.A, SMALL.B * x / u, SMALL.C * y / x, SMALL.D * y / u)
-    first = required_precision(SMALL, 80, 1e-3, z=U, basis=basis)
-    second = required_precision(other, 80, 1e-3 * 2.0**-10, z=U * 2.0**30, basis=basis)
-    assert first.fmt == second.fmt is not None
+    first = required_precision(SMALL, U, 1e-3, basis=basis)
+    second = required_precision(other, U * 2.0**30, 1e-3 * 2.0**-10, basis=basis)
+    assert first.format == second.format is not None
     assert [ratio for _, ratio in first.tried] == pytest.approx([ratio for _, ratio in second.tried], rel=1e-9, abs=0)
 
 
@@ -112,18 +112,18 @@ def test_probable_errors_are_three_standard_deviations():
     """Of x+ = x/2 + u: the peak gain is 2, and storing an input of at most 1 in 12 bits is off by at most 2**-13."""
     system, fmt = LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 12)
     found = from_schedule(
-        filter_schedule(system.as_filter(), fmt), limits(2, 1, state=[2, 2], innovation=1, measurement=1), 1
+        filter_schedule(system.as_filter(), fmt), limits(state=[2, 2], innovation=1, measurement=1), 1
     )
-    ratios = dict(required_precision(system, 1, 1e-3, basis="probable", within=limits(1, 1, measurement=1)).tried)
+    ratios = dict(required_precision(system, 1, 1e-3, basis="probable", within=limits(measurement=1)).tried)
     assert ratios[12] == pytest.approx((3 * probable_error(found)[1] + 2 * 2**-13) / 1e-3, rel=1e-3)
 
 
 def test_only_errors_beyond_float64_are_said_not_to_be_finite():
-    missed = required_precision(SMALL, 8, 1e-40, z=U[:8])
-    assert missed.fmt is None
+    missed = required_precision(SMALL, U[:8], 1e-40)
+    assert missed.format is None
     assert missed.why == ""
-    beyond = required_precision(SMALL, 8, 1e-320, z=U[:8] * 2.0**30)
-    assert beyond.fmt is None
+    beyond = required_precision(SMALL, U[:8] * 2.0**30, 1e-320)
+    assert beyond.format is None
     assert beyond.why.endswith("an error over its tolerance is beyond the range of float64")
 
 
@@ -150,19 +150,18 @@ def vars_of(system):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"z": None}, "got no inputs"),
-        ({"z": U[:, 0]}, r"write u.reshape\(-1, 1\)"),
-        ({"z": U[:7]}, r"needed \(80, 1\)"),
+        ({"z": 80}, "got a number of steps for .*, a linear system; needed inputs"),
+        ({"z": np.ones((7, 2))}, r"needed \(steps, 1\)"),
         ({"z": U * math.nan}, "needed a finite number"),
         ({"tolerance": 0}, "needed an error above 0 for each of the 1 outputs"),
-        ({"tolerance": "0.1"}, "got tolerance '0.1'"),
-        ({"steps": True}, "got True steps"),
-        ({"basis": "guarantee"}, "without limits"),
+        ({"tolerance": "a tenth"}, "got tolerance 'a tenth'"),
+        ({"z": True}, "got True steps"),
+        ({"basis": "probable"}, "without limits"),
     ],
 )
 def test_what_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
-        required_precision(**({"model": SMALL, "steps": 80, "tolerance": 1e-3, "z": U} | arguments))
+        required_precision(**{"model": SMALL, "z": U, "tolerance": 1e-3} | arguments)
 
 
 @pytest.mark.parametrize(
@@ -186,19 +185,19 @@ def test_shapes_that_do_not_fit(arguments, message):
 @pytest.mark.parametrize("basis", ["bound", "guarantee"])
 def test_a_system_with_a_first_state_has_no_bound(x0, basis):
     system = LinearSystem([["0.5", 0], [0, "0.25"]], [[1], [1]], [[1, 1]], x0=x0)
-    within = limits(2, 1, measurement=1.0) if basis == "guarantee" else None
+    within = limits(measurement=1.0) if basis == "guarantee" else None
     with pytest.raises(ValueError, match=rf"got a first state .* and basis \"{basis}\"; needed x0 = 0 for a bound"):
-        required_precision(system, 80, 1e-3, z=U, basis=basis, within=within)
+        required_precision(system, U, 1e-3, basis=basis, within=within)
 
 
 def test_an_unstable_system_has_a_bound_only_for_some_steps():
     growing = LinearSystem([["1.01"]], [[1]])
-    found = required_precision(growing, 80, 1e-3, z=U, basis="bound")
-    assert found.ends
-    observed = required_precision(growing, 80, 1e-3, z=U)
-    assert found.precision >= observed.precision
-    probable = required_precision(growing, 80, 1e-3, basis="probable", within=limits(1, 1, measurement=1))
-    assert probable.fmt is None
+    found = required_precision(growing, U, 1e-3, basis="bound")
+    assert found.steps == len(U)
+    observed = required_precision(growing, U, 1e-3)
+    assert found.digits >= observed.digits
+    probable = required_precision(growing, 80, 1e-3, basis="probable", within=limits(measurement=1))
+    assert probable.format is None
     assert "the system as given is not stable, since A has an eigenvalue of size 1.01," in str(probable)
 
 
@@ -291,9 +290,9 @@ NEAR = LinearSystem(companion([1 - Fraction(1, 10**20)] * 2), [[1], [0]])
 
 @pytest.mark.parametrize(("system", "size"), [(UNSTABLE, "1.1"), (ACCUMULATOR, "1 or more")])
 def test_an_unstable_system_has_no_steady_state_in_any_precision_and_the_answer_says_why(system, size):
-    within = limits(1, 1, measurement=1)
-    found = required_precision(system, 20, 1e-3, z=np.ones((20, 1)), basis="probable", within=within)
-    assert found.precision is None
+    within = limits(measurement=1)
+    found = required_precision(system, np.ones((20, 1)), 1e-3, basis="probable", within=within)
+    assert found.digits is None
     assert str(found) == (
         "no precision meets the tolerance by three times the probable error: the system as given is not stable, since "
         f"A has an eigenvalue of size {size}, mostly in state 0, so that an error of rounding never decays; ask with "
@@ -303,9 +302,9 @@ def test_an_unstable_system_has_no_steady_state_in_any_precision_and_the_answer_
 
 @pytest.mark.parametrize("basis", ["bound", "probable"])
 def test_a_system_that_is_unstable_only_as_stored_is_said_to_be(basis):
-    within = None if basis == "bound" else limits(2, 1, measurement=1)
-    found = required_precision(NEAR, 20, 1e-3, z=np.ones((20, 1)), basis=basis, within=within)
-    assert found.precision is None
+    within = None if basis == "bound" else limits(measurement=1)
+    found = required_precision(NEAR, np.ones((20, 1)), 1e-3, basis=basis, within=within)
+    assert found.digits is None
     assert "no precision up to 53 bits, the most with compiled loops" in str(found)
     assert "in 53 bits the system is stable, but as stored in 53 bits it is not, since A has" in found.why
     assert "eigenvalue of size 1 or more" in found.why
@@ -318,39 +317,36 @@ def test_below_the_answer_a_system_that_is_unstable_as_stored_is_named_with_the_
     assert stable == [t for t, radius in zip(range(2, 19), radii, strict=True) if radius < 1 - 1e-6]
     assert 12 not in stable
     assert 14 in stable
-    asked = {"steps": 20, "tolerance": 1e3, "z": np.ones((20, 1)), "basis": "bound"}
-    at_12 = required_precision(system, **asked, largest=12)
+    asked = {"z": np.ones((20, 1)), "tolerance": 1e3, "basis": "bound"}
+    at_12 = required_precision(system, highest=12, **asked)
     assert at_12.why == f"in 12 bits {system.unstable(FloatFormat(2, 12))}"
     assert "the system is stable, but as stored in 12 bits it is not" in at_12.why
-    assert at_12.cause == ""
     found = required_precision(system, **asked)
     assert found.why.startswith(
         "in 14 bits no bound was found: in this precision, an error causes rounding errors as large as itself"
     )
-    assert found.precision == 17
-    assert system.unstable(found.fmt) == ""
+    assert found.digits == 17
+    assert system.unstable(found.format) == ""
 
 
 def test_a_slow_stable_system_has_a_bound_for_the_steps_asked():
     system = LinearSystem([["0.9999999"]], [[1]])
-    found = required_precision(system, 20, 1e3, z=np.ones((20, 1)), basis="bound")
-    assert found.precision == 38
-    assert found.cause == ""
+    found = required_precision(system, np.ones((20, 1)), 1e3, basis="bound")
+    assert found.digits == 38
     assert "proved for this run of 20 steps" in str(found)
 
 
 def test_errors_that_grow_in_every_step_are_named_where_no_precision_is_enough():
-    found = required_precision(LinearSystem([[2]], [[1]]), 200, 1e-3, z=np.full((200, 1), 0.1))
-    assert found.precision is None
+    found = required_precision(LinearSystem([[2]], [[1]]), np.full((200, 1), 0.1), 1e-3)
+    assert found.digits is None
     assert (
         "is not stable, since A has an eigenvalue of size 2, mostly in state 0, so that errors grow with every"
         in str(found)
     )
-    assert "whatever the precision: take fewer steps" in found.advice
-    stable = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 5, 1e-30, z=np.ones((5, 1)))
-    assert stable.precision is None
-    assert stable.advice == f"53 bits give {stable.tried[-1][1]:.3g} times the tolerance"
-    assert stable.cause == ""
+    assert "whatever the precision: take fewer steps" in str(found)
+    stable = required_precision(LinearSystem([["0.9"]], [["0.1"]]), np.ones((5, 1)), 1e-30)
+    assert stable.digits is None
+    assert stable.notes[0] == f"53 bits give {stable.tried[-1][1]:.3g} times the tolerance"
 
 
 @pytest.mark.parametrize(
@@ -371,9 +367,9 @@ def test_an_overflow_names_its_cause_and_a_cure_that_helps(A, b, fmt, message):
 
 
 def test_sizes_beyond_float64_are_named():
-    for basis, within in (("bound", None), ("probable", limits(1, 1, measurement=1))):
+    for basis, within in (("bound", None), ("probable", limits(measurement=1))):
         found = required_precision(
-            LinearSystem([["0.9"]], [["1e308"]]), 5, 1e300, z=np.ones((5, 1)), basis=basis, within=within
+            LinearSystem([["0.9"]], [["1e308"]]), np.ones((5, 1)), 1e300, basis=basis, within=within
         )
         assert "in 53 bits got" in found.why
         assert "beyond the range of" in found.why

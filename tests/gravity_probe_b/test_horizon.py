@@ -38,8 +38,8 @@ def constants() -> LinearModel:
 @pytest.mark.parametrize("form", [Form.INNOVATION, Form.HUNG])
 @pytest.mark.parametrize("block", [3, 7, STEPS])
 def test_blocks_give_the_bound_of_all_steps_at_once(block: int, form: Form) -> None:
-    fmt, within = FloatFormat(2, 24), limits(2, 1, state=[10, 20], innovation=5)
-    found = guarantee(constants(), fmt, within, form, most=STEPS, horizon=STEPS)
+    fmt, within = FloatFormat(2, 24), limits(state=[10, 20], innovation=5)
+    found = guarantee(constants(), fmt, within, form=form, most=STEPS, horizon=STEPS)
     assert found.steps == STEPS
     blocks = list(bounds_in_blocks(constants(), fmt, [within], [found.bound], STEPS, form, block, window=STEPS))
     done, (last,) = blocks[-1]
@@ -51,14 +51,14 @@ def test_blocks_give_the_bound_of_all_steps_at_once(block: int, form: Form) -> N
 
 
 def test_a_bound_above_the_assumed_error_ends_it() -> None:
-    fmt, within = FloatFormat(2, 24), limits(2, 1, state=[10, 20], innovation=5)
+    fmt, within = FloatFormat(2, 24), limits(state=[10, 20], innovation=5)
     with pytest.raises(ArithmeticError, match="exceeds the assumed"):
         list(bounds_in_blocks(constants(), fmt, [within], [[1e-9, 1e-9]], STEPS))
 
 
 def test_a_covariance_that_loses_definiteness_ends_it() -> None:
     model = replace(constants(), R=exact([["1e-12"]]), P0=exact([["1e4", "0"], ["0", "1e4"]]))
-    fmt, within = FloatFormat(2, 11), limits(2, 1, state=[10, 20], innovation=5)
+    fmt, within = FloatFormat(2, 11), limits(state=[10, 20], innovation=5)
     run = Run(model.rounded(fmt), fmt, Form.INNOVATION, range(1, 4))
     run.take(fmt.array(np.zeros((3, 1))))
     assert run.indefinite
@@ -116,7 +116,7 @@ def test_the_first_cycle_of_gravity_probe_b_again() -> None:
 
 def test_a_saved_run_continues_with_the_same_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(horizon, "SAVE_EVERY", 2)
-    fmt, within = FloatFormat(2, 24), limits(2, 1, state=[10, 20], innovation=5)
+    fmt, within = FloatFormat(2, 24), limits(state=[10, 20], innovation=5)
     given = constants(), fmt, [within], [np.full(2, 1.0)], STEPS, Form.INNOVATION, 7, 8
     whole = list(bounds_in_blocks(*given))
     saved = tmp_path / "state.pickle"

@@ -124,7 +124,7 @@ def given_singular():
     G = exact([["160/101", "54/89"], ["2/101", "-38/97"], ["-151/89", "25/89"]])
     Phi, unit = exact(np.diag([0, 1, 1])) / 8, exact(np.eye(3, dtype=int))
     model = LinearModel(Phi, exact([["7/4", -2, "-5/4"]]), G @ G.T, exact([["1/4"]]), exact([0, 0, 0]), unit)
-    within = limits(3, 1, state=[19.6905, 1.21509, 19.40933], innovation=59.8751)
+    within = limits(state=[19.6905, 1.21509, 19.40933], innovation=59.8751)
     return Drawn("singular", model, FloatFormat(2, 9), Form.UD, "reached", within, np.array([479 / 8]))
 
 
@@ -147,7 +147,7 @@ def test_the_survey_finds_factors_of_another_covariance():
 def test_errors_are_those_of_filters_without_the_package(seed):
     """The run is repeated in integers, and the exact filter in Fractions; both for as long as Fractions stay short."""
     drawn = draw(seed)
-    found = guarantee(drawn.model, drawn.fmt, drawn.within, drawn.form, most=filters.MOST, horizon=filters.STEPS)
+    found = guarantee(drawn.model, drawn.fmt, drawn.within, form=drawn.form, most=filters.MOST, horizon=filters.STEPS)
     compared_steps = 0
     for _, z in filters.inputs(drawn, found, np.random.default_rng(seed)):
         off, _ = filters.errors(drawn, z)
@@ -170,7 +170,15 @@ def test_errors_are_those_of_filters_without_the_package(seed):
 
 def test_a_run_counts_until_the_exact_filter_leaves_its_limits():
     model = LinearModel(*(exact([[each]]) for each in ("1/2", 1, 1, 1)), exact([0]), exact([[1]]))
-    drawn = Drawn("plain", model, FloatFormat(2, 8), Form.INNOVATION, "all", limits(1, 1, 2, 3, 4), np.array([4.0]))
+    drawn = Drawn(
+        "plain",
+        model,
+        FloatFormat(2, 8),
+        Form.INNOVATION,
+        "all",
+        limits(state=2, innovation=3, measurement=4),
+        np.array([4.0]),
+    )
     for z, true, steps in (
         ([1, 1, 5, 1], [1, 1, 1, 1], 2),  # a measurement beyond 4
         ([1, 1, 1, 1], [1, 3, 1, 1], 1),  # a state beyond 2
@@ -248,7 +256,7 @@ def test_the_worst_error_is_reached_and_within_the_bound(seed):
     for each in found.z.tolist():
         error = rounded.step([Fraction(each)])[0] - true.step([Fraction(each)])[0]
     assert abs(float(error)) == pytest.approx(found.error, rel=1e-12)
-    bound = guarantee(given.model, given.fmt, limits(1, 1, measurement=float(given.limit)), given.form).bound[0]
+    bound = guarantee(given.model, given.fmt, limits(measurement=float(given.limit)), form=given.form).bound[0]
     assert found.error + found.later <= bound
     assert scalar.examine(seed) in scalar.load()
 

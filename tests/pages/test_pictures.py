@@ -275,7 +275,7 @@ REACHED = {"a": (7, 7), "b": (6, 6), "c": (5, 4), "d": (2, 1), "e": (2, 1), "xâ‚
 def test_an_operation_shows_its_share_and_its_way(pages, operation, state):
     page = pages("step")
     found = type_in(page, "step", operation=operation, state=state)
-    guaranteed = guarantee(tracker(), FloatFormat(2, 24), limits(n=2, m=1, state=[1000, 30], innovation=8))
+    guaranteed = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1000, 30], innovation=8))
     each = contributions(guaranteed)
     rounding = np.flatnonzero(each.errors)
     o, i = rounding[STEP.inputs[0].choices.index(operation)], ["position", "velocity"].index(state)

@@ -62,7 +62,7 @@ def test_the_data_of_the_year_are_the_stored_runs():
 
 
 def test_the_operations_of_the_picture_are_those_that_round():
-    found = guarantee(tracker(), FloatFormat(2, 24), limits(n=2, m=1, state=[1000, 30], innovation=8))
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1000, 30], innovation=8))
     errors = contributions(found).errors
     lines = [line for line in operations.step_data()["lines"] if line["formula"]]
     assert [line["error"] for line in lines] == pytest.approx(errors[errors > 0], rel=1e-5)

@@ -1,4 +1,4 @@
-"""gpbnb.wordlength.blocks: the digits of each block, checked by runs of their own."""
+"""The digits of each block, checked by runs of their own."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from gpbnb import BlockFormats, FloatFormat, Form, LinearModel, LinearSystem, required_block_precisions
+from gpbnb import BlockFormats, FloatFormat, Form, LinearModel, required_precision
 from gpbnb.filters.blocks import BLOCKS
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.filters.simulation import simulated_measurements
@@ -31,9 +31,8 @@ def share(blocks, form=Form.INNOVATION):
 
 @pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD])
 def test_each_block_is_as_low_as_it_can_be_and_the_neediest_limits(form):
-    found = required_block_precisions(CART, STEPS, TOLERANCE, form=form, z=Z)
-    assert found.formats is not None
-    assert share(found.formats, form) == pytest.approx(found.ratio)
+    found = required_precision(CART, Z, TOLERANCE, kind="blocks", form=form)
+    assert share(found.format, form) == pytest.approx(found.ratio)
     assert found.ratio <= 1
     wide = BlockFormats.uniform(FloatFormat(2, 53))
     for name in BLOCKS:
@@ -45,35 +44,20 @@ def test_each_block_is_as_low_as_it_can_be_and_the_neediest_limits(form):
             or share(wide.with_block(name, FloatFormat(2, digits - 1)), form) > 1
             or share(wide.with_block(name, FloatFormat(2, digits)), form) > 1
         )
-        assert getattr(found.formats, name).precision <= found.uniform.precision
+        assert getattr(found.format, name).precision <= required_precision(CART, Z, TOLERANCE, form=form).digits
     assert all(found.alone[name] == max(found.alone.values()) for name in found.limiting)
     assert found.limiting
     assert "limit" in str(found)
     # the block that is lowered last cannot be lowered any further
     last = max(BLOCKS, key=lambda name: (found.alone[name], BLOCKS.index(name)))
-    lower = found.formats.with_block(last, FloatFormat(2, getattr(found.formats, last).precision - 1))
+    lower = found.format.with_block(last, FloatFormat(2, getattr(found.format, last).precision - 1))
     assert share(lower, form) > 1
 
 
-def test_sums_may_have_a_format_of_their_own():
-    found = required_block_precisions(CART, STEPS, TOLERANCE, z=Z, sums=True)
-    assert found.formats is not None
-    assert found.formats.sums is not None
-    assert found.formats.sums.precision >= max(getattr(found.formats, name).precision for name in BLOCKS)
-    assert share(found.formats) == pytest.approx(found.ratio)
-
-
 def test_without_an_answer_in_one_format_there_is_none_for_the_blocks():
-    found = required_block_precisions(CART, STEPS, 1e-30, z=Z)
-    assert found.formats is None
+    found = required_precision(CART, Z, 1e-30, kind="blocks")
+    assert found.format is None
     assert str(found).startswith("no precision up to 53 bits")
-
-
-def test_only_kalman_filters_have_blocks():
-    with pytest.raises(TypeError, match="got a LinearSystem; needed a LinearModel"):
-        required_block_precisions(LinearSystem([["0.5"]], [[1]]), 5, 0.1)
-    with pytest.raises(ValueError, match="got the Carlson form; needed one with compiled loops"):
-        required_block_precisions(CART, 5, 0.1, form="Cholesky")
 
 
 def test_the_command_lists_the_blocks(tmp_path, capsys):
@@ -96,11 +80,11 @@ def test_the_command_lists_the_blocks(tmp_path, capsys):
         str(page),
     ]
     assert main(asked) == 0
-    expected = required_block_precisions(CART, 60, 0.01)
+    expected = required_precision(CART, 60, 0.01, kind="blocks")
     assert str(expected) in capsys.readouterr().out
     written = json.loads(page.with_suffix(".json").read_text())
     assert written["blocks"] == [
-        [name, getattr(expected.formats, name).precision, expected.alone[name]] for name in BLOCKS
+        [name, getattr(expected.format, name).precision, expected.alone[name]] for name in BLOCKS
     ]
     assert "Precision of each block" in page.read_text()
     system = tmp_path / "system.toml"

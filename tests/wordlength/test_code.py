@@ -25,6 +25,7 @@ from gpbnb import (
     WordFormats,
     guarantee,
     limits,
+    required_precision,
     write_code,
 )
 from gpbnb.bounds.system import output_errors
@@ -41,7 +42,6 @@ from gpbnb.wordlength.c_integers import Integers, Needs
 from gpbnb.wordlength.c_source import places
 from gpbnb.wordlength.code import _in_long_words, model_coefficients, prepared
 from gpbnb.wordlength.models import read_model
-from gpbnb.wordlength.precision import required_precision
 from tests.corpus import conformance
 from tests.plain_program import steps_in_python
 
@@ -73,7 +73,7 @@ BIQUAD = FilterDesign(["0.1", "0.2", "0.1"], [1, "-1.2", "0.5"], name="a low-pas
 
 @needs_compiler
 def test_another_order_of_operations_fails_the_test_that_comes_with_the_code(tmp_path):
-    write_code(BIQUAD, BINARY32, "direct form I", tmp_path)
+    write_code(BIQUAD, BINARY32, tmp_path, form="direct form I")
     assert built(tmp_path)[0] == 0
     source = (tmp_path / "filter.c").read_text()
     products = re.findall(r"const float (r\d+) = (\w+ \* r\d+);", source)
@@ -248,7 +248,7 @@ def fits(model, fmt, form):
 )
 def test_an_overflow_before_a_section_of_zeros_ends_the_code(fmt, gain, u, tmp_path):
     system = LinearSystem.from_sections([[gain, gain, 0, 1, 0, 0], [0, 0, 0, 1, "0.5", 0]], "direct form I")
-    write_code(system, fmt, None, tmp_path, inputs=np.full((3, 1), u))
+    write_code(system, fmt, tmp_path, inputs=np.full((3, 1), u))
     assert [line.split()[0] for line in (tmp_path / "filter_vectors.txt").read_text().splitlines()] == ["-2"]
     assert built(tmp_path)[0] == 0
 
@@ -259,7 +259,7 @@ def test_a_format_without_the_number_one_is_refused(fmt, form, tmp_path):
     whole, even = fmt.fraction_bits > 0, np.array([[2]])
     model = LinearModel(*(np.array([["0.5"]]) if whole else even for _ in range(4)), [0], [["0.5"]] if whole else even)
     with pytest.raises(ValueError, match=r"which does not hold the number 1; needed .* at least 1 integer bit|UD form"):
-        write_code(model, fmt, form, tmp_path)
+        write_code(model, fmt, tmp_path, form=form)
 
 
 def test_the_ud_form_divides_by_no_factor_of_r_that_is_zero(tmp_path):
@@ -269,7 +269,7 @@ def test_the_ud_form_divides_by_no_factor_of_r_that_is_zero(tmp_path):
     assert [each.letter for each in run.repairs] == ["R"]
     assert (run.exactly(run.UR)[0].diagonal() > 0).all()
     with pytest.raises(ValueError, match="in which R does not stay positive definite when its factors"):
-        write_code(replace(model, H=[["1"]], R=[["0.01"]]), FixedFormat(6, 4), Form.UD, tmp_path)
+        write_code(replace(model, H=[["1"]], R=[["0.01"]]), FixedFormat(6, 4), tmp_path, form=Form.UD)
 
 
 @needs_compiler
@@ -278,7 +278,7 @@ def test_a_zero_pivot_stops_the_code_in_the_step_that_stops_the_emulation(tmp_pa
     model = LinearModel([["0.5"]], [["1/64"]], [[0]], [["1/2048"]], [1], [[1]], "fades")
     run = Run(model, fmt, "innovation", ())
     run.take(np.zeros((50, 1)))
-    write_code(model, fmt, "innovation", tmp_path, inputs=np.zeros((50, 1)))
+    write_code(model, fmt, tmp_path, form="innovation", inputs=np.zeros((50, 1)))
     assert built(tmp_path)[0] == 0
     vectors = (tmp_path / "filter_vectors.txt").read_text().splitlines()
     assert run.indefinite
@@ -288,7 +288,7 @@ def test_a_zero_pivot_stops_the_code_in_the_step_that_stops_the_emulation(tmp_pa
 @needs_compiler
 def test_an_overflow_ends_the_code_in_the_step_that_ends_the_emulation(tmp_path):
     for fmt in (BINARY32, BINARY64, FixedFormat(4, 11), WordFormats(FixedFormat(4, 11), 12, FixedFormat(6, 20))):
-        write_code(GROWING, fmt, None, tmp_path, inputs=np.ones((3000, 1)))
+        write_code(GROWING, fmt, tmp_path, inputs=np.ones((3000, 1)))
         assert built(tmp_path)[0] == 0
         last = (tmp_path / "filter_vectors.txt").read_text().splitlines()[-1]
         assert last.startswith("-2 ")
@@ -298,7 +298,7 @@ def test_an_overflow_ends_the_code_in_the_step_that_ends_the_emulation(tmp_path)
 @needs_compiler
 def test_a_zero_has_no_sign(tmp_path):
     system = LinearSystem([["-0.5"]], [[0]], x0=[1])
-    write_code(system, BINARY32, None, tmp_path, inputs=np.zeros((400, 1)))
+    write_code(system, BINARY32, tmp_path, inputs=np.zeros((400, 1)))
     assert built(tmp_path)[0] == 0
     assert (tmp_path / "filter_vectors.txt").read_text().splitlines()[-1].split()[-1] == "0x0p+0"
 
@@ -340,34 +340,32 @@ def header(path):
 
 
 def test_a_header_states_the_bound(tmp_path):
-    within = limits(2, 1, measurement=1)
-    path = write_code(BIQUAD, BINARY32, None, tmp_path, within=within)[0]
+    within = limits(measurement=1)
+    path = write_code(BIQUAD, BINARY32, tmp_path, within=within)[0]
     (bound,) = output_errors(BIQUAD.system(), BINARY32, within.measurement)
     assert f"each output stays within {bound:.3g} of that of the exact filter" in header(path)
-    path = write_code(models()["one state"], BINARY32, "Joseph", tmp_path, within=limits(1, 1, state=9, innovation=9))[
-        0
-    ]
-    found = guarantee(models()["one state"], BINARY32, limits(1, 1, state=9, innovation=9), Form.JOSEPH)
+    path = write_code(models()["one state"], BINARY32, tmp_path, form="Joseph", within=limits(state=9, innovation=9))[0]
+    found = guarantee(models()["one state"], BINARY32, limits(state=9, innovation=9), form=Form.JOSEPH)
     assert f"rounding moves the estimates by at most {found.bound[0]:.3g}, for ever" in header(path)
-    path = write_code(LinearSystem.pid(1, "0.1"), BINARY32, None, tmp_path, within=limits(1, 1, measurement=1))[0]
+    path = write_code(LinearSystem.pid(1, "0.1"), BINARY32, tmp_path, within=limits(measurement=1))[0]
     assert "No bound: the system as given is not stable" in header(path)
 
 
 def test_a_header_names_the_order_and_the_format(tmp_path):
     words = WordFormats(FixedFormat(0, 15, "down", "wrap"), FixedFormat(1, 14), FixedFormat(2, 29))
-    text = header(write_code(BIQUAD, words, None, tmp_path)[0])
+    text = header(write_code(BIQUAD, words, tmp_path)[0])
     assert (
         "data of 16 bits with 15 after the point (rounded down, wrapped around); a number n stands for n / 2**15"
         in text
     )
     assert "in the order in which gpbnb emulates the filter and bounds its errors" in text
     assert "-ffast-math" not in text
-    assert "never with -ffast-math" in header(write_code(BIQUAD, BINARY64, None, tmp_path)[0])
+    assert "never with -ffast-math" in header(write_code(BIQUAD, BINARY64, tmp_path)[0])
 
 
 def test_a_name_cannot_end_a_comment(tmp_path):
     named = FilterDesign([1], [1, "0.5"], name="x */ int y; /* \\\n ??/ ü")
-    text = write_code(named, BINARY32, None, tmp_path)[0].read_text()
+    text = write_code(named, BINARY32, tmp_path)[0].read_text()
     assert text.count("*/") == text.count("/*")
     assert "int y; / * \\ ? ?" not in text.split("*/")[1]
 
@@ -408,23 +406,23 @@ def test_a_name_cannot_end_a_comment(tmp_path):
 )
 def test_what_has_no_code_is_refused(given, fmt, form, message, tmp_path):
     with pytest.raises(ValueError, match=re.escape(message)):
-        write_code(given, fmt, form, tmp_path / "code")
+        write_code(given, fmt, tmp_path / "code", form=form)
     assert not (tmp_path / "code").exists()
 
 
 @pytest.mark.parametrize("name", ["", "1st", "a-b", "while", "../x", "x" * 32, None, "filtré"])
 def test_a_name_that_c_does_not_take_is_refused(name, tmp_path):
     with pytest.raises(ValueError, match="got name"):
-        write_code(BIQUAD, BINARY32, None, tmp_path, name=name)
+        write_code(BIQUAD, BINARY32, tmp_path, name=name)
 
 
 def test_other_objects_are_refused(tmp_path):
     with pytest.raises(
         TypeError, match="got a dict; needed a LinearSystem, a FilterDesign, a LinearModel or a NonlinearSystem"
     ):
-        write_code({}, BINARY32, None, tmp_path)
+        write_code({}, BINARY32, tmp_path)
     with pytest.raises(TypeError, match="got the format 32"):
-        write_code(BIQUAD, 32, None, tmp_path)
+        write_code(BIQUAD, 32, tmp_path)
 
 
 def test_names_that_are_none_in_c_are_numbered():
@@ -437,7 +435,7 @@ def test_names_that_are_none_in_c_are_numbered():
 
 @needs_compiler
 def test_fast_math_is_refused_by_the_compiler(tmp_path):
-    write_code(BIQUAD, BINARY32, None, tmp_path)
+    write_code(BIQUAD, BINARY32, tmp_path)
     command = [installed()[0], "-std=c99", "-ffast-math", "-c", "filter.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
@@ -447,8 +445,8 @@ def test_fast_math_is_refused_by_the_compiler(tmp_path):
 @needs_compiler
 @pytest.mark.skipif(not shutil.which("make"), reason="no make")
 def test_two_filters_in_one_folder_do_not_share_a_name(tmp_path):
-    write_code(BIQUAD, BINARY32, None, tmp_path, name="low")
-    write_code(models()["one state"], FixedFormat(8, 23), "UD", tmp_path, name="kalman")
+    write_code(BIQUAD, BINARY32, tmp_path, name="low")
+    write_code(models()["one state"], FixedFormat(8, 23), tmp_path, form="UD", name="kalman")
     command = [installed()[0], *FLAGS.split(), "-Werror", "-shared", "-fPIC", "-o", "both", "low.c", "kalman.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -569,7 +567,7 @@ def test_a_constant_gain_is_answered_as_its_linear_system(tracker, capsys):
     model = read_model(arguments[0])
     z = simulated_measurements(model, 50)
     assert main([*arguments[:-2], "--basis", "emulation", "--report", str(folder) + ".html"]) == 0
-    expected = required_precision(settled_filter(model), 50, 0.01, z=z, basis="emulation")
+    expected = required_precision(settled_filter(model), z, 0.01, basis="emulation")
     assert capsys.readouterr().out.strip() == str(expected)
     page = folder.with_name("code.html").read_text(encoding="utf-8")
     assert "simulated by the model, seed 0" in page

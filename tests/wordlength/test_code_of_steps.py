@@ -49,7 +49,7 @@ def test_short_words_in_every_rounding():
 
 def last_status(system, fmt, u, folder):
     """Compile and run the test of the code; return the status of the last test vector and the number of vectors."""
-    write_code(system, fmt, None, folder, inputs=u)
+    write_code(system, fmt, folder, inputs=u)
     command = [installed()[0], *FLAGS.split(), "-Werror", "-O2", "-o", "run", "test_filter.c", "filter.c", "-lm"]
     subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     done = subprocess.run(["./run"], cwd=folder, capture_output=True, text=True, check=False)
@@ -95,13 +95,13 @@ def test_the_code_ends_in_the_step_in_which_the_emulation_ends(step, status, fmt
 )
 def test_what_has_no_code_is_refused(fmt, form, message, tmp_path):
     with pytest.raises(ValueError, match=re.escape(message)):
-        write_code(SYSTEMS[0], fmt, form, tmp_path)
+        write_code(SYSTEMS[0], fmt, tmp_path, form=form)
 
 
 def test_a_function_without_a_counterpart_is_refused(tmp_path):
     turning = NonlinearSystem(lambda fmt, x, u: (x + u, np.sin(x)), [0])
     with pytest.raises(ValueError, match=r"got np\.sin in the step, for which C has no function"):
-        write_code(turning, BINARY32, None, tmp_path / "code")
+        write_code(turning, BINARY32, tmp_path / "code")
     assert not (tmp_path / "code").exists()
 
 
@@ -109,10 +109,10 @@ def test_a_function_without_a_counterpart_is_refused(tmp_path):
 def test_a_root_of_words_with_an_unusual_point_is_refused(fmt, tmp_path):
     rooted = NonlinearSystem(lambda fmt, x, u: (x, np.sqrt(abs(u))), [0])
     with pytest.raises(ValueError, match=r"got a square root of \d+ bits with -?\d+ after the point"):
-        write_code(rooted, fmt, None, tmp_path)
+        write_code(rooted, fmt, tmp_path)
 
 
 def test_a_header_claims_no_bound(tmp_path):
-    text = write_code(SYSTEMS[0], BINARY32, None, tmp_path)[0].read_text()
+    text = write_code(SYSTEMS[0], BINARY32, tmp_path)[0].read_text()
     assert "a PI controller with two clips, in BINARY32" in text
     assert "bounds" not in text

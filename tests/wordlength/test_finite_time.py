@@ -10,20 +10,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import (
-    FixedFormat,
-    FloatFormat,
-    LinearModel,
-    LinearSystem,
-    WordFormats,
-    limits,
-    linalg,
-    required_fraction_bits,
-    required_precision,
-)
+from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, WordFormats, limits, linalg, required_precision
 from gpbnb.bounds.system import output_errors
 from gpbnb.bounds.words import WordGuarantee
-from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.required import judge
 from tests.plain_structures import fixed, floating
 
 TENTH = Fraction(1, 10)
@@ -80,17 +70,14 @@ def inputs_of(rng, steps, kind):
 def test_two_hundred_tenths_need_no_more_than_the_17_bits_that_4040_unit_roundoffs_give():
     """Each of 200 sums is at most 20, its rounding 20 units, and storing a tenth 200 times adds 20: 4040 with both."""
     assert 4040 * Fraction(1, 2**17) < Fraction(5, 100)
-    for basis, asked in (
-        ("bound", {"z": np.full((200, 1), 0.1)}),
-        ("guarantee", {"within": limits(1, 1, measurement=0.1)}),
-    ):
-        found = required_precision(CLOCK, 200, 0.05, basis=basis, **asked)
-        assert found.precision is not None
-        assert found.precision <= 17
-        assert found.ends
+    for basis, z, within in (("bound", np.full((200, 1), 0.1), None), ("guarantee", 200, limits(measurement=0.1))):
+        found = required_precision(CLOCK, z, 0.05, basis=basis, within=within)
+        assert found.digits is not None
+        assert found.digits <= 17
+        assert found.steps == 200
         kind = "proved for this run of 200 steps" if basis == "bound" else "guaranteed for 200 steps"
         assert str(found).endswith(kind)
-        observed = clock(floating(2, found.precision, "nearest"), [TENTH] * 200)
+        observed = clock(floating(2, found.digits, "nearest"), [TENTH] * 200)
         assert observed <= Fraction(5, 100)
     for digits in (17, 24, 53):
         bound = output_errors(CLOCK, FloatFormat(2, digits), 0.1, 200)[0]
@@ -127,19 +114,18 @@ def test_a_bound_grows_with_its_steps_and_that_of_a_stable_system_stays_below_th
 
 
 def test_a_stable_system_is_bounded_for_ever_and_another_only_for_its_steps():
-    within = limits(1, 1, measurement=1)
+    within = limits(measurement=1)
     stable = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 200, 1e-3, basis="guarantee", within=within)
-    assert not stable.ends
+    assert stable.steps is None
     assert str(stable).endswith("guaranteed for ever")
     judged = judge(CLOCK, FloatFormat(2, 24), 200, 1e-3, basis="guarantee", within=within)
-    assert judged.ends
     assert "nothing is proved for 24 bits: the guaranteed bound for 200 steps is " in str(judged)
     assert judged.ratio == pytest.approx(output_errors(CLOCK, FloatFormat(2, 24), 1.0, 200)[0] / 1e-3)
 
 
 def test_a_bound_over_steps_that_no_precision_meets_names_the_cause():
-    found = required_precision(LinearSystem([[2]], [[1]]), 200, 1e-3, basis="bound", z=np.full((200, 1), 0.1))
-    assert found.precision is None
+    found = required_precision(LinearSystem([[2]], [[1]]), np.full((200, 1), 0.1), 1e-3, basis="bound")
+    assert found.digits is None
     assert "no precision up to 53 bits" in str(found)
     assert "A has an eigenvalue of size 2, mostly in state 0, so that errors add up with every" in str(found)
     with pytest.raises(OverflowError, match="largest gain over 5000 steps is beyond the range of float64; take fewer"):
@@ -259,17 +245,17 @@ def test_words_have_a_bound_over_their_steps(system, emulated, mode):
     bound = WordGuarantee(system, 1.0, 40).errors(words)[0]
     observed = float(emulated(fixed(10, mode), inputs))
     assert observed <= bound < 12 * observed
-    found = required_fraction_bits(system, np.full((40, 1), 0.9), 0.05, "guarantee", mode)
-    assert found.fmt is not None
+    found = required_precision(system, np.full((40, 1), 0.9), 0.05, kind="fixed", basis="guarantee", rounding=mode)
+    assert found.format is not None
     assert found.steps == 40
-    assert "by guarantee for 40 steps" in str(found)
-    assert float(emulated(fixed(found.fmt.fraction_bits, mode), inputs)) <= 0.05
+    assert "guaranteed for 40 steps" in str(found)
+    assert float(emulated(fixed(found.digits, mode), inputs)) <= 0.05
 
 
 def test_a_kalman_filter_that_never_settles_has_a_guarantee_over_its_steps():
     """The second state is not observed and keeps its errors."""
     lost = LinearModel([[1, 0], [0, 1]], [[1, 0]], [["0.01", 0], [0, 0]], [[1]], [0, 0], np.eye(2))
-    found = required_precision(lost, 30, 1e-3, basis="guarantee", within=limits(2, 1, 10, 10))
-    assert found.precision is not None
-    assert found.ends
+    found = required_precision(lost, 30, 1e-3, basis="guarantee", within=limits(state=10, innovation=10))
+    assert found.digits is not None
+    assert found.steps == 30
     assert str(found).endswith("guaranteed for 30 steps")

@@ -10,15 +10,21 @@ import numpy as np
 import pytest
 from small_filter import unscaled
 
-from gpbnb import BINARY64, LinearSystem, WordFormats, required_fraction_bits, required_word_formats
+from gpbnb import BINARY64, FloatFormat, LinearSystem, WordFormats, required_precision
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.words import largest_rounding
 from gpbnb.filters.simulation import Simulation
 from gpbnb.filters.system import biquad, controller, state_space
-from gpbnb.wordlength import examples, fixed_point
-from gpbnb.wordlength.fixed_point import ScaledFilter
+from gpbnb.report.processors import scaled as fixed_point
+from gpbnb.report.processors.scaled import ScaledFilter
+from gpbnb.wordlength import examples
 from tests.plain_program import steps_in_python
+
+
+def stored_coefficients(made, bits):
+    return FloatFormat(2, bits).array(made.coefficients).to_fractions()
+
 
 MODES = [mode for mode in Rounding if mode is not Rounding.STOCHASTIC]
 
@@ -39,7 +45,7 @@ def test_every_step_is_that_of_the_fixed_point_kernel(mode: Rounding) -> None:
     """The integers against the correctly rounded scalar operations of the format."""
     given, z = tracked()
     fmt = FixedFormat(fixed_point.integer_bits(given, z), 12, mode)
-    coefficients = fixed_point.stored_coefficients(given.filter, 9)
+    coefficients = stored_coefficients(given.filter, 9)
     program, unit = given.filter.program, fmt.unit
     state, true = [Fraction(0)] * program.n, [Fraction(0)] * program.n
     errors = fixed_point.emulated(given, z[:40], fmt, 9)
@@ -60,7 +66,7 @@ def test_a_long_accumulator_rounds_each_sum_once() -> None:
     given = unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
     z = np.random.default_rng(1).uniform(-1, 1, (50, 1))
     fmt = FixedFormat(2, 8)
-    coefficients = fixed_point.stored_coefficients(given.filter, 15)
+    coefficients = stored_coefficients(given.filter, 15)
     b0, b1, b2, a1, a2 = coefficients
     s1 = s2 = t1 = t2 = Fraction(0)
     errors = fixed_point.emulated(given, z, fmt, wide=True)
@@ -95,40 +101,21 @@ def test_the_bound_of_one_state_is_its_geometric_series() -> None:
     assert np.allclose(chopped, 2 * bound)
 
 
-def test_an_integrator_has_no_bound_for_ever() -> None:
-    given = unscaled(controller("1", "0.01", "0", "0"))
-    answer = fixed_point.required_fraction_bits(given, np.ones((20, 1)), 0.1, "guarantee")
-    assert answer.fmt is None
-    assert "the filter as given is not stable" in answer.why
-
-
 def test_answers_count_fraction_bits() -> None:
     given, z = tracked()
     tolerance = [0.1, math.inf]
-    observed = fixed_point.required_fraction_bits(given, z, tolerance)
-    proved = fixed_point.required_fraction_bits(given, z, tolerance, "guarantee")
-    assert observed.fmt is not None
-    assert proved.fmt is not None
+    observed = fixed_point.required_bits(given, z, tolerance)
+    proved = fixed_point.required_bits(given, z, tolerance, "guarantee")
+    assert observed.format is not None
     assert (observed.basis, proved.basis) == ("emulation", "guarantee")
-    assert observed.fmt.fraction_bits <= proved.fmt.fraction_bits
+    assert observed.digits <= proved.digits
     for answer in (observed, proved):
         ratios = dict(answer.tried)
-        bits = answer.fmt.fraction_bits  # type: ignore[union-attr]
+        bits = answer.digits  # type: ignore[union-attr]
         assert ratios[bits] <= 1 >= ratios[bits + 1]
         assert ratios[bits - 1] > 1
         assert f"{bits} fraction bits in a word of" in str(answer)
         assert f"{bits - 1} fraction bits give" in answer.why
-    named = fixed_point.required_fraction_bits(given, z, tolerance, "guarantee", "nearest")
-    assert named.tried == proved.tried
-
-
-def test_a_tolerance_that_no_format_meets_has_no_answer() -> None:
-    given, z = tracked()
-    answer = fixed_point.required_fraction_bits(given, z, 1e-30, "guarantee")
-    assert (answer.fmt, answer.basis) == (None, "guarantee")
-    assert answer.tried[-1][0] == 59
-    assert all(ratio > 1 for _, ratio in answer.tried)
-    assert str(answer).startswith("no format, by guarantee: 59 fraction bits give ")
 
 
 @pytest.mark.parametrize(
@@ -157,66 +144,6 @@ def test_scaling_keeps_what_occurs_below_one() -> None:
     assert (np.abs(z).max(axis=0) * 2 < 2.0 ** given.measurement.astype(float)).all()
 
 
-@pytest.mark.parametrize("tolerance", [0.0, [0.1, 0.0], [-0.1, 0.1], [0.1, math.nan], math.inf])
-def test_a_tolerance_is_above_zero_for_each_state_and_finite_for_one(tolerance: Any) -> None:
-    given, z = tracked()
-    with pytest.raises(ValueError, match="needed an error above 0 for each of the"):
-        fixed_point.required_fraction_bits(given, z, tolerance)
-
-
-@pytest.mark.parametrize("basis", ["bound", "probable", "", None])
-def test_fixed_point_has_two_bases(basis: Any) -> None:
-    given, z = tracked()
-    with pytest.raises(ValueError, match=rf"got basis {basis!r}; needed \"emulation\" or \"guarantee\""):
-        fixed_point.required_fraction_bits(given, z, 0.1, basis)
-
-
-NEAR = biquad("0.3", 0, 0, "-1.9999988", "0.9999998")
-
-
-@pytest.mark.parametrize(
-    ("made", "bits", "message"),
-    [
-        (
-            state_space([["1.1"]], [[1]]),
-            15,
-            "the filter as given is not stable, so that errors of rounding never decay",
-        ),
-        (
-            state_space([["1"]], [["0.3"]]),
-            15,
-            "the filter as given is not stable, so that errors of rounding never decay",
-        ),
-        (NEAR, 15, "the filter is stable, but not with its coefficients stored in 15 bits; raise coefficient_bits"),
-        (
-            NEAR,
-            40,
-            "the filter is stable, but the system decays too slowly for a bound: its response is not negligible",
-        ),
-    ],
-)
-def test_without_a_guarantee_the_answer_names_the_cause(made, bits, message):  # type: ignore[no-untyped-def]
-    z = np.full((20, 1), 0.1)
-    answer = fixed_point.required_fraction_bits(unscaled(made), z, 1e-3, "guarantee", coefficient_bits=bits)
-    assert answer.fmt is None
-    assert str(answer).startswith(f"no format, by guarantee: {message}")
-
-
-def test_an_accumulator_has_no_proof_for_ever_even_without_rounding_errors() -> None:
-    made = unscaled(state_space([[1]], [[1]]))
-    answer = fixed_point.required_fraction_bits(made, np.ones((20, 1)), 1e-3, "guarantee")
-    assert answer.fmt is None
-    assert "the filter as given is not stable" in answer.why
-
-
-def test_without_an_answer_the_most_that_was_tried_is_named() -> None:
-    made = unscaled(biquad("0.3", 0, 0, "-1.6", "0.64"))
-    z = np.random.default_rng(0).uniform(-1, 1, (20, 1))
-    answer = fixed_point.required_fraction_bits(made, z, 1e-300)
-    assert answer.fmt is None
-    assert str(answer).endswith("; 59 fraction bits are the most tried")
-
-
 def near_a_power_of_two(seed):
     """A stable system and inputs whose largest number, without rounding, is just below a power of two."""
     rng = np.random.default_rng(seed)
@@ -231,25 +158,25 @@ def near_a_power_of_two(seed):
 def test_no_other_integer_bits_give_a_shorter_word(seed, basis):
     system, u = near_a_power_of_two(seed)
     tolerance = 0.02 * np.abs(system.outputs(u)[..., 0]).max()
-    found = required_fraction_bits(system, u, tolerance, basis)
-    for integer_bits in range(found.fmt.integer_bits - 2, found.fmt.integer_bits + 3):
+    found = required_precision(system, u, tolerance, kind="fixed", basis=basis)
+    for integer_bits in range(found.format.data.integer_bits - 2, found.format.data.integer_bits + 3):
         like = WordFormats(FixedFormat(integer_bits, 20), 15, None)
-        other = required_fraction_bits(system, u, tolerance, basis, like=like)
-        assert not other.met or other.fmt.precision >= found.fmt.precision
+        other = required_precision(system, u, tolerance, kind="fixed", basis=basis, like=like)
+        assert not other.met or other.digits >= found.digits
 
 
 def test_limits_that_a_run_never_reaches_need_integer_bits_too():
     controller = LinearSystem.pid("0.8", "0.05", limits=(-1, 1))
     u = 0.05 * np.sin(0.3 * np.arange(60))[:, None]
-    given = required_fraction_bits(controller, u, 0.01, like=FixedFormat(1, 14))
-    found = required_fraction_bits(controller, u, 0.01)
-    assert found.fmt == given.fmt
-    assert required_word_formats(controller, u, 0.01).words.data == found.fmt
+    given = required_precision(controller, u, 0.01, kind="fixed", like=FixedFormat(1, 14))
+    found = required_precision(controller, u, 0.01, kind="fixed")
+    assert found.format.data == given.format
+    assert required_precision(controller, u, 0.01, kind="words").format.data == found.format.data
 
 
 def test_a_scaled_filter_gets_the_integer_bits_of_its_run_in_the_format():
     z = np.ones((60, 1))
     given = ScaledFilter(state_space([["0.5"]], [["0.4999"]]), np.zeros(1, int), np.zeros(1, int), np.zeros((1, 1)))
-    found = required_fraction_bits(given, z * 0.9999, 0.02)
+    found = fixed_point.required_bits(given, z * 0.9999, 0.02)
     assert found.met
-    assert np.abs(fixed_point.emulated(given, z * 0.9999, found.fmt)).max() <= 0.02
+    assert np.abs(fixed_point.emulated(given, z * 0.9999, found.format)).max() <= 0.02

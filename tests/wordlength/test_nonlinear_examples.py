@@ -123,10 +123,10 @@ def test_the_beacon_is_tracked_behind_the_instrument():
     given = FloatFormat(2, 53).array(x)
     assert examples.tracked_motion(given).to_float().tolist() == [305, -394, 5, 6]
     assert examples.tracked_sight(given).to_float().tolist() == [500, math.atan2(-400, 300)]
-    found = emulate(model, z, FloatFormat(2, 40), "Joseph")
-    distance = np.hypot(*found.reference.x[-1, :2].astype(float))
+    found = emulate(model, z, FloatFormat(2, 40), form="Joseph")
+    distance = np.hypot(*found.x[-1, :2].to_float())
     assert abs(distance - z[-1, 0]) < 0.1
-    assert found.state_norm.max() < 1e-4
+    assert found.largest.max() < 1e-4
 
 
 def test_the_clipped_controller_is_clipped():

@@ -9,8 +9,9 @@ import pytest
 from gpbnb import FloatFormat, LinearModel, Rounding
 from gpbnb.wordlength import examples
 from gpbnb.wordlength import records as module
-from gpbnb.wordlength.precision import survey, survey_formats
 from gpbnb.wordlength.records import RecordSurvey, survey_records
+from gpbnb.wordlength.strategies import strategy_for
+from tests.surveying import survey
 
 FORMATS = [FloatFormat(2, 10), FloatFormat(2, 24), FloatFormat(10, 5), FloatFormat(2, 12, Rounding.CHOP)]
 TRACKER = examples.tracker()
@@ -36,20 +37,20 @@ def test_it_is_the_survey_of_each_record():
 def test_any_executor_gives_the_same(kind):
     z = data()
     with kind(2) as executor:
-        found = survey_records(TRACKER, z, 0.01, FORMATS, "UD", executor=executor, chunk=2)
-    assert np.array_equal(found.ratios, survey_records(TRACKER, z, 0.01, FORMATS, "UD").ratios)
+        found = survey_records(TRACKER, z, 0.01, FORMATS, form="UD", executor=executor, chunk=2)
+    assert np.array_equal(found.ratios, survey_records(TRACKER, z, 0.01, FORMATS, form="UD").ratios)
 
 
 def test_an_interrupted_survey_goes_on(tmp_path, monkeypatch):
     calls = []
 
-    def counted(model, z, *rest):
-        calls.append(len(z))
+    def counted(model, data, *rest, **options):
+        calls.append(data.steps)
         if len(calls) == 3:
             raise KeyboardInterrupt
-        return survey_formats(model, z, *rest)
+        return strategy_for(model, data, *rest, **options)
 
-    monkeypatch.setattr(module, "survey_formats", counted)
+    monkeypatch.setattr(module, "strategy_for", counted)
     z, formats = data(4), FORMATS[:1]
     with pytest.raises(KeyboardInterrupt):
         survey_records(TRACKER, z, 0.01, formats, directory=tmp_path)
@@ -67,7 +68,7 @@ def test_another_question_does_not_use_saved_records(tmp_path):
     others = [
         survey_records(replace(TRACKER, R=TRACKER.R * 2), z, 0.01, formats, directory=tmp_path),
         survey_records(TRACKER, [z[0] * 2], 0.01, formats, directory=tmp_path),
-        survey_records(TRACKER, z, 0.01, formats, "UD", directory=tmp_path),
+        survey_records(TRACKER, z, 0.01, formats, form="UD", directory=tmp_path),
         survey_records(TRACKER, z, 0.01, formats, basis="bound", directory=tmp_path),
     ]
     assert all(each.ratios != first for each in others)
@@ -97,11 +98,10 @@ def test_shares_and_what_is_enough():
         ({"records": []}, "got no records"),
         ({"records": 3}, "got 3 records to simulate without steps"),
         ({"records": data(1), "steps": 4}, "got steps with records"),
-        ({"records": [[1, 2]]}, r"got record 0 of shape \(2,\); needed \(steps, 1\)"),
+        ({"records": [[[1, 2]]]}, r"got record 0 of shape \(1, 2\); needed \(steps, 1\)"),
         ({"records": 0, "steps": 5}, "got 0 records"),
         ({"formats": []}, "got 0 formats"),
         ({"formats": [FORMATS[0]] * 2}, "got 2 formats, 1 different"),
-        ({"formats": [24]}, "got 24; needed a FloatFormat"),
         ({"formats": [FloatFormat(2, 113)]}, "got 113 bits; needed at most 53 for compiled loops"),
         ({"basis": "guarantee"}, 'got basis "guarantee"; needed "emulation" or "bound"'),
         ({"tolerance": 0}, "got tolerance 0"),
@@ -115,6 +115,6 @@ def test_bad_questions_are_refused(given, message):
 
 
 def test_other_models_are_refused():
-    with pytest.raises(TypeError, match="got a model int; needed a LinearModel"):
+    with pytest.raises(TypeError, match="got a int; needed the path"):
         survey_records(1, data(1), 0.1, FORMATS)
     assert isinstance(TRACKER, LinearModel)

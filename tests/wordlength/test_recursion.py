@@ -5,24 +5,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import (
-    BFLOAT16,
-    FixedFormat,
-    FloatFormat,
-    LinearSystem,
-    NonlinearModel,
-    required_block_precisions,
-    required_fraction_bits,
-    required_precision,
-    survey_records,
-)
+from gpbnb import BFLOAT16, FixedFormat, FloatFormat, LinearSystem, NonlinearModel, required_precision, survey_records
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.forms import Form
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.wordlength import examples
-from gpbnb.wordlength.precision import survey
+from tests.surveying import survey
 
 Z = np.random.default_rng(3).standard_normal(200)
 
@@ -38,12 +28,12 @@ def smoother(fmt, z):
 @pytest.mark.parametrize("base", [2, 10, 16])
 def test_a_function_gets_the_answer_of_the_same_linear_system(base):
     system = LinearSystem([["0.9"]], [["0.1"]])
-    by_function = required_precision(smoother, 200, 1e-3, base=base, z=Z)
-    by_system = required_precision(system, 200, 1e-3, base=base, z=Z.reshape(-1, 1))
+    by_function = required_precision(smoother, Z, 1e-3, base=base)
+    by_system = required_precision(system, Z.reshape(-1, 1), 1e-3, base=base)
     assert [digits for digits, _ in by_function.tried] == [digits for digits, _ in by_system.tried]
     ratios = [[ratio for _, ratio in each.tried] for each in (by_function, by_system)]
     assert np.allclose(*ratios, rtol=1e-9, atol=1e-9)
-    assert by_function.precision == by_system.precision
+    assert by_function.digits == by_system.digits
     assert by_function.basis == "emulation"
 
 
@@ -60,9 +50,9 @@ def test_a_kalman_filter_written_as_a_function_gets_the_answer_of_its_model():
             found.append(run.x)
         return found
 
-    asked = {"steps": 60, "tolerance": 0.01, "z": z}
+    asked = {"z": z, "tolerance": 0.01}
     a, b = (required_precision(each, **asked) for each in (written, tracker))
-    assert a.precision == b.precision
+    assert a.digits == b.digits
     # the reference of the model has the digits of double-double
     assert [digits for digits, _ in a.tried] == [digits for digits, _ in b.tried]
     assert np.allclose([x for _, x in a.tried], [y for _, y in b.tried], rtol=1e-9)
@@ -82,7 +72,7 @@ def _tracked(fmt, z, model):
 
 
 def test_the_survey_has_the_ratios_of_the_search():
-    found = required_precision(smoother, 200, 1e-3, z=Z)
+    found = required_precision(smoother, Z, 1e-3)
     precisions = [digits for digits, _ in found.tried]
     assert survey(smoother, Z, 1e-3, precisions) == found.tried
 
@@ -98,7 +88,7 @@ def test_a_function_without_inputs_and_several_outputs():
 
     both = required_precision(rotation, 100, 1e-3)
     first = required_precision(rotation, 100, [1e-3, np.inf])
-    assert both.precision >= first.precision > 10
+    assert both.digits >= first.digits > 10
 
 
 def test_a_function_that_stops_in_few_digits():
@@ -108,9 +98,9 @@ def test_a_function_that_stops_in_few_digits():
         return [np.sqrt((1 - x) - y) for x, y in z]
 
     assert survey(rest, [["0.57", "0.42"]], 1e-2, [3])[0][1] == np.inf
-    found = required_precision(rest, 1, 1e-2, z=[["0.57", "0.42"]])
-    assert dict(found.tried)[found.precision] <= 1
-    assert found.precision > 3
+    found = required_precision(rest, [["0.57", "0.42"]], 1e-2)
+    assert dict(found.tried)[found.digits] <= 1
+    assert found.digits > 3
 
 
 REFUSED = [
@@ -138,28 +128,20 @@ REFUSED = [
 @pytest.mark.parametrize(("run", "kind", "message"), REFUSED)
 def test_functions_that_leave_the_format_are_refused(run, kind, message):
     with pytest.raises(kind, match=message):
-        required_precision(run, 200, 1e-3, z=Z)
+        required_precision(run, Z, 1e-3)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"basis": "bound"}, 'got basis "bound" of a function'),
-        ({"form": "UD"}, "got the UD form; needed none"),
-        ({"within": limits(1, 1, state=1, innovation=1)}, "got limits for a function"),
-        ({"z": Z[:5]}, r"got inputs of shape \(5,\); needed one row for each of the 200 steps"),
+        ({"within": limits(state=1, innovation=1)}, 'got limits and basis "emulation"'),
         ({"tolerance": [1, 1]}, "got tolerance"),
         ({"base": 3}, "got base 3"),
     ],
 )
 def test_options_that_a_function_cannot_have_are_refused(options, message):
     with pytest.raises(ValueError, match=message):
-        required_precision(**{"model": smoother, "steps": 200, "tolerance": 1e-3, "z": Z} | options)
-
-
-def test_a_linear_system_has_no_forms():
-    with pytest.raises(ValueError, match="got the UD form; needed none"):
-        required_precision(LinearSystem([["0.9"]], [["0.1"]]), 200, 1e-3, form="UD", z=Z.reshape(-1, 1))
+        required_precision(**{"model": smoother, "z": Z, "tolerance": 1e-3} | options)
 
 
 def muller(steps):
@@ -188,59 +170,59 @@ def muller_error(fmt, steps):
 def test_mullers_recurrence_needs_more_digits_than_compiled_loops_have(base, answer):
     """Digits that a limit of 53 bits or 18 decimal digits would deny."""
     found = required_precision(muller(32), 32, 1e-3, base=base)
-    assert found.precision == answer
+    assert found.digits == answer
     tried = dict(found.tried)
     for digits in (answer - 1, answer, answer + 1):
         error = muller_error(FloatFormat(base, digits), 32)
         assert (error <= Fraction(1, 1000)) == (digits >= answer)
         assert tried[digits] == pytest.approx(float(error * 1000), rel=1e-9)
-    assert survey(muller(32), None, 1e-3, [answer - 1, answer], base=base) == tuple(
+    assert survey(muller(32), 32, 1e-3, [answer - 1, answer], base=base) == tuple(
         (digits, tried[digits]) for digits in (answer - 1, answer)
     )
 
 
 def test_the_answer_names_the_limit_that_ended_the_search():
-    found = required_precision(muller(32), 32, 1e-3, base=10, largest=40)
-    assert found.precision is None
+    found = required_precision(muller(32), 32, 1e-3, base=10, highest=40)
+    assert found.digits is None
     assert str(found) == (
-        "no precision up to 40 decimal digits, where largest=40 ends the search, "
+        "no precision up to 40 decimal digits, where highest=40 ends the search, "
         "meets the tolerance in a run of 32 steps"
     )
     assert str(required_precision(muller(46), 46, 1e-3, base=10)).startswith(
-        "no precision up to 60 decimal digits, where largest=60"
+        "no precision up to 60 decimal digits, where highest=60"
     )
     met = {digits: muller_error(FloatFormat(10, digits), 46) <= Fraction(1, 1000) for digits in range(58, 66)}
     least = min(digits for digits in range(58, 65) if met[digits] and met[digits + 1])
-    assert required_precision(muller(46), 46, 1e-3, base=10, largest=70).precision == least > 60
+    assert required_precision(muller(46), 46, 1e-3, base=10, highest=70).digits == least > 60
 
 
 def test_without_digits_for_its_reference_a_function_is_refused_with_the_limit_to_raise():
-    with pytest.raises(ValueError, match=r"in 72 decimal digits .* that in 108; .* try largest=144") as caught:
+    with pytest.raises(ValueError, match=r"in 72 decimal digits .* that in 108; .* try highest=144") as caught:
         required_precision(muller(50), 50, 1e-3, base=10)
     assert "If errors only grow" in str(caught.value)
-    assert required_precision(muller(50), 50, 1e-3, base=10, largest=144).precision > 60
+    assert required_precision(muller(50), 50, 1e-3, base=10, highest=144).digits > 60
 
 
 def test_an_answer_below_the_limit_of_compiled_loops_is_found_without_trying_more():
-    assert max(digits for digits, _ in required_precision(smoother, 200, 1e-3, z=Z).tried) == 53
-    found = required_precision(smoother, 200, 1e-3, z=Z, largest=12)
+    assert max(digits for digits, _ in required_precision(smoother, Z, 1e-3).tried) == 53
+    found = required_precision(smoother, Z, 1e-3, highest=12)
     assert max(digits for digits, _ in found.tried) <= 12
-    assert found.precision == required_precision(smoother, 200, 1e-3, z=Z).precision
+    assert found.digits == required_precision(smoother, Z, 1e-3).digits
 
 
 def test_a_model_ends_at_the_compiled_loops_or_below():
     system, z = LinearSystem([["0.9"]], [["0.1"]]), Z.reshape(-1, 1)
-    found = required_precision(system, 200, 1e-30, z=z, rounding="even")
+    found = required_precision(system, z, 1e-30, rounding="even")
     assert str(found).startswith("no precision up to 53 bits, the most with compiled loops in base 2, rounded even, ")
-    assert "up to 9 bits, where largest=9 ends" in str(required_precision(system, 200, 1e-30, z=z, largest=9))
-    for model, measured in ((system, z), (examples.tracker(), None)):
+    assert "up to 9 bits, where highest=9 ends" in str(required_precision(system, z, 1e-30, highest=9))
+    for model, measured in ((system, z), (examples.tracker(), 5)):
         with pytest.raises(
-            ValueError, match=r"got largest=54 for a model; needed at most 53 bits, .* function of a format"
+            ValueError, match=r"got highest=54 for a model; needed at most 53 bits, .* function of a format"
         ):
-            required_precision(model, 200, 1e-3, z=measured, largest=54)
+            required_precision(model, measured, 1e-3, highest=54)
     for wrong in (1, 2.5, "20"):
-        with pytest.raises(ValueError, match=r"got .* largest; needed a whole number, at least 2"):
-            required_precision(smoother, 200, 1e-3, z=Z, largest=wrong)
+        with pytest.raises(ValueError, match=r"got .* highest; needed a whole number, at least 2"):
+            required_precision(smoother, Z, 1e-3, highest=wrong)
 
 
 def angles(fmt, z):
@@ -252,19 +234,19 @@ def angles(fmt, z):
 def test_leaving_the_domain_of_a_function_is_a_lack_of_digits():
     with pytest.raises(DomainError, match=r"got np.arcsin of 1\.000244140625; needed an argument for which"):
         angles(FloatFormat(2, 13), FloatFormat(2, 13).array([1, 2]))
-    found = required_precision(angles, 2, 0.02, z=[1, 2])
-    assert found.precision == 14
+    found = required_precision(angles, [1, 2], 0.02)
+    assert found.digits == 14
     assert dict(found.tried)[13] == np.inf
     assert "in 13 bits the function stops: got np.arcsin of 1.000244140625" in str(found)
     with pytest.raises(DomainError, match=r"the function stops in its reference of .* np.arcsin of 1.6"):
-        required_precision(lambda fmt, z: np.arcsin(z + fmt.array("0.6")), 1, 0.02, z=[1])
+        required_precision(lambda fmt, z: np.arcsin(z + fmt.array("0.6")), [1], 0.02)
 
 
 def test_a_function_that_stops_in_its_reference_says_so():
     with pytest.raises(
         ZeroDivisionError, match=r"the function stops in its reference of 237 bits: .* division by zero"
     ):
-        required_precision(lambda fmt, z: 1 / (z - z), 200, 1e-3, z=Z)
+        required_precision(lambda fmt, z: 1 / (z - z), Z, 1e-3)
 
 
 def running_mean(fmt, values):
@@ -285,8 +267,8 @@ def running_mean(fmt, values):
 def test_a_precision_that_cannot_hold_a_whole_number_is_not_enough(function, z, tolerances, least):
     """The answer holds every whole number that the function takes, whatever precisions the search tries on its way."""
     for tolerance in tolerances:
-        found = required_precision(function, len(z), tolerance, z=z)
-        assert found.precision >= least
+        found = required_precision(function, z, tolerance)
+        assert found.digits >= least
         assert all(ratio == np.inf for digits, ratio in found.tried if digits < least)
     (_, short), (_, long) = survey(function, z, 1, [2, 24])
     assert short == np.inf
@@ -308,10 +290,10 @@ def test_a_whole_number_in_a_nonlinear_filter_lacks_digits_like_any_other():
         P0=np.eye(2),
     )
     z = np.hypot(1234 - np.arange(1, 11) / 8, 777)[:, None]
-    found = required_precision(model, 10, 10.0, z=z)
-    assert found.precision == 10
+    found = required_precision(model, z, 10.0)
+    assert found.digits == 10
     assert "in 9 bits the run is refused: a whole number that the format does not hold exactly at step 1" in str(found)
-    blocks = required_block_precisions(model, 10, 10.0, z=z).formats
+    blocks = required_precision(model, z, 10.0, kind="blocks").format
     assert blocks.state.precision >= 10
     assert "inf" in str(survey_records(model, [z], 10.0, [BFLOAT16]))
-    assert required_fraction_bits(model, z, 10.0, like=FixedFormat(22, 4)).met
+    assert required_precision(model, z, 10.0, kind="fixed", like=FixedFormat(22, 4)).met

@@ -8,10 +8,16 @@ from math import floor
 import numpy as np
 import pytest
 
-from gpbnb import FixedFormat, LinearSystem, WordFormats, required_fraction_bits
+from gpbnb import FixedFormat, LinearSystem, WordFormats, required_precision
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.blocks import MOST_COEFFICIENT_BITS, required_word_formats
-from gpbnb.wordlength.fixed_point import words_error
+from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS
+from gpbnb.wordlength.strategies import strategy_for
+from gpbnb.wordlength.strategy import Data
+
+
+def words_error(system, z, tolerance, basis="emulation"):
+    return strategy_for(system, Data(z, len(z)), tolerance, basis).proof
+
 
 ALPHA = Fraction(1097, 4096)
 STEP = [512] * 200
@@ -45,8 +51,8 @@ def test_the_integer_smoother_ends_three_below_its_step():
 def test_the_smoother_needs_what_a_plain_loop_over_integers_needs():
     system, z = LinearSystem.smoother("1097/4096"), np.array(STEP, float).reshape(-1, 1)
     for tolerance in (3, 0.5):
-        found = required_word_formats(system, z, tolerance, rounding="floor")
-        words = found.words
+        found = required_precision(system, z, tolerance, kind="words", rounding="floor")
+        words = found.format
         assert words is not None
         assert isinstance(words.coefficients, int)
         assert largest_error(words.data.fraction_bits, MOST_COEFFICIENT_BITS) <= tolerance
@@ -60,8 +66,8 @@ def test_the_smoother_needs_what_a_plain_loop_over_integers_needs():
 def test_no_format_of_a_biquad_can_be_lowered(basis):
     system = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"])
     z = np.sign(np.sin(np.arange(150.0) ** 1.3)).reshape(-1, 1) + 0.25
-    found = required_word_formats(system, z, 0.01, basis)
-    words, error = found.words, words_error(system, z, 0.01, basis)
+    found = required_precision(system, z, 0.01, kind="words", basis=basis)
+    words, error = found.format, words_error(system, z, 0.01, basis)
     assert words is not None
     assert found.ratio == error(words).ratio <= 1
     shorter = WordFormats(words.data, words.coefficients - 1, words.sums)
@@ -88,8 +94,8 @@ def test_the_command_answers_in_fraction_bits(tmp_path, capsys):
     printed = capsys.readouterr().out
     system = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"], "direct form I")
     z = np.ones((80, 1))
-    assert printed.startswith(f"direct form I: {required_fraction_bits(system, z, 0.01)}\n")
-    assert str(required_word_formats(system, z, 0.01)) in printed
+    assert printed.startswith(f"direct form I: {required_precision(system, z, 0.01, kind='fixed')}\n")
+    assert str(required_precision(system, z, 0.01, kind="words")) in printed
     for more, message in (
         (["--digits", "9"], "got --fixed and --digits; needed --fixed alone, which searches the fraction bits; to jud"),
         (["--emin", "0", "--emax", "9"], "got --fixed and --emin, --emax; needed --fixed alone"),

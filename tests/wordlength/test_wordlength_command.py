@@ -17,6 +17,7 @@ import pytest
 from markup import Elements
 
 from gpbnb import __main__ as top
+from gpbnb import required_precision
 from gpbnb.bounds.check import prove
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.model import LinearModel
@@ -24,7 +25,6 @@ from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength import running as command
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_filter, read_measurements, read_model
-from gpbnb.wordlength.precision import required_precision
 from gpbnb.wordlength.report import Answer, Report, study
 
 MODEL = """
@@ -62,18 +62,18 @@ def test_the_command_answers_and_writes_page_and_json(files, capsys):
     folder, z = files
     given = [str(folder / "model.toml"), "--measurements", str(folder / "z.csv"), "--tolerance", "0.01,inf"]
     assert main([*given, "--report", str(folder / "out.html")]) == 0
-    expected = required_precision(read_model(folder / "model.toml"), 60, (0.01, math.inf), z=z)
+    expected = required_precision(read_model(folder / "model.toml"), z, (0.01, math.inf))
     shown = capsys.readouterr()
     assert shown.out.strip() == str(expected)
     assert "UD, bound: " in shown.err  # progress
     found = json.loads((folder / "out.json").read_text(encoding="utf-8"))
-    assert found["digits"] == expected.precision
+    assert found["digits"] == expected.digits
     assert found["limiting"] == 0
-    assert found["errors"][0] == pytest.approx(dict(expected.tried)[expected.precision])
+    assert found["errors"][0] == pytest.approx(dict(expected.tried)[expected.digits])
     assert found["errors"][1] is None
     assert {each["label"] for each in found["answers"]} >= {"innovation, emulation", "UD, bound"}
     text = (folder / "out.html").read_text(encoding="utf-8")
-    assert f"<strong>{expected.precision} bits</strong>" in text
+    assert f"<strong>{expected.digits} bits</strong>" in text
     assert "tracker &lt;1&gt;" in text
     for outside in ("http://", "https://", "<script", "<link", "src="):
         assert outside not in text
@@ -111,7 +111,7 @@ def test_a_report_shows_the_arguments_of_the_process(files, monkeypatch, capsys)
         (["--rounding", "chop"], "rounding", "chop"),
         (["--form", "UD"], "form", "UD"),
         (["--basis", "bound", "--basis", "emulation"], "bases", ["bound", "emulation"]),
-        (["--basis", "probable", "--measurement", "9"], "within", limits(2, 1, measurement=9)),
+        (["--basis", "probable", "--measurement", "9"], "within", limits(measurement=9)),
     ],
 )
 def test_each_option_is_the_part_of_the_question_that_it_names(files, monkeypatch, options, name, value):
@@ -157,16 +157,16 @@ def test_a_guarantee_takes_limits_and_shows_them(files, capsys):
     ]
     bases = ["--basis", "guarantee", "--basis", "probable"]
     assert main([*given, *bases, "--state", "1e4,50", "--innovation", "30"]) == 0
-    model, within = read_model(folder / "model.toml"), limits(2, 1, [1e4, 50], 30)
+    model, within = read_model(folder / "model.toml"), limits(state=[1e4, 50], innovation=30)
     expected = required_precision(model, 50, (0.01, math.inf), basis="guarantee", within=within)
     probable = required_precision(model, 50, (0.01, math.inf), form="UD", basis="probable", within=within)
     assert capsys.readouterr().out.strip() == str(expected)
     found = json.loads((folder / "out.json").read_text(encoding="utf-8"))
-    assert found["digits"] == expected.precision
+    assert found["digits"] == expected.digits
     assert found["limits"] == {"state": [1e4, 50], "innovation": [30], "measurement": [None]}
     answers = {each["label"]: each["digits"] for each in found["answers"]}
-    assert answers["innovation, guarantee"] == expected.precision
-    assert answers["UD, probable"] == probable.precision
+    assert answers["innovation, guarantee"] == expected.digits
+    assert answers["UD, probable"] == probable.digits
     text = (folder / "out.html").read_text(encoding="utf-8")
     assert "<td>limit on the state</td><td>10000, 50</td>" in text
     assert "<td>limit on the measurement</td><td>any</td>" in text
@@ -174,7 +174,7 @@ def test_a_guarantee_takes_limits_and_shows_them(files, capsys):
     assert "holds for these measurements" not in text
     wider = [*given, "--basis", "guarantee", "--state", "1e8", "--innovation", "3e5"]
     assert main(wider) == 0
-    assert json.loads((folder / "out.json").read_text(encoding="utf-8"))["digits"] > expected.precision
+    assert json.loads((folder / "out.json").read_text(encoding="utf-8"))["digits"] > expected.digits
 
 
 @pytest.mark.parametrize("form", ["innovation", "UD"])
@@ -252,7 +252,7 @@ def test_a_guarantee_for_a_system_takes_limits_on_the_measurement(tmp_path, caps
     path.write_text("A = [[0.5]]\nB = [[1]]\n", encoding="utf-8")
     given = [str(path), "--tolerance", "1e-4", "--basis", "guarantee", "--report", str(tmp_path / "out.html")]
     assert main([*given, "--measurement", "2"]) == 0
-    expected = required_precision(read_model(path), 1000, 1e-4, basis="guarantee", within=limits(1, 1, measurement=2))
+    expected = required_precision(read_model(path), 1000, 1e-4, basis="guarantee", within=limits(measurement=2))
     assert capsys.readouterr().out.strip() == str(expected)
     found = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
     assert found["limits"]["measurement"] == [2]
@@ -274,7 +274,7 @@ def test_a_guarantee_for_a_system_takes_limits_on_the_measurement(tmp_path, caps
         (["--basis", "probable"], "got --basis probable with no limits; needed --state and --innovation, or --measure"),
         (["--basis", "guarantee", "--state", "5"], "needed a finite limit for each measurement, or for each state and"),
         (["--basis", "guarantee", "--state", "5,x"], "got --state 5,x; needed numbers with commas between"),
-        (["--basis", "guarantee", "--measurement", "1,2,3"], "on the measurement; needed one number, or 1"),
+        (["--basis", "guarantee", "--measurement", "1,2,3"], "got 3 limits on the measurement; needed one, or 1"),
         (["--basis", "guarantee", "--measurement=-1"], "on the measurement; needed numbers that are not negative"),
         (
             ["--state", "5", "--innovation", "1"],
@@ -369,7 +369,7 @@ def test_the_command_takes_known_inputs(files, capsys):
     given = [str(folder / "model.toml"), "--measurements", str(folder / "z.csv"), "--tolerance", "0.01,inf"]
     assert main([*given, "--inputs", str(folder / "u.csv"), "--basis", "emulation", "--form", "Cholesky"]) == 0
     model = read_model(folder / "model.toml", u)
-    expected = required_precision(model, 9, (0.01, math.inf), z=z, form="Cholesky")
+    expected = required_precision(model, z, (0.01, math.inf), form="Cholesky")
     shown = capsys.readouterr()
     assert shown.out.strip() == str(expected)
     assert "Carlson, emulation: " in shown.err

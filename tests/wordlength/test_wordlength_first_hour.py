@@ -20,24 +20,20 @@ from gpbnb import (
     NonlinearModel,
     emulate,
     guarantee,
-    limit_cycles,
     limits,
     read_model,
-    required_block_precisions,
-    required_fraction_bits,
     required_precision,
-    required_word_formats,
     survey_records,
     write_code,
 )
 from gpbnb.names import format_parts
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.judging import judge
 from gpbnb.wordlength.models import read_measurements
+from gpbnb.wordlength.required import judge
 
 WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
 SYSTEM = LinearSystem([["0.9"]], [["0.1"]])
-WITHIN = limits(1, 1, measurement=0.001)
+WITHIN = limits(measurement=0.001)
 TOML = "Phi=[[1,1],[0,1]]\nH=[[1,0]]\nQ=[[1,0],[0,1]]\nR=[[1]]\nx0=[0,0]\nP0=[[1,0],[0,1]]\n"
 
 
@@ -164,7 +160,7 @@ def test_a_digital_filter_has_named_inputs_and_outputs():
     system = read_model(given)
     assert (system.input_names, system.output_names) == (("gyro (°/s)",), ("rate (°/s)",))
     with pytest.raises(ValueError, match='input "gyro"'):
-        required_precision(system, 1, 1, z=[[math.nan]])
+        required_precision(system, [[math.nan]], 1)
     with pytest.raises(ValueError, match="states unknown; needed b and a, or sos, and perhaps structure, pairing, "):
         read_model({**given, "states": ["x"]})
 
@@ -172,49 +168,31 @@ def test_a_digital_filter_has_named_inputs_and_outputs():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (
-            lambda: guarantee(SYSTEM, BINARY32, limits(1, 1, measurement=1)),
-            "got a LinearSystem; needed a LinearModel",
-        ),
-        (lambda: guarantee(None, BINARY32, limits(1, 1, 1, 1)), "got a NoneType; needed a LinearModel"),
-        (lambda: limits(1, 1, "a", 1), "got 'a' on the state; needed numbers"),
-        (lambda: limits(0, 1, 1, 1), "got 0 states; needed a whole number, at least 1"),
-        (
-            lambda: survey_records(WALK, 3, 1, BINARY16, steps=5),
-            "got formats FloatFormat.*; needed a list",
-        ),
+        (lambda: guarantee(None, BINARY32, limits(state=1, innovation=1)), "got a NoneType; needed the path"),
+        (lambda: guarantee(SYSTEM, 32, limits(measurement=1)), "got the format 32; needed a FloatFormat"),
+        (lambda: guarantee(WALK, BINARY32, limits(measurement=1), horizon=0), "got 0 horizon; needed a whole number"),
+        (lambda: limits(state="a", innovation=1), "got 'a' on the state; needed one number for all"),
+        (lambda: limits(state=[[1]], innovation=1), r"got limits of shape \(1, 1\) on the state; needed one number"),
+        (lambda: survey_records(WALK, 3, 1, BINARY16, steps=5), "got formats FloatFormat.*; needed a list"),
         (lambda: survey_records(WALK, None, 1, [BINARY16]), "got records None; needed"),
-        (lambda: limit_cycles(SYSTEM, FixedFormat(2, 5)), "got words FixedFormat.*; needed WordFormats"),
-        (lambda: limit_cycles(WALK, FixedFormat(2, 5)), "got a LinearModel; needed a LinearSystem"),
-        (
-            lambda: required_fraction_bits(WALK, [[1]], 1),
-            "got like=None for a LinearModel; needed a FixedFormat",
-        ),
-        (lambda: required_fraction_bits(3, [[1]], 1), "got a int; needed a LinearSystem, a model or a function"),
-        (
-            lambda: required_fraction_bits(WALK, [[1]], 1, "guarantee", like=FixedFormat(2, 5)),
-            'got basis "guarantee" for .*; needed "emulation"; for a LinearModel, use guarantee',
-        ),
-        (
-            lambda: required_fraction_bits(SYSTEM, [[1]], 1, form="UD"),
-            "got the UD form; needed none: only a LinearModel or a NonlinearModel has forms",
-        ),
-        (
-            lambda: required_precision(WALK, np.ones((1000, 1)), 1),
-            r"^got steps of shape \(1000, 1\); needed a whole number; pass measurements by name: required_precision\(",
-        ),
-        (lambda: required_precision(WALK, [[0.5]] * 1000, 1), r"^got steps of shape \(1000,\); needed a whole number"),
+        (lambda: emulate(SYSTEM, [1], 32), "got the format 32; needed a FloatFormat, a FixedFormat, WordFormats"),
+        (lambda: emulate(SYSTEM, [1], "float33"), "got format 'float33'; needed one of BINARY16"),
+        (lambda: required_precision(SYSTEM, [1], 1, like="Q3.12"), 'kind="fixed" takes a FixedFormat'),
+        (lambda: required_precision(SYSTEM, [1], 1, kind="fixed", like="float32"), "needed a FixedFormat or a name"),
+        (lambda: required_precision(SYSTEM, [1], 1, kind="mixed"), "got kind 'mixed'; needed one of 'float', 'fixed'"),
+        (lambda: required_precision(SYSTEM, "u.csv", 1), "got 'u.csv' for z; needed measurements or inputs"),
+        (lambda: required_precision(3, [[1]], 1), "got a int; needed the path"),
         (
             lambda: required_precision(WALK, 5, np.ones((1000, 1))),
             r"^got a tolerance of shape \(1000, 1\); needed an error above 0 for each of the 1 states, one finite: one",
         ),
         (lambda: required_precision(WALK, 5, [1, 2]), r"^got tolerance \[1, 2\] of shape \(2,\); needed"),
         (lambda: required_precision(lambda: 1, 5, 1), "got a function that does not take .*fmt.*: .*; needed f.fmt."),
-        (lambda: required_precision(lambda f, z: 1, 5, 1), "got a function that does not take .*; needed f.fmt.* z="),
+        (lambda: required_precision(lambda f, z: 1, 5, 1), "does not take .*; needed f.fmt., or inputs in place of"),
         # options that would change nothing
         *(
             (
-                partial(answer, 5, 1, z=np.ones((5, 1)), basis=basis, within=WITHIN),
+                partial(answer, np.ones((5, 1)), 1, basis=basis, within=WITHIN),
                 f'got limits and basis "{basis}", wh',
             )
             for model in (WALK, SYSTEM)
@@ -222,12 +200,12 @@ def test_a_digital_filter_has_named_inputs_and_outputs():
             for basis in ("emulation", "bound")
         ),
         (
-            lambda: required_precision(SYSTEM, 5, 1, basis="guarantee", within=limits(5, 1, measurement=1)),
-            r"got limits of shape \(5,\) on the state; needed \(1,\)",
+            lambda: required_precision(SYSTEM, 5, 1, basis="guarantee", within=limits(measurement=[1, 2])),
+            "got 2 limits on the measurement; needed one, or 1",
         ),
         (
-            lambda: required_precision(SYSTEM, 5, 1, basis="guarantee", within=limits(1, 1, state=1, measurement=1)),
-            r"got limits on states or innovations for .*; needed limits on its inputs alone: write limits\(1, 1, meas",
+            lambda: required_precision(SYSTEM, 5, 1, basis="guarantee", within=limits(state=1, measurement=1)),
+            r"got limits on states or innovations for .*; needed limits on its inputs alone: write limits\(meas",
         ),
         (
             lambda: read_model({"b": [1], "a": [1, "0.5"], "scale": True}),
@@ -241,16 +219,15 @@ def test_a_digital_filter_has_named_inputs_and_outputs():
         (lambda: read_model(WALK, structure="cascade"), "got structure 'cascade' for a LinearModel, which is computed"),
         (lambda: read_model(SYSTEM, structure="cascade"), "got structure 'cascade' for a LinearSystem, which is comp"),
         (
-            lambda: required_fraction_bits(SYSTEM, [[1]], 1, rounding="chop", wide=True, like=FixedFormat(2, 5)),
-            "got rounding and wide beside like; needed like alone: its formats set them",
+            lambda: required_precision(SYSTEM, [[1]], 1, kind="fixed", rounding="chop", like=FixedFormat(2, 5)),
+            "got rounding beside like; needed like alone, which sets them",
         ),
         (
-            lambda: required_fraction_bits(SYSTEM, [[1]], 1, coefficient_bits=9, like=FixedFormat(2, 5)),
-            "got coefficient_bits beside like; needed like alone",
+            lambda: required_precision(SYSTEM, [[1]], 1, kind="fixed", coefficient_bits=9, like=FixedFormat(2, 5)),
+            "got coefficient_bits beside like",
         ),
         # questions that would take days
         (lambda: survey_records(WALK, 10**12, 1, [BINARY16], steps=5), "000 records; needed .* at most 1,000,000"),
-        (lambda: limits(10**9, 1, 1, 1), "got 1000000000 states; needed .* at most 65,536"),
         (
             lambda: NonlinearModel(abs, None, abs, None, [[1]], [[1]], [1], [[1]], iterations=10**9),
             "got 1000000000 iterations; needed .* at most 1,000",
@@ -268,34 +245,35 @@ def test_an_answer_is_true_if_it_meets_the_tolerance():
     z = np.ones((5, 1))
     for tolerance, met in ((0.01, True), (1e-40, False)):
         answers = [
-            required_precision(WALK, 5, tolerance, z=z),
-            judge(WALK, BINARY32, 5, tolerance, z=z),
-            required_fraction_bits(SYSTEM, z, tolerance),
-            required_block_precisions(WALK, 5, tolerance, z=z),
-            required_word_formats(SYSTEM, z, tolerance),
+            required_precision(WALK, z, tolerance),
+            judge(WALK, BINARY32, z, tolerance),
+            required_precision(SYSTEM, z, tolerance, kind="fixed"),
+            required_precision(WALK, z, tolerance, kind="blocks"),
+            required_precision(SYSTEM, z, tolerance, kind="words"),
         ]
         assert [(bool(each), each.met) for each in answers] == [(met, met)] * 5
 
 
 def test_the_header_of_written_code_holds_no_refusal(tmp_path):
-    with pytest.raises(ValueError, match=r"got limits of shape \(3,\) on the state; needed \(1,\)"):
-        write_code(WALK, BINARY32, None, tmp_path, within=limits(3, 1, measurement=1))
-    with pytest.raises(ValueError, match=r"got limits of shape \(3,\) on the state; needed \(1,\)"):
-        write_code(SYSTEM, BINARY32, None, tmp_path, within=limits(3, 1, measurement=1))
+    for model in (WALK, SYSTEM):
+        with pytest.raises(ValueError, match="got 2 limits on the measurement; needed one, or 1"):
+            write_code(model, BINARY32, tmp_path, within=limits(measurement=[1, 1]))
 
 
 @pytest.mark.parametrize("name", ["filter.h", "filter.c", "test_filter.c", "filter_vectors.txt", "Makefile"])
 def test_written_code_replaces_only_files_that_gpbnb_has_written(name, tmp_path):
     for _ in range(2):
-        paths = write_code(SYSTEM, BINARY32, None, tmp_path)
+        paths = write_code(SYSTEM, BINARY32, tmp_path)
     assert all(path.is_file() for path in paths)
     for path in paths:
         path.unlink()
     (tmp_path / name).write_text("my own\n")
     with pytest.raises(ValueError, match=f"in which {name} was not written by gpbnb; needed a folder without files"):
-        write_code(SYSTEM, BINARY32, None, tmp_path)
+        write_code(SYSTEM, BINARY32, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [name]
     assert (tmp_path / name).read_text() == "my own\n"
+    write_code(SYSTEM, BINARY32, tmp_path, overwrite=True)
+    assert (tmp_path / name).read_text() != "my own\n"
 
 
 @pytest.mark.parametrize("command", ["gpbnb.wordlength", "gpbnb wordlength"])
@@ -313,18 +291,18 @@ def test_an_error_of_the_function_itself_stays():
         return fmt.array(z, 1, 2, 3, 4)
 
     with pytest.raises(TypeError, match="positional arguments but"):
-        required_precision(run, 2, 1, z=[[1], [2]])
+        required_precision(run, [[1], [2]], 1)
 
 
 def test_an_overflow_names_the_numbers_that_are_too_large():
     with pytest.raises(OverflowError, match=r"^measurements: entry \[1, 0\]: got a result of about 2\*\*"):
         emulate(WALK, [[1], [1e6]], BINARY16)
-    found = judge(WALK, BINARY16, 2, 1, z=[[1.0], [1e6]])
+    found = judge(WALK, BINARY16, [[1.0], [1e6]], 1)
     assert "measurements: entry [1, 0]: got a result" in str(found)
     large = LinearSystem([["0.5"]], [["0.25"]], C=[[3]], state_names=["level"])
-    assert "coefficient C1_1: got a result of about 3" in str(judge(large, FixedFormat(0, 15), 2, 1, z=[[0], [0]]))
+    assert "got C1_1 = 3, beyond the range" in str(judge(large, FixedFormat(0, 15), [[0], [0]], 1))
     sections = LinearSystem.from_coefficients([1, 2, 1], [1, "-1.5", "0.75"])
-    assert "coefficient b0: got a result of about 1" in str(judge(sections, FixedFormat(0, 15), 2, 1, z=[[0], [0]]))
+    assert "got b0 = 1, beyond the range" in str(judge(sections, FixedFormat(0, 15), [[0], [0]], 1))
 
 
 def test_fraction_bits_of_a_kalman_filter_end_with_the_compiled_loops():
@@ -333,20 +311,20 @@ def test_fraction_bits_of_a_kalman_filter_end_with_the_compiled_loops():
         [[1, "0.1"], [0, 1]], [[1, 0]], [["1e-4", 0], [0, "0.01"]], [["0.01"]], [0, 0], np.eye(2) * 99
     )
     z = np.arange(20).reshape(-1, 1) / 100
-    found = required_fraction_bits(tracker, z, 1e-2, like=FixedFormat(8, 8), form="UD")
+    found = required_precision(tracker, z, 1e-2, kind="fixed", like=FixedFormat(8, 8), form="UD")
     assert not found.met
     assert max(digits for digits, _ in found.tried) == 43
-    reason = emulate(tracker, z, FixedFormat(8, 20), "UD").reason
+    reason = emulate(tracker, z, FixedFormat(8, 20), form="UD").reason
     assert "use more integer bits" in reason
     most = "43 fraction bits are the most with compiled loops"
     assert found.why == f"43 fraction bits fail: the run is refused: {reason}; {most}"
-    assert required_fraction_bits(tracker, z, 1e-2, like=FixedFormat(30, 8), form="UD").met
+    assert required_precision(tracker, z, 1e-2, kind="fixed", like=FixedFormat(30, 8), form="UD").met
     with pytest.raises(ValueError, match="got 60 bits in fixed point; needed at most 51 for compiled loops"):
-        required_fraction_bits(tracker, z, 1e-2, like=FixedFormat(60, 8), form="UD")
+        required_precision(tracker, z, 1e-2, kind="fixed", like=FixedFormat(60, 8), form="UD")
 
 
 def test_a_format_too_small_for_the_model_misses_by_a_guarantee_as_by_emulation():
     wide = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [["1e6"]])
-    found = judge(wide, BINARY16, 2, 1, basis="guarantee", within=limits(1, 1, 10, 10))
+    found = judge(wide, BINARY16, 2, 1, basis="guarantee", within=limits(state=10, innovation=10))
     assert not found.met
     assert found.why.startswith("overflow: P0: entry [0, 0]: got a result of about 2**19; needed at most 65504")

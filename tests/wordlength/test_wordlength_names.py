@@ -110,20 +110,20 @@ def test_messages_name_the_state():
             grown, x0=[0, "1e200"], A=[[0, 0], [0, "0.5"]], C=[[0, "1e160"]], D=[[0]], output_names=["speed (m/s)"]
         ).outputs([[0]] * 3)
     with pytest.raises(ValueError, match='got inf for measurement "range" of step 2'):
-        required_precision(CART, 3, 0.1, z=[[1], [math.inf], [2]])
+        required_precision(CART, [[1], [math.inf], [2]], 0.1)
 
 
 def test_a_process_that_never_settles_is_told_what_to_ask_instead():
     integrator = LinearSystem([[1]], [["0.1"]], state_names=["charge (C)"])
-    found = required_precision(integrator, 3, 0.1, basis="probable", within=limits(1, 1, measurement=1))
+    found = required_precision(integrator, 3, 0.1, basis="probable", within=limits(measurement=1))
     assert 'mostly in state "charge", so that an error of rounding never decays; ask with basis "bound"' in str(found)
     lost = LinearModel(
         [[1, 0], [0, 1]], [[1, 0]], [["0.01", 0], [0, 0]], [[1]], [0, 0], np.eye(2), state_names=["a (m)", "b (m)"]
     )
-    found = required_precision(lost, 3, 0.1, basis="probable", within=limits(2, 1, 10, 10), largest=3)
+    found = required_precision(lost, 3, 0.1, basis="probable", within=limits(state=10, innovation=10), highest=3)
     assert 'mostly in state "b"; ask with basis "bound" for a number of steps instead' in str(found)
     with pytest.raises(ValueError, match='got nan for input "u" of step 2; needed a finite number'):
-        required_precision(replace(integrator, input_names=["u (A)"]), 2, 0.1, z=[[1], [math.nan]])
+        required_precision(replace(integrator, input_names=["u (A)"]), [[1], [math.nan]], 0.1)
 
 
 def test_a_model_file_has_names(tmp_path):
@@ -144,7 +144,7 @@ def test_a_question_reads_what_read_model_reads(tmp_path):
     control = pytest.importorskip("control")
     z = np.arange(6.0).reshape(-1, 1) / 8
     matrices = [[0.5]], [[1.0]], [[1.0]], [[0.0]]
-    expected = required_precision(LinearSystem(*matrices), 6, 0.01, z=z)
+    expected = required_precision(LinearSystem(*matrices), z, 0.01)
     (tmp_path / "system.toml").write_text("A = [[0.5]]\nB = [[1]]\n")
     for given in (
         dlti(*matrices, dt=1),
@@ -153,6 +153,6 @@ def test_a_question_reads_what_read_model_reads(tmp_path):
         str(tmp_path / "system.toml"),
         {"A": [[0.5]], "B": [[1]]},
     ):
-        assert required_precision(given, 6, 0.01, z=z) == expected
+        assert required_precision(given, z, 0.01) == expected
     with pytest.raises(TypeError, match="got a int; needed the path of a TOML file"):
         required_precision(7, 6, 0.01)

@@ -24,9 +24,9 @@ from gpbnb.report import ledger_options
 from gpbnb.report.ledger.render import FORMATS
 from gpbnb.wordlength import options, running
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.report import Question, study
-from gpbnb.wordlength.requirement import Basis
+from gpbnb.wordlength.required import judge
 
 SYSTEM = 'A = [[0.875]]\nB = [[0.125]]\ninputs = ["sensor (V)"]\noutputs = ["level (V)"]\n'
 FILTER = "Phi = [[1]]\nH = [[1]]\nQ = [[0.01]]\nR = [[1]]\nx0 = [0]\nP0 = [[1]]\n"
@@ -229,10 +229,10 @@ def test_a_system_runs_with_simulated_inputs(folder, capsys):
 
 def test_a_judged_format_meets_the_tolerance_where_a_search_finds_fewer_digits(folder, capsys):
     system, u = LinearSystem([["0.875"]], [["0.125"]]), simulated_inputs("noise", 1, 60, 1)
-    ratio = judge(system, BINARY32, 60, 1e-3, z=u).ratio
-    found = dict(gpbnb.required_precision(system, 60, 1e-3, rounding="even", z=u).tried)
+    ratio = judge(system, BINARY32, u, 1e-3).ratio
+    found = dict(gpbnb.required_precision(system, u, 1e-3, rounding="even").tried)
     assert ratio == found[24]
-    assert judge(system, BFLOAT16, 60, 1e-3, z=u).ratio > 1
+    assert judge(system, BFLOAT16, u, 1e-3).ratio > 1
     given = [str(folder / "system.toml"), "--tolerance", "1e-3", "--simulate", "noise", "--steps", "60"]
     assert main([*given, "--format", "binary32"]) == 0
     assert capsys.readouterr().out == f"BINARY32 meets the tolerance: {ratio:.2g} of it, observed in 60 steps\n"
@@ -240,9 +240,9 @@ def test_a_judged_format_meets_the_tolerance_where_a_search_finds_fewer_digits(f
     assert "BFLOAT16 misses the tolerance: " in capsys.readouterr().out
     assert main([*given, "--format", "fixed -3.20"]) == 1
     assert "misses the tolerance, in a run of 60 steps: " in capsys.readouterr().out
-    within = limits(1, 1, measurement=9)
+    within = limits(measurement=9)
     bounds = [
-        judge(system, BINARY32, 60, 1e-3, basis=basis, z=u, within=None if basis == "bound" else within)
+        judge(system, BINARY32, u, 1e-3, basis=basis, within=None if basis == "bound" else within)
         for basis in ("bound", "guarantee", "probable")
     ]
     assert bounds[0].ratio > ratio

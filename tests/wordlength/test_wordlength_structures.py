@@ -17,7 +17,7 @@ from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, run_words
 from gpbnb.wordlength import models
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.fixed_point import required_fraction_bits, with_fraction_bits
+from gpbnb.wordlength.fixed import exact_sums, with_fraction_bits
 from gpbnb.wordlength.models import DESIGN, read_filter, read_model
 
 SOS = signal.butter(4, 0.1, output="sos")
@@ -184,10 +184,10 @@ def test_designs_that_are_refused(given, message):
 
 def test_an_unstable_filter_has_a_cause():
     system = LinearSystem.from_coefficients([1], [1, "-1.01"])
-    found = required_precision(system, 20, 1e-30, z=np.ones((20, 1)), basis="bound")
-    assert found.precision is None
+    found = required_precision(system, np.ones((20, 1)), 1e-30, basis="bound")
+    assert found.digits is None
     assert "the system as given is not stable, since A has an eigenvalue of size 1.01" in str(found)
-    assert required_precision(system, 20, 0.01, z=np.ones((20, 1)), basis="bound").ends
+    assert required_precision(system, np.ones((20, 1)), 0.01, basis="bound").steps == 20
 
 
 @pytest.mark.parametrize("structure", ["direct form I", "cascade", "lattice"])
@@ -262,17 +262,17 @@ def test_fraction_bits_of_a_system(structure):
     u = np.random.default_rng(0).uniform(-1, 1, (300, 1))
     system = FilterDesign(sos=SOS).system(structure)
     like = WordFormats(FixedFormat(12, 1), FixedFormat(6, 24), FixedFormat(16, 13, overflow="wrap"))
-    observed = required_fraction_bits(system, u, 1e-3, like=like)
-    proved = required_fraction_bits(system, u, 1e-3, "guarantee", like=like)
-    assert observed.words == with_fraction_bits(like, observed.fmt.fraction_bits)
-    assert observed.words.sums.fraction_bits == observed.fmt.fraction_bits + 12
-    assert observed.fmt.fraction_bits <= proved.fmt.fraction_bits <= observed.fmt.fraction_bits + 8
+    observed = required_precision(system, u, 1e-3, kind="fixed", like=like)
+    proved = required_precision(system, u, 1e-3, kind="fixed", basis="guarantee", like=like)
+    assert observed.format == with_fraction_bits(like, observed.digits)
+    assert observed.format.sums.fraction_bits == observed.digits + 12
+    assert observed.digits <= proved.digits <= observed.digits + 8
     for bits, ratio in observed.tried:
         if math.isfinite(ratio):
             found = run_words(system, u, with_fraction_bits(like, bits)).outputs(1) - system.outputs(u)
             assert ratio == pytest.approx(float(np.abs(found.sum(axis=-1)).max() / 1e-3), rel=1e-9)
-    errors = WordGuarantee(system, np.abs(u).max()).errors(proved.words)
-    assert dict(proved.tried)[proved.fmt.fraction_bits] == pytest.approx(errors[0] / 1e-3)
+    errors = WordGuarantee(system, np.abs(u).max()).errors(proved.format)
+    assert dict(proved.tried)[proved.digits] == pytest.approx(errors[0] / 1e-3)
     assert errors[0] <= 1e-3
 
 
@@ -280,11 +280,10 @@ def test_one_rounding_in_a_sum_saves_bits():
     """Nine products in one sum: nine roundings of half a unit against one."""
     u = np.ones((20, 1))
     system = LinearSystem.from_coefficients(signal.firwin(9, 0.3), structure="FIR")
-    single, wide = (
-        required_fraction_bits(system, u, 1e-3, "guarantee", coefficient_bits=20, wide=each) for each in (False, True)
-    )
-    assert single.fmt.fraction_bits > wide.fmt.fraction_bits
-    formats = [with_fraction_bits(each.words, 12) for each in (single, wide)]
+    likes = (WordFormats(FixedFormat(1, 20), 20), exact_sums(system.as_filter(), FixedFormat(1, 20), 20))
+    single, wide = (required_precision(system, u, 1e-3, kind="fixed", basis="guarantee", like=each) for each in likes)
+    assert single.digits > wide.digits
+    formats = [with_fraction_bits(each.format, 12) for each in (single, wide)]
     errors = [WordGuarantee(system, 1.0).errors(each)[0] for each in formats]
     assert errors[0] - errors[1] == pytest.approx(8 / 2 / 2**12, rel=2.0**-19)  # a claim has a margin of 2**-20
 
@@ -298,9 +297,8 @@ def test_fraction_bits_of_a_function():
         return found
 
     z = np.random.default_rng(1).uniform(-1, 1, 60)
-    found = required_fraction_bits(smoother, z, 1e-3, like=FixedFormat(2, 1))
-    system = required_fraction_bits(LinearSystem.smoother("0.3"), z[:, None], 1e-3, like=FixedFormat(2, 1))
-    assert found.fmt == system.fmt
+    found = required_precision(smoother, z, 1e-3, kind="fixed", like=FixedFormat(2, 1))
+    system = required_precision(LinearSystem.smoother("0.3"), z[:, None], 1e-3, kind="fixed", like=FixedFormat(2, 1))
+    assert found.format == system.format
     assert [ratio for _, ratio in found.tried] == pytest.approx([ratio for _, ratio in system.tried], rel=1e-6)
-    with pytest.raises(ValueError, match="got like=None for a function; needed a FixedFormat"):
-        required_fraction_bits(smoother, z, 1e-3)
+    assert required_precision(smoother, z, 1e-3, kind="fixed").digits == found.digits

@@ -11,6 +11,7 @@ import pytest
 import small_filter
 from tabulated import by_header
 
+from gpbnb import Requirement, required_precision
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.inverse import smallest_precision
@@ -23,8 +24,7 @@ from gpbnb.report.guarantees import table as guarantees
 from gpbnb.report.integration.theory import needed_precision
 from gpbnb.report.wordlengths import study, tables
 from gpbnb.wordlength import examples, ranges
-from gpbnb.wordlength.precision import required_precision, survey
-from gpbnb.wordlength.requirement import Requirement
+from tests.surveying import survey
 
 TILT = examples.tilt()
 Z = examples.tilt_measurements(300)
@@ -86,7 +86,7 @@ def test_growth_answers_for_the_first_steps():
     z = year.simulation(year.MODELS[0]).measurements(12)
     tolerance = [1] * 4 + [math.inf] * 6
     (found,) = study.required_precision_by_steps(model, z, tolerance, [12], form=Form.UD)
-    assert found == required_precision(model, 12, tolerance, form=Form.UD, z=z)
+    assert found == required_precision(model, z, tolerance, form=Form.UD)
 
 
 def test_growth_knows_nothing_of_what_comes_later():
@@ -97,7 +97,7 @@ def test_growth_knows_nothing_of_what_comes_later():
     z[6] = 1e6
     later = LinearModel(Phi, H, [calm] * 6 + [thin], R, [3, -1], P0)
     for basis in ("emulation", "bound"):
-        alone = [required_precision(model, k, 1e-4, basis=basis, z=z[:k]) for k in (2, 6)]
+        alone = [required_precision(model, z[:k], 1e-4, basis=basis) for k in (2, 6)]
         assert study.required_precision_by_steps(later, z, 1e-4, (2, 6), basis=basis) == tuple(alone)
         assert study.required_precision_by_steps(later, z, 1e-4, (7,), basis=basis)[0].tried != alone[1].tried
 
@@ -105,7 +105,7 @@ def test_growth_knows_nothing_of_what_comes_later():
 def test_growth_grows():
     found = study.required_precision_by_steps(TILT, Z, TOLERANCE, (10, 300), basis="bound")
     assert [each.steps for each in found] == [10, 300]
-    assert found[0].fmt.precision < found[1].fmt.precision
+    assert found[0].digits < found[1].digits
     assert {each.basis for each in found} == {"bound"}
 
 
@@ -165,8 +165,8 @@ def test_a_companion_bounds_closely():
 def test_a_companion_where_the_running_bound_says_nothing():
     model, z = examples.precise_tracker(), np.full((20, 1), 1.0)
     assert survey(model, z, 0.01, [40], basis="bound") == ((40, math.inf),)
-    found = required_precision(model, 20, 0.01, basis="bound", z=z)
-    last = max(digits for digits, ratio in found.tried if math.isinf(ratio) and digits < found.precision)
+    found = required_precision(model, z, 0.01, basis="bound")
+    last = max(digits for digits, ratio in found.tried if math.isinf(ratio) and digits < found.digits)
     assert last >= 40
     assert found.why == f"in {last} bits the bound says nothing"
     error, bound = study.companion_run(model, z, FloatFormat(2, 40))

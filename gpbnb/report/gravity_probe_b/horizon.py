@@ -21,7 +21,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.bounds.gains import check_deterministic, packed_coefficients
-from gpbnb.bounds.guarantee import check_limits, limits
+from gpbnb.bounds.guarantee import limits, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.units import stored_sizes
 from gpbnb.filters.forms import Form
@@ -117,7 +117,7 @@ def bounds_in_blocks(
     model.refuse_inputs("bounds in blocks")
     model.check_steps(steps)
     stored = model.rounded(fmt)
-    _check(stored, within, assumed)
+    within = _sized(stored, within, assumed)
     block = stored.cycle if block is None else block
     run, true = (
         Run(model, fmt, form, range(1, block + 1)),
@@ -152,10 +152,10 @@ def bounds_in_blocks(
         yield done, [HorizonBounds(one.worst, one.last, one.parts) for one in each]
 
 
-def _check(stored: LinearModel, within: Sequence[FilterLimits], assumed: Sequence[Any]) -> None:
-    """Reject limits that are not finite, and assumed errors of another shape."""
-    for limit, error in zip(within, assumed, strict=True):
-        check_limits(limit, stored.n, stored.m, stored.x0)
+def _sized(stored: LinearModel, within: Sequence[FilterLimits], assumed: Sequence[Any]) -> list[FilterLimits]:
+    """Return limits with one entry each; reject those that are not finite, and assumed errors of another shape."""
+    found = [sized_limits(limit, stored.n, stored.m, stored.x0) for limit in within]
+    for limit, error in zip(found, assumed, strict=True):
         if not (np.isfinite(limit.state).all() and np.isfinite(limit.innovation).all()):
             raise ValueError(
                 f"got limits {limit.state} on the state and {limit.innovation} on the innovation; needed finite ones: "
@@ -163,6 +163,7 @@ def _check(stored: LinearModel, within: Sequence[FilterLimits], assumed: Sequenc
             )
         if np.shape(error) != (stored.n,):
             raise ValueError(f"got assumed errors of shape {np.shape(error)}; needed ({stored.n},), one for each state")
+    return found
 
 
 def _begun(fmt: FloatFormat, within: Sequence[FilterLimits], assumed: Sequence[Any]) -> list[_Carried]:
@@ -286,7 +287,7 @@ def gravity_probe_b_bounds(
     precision: int, steps: int = YEAR, saved: Path | None = None
 ) -> Iterator[tuple[int, list[HorizonBounds]]]:
     """Yield bounds for a year of Gravity Probe B in a binary format, first for absolute states, then for deviations."""
-    within = [limits(10, 2, state=state, innovation=INNOVATION) for state in (ABSOLUTE, DEVIATION)]
+    within = [limits(state=state, innovation=INNOVATION) for state in (ABSOLUTE, DEVIATION)]
     assumed = [1e-2 * np.array(state) for state in (ABSOLUTE, DEVIATION)]
     fmt = FloatFormat(2, precision)
     return bounds_in_blocks(year_model(MODELS[0], 2), fmt, within, assumed, steps, saved=saved)

@@ -21,7 +21,7 @@ from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.table import CASES, FORMAT, case_guarantee
 from gpbnb.sweeps import Column, Sweep
 from gpbnb.wordlength.examples import cyclic, tracker
-from gpbnb.wordlength.precision import required_precision
+from gpbnb.wordlength.required import required_precision
 
 COMMAND = "python -m gpbnb.report.guarantees.certificates"
 SLOW = ("altimeter", "tilt filter", "ten states")
@@ -56,21 +56,21 @@ class CheckedCertificate(NamedTuple):
 
 def _cyclic() -> Guarantee:
     """The filter with ten states of the chapter, in the UD form, whose gain repeats."""
-    return guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(10, 2, state=100, innovation=10), Form.UD)
+    return guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(state=100, innovation=10), form=Form.UD)
 
 
 def tracker_guarantee(factor: int = 1, fmt: FloatFormat = FORMAT) -> Guarantee:
     """The tracker of the chapter, with limits that are wider by a factor."""
-    return guarantee(tracker(), fmt, limits(2, 1, state=[factor * 1000, factor * 30], innovation=factor * 8))
+    return guarantee(tracker(), fmt, limits(state=[factor * 1000, factor * 30], innovation=factor * 8))
 
 
 def _within_a_centimetre() -> Guarantee:
     """The tracker in the least precision that keeps its errors within 0.01."""
-    within = limits(2, 1, state=[1000, 30], innovation=8)
+    within = limits(state=[1000, 30], innovation=8)
     answer = required_precision(tracker(), 1, [0.01, 0.01], basis="guarantee", within=within)
-    if not isinstance(answer.fmt, FloatFormat):
+    if not isinstance(answer.format, FloatFormat):
         raise ArithmeticError(f"got {answer}; needed a precision that meets the tolerance")
-    return tracker_guarantee(fmt=answer.fmt)
+    return tracker_guarantee(fmt=answer.format)
 
 
 def guarantees() -> dict[str, Callable[[], Guarantee]]:

@@ -71,9 +71,9 @@ def draw(seed: int) -> Drawn:
             return Drawn(kind, model, fmt, form, limited, reached, Z)
         limited = "measurement"
     if limited == "measurement":
-        within = limits(n, m, measurement=Z)
+        within = limits(measurement=Z)
     else:
-        within = limits(n, m, state=X, innovation=V, measurement=Z if limited == "all" else math.inf)
+        within = limits(state=X, innovation=V, measurement=Z if limited == "all" else math.inf)
     return Drawn(kind, model, fmt, form, limited, within, Z)
 
 
@@ -88,7 +88,7 @@ def _reached(model: LinearModel, fmt: FloatFormat, Z: NDArray[np.float64]) -> Fi
     first = np.maximum(np.abs(stored.x0.astype(np.float64)), np.abs(model.x0.astype(np.float64)))
     innovation = np.abs(innovations(stored, true, z.astype(np.float64)))
     X = np.maximum(np.abs(true).max(axis=0), first)
-    return limits(model.n, model.m, state=X * (1 + 2.0**-30), innovation=innovation.max(axis=0) * (1 + 2.0**-30))
+    return limits(state=X * (1 + 2.0**-30), innovation=innovation.max(axis=0) * (1 + 2.0**-30))
 
 
 def _format(rng: np.random.Generator) -> FloatFormat:

@@ -245,9 +245,9 @@ def examine(seed: int) -> ScalarRow:
     given = draw(seed)
     fmt = given.fmt
     about = (seed, fmt.precision, fmt.rounding.value, int(fmt.subnormal), given.form.name.lower())
-    within = limits(1, 1, measurement=float(given.limit))
+    within = limits(measurement=float(given.limit))
     try:
-        found = guarantee(given.model, fmt, within, given.form, most=LONGEST)
+        found = guarantee(given.model, fmt, within, form=given.form, most=LONGEST)
     except (ValueError, ArithmeticError):
         return ScalarRow(*about, "no bound for ever", 0, "0", "0", "0")
     if not found.for_ever:

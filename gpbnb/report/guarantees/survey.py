@@ -61,7 +61,7 @@ def compute(seed: int) -> SurveyRow:
     fmt = FloatFormat(base, precision, list(Rounding)[int(rng.integers(2))])
     A, B = np.round(A * 2**20) / 2**20, np.round(B * 2**20) / 2**20
     Z = 10.0 ** rng.uniform(-2, 3, m)
-    found = from_schedule(filter_schedule(state_space(A, B), fmt), limits(n, m, measurement=Z))
+    found = from_schedule(filter_schedule(state_space(A, B), fmt), limits(measurement=Z))
     if not found.for_ever:  # rounded to few digits, the loop may be unstable
         return SurveyRow(seed, n, m, base, precision, fmt.rounding.value, f"{found.radius:.4f}", 0, "0", "0", "0")
     F, steer, worst = closed_loops(found.schedule), np.zeros((m, n + 1)), [0.0, 0.0, 0.0]

@@ -36,9 +36,9 @@ from gpbnb.report.guarantees.published import (
     px4_landing_target,
 )
 from gpbnb.sweeps import Column, Sweep
+from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.examples import TILT_STATES, altimeter, tilt, tracker
-from gpbnb.wordlength.precision import required_precision
-from gpbnb.wordlength.requirement import Basis
+from gpbnb.wordlength.required import required_precision
 
 FILE = Path(__file__).with_name("guarantees.csv")
 FORMAT = FloatFormat(2, 24)
@@ -230,12 +230,12 @@ def case_guarantee(
     """Compute the guarantee of a case, whose filter is `made`, in a format; or only guess it."""
     bounded, of_filter = (guarantee, from_schedule) if proved else (guessed, from_guess)
     if isinstance(made, LinearModel):
-        within = limits(made.n, made.m, state=case.state, innovation=case.innovation)
+        within = limits(state=case.state, innovation=case.innovation)
         if case.horizon is not None:
             return bounded(made, fmt, within, case.form, most=case.horizon, horizon=case.horizon)
         return bounded(made, fmt, within, case.form, most=100_000, horizon=1)
     schedule = filter_schedule(made, fmt)
-    return of_filter(schedule, limits(schedule.program.n, schedule.program.m, measurement=case.measurement))
+    return of_filter(schedule, limits(measurement=case.measurement))
 
 
 def _bits(
@@ -251,7 +251,7 @@ def _bits(
         if not isinstance(made, LinearModel):
             return ""
         answer = required_precision(made, case.horizon or RECORD, list(tolerance), basis=basis, form=case.form)
-        return str(answer.fmt.precision) if answer.fmt else ""
+        return str(answer.digits) if answer.met else ""
     if basis == "probable" and finite:
         return ""
 

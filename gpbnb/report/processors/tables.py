@@ -16,7 +16,7 @@ from gpbnb.arithmetic.named import rounding_text
 from gpbnb.bounds.words import largest_rounding
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.processors.experiment import Processor, ProcessorResult, Sum
-from gpbnb.wordlength.fixed_point import ScaledFilter, bound_per_unit, emulated, integer_bits
+from gpbnb.report.processors.scaled import ScaledFilter, bound_per_unit, emulated, integer_bits
 
 
 def outcomes(found: Mapping[str, Sequence[ProcessorResult]], state: int = 0) -> Table:

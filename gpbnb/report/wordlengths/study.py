@@ -23,8 +23,8 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.report.kalman import report_bounds
-from gpbnb.wordlength.precision import required_precision
-from gpbnb.wordlength.requirement import Requirement
+from gpbnb.wordlength.answer import Requirement
+from gpbnb.wordlength.required import required_precision
 
 Curve = Sequence[tuple[int, float]]
 """Steps, and a number at each."""
@@ -33,7 +33,7 @@ Curve = Sequence[tuple[int, float]]
 def required_precision_by_steps(
     model: LinearModel, z: NDArray[Any], tolerance: float | Sequence[float], steps: Sequence[int], **options: Any
 ) -> tuple[Requirement, ...]:
-    """Return answers of :func:`gpbnb.wordlength.precision.required_precision` for several numbers of first steps.
+    """Return answers of :func:`gpbnb.required_precision` for several numbers of first steps.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def required_precision_by_steps(
     """
     if not all(1 <= k <= len(z) for k in steps):
         raise ValueError(f"got steps {list(steps)} and {len(z)} measurements; needed from 1 to {len(z)} steps")
-    return tuple(required_precision(_first(model, k), k, tolerance, z=z[:k], **options) for k in steps)
+    return tuple(required_precision(_first(model, k), z[:k], tolerance, **options) for k in steps)
 
 
 def _first(model: LinearModel, steps: int) -> LinearModel:
@@ -100,7 +100,7 @@ def update_stagnation(
 ) -> tuple[UpdateStagnation, ...]:
     """Measure how much the updates of a slow state stagnate in several formats.
 
-    Errors are defined as in :func:`gpbnb.wordlength.precision.survey`.
+    Errors are defined as in :func:`gpbnb.survey_records`.
 
     Parameters
     ----------

@@ -1,0 +1,159 @@
+"""Guarantees and limit cycles of models of any kind that have them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_named
+from gpbnb.bounds import guarantee as of_filters
+from gpbnb.bounds import limit_cycles as cycles
+from gpbnb.bounds.guarantee import Guarantee
+from gpbnb.bounds.guess import FilterLimits
+from gpbnb.bounds.limit_cycles import LimitCycles
+from gpbnb.bounds.system import output_errors, output_proof
+from gpbnb.bounds.words import WordGuarantee
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import whole_number
+from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.words import WordFormats
+from gpbnb.wordlength.answer import format_in_words
+from gpbnb.wordlength.models import ModelSource
+from gpbnb.wordlength.strategies import largest_inputs
+from gpbnb.wordlength.tasks import admitted
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OutputGuarantee:
+    """A bound on the errors of the outputs of a linear system, for all inputs within limits.
+
+    Parameters
+    ----------
+    bound : (p,), bound of the error of each output; infinite if there is none.
+    steps : None if the bound holds for ever; otherwise the number of steps for which it holds.
+    why : why the bound does not hold for ever; empty if it does.
+    format : the format or formats.
+    text : what was proved, as JSON; empty if there is no bound, or if the system limits its values.
+    """
+
+    bound: NDArray[np.float64]
+    steps: int | None
+    why: str
+    format: FloatFormat | FixedFormat | WordFormats
+    text: str = ""
+
+    @property
+    def for_ever(self) -> bool:
+        """Whether the bound holds for any number of steps."""
+        return self.steps is None
+
+    def certificate(self) -> str:
+        """Return what was proved as JSON, which :mod:`gpbnb.bounds.check` verifies without the rest of this package.
+
+        Raises
+        ------
+        ValueError : there is no bound, or the system limits its values.
+        """
+        if not self.text:
+            raise ValueError(
+                f"got no certificate for the bound {self.bound}: {self.why or 'the system limits its values'}"
+            )
+        return self.text
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{each:.3g}" for each in self.bound)
+        time = "for ever" if self.for_ever else f"for {self.steps} steps only, because {self.why}"
+        return f"within {numbers} {time}; in {format_in_words(self.format)}"
+
+
+def guarantee(
+    model: ModelSource,
+    fmt: FloatFormat | FixedFormat | WordFormats | str,
+    within: FilterLimits,
+    *,
+    form: Form | str | None = None,
+    horizon: int = 1_000,
+    most: int | None = None,
+) -> Guarantee | OutputGuarantee:
+    """Bound the effect of rounding on a Kalman filter or a linear system, for all admissible measurements or inputs.
+
+    Parameters
+    ----------
+    model : a Kalman filter without known inputs, or a linear system, as :func:`gpbnb.read_model` reads them.
+    fmt : a format or its name; for a linear system also :class:`gpbnb.WordFormats`.
+    within : limits from :func:`gpbnb.limits`; those of a linear system are limits on its inputs, `measurement`.
+    form : form of a Kalman filter, by default the innovation form.
+    horizon : the number of steps that the bound covers if no bound holds for ever.
+    most : the largest number of steps to emulate while the gain of a filter settles; see
+        :func:`gpbnb.bounds.guarantee.guarantee`, which lists the assumptions, too.
+
+    Raises
+    ------
+    ValueError : a model without guarantees, where the message says what to use; limits for another model.
+    TypeError : `within` is not a result of ``limits``, or `fmt` is not a format.
+
+    Examples
+    --------
+    >>> from gpbnb import LinearSystem, limits
+    >>> guarantee(LinearSystem.smoother("1/8"), "float32", limits(measurement=10))
+    within 5.44e-06 for ever; in BINARY32
+    """
+    given = admitted(model, "have a guarantee", "" if form is None else "have a form")
+    named: Any = format_named(fmt)
+    horizon = whole_number("horizon", horizon)
+    if most is not None:
+        whole_number("most", most)
+    if isinstance(given, LinearModel):
+        return of_filters.guarantee(given, named, within, form or Form.INNOVATION, most, horizon)
+    if not isinstance(named, (FloatFormat, FixedFormat, WordFormats)):
+        raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat, WordFormats, or a name")
+    return _of_system(given, named, largest_inputs(given, within), horizon)
+
+
+def _of_system(system: LinearSystem, fmt: Any, largest: NDArray[np.float64], horizon: int) -> OutputGuarantee:
+    linear = system.as_filter().program.is_linear
+    why = system.unstable() if linear else ""
+    steps = horizon if why else None
+    for tried in (steps, horizon) if not linear else (steps,):
+        try:
+            if isinstance(fmt, WordFormats):
+                proof = WordGuarantee(system, largest, tried).proof(fmt)
+            elif linear:
+                proof = output_proof(system, fmt, largest, tried)
+            else:
+                return OutputGuarantee(output_errors(system, fmt, largest, tried), tried, why, fmt)
+            return OutputGuarantee(proof.bound[system.n :], tried, why, fmt, proof.text)
+        except (ValueError, OverflowError) as error:
+            why = str(error)
+    return OutputGuarantee(np.full(system.p, np.inf), 0, why, fmt)
+
+
+def limit_cycles(
+    system: ModelSource,
+    fmt: WordFormats | FixedFormat | str,
+    u: Any = 0,
+    *,
+    most: int | None = None,
+    everywhere: bool = False,
+) -> LimitCycles:
+    """Find every limit cycle in which a fixed-point filter can end when its input is constant.
+
+    Parameters
+    ----------
+    system : a stable linear system, in any structure.
+    fmt : the format of all numbers, or :class:`gpbnb.WordFormats` for data, coefficients and sums.
+    u, most, everywhere : as for :func:`gpbnb.bounds.limit_cycles.limit_cycles`.
+
+    Raises
+    ------
+    ValueError, TypeError, OverflowError : as for that function.
+    """
+    given, named = admitted(system, "be searched for limit cycles"), format_named(fmt)
+    words = WordFormats(named) if isinstance(named, FixedFormat) else named
+    return cycles.limit_cycles(given, words, u, cycles.MOST_STATES if most is None else most, everywhere)

@@ -1,0 +1,200 @@
+"""One run of a model of any kind, with every operation rounded, and its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.conversion import Numbers
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_named
+from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.array_forms import AnyForm
+from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel, stored_measurements
+from gpbnb.filters.named import form_named
+from gpbnb.filters.nonlinear import NonlinearModel
+from gpbnb.filters.nonlinear_run import opened, true_states
+from gpbnb.filters.smoothing import FixedIntervalSmoother
+from gpbnb.filters.system import LinearSystem, system_inputs
+from gpbnb.filters.words import WordFormats
+from gpbnb.wordlength.answer import format_in_words
+from gpbnb.wordlength.functions import STOPS, exact_outputs, function_strategy, outputs_of
+from gpbnb.wordlength.models import ModelSource
+from gpbnb.wordlength.strategies import measured, system_pairs
+from gpbnb.wordlength.strategy import AnyFormat, Data, Function
+from gpbnb.wordlength.tasks import admitted, data_of
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EmulatedRun:
+    """A run in a format, with the error of each number.
+
+    Parameters
+    ----------
+    format : the format or formats.
+    x : (steps, n), estimates or states after each step, in the format; None for a function.
+    y : (steps, p), outputs in the format; None for a Kalman filter.
+    errors : (steps, n or p), computed estimates or outputs minus those of the reference.
+    reason : what ended the run early, such as "overflow in the gain at step 812"; otherwise empty. Only the steps
+        before are there.
+    indefinite : the first step at which a computed variance was not positive; None if there is none.
+    form : form of a Kalman filter.
+    repairs : changes of covariances that would otherwise be indefinite, each as text.
+    """
+
+    format: AnyFormat
+    x: FloatArray | None
+    y: FloatArray | None
+    errors: NDArray[np.float64]
+    reason: str = ""
+    indefinite: int | None = None
+    form: AnyForm | None = None
+    repairs: tuple[str, ...] = ()
+
+    @property
+    def steps(self) -> int:
+        """Number of steps done."""
+        return len(self.errors)
+
+    @property
+    def largest(self) -> NDArray[np.float64]:
+        """Largest size of the error of each state or output."""
+        return np.asarray(np.abs(self.errors).max(axis=0, initial=0.0))
+
+    def __repr__(self) -> str:
+        fmt = self.format if isinstance(self.format, BlockFormats) else format_in_words(self.format)
+        form = "" if self.form is None else f"{self.form}, "
+        what = "output" if self.form is None else "state"
+        numbers = ", ".join(f"{error:.2g}" for error in self.largest)
+        ended = f"; {self.reason}" if self.reason else ""
+        count = f"{self.steps} step{'s' * (self.steps != 1)}"
+        return f"{form}{fmt}, {count}: largest error of each {what} {numbers}{ended}"
+
+
+def emulate(
+    model: ModelSource | NonlinearModel | Function,
+    z: Numbers | int,
+    fmt: AnyFormat | str,
+    *,
+    form: AnyForm | str | None = None,
+    reference: Literal["given", "stored"] = "given",
+    seed: int = 0,
+) -> EmulatedRun:
+    """Run a model with every operation rounded, and compare each step with a run without rounding.
+
+    Parameters
+    ----------
+    model, z, form, seed : as for :func:`gpbnb.required_precision`.
+    fmt : a floating-point or fixed-point format, or its name, such as "float32" or "Q3.12"; for a linear system also
+        :class:`gpbnb.WordFormats`, and for a Kalman filter :class:`gpbnb.BlockFormats`.
+    reference : "given" compares with the model as given, so that errors include those of storing it. "stored" compares
+        with model and data as the format stores them, so that errors come from the arithmetic alone; for a linear
+        model.
+
+    Raises
+    ------
+    ValueError, TypeError : as for :func:`gpbnb.required_precision`.
+
+    Examples
+    --------
+    >>> from gpbnb import LinearSystem
+    >>> run = emulate(LinearSystem.smoother("1/8"), [1, 1, 1], "Q3.4")
+    >>> run.y.to_float().ravel().tolist(), run
+    ([0.125, 0.25, 0.375], 8-bit fixed point (4 fraction bits), 3 steps: largest error of each output 0.045)
+    """
+    fmt = format_named(fmt)
+    if not isinstance(fmt, (FloatFormat, FixedFormat, WordFormats, BlockFormats)):
+        raise TypeError(
+            f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat, WordFormats, BlockFormats, or a name as "
+            '"float32" or "Q3.12"'
+        )
+    if reference not in ("given", "stored"):
+        raise ValueError(f'got reference {reference!r}; needed "given" or "stored"')
+    words = "have formats for data, coefficients and sums" if isinstance(fmt, WordFormats) else ""
+    blocks = "have formats for blocks" if isinstance(fmt, BlockFormats) else ""
+    given = admitted(model, words, blocks, "" if form is None else "have a form")
+    data, stored = data_of(given, z, seed), reference == "stored"
+    if stored and not isinstance(given, LinearModel | LinearSystem):
+        raise ValueError('got reference="stored" for functions, which round their own constants; needed "given"')
+    if isinstance(given, LinearModel | NonlinearModel):
+        return _filter(given, data, fmt, form_named(Form.INNOVATION if form is None else form), stored)
+    if isinstance(given, LinearSystem):
+        return _system(given, data, fmt, stored)
+    return _function(given, data, fmt)
+
+
+def _in_format(pairs: NDArray[np.float64], fmt: Any) -> FloatArray:
+    """Return numbers of a format that are given as sums of two float64."""
+    found: FloatArray = fmt.array(
+        pairs[..., 0] if not pairs[..., 1].any() else exact(pairs[..., 0]) + exact(pairs[..., 1])
+    )
+    return found
+
+
+def _filter(model: Any, data: Data, fmt: Any, form: AnyForm, stored: bool) -> EmulatedRun:
+    sound, z = measured(model, data)
+    kept = stored_measurements(z, fmt)
+    run = opened(sound, fmt, form)
+    states = run.states(kept)
+    if stored:
+        true = true_states(sound.rounded(fmt.model if isinstance(fmt, BlockFormats) else fmt), kept)  # type: ignore[union-attr]
+    else:
+        true = true_states(sound, z)
+    x = _in_format(states, fmt.state if isinstance(fmt, BlockFormats) else fmt)
+    errors = np.asarray((states - true[: len(states)]).sum(axis=2))
+    repairs = tuple(str(each) for each in run.repairs)
+    return EmulatedRun(fmt, x, None, errors, run.reason, run.indefinite, form, repairs)
+
+
+def _system(system: LinearSystem, data: Data, fmt: Any, stored: bool) -> EmulatedRun:
+    if data.z is None:
+        raise ValueError(f"got a number of steps for {system.name}; needed its inputs, of shape (steps, {system.m})")
+    u, of_data = system_inputs(system, data.z), fmt.data if isinstance(fmt, WordFormats) else fmt
+    true = system.outputs(u)
+    if stored:
+        if isinstance(fmt, WordFormats):
+            raise ValueError('got reference="stored" and WordFormats; needed "given"')
+        x0 = of_data.array(system.x0).to_fractions()
+        A, B, C, D = system.stored(fmt)
+        true = LinearSystem(A, B, C, D, x0).outputs(of_data.array(u).to_fractions())
+    _, pairs, reason = longest(lambda steps: system_pairs(system, u[:steps], fmt), len(u))
+    if pairs is None:
+        pairs = np.zeros((0, system.n + system.p, 2))
+    numbers, n = _in_format(pairs, of_data), system.n
+    off = pairs[:, n:] - true[: len(pairs)]
+    return EmulatedRun(fmt, numbers[:, :n], numbers[:, n:], np.asarray(off.sum(axis=2)), reason)
+
+
+def longest(run: Callable[[int], Any], steps: int) -> tuple[int, Any, str]:
+    """Return the most steps that a run takes without an overflow, what it returns, and why there are no more."""
+    try:
+        return steps, run(steps), ""
+    except OverflowError as error:
+        low, high, found, why = 0, steps, None, str(error)
+    while high - low > 1:
+        middle = (low + high) // 2
+        try:
+            found, low = run(middle), middle
+        except OverflowError:
+            high = middle
+    return low, found, why
+
+
+def _function(run: Function, data: Data, fmt: Any) -> EmulatedRun:
+    strategy = function_strategy(run, data, 1.0, fmt.base, fmt.precision)
+    try:
+        found = outputs_of(strategy.run, fmt, strategy.z, None)
+    except STOPS as fault:
+        return EmulatedRun(fmt, None, None, np.zeros((0, strategy.true.shape[1])), f"the function stops: {fault}")
+    errors = (exact_outputs(found) - strategy.true).astype(np.float64)
+    if isinstance(run, FixedIntervalSmoother):
+        return EmulatedRun(fmt, found, None, errors, form=form_named(run.form))
+    return EmulatedRun(fmt, None, found, errors)
