@@ -45,6 +45,13 @@ def test_a_statement_must_not_hold_where_the_domain_says_so():
     assert judged("x == 1; y < 2", {"x": 1, "y": 1}, {"y": 2, "part": 2, "holds": False}, mode="exact").right
 
 
+def test_one_instance_in_which_a_relation_fails_is_enough():
+    right, wrong = {"x": 1, "y": 1}, {"x": 1, "y": 2}
+    assert judged("x == y", right, right).right
+    for instances in ((wrong, right, right), (right, wrong, right), (right, right, wrong)):
+        assert judged("x == y", *instances).count == "holds in 2 of 3 instances"
+
+
 def test_nothing_is_right_without_an_instance_or_a_part():
     assert not judged("x == x").right
     assert not judge((), [{"x": 1}]).right

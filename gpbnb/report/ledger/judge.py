@@ -7,7 +7,7 @@ A row of ``checks/<topic>.csv`` judges some statements. Its columns:
   several instances. A statement without a domain is not judged.
 - *mode*: ``exact``; ``first order``; ``bound`` and ``bound to first order``, where every bound is attained as well;
   ``close``, to the digits that are printed; ``largest errors``, as :mod:`gpbnb.report.ledger.largest` says.
-- *also*: an expression that must be true besides.
+- *also*: an expression that must be true besides; without a domain, it judges the statement alone.
 - *verdict*: what a mismatch is called, or else what the statement is, such as ``given``; *root*: its root error.
 - *recomputed*, *note*, *otherwise*: what the ledger says; *otherwise* replaces the note of a mismatch. Expressions in
   braces are filled in. ``found`` is the outcome, and ``printed`` the statement.
@@ -179,7 +179,7 @@ def holds(link: Link, mode: str = "exact", side: Relation | None = None, equal: 
         case "!=":
             return any(signs)
         case "<=" | ">=":
-            return (1 if symbol == "<=" else -1) not in signs
+            return set(signs) <= {0, -1 if symbol == "<=" else 1}
         case _:
             return set(signs) <= {-1 if symbol == "<" else 1}
 
@@ -198,7 +198,7 @@ def attains(link: Link, zero: bool = False, share: Fraction = ATTAINED) -> bool:
     if a.shape != b.shape:
         return False
     pairs = list(zip(a.flat, b.flat, strict=True))
-    return any((sign(y) > 0 and sign(x - y * share) >= 0) or (zero and sign(x - y) == 0) for x, y in pairs)
+    return any((sign(y) == 1 and sign(x - y * share) in (0, 1)) or (zero and sign(x - y) == 0) for x, y in pairs)
 
 
 def entries(value: Any) -> Any:
@@ -216,7 +216,10 @@ def entries(value: Any) -> Any:
 
 
 def sign(x: Any, slack: Any = 0) -> int:
-    """Return the sign of a number; of one to first order, that of its error if it has no other value."""
+    """Return the sign of a number, or 2 for an expression whose sign is not known.
+
+    A number to first order has the sign of its error if it has no other value.
+    """
     if hasattr(x, "slope"):
         return sign(x.value, slack) or sign(x.slope, slack)
     if isinstance(x, sp.Basic):
@@ -227,21 +230,22 @@ def sign(x: Any, slack: Any = 0) -> int:
         if x.free_symbols:
             return _sign_of_terms(x)
         if not x.is_comparable:
-            raise Undefined(f"got {x}; needed a number")
+            return 2
         x = sp.N(x, DIGITS)
     return 0 if abs(x) <= slack else 1 if x > 0 else -1
 
 
 def _sign_of_terms(x: sp.Expr) -> int:
-    """Return the common sign of all terms of a rational expression in positive symbols."""
+    """Return the common sign of all terms of a rational expression in positive symbols, 2 if they have none."""
     x = sp.cancel(sp.expand(x))
     letters = sorted(x.free_symbols, key=str)
     others = [letter for letter in letters if not letter.is_integer]
-    terms = sp.Poly(sp.numer(x), *others).coeffs() if others else [sp.numer(x)]
+    try:
+        terms = sp.Poly(sp.numer(x), *others).coeffs() if others else [sp.numer(x)]
+    except sp.PolynomialError:
+        return 2
     signs = {sp.sign(term.subs({letter: 2 + i for i, letter in enumerate(letters)})) for term in terms}
-    if len(signs) != 1:
-        raise Undefined(f"got {x}; needed a number, or terms of one sign")
-    return int(signs.pop())
+    return int(signs.pop()) if len(signs) == 1 else 2
 
 
 # -- rows of data ---------------------------------------------------------------------------------
@@ -287,7 +291,7 @@ class CheckRow:
     @property
     def takes_statement(self) -> bool:
         """Whether the statement is judged by what it prints."""
-        return bool(self.domain)
+        return bool(self.domain) or "printed" in self.also
 
 
 def read(topic: str, *namespaces: Mapping[str, Any]) -> Checks:

@@ -1,9 +1,8 @@
-"""The checks of the printed statements, one module or package per topic of the book, with a file of judgements each."""
+"""The checks of the printed statements, one module per topic of the book, with a file of rows each."""
 
 from collections.abc import Mapping
 
 from gpbnb.report.ledger.checks import budget, geometry, integration, inversion, kalman, rolling, rounding
-from gpbnb.report.ledger.judge import read
 from gpbnb.report.ledger.registry import Checks
 
 TOPICS: Mapping[str, Checks] = {
@@ -16,7 +15,3 @@ TOPICS: Mapping[str, Checks] = {
     "geometry": geometry.CHECKS,
 }
 """The checks of each topic, in the order of the chapters."""
-
-for _topic in (integration,):  # not judged by rows of data yet
-    for _key, _check in read(_topic.__name__, vars(_topic)).items():
-        _topic.CHECKS.add(_key)(_check)
