@@ -18,7 +18,6 @@ from gpbnb.report import ledger
 from gpbnb.report.display.derivation import Derivation
 from gpbnb.report.ledger.checking import Row
 from gpbnb.report.ledger.finding import Finding, Verdict
-from gpbnb.report.ledger.registry import Checks
 from gpbnb.report.ledger.stored import load_findings
 
 Change = Callable[[pytest.MonkeyPatch], None]
@@ -26,11 +25,6 @@ Change = Callable[[pytest.MonkeyPatch], None]
 INVENTORY = ledger.load_statements()
 
 # -- what the checks found ------------------------------------------------------------------------
-
-
-def functions(checks: Checks) -> dict[str, Callable[[], Finding]]:
-    """The checks of a topic by their names."""
-    return {check.__name__: check for check in checks.values()}
 
 
 def examined(entries: Iterable[ledger.Statement]) -> tuple[Row, ...]:
@@ -42,16 +36,6 @@ def examined(entries: Iterable[ledger.Statement]) -> tuple[Row, ...]:
 def finding(rows: Iterable[Row], key: str) -> Finding:
     """That of an entry."""
     return next(row.finding for row in rows if row.statement.id == key)
-
-
-def findings_of(rows: Iterable[Row], checks: Checks, name: str) -> list[Finding]:
-    """Those of the entries that one function checks."""
-    return [row.finding for row in rows if row.statement.id in checks and checks[row.statement.id].__name__ == name]
-
-
-def by_verdict(rows: Iterable[Row]) -> dict[Verdict, set[str]]:
-    """Ids of the entries with each verdict."""
-    return {verdict: {row.statement.id for row in rows if row.finding.verdict is verdict} for verdict in Verdict}
 
 
 def check_texts(rows: Iterable[Row]) -> None:
@@ -70,25 +54,6 @@ def check_texts(rows: Iterable[Row]) -> None:
         assert not any(run in row.finding.recomputed for run in runs), row.statement.id
         assert row.finding.note or row.finding.verdict is Verdict.VERIFIED, row.statement.id
         assert row.finding.recomputed or row.finding.agrees is None, row.statement.id
-
-
-def check_again(rows: Iterable[Row], checks: Checks, *names: str) -> None:
-    """Some checks find the same when they are run anew."""
-    for name in names:
-        before = findings_of(rows, checks, name)
-        assert before == [functions(checks)[name]()] * len(before) != []
-
-
-def check_disagrees(function: Callable[[], Finding]) -> None:
-    found = function()
-    assert found.agrees is False
-    assert found.verdict not in (Verdict.VERIFIED, Verdict.ANSWERED)
-
-
-def check_agrees(function: Callable[[], Finding]) -> None:
-    found = function()
-    assert found.agrees is True
-    assert found.verdict is Verdict.VERIFIED
 
 
 # -- changes --------------------------------------------------------------------------------------

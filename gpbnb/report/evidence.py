@@ -8,7 +8,6 @@ from typing import NamedTuple
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees import filters, scalar, survey
 from gpbnb.report.ledger.checks import TOPICS
-from gpbnb.report.ledger.registry import takes_statement
 from gpbnb.report.ledger.statements import load_statements
 
 
@@ -71,7 +70,7 @@ def true_errors() -> Checked:
 
 def statements() -> int:
     """Count the printed statements that a check reads, so that an altered one must be rejected."""
-    judged = {key for checks in TOPICS.values() for key, check in checks.items() if takes_statement(check)}
+    judged = {key for checks in TOPICS.values() for key, check in checks.items() if check.takes_statement}
     return sum(bool(each.form) and each.id in judged for each in load_statements())
 
 

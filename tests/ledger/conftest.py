@@ -17,8 +17,8 @@ def topic(tmp_path, monkeypatch):
 
     def make(name, body):
         source = (
-            "from gpbnb.report.ledger.finding import Verdict, answer, compare, unverifiable\n"
-            "from gpbnb.report.ledger.registry import Checks\n\nCHECKS = Checks()\n\n"
+            "from gpbnb.report.ledger.finding import Verdict, answer, compare\n"
+            "from gpbnb.report.ledger.judge import Checks\n\nCHECKS = Checks()\n\n"
         )
         (tmp_path / f"{name}.py").write_text(source + textwrap.dedent(body), encoding="utf-8")
         return name
@@ -35,9 +35,10 @@ def complete(topic, request):
         f"""
         CALLS = []
 
-        @CHECKS.add(*{CHECKED})
-        def both():
-            CALLS.append(1)
-            return compare(False, "$|a|$, not \\"b\\"", Verdict.MISPRINT, "line one\\nline two")
+        def both(printed):
+            CALLS.append(printed.id)
+            return compare(True, "$|a|$, not \\"b\\"", note="line one\\nline two")
+
+        CHECKS.update(dict.fromkeys({CHECKED}, both))
         """,
     )

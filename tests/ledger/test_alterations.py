@@ -15,7 +15,6 @@ from gpbnb.report.ledger.checks import TOPICS, rounding
 from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict
 from gpbnb.report.ledger.formula import Undefined, Words
-from gpbnb.report.ledger.registry import takes_statement
 from gpbnb.report.ledger.statements import Statement, load_statements
 from gpbnb.report.rounding import experiment
 
@@ -135,7 +134,7 @@ def needed(statement):
     return 1 if in_words and statement.kind not in MUST_HAVE_FORM else 3
 
 
-TAKEN = [each for each in STATEMENTS if each.form and takes_statement(CHECKED[each.id][each.id])]
+TAKEN = [each for each in STATEMENTS if each.form and CHECKED[each.id][each.id].takes_statement]
 """Statements with a form that their checks judge."""
 FIRST = {sameness(each): each.id for each in reversed([*TAKEN, *CORRECTED])}
 for each in (TAKEN, CORRECTED):

@@ -9,6 +9,7 @@ import sympy as sp
 from gpbnb.report.ledger.finding import Verdict
 from gpbnb.report.ledger.formula import Link, read
 from gpbnb.report.ledger.judge import CheckRow, holds, judge
+from gpbnb.report.ledger.judge import read as read_rows
 from gpbnb.report.ledger.quantities import BETA, Matrix
 from gpbnb.report.ledger.statements import Statement
 
@@ -136,3 +137,13 @@ def test_a_definition_is_given_if_it_holds():
     definition = row(domain="true()", verdict="given", recomputed="x", note="defines x", otherwise="not so")
     assert definition(PRINTED).verdict is Verdict.GIVEN
     assert definition(OTHER).verdict is Verdict.MISPRINT
+
+
+def test_two_rows_of_a_statement_are_refused(tmp_path, monkeypatch):
+    (tmp_path / "twice").mkdir()
+    (tmp_path / "twice" / "__init__.py").touch()
+    header = ",".join(("statements", *EMPTY))
+    (tmp_path / "twice" / "topic.csv").write_text(f"{header}\n*.eq1 hung1984.II.eq1,,,,given,,,a definition,\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ValueError, match=r"two rows of 'hung1984\.II\.eq1' in topic\.csv; needed one"):
+        read_rows("twice.topic", {})

@@ -83,15 +83,15 @@ def test_one_record_an_entry_and_status_1_while_checks_are_missing(ledger, compl
     assert [record["printed"] for record in found] == [entry.printed for entry in INVENTORY]
     lacking = len(INVENTORY) - len(CHECKED)
     assert done.stderr.decode() == (
-        f"{len(INVENTORY)} entries: {len(CHECKED)} misprint, {lacking} no check\n{lacking} entries have no check\n"
+        f"{len(INVENTORY)} entries: {len(CHECKED)} verified, {lacking} no check\n{lacking} entries have no check\n"
     )
     assert done.returncode == 1
 
 
 def test_status_0_when_the_selection_is_complete(ledger, complete):
     done = ledger(complete, "--document", "hung1984", "--chapter", "I")
-    assert [record["verdict"] for record in records(done.stdout)] == ["misprint"] * len(CHECKED)
-    assert done.stderr.decode() == f"{len(CHECKED)} entries: {len(CHECKED)} misprint\n0 entries have no check\n"
+    assert [record["verdict"] for record in records(done.stdout)] == ["verified"] * len(CHECKED)
+    assert done.stderr.decode() == f"{len(CHECKED)} entries: {len(CHECKED)} verified\n0 entries have no check\n"
     assert done.returncode == 0
 
 
@@ -109,10 +109,10 @@ def test_formats(ledger, complete):
     assert ledger(complete, *chosen).stdout.decode() == to_csv(part)
     assert ledger(complete, *chosen, "--format", "markdown").stdout.decode() == table(part).markdown() + "\n"
     assert [item["agrees"] for item in json.loads(ledger(complete, *chosen, "--format", "json").stdout)] == [
-        False
+        True
     ] * len(CHECKED)
     text = ledger(complete, *chosen, "--format", "text").stdout.decode()
-    assert text.startswith('misprint      hung1984.I.two-tasks  $|a|$, not "b"  line one line two\n')
+    assert text.startswith('verified      hung1984.I.two-tasks  $|a|$, not "b"  line one line two\n')
 
 
 def test_output_does_not_depend_on_the_terminal_encoding(ledger, complete):
@@ -150,9 +150,7 @@ def test_bad_arguments_are_explained_with_status_2(ledger, complete, arguments, 
 
 
 def test_a_check_of_no_statement_is_explained_with_status_2(ledger, topic):
-    done = ledger(
-        topic("stray_topic", '@CHECKS.add("hung1984.II.eq999")\ndef stray():\n    return compare(True, "1")\n')
-    )
+    done = ledger(topic("stray_topic", 'CHECKS["hung1984.II.eq999"] = lambda printed: compare(True, "1")\n'))
     assert done.returncode == 2
     assert "needed an id from statements.csv" in done.stderr.decode()
     assert "Traceback" not in done.stderr.decode()
@@ -162,13 +160,11 @@ def test_a_check_that_raises_is_named_and_hides_no_other(ledger, topic):
     name = topic(
         "raising_topic",
         """
-        @CHECKS.add("hung1984.I.two-tasks")
-        def divides():
+        def divides(printed):
             return 1 / 0
 
-        @CHECKS.add(*OTHERS)
-        def fine():
-            return compare(True, "1")
+        CHECKS.update(dict.fromkeys(OTHERS, lambda printed: compare(True, "1")))
+        CHECKS["hung1984.I.two-tasks"] = divides
         """.replace("OTHERS", repr(tuple(entry.id for entry in CHECKED[1:]))),
     )
     done = ledger(name, "--document", "hung1984", "--chapter", "I")
@@ -176,7 +172,7 @@ def test_a_check_that_raises_is_named_and_hides_no_other(ledger, topic):
     assert [record["verdict"] for record in records(done.stdout)] == ["", *["verified"] * len(CHECKED[1:])]
     first, *rest = done.stderr.decode().splitlines()
     assert first.startswith("the check of hung1984.I.two-tasks failed: ZeroDivisionError: division by zero (")
-    assert first.endswith("raising_topic.py:9)")
+    assert first.endswith("raising_topic.py:8)")
     assert rest == [f"{len(CHECKED)} entries: {len(CHECKED) - 1} verified, 1 check failed", "0 entries have no check"]
 
 

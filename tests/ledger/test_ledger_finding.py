@@ -1,4 +1,4 @@
-"""gpbnb.report.ledger.finding: what a finding may be, how verdicts follow, and the registry of checks."""
+"""gpbnb.report.ledger.finding: what a finding may be, and how verdicts follow."""
 
 import dataclasses
 
@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 import sympy
 
-from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
-from gpbnb.report.ledger.registry import Checks
-from gpbnb.report.ledger.statements import Statement
+from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare
 
 ALLOWED = {
     ("verified", True),
@@ -124,100 +122,8 @@ def test_answer_says_where(holds):
         answer(holds, "4", "")
 
 
-def test_unverifiable():
-    assert unverifiable("", "no data") == Finding("", None, Verdict.UNVERIFIABLE, "no data")
-    with pytest.raises(ValueError, match="without a note"):
-        unverifiable("4", "")
-
-
-def made(key):
-    return Statement(key, "hung1984", "II", "1", key, "equation", "a")
-
-
-def good() -> Finding:
-    return compare(True, "1")
-
-
-def other() -> Finding:
-    return compare(False, "2")
-
-
-def test_checks_is_a_mapping_that_keeps_order_and_shares_functions():
-    checks = Checks()
-    assert checks.add("b", "a")(good) is good
-    checks.add("c")(other)
-    assert list(checks) == ["b", "a", "c"]
-    assert len(checks) == 3
-    assert "a" in checks
-    assert "z" not in checks
-    assert checks["a"] is checks["b"] is good
-    assert dict(checks) == {"b": good, "a": good, "c": other}
-    assert checks.run(made("a")) == good()
-    assert checks.run(made("c")) == other()
-    assert repr(checks) == "Checks(3 ids)"
-
-
-def test_a_second_check_of_an_id_is_refused_and_nothing_of_it_registered():
-    checks = Checks()
-    checks.add("a")(good)
-    with pytest.raises(ValueError, match=r"two checks of 'a', .*good and .*other"):
-        checks.add("b", "a")(other)
-    assert dict(checks) == {"a": good}
-
-
-def test_an_id_given_twice_at_once_is_refused():
-    with pytest.raises(ValueError, match=r"two checks of 'a', .*good and .*good"):
-        Checks().add("a", "a")(good)
-
-
-def test_missing_id():
-    checks = Checks()
-    checks.add("a")(good)
-    for look in (lambda: checks.run(made("z")), lambda: checks["z"]):
-        with pytest.raises(KeyError, match=r"'z', which has no check here; needed one of the 1 ids"):
-            look()
-    assert checks.get("z") is None
-
-
-@pytest.mark.parametrize("result", [None, True, "verified", (True, "1")])
-def test_a_check_must_return_a_finding(result):
-    def lazy():
-        return result
-
-    checks = Checks()
-    checks.add("a")(lazy)
-    with pytest.raises(TypeError, match=r"got .* from the check of 'a', .*lazy; needed a Finding"):
-        checks.run(made("a"))
-
-
-def test_a_check_takes_the_printed_statement():
-    checks = Checks()
-    checks.add("a", "b")(lambda printed: compare(printed.id == "a", printed.id))
-    assert [checks.run(made(key)).verdict for key in "ab"] == [Verdict.VERIFIED, Verdict.WRONG]
-
-
-def test_a_check_takes_nothing_else():
-    with pytest.raises(TypeError, match="with several arguments; needed a check that takes only the printed statement"):
-        Checks().add("a")(lambda x, y: good())
-
-
-def test_given_has_nothing_to_compare():
-    assert given("a definition") == Finding("", None, Verdict.GIVEN, "a definition")
-    with pytest.raises(ValueError, match="without a note"):
-        given("")
-
-
 def test_only_a_disagreement_has_a_root_error():
     assert compare(False, "4", root="product").root == "product"
     assert compare(True, "4", root="product").root == ""
     with pytest.raises(ValueError, match="with the root error 'product'"):
         Finding("4", True, Verdict.VERIFIED, root="product")
-
-
-@pytest.mark.parametrize(
-    ("ids", "error", "message"),
-    [((), TypeError, "without an id"), ((good,), TypeError, "needed an id, as in"), ((" ",), ValueError, "blank")],
-)
-def test_ids_are_given(ids, error, message):
-    with pytest.raises(error, match=message):
-        Checks().add(*ids)

@@ -7,7 +7,7 @@ import pytest
 
 from gpbnb.report import ledger
 from gpbnb.report.ledger import legibility
-from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict, compare, given
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, compare
 from gpbnb.report.ledger.legibility import Damage, charged, load_legibility
 
 DAMAGES = load_legibility()
@@ -41,7 +41,7 @@ def test_without_a_witness_the_author_is_charged(damaged, key):
 
 
 def test_a_statement_that_is_right_needs_nobody_to_charge(damaged):
-    for right in (compare(True, "1"), given("a definition")):
+    for right in (compare(True, "1"), Finding("", None, Verdict.GIVEN, "a definition")):
         assert charged("a", right) is right
 
 

@@ -11,7 +11,7 @@ from markup import Elements
 from gpbnb.report import ledger
 from gpbnb.report.ledger import Row, load_statements, page
 from gpbnb.report.ledger.corrections import load_corrections
-from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare
 from gpbnb.report.ledger.html import typeset
 from gpbnb.report.ledger.statements import DOCUMENTS, Statement
 
@@ -20,7 +20,7 @@ FINDINGS = (
     compare(True, "yes"),
     compare(False, r"$a<b$ & <c>", Verdict.WRONG, "see the chapter *Rounding bounds*; *not* x*y*z, x*y* z"),
     compare(False, "one", Verdict.MISPRINT),
-    unverifiable("", "no data"),
+    Finding("", None, Verdict.UNVERIFIABLE, "no data"),
     answer(True, "$|x|$", "here"),
 )
 STATEMENTS = load_statements()
@@ -171,10 +171,10 @@ def test_root_errors_begin_with_the_one_that_spoils_most():
     ("finding", "shown", "collapsed"),
     [
         (compare(True, "1", note="n"), ["printed"], ["recomputed", "note"]),
-        (given("n"), ["printed"], ["note"]),
+        (Finding("", None, Verdict.GIVEN, "n"), ["printed"], ["note"]),
         (compare(False, "1", Verdict.MISPRINT, "n"), ["printed", "corrected"], ["recomputed", "note"]),
         (compare(False, "1", Verdict.WRONG, "n"), ["printed", "corrected", "recomputed", "note"], []),
-        (unverifiable("1", "n"), ["printed", "recomputed", "note"], []),
+        (Finding("1", None, Verdict.UNVERIFIABLE, "n"), ["printed", "recomputed", "note"], []),
     ],
     ids=lambda each: each.verdict.value if isinstance(each, Finding) else None,
 )

@@ -12,7 +12,7 @@ from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 from gpbnb.report.ledger import Row, load_statements, table
-from gpbnb.report.ledger.finding import Verdict, answer, compare, unverifiable
+from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare
 from gpbnb.report.ledger.render import to_csv, to_json, to_markdown, to_text
 from gpbnb.report.ledger.statements import Statement
 
@@ -20,7 +20,7 @@ ENTRY = Statement("hung1984.II.eq20", "hung1984", "II", "6", "eq (20)", "equatio
 FINDINGS = {
     "misprint": compare(False, r"$(n+m-1)\beta$", Verdict.MISPRINT, 'one "sign", \nas |(20)| of 1982'),
     "verified": compare(True, "yes"),
-    "unverifiable": unverifiable("", "no data"),
+    "unverifiable": Finding("", None, Verdict.UNVERIFIABLE, "no data"),
     "answered": answer(True, "done", "here"),
 }
 ROWS = (*(Row(ENTRY, finding) for finding in FINDINGS.values()), Row(ENTRY, None), Row(ENTRY, None, ValueError("x")))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.finding import Finding, Verdict
-from gpbnb.report.ledger.registry import Check, Checks, takes_statement
+from gpbnb.report.ledger.judge import Checks
 from gpbnb.report.ledger.statements import Statement
 
 MISSING = "missing"
@@ -75,25 +75,15 @@ def examine(
 
     Returns
     -------
-    rows : in the order of `statements`. A check that judges several statements at once runs only once.
+    rows : in the order of `statements`.
     """
-    results: dict[Check, Finding | Exception] = {}
     rows: list[Row] = []
     for statement in progress(tuple(statements)):
         checks = next((checks for checks in topics.values() if statement.id in checks), None)
-        if checks is None:
-            rows.append(Row(statement, None))
-            continue
-        check = checks[statement.id]
-        result = results.get(check)
-        if result is None:
-            try:
-                result = checks.run(statement)
-            except Exception as error:
-                result = error
-            if not takes_statement(check):
-                results[check] = result
-        rows.append(Row(statement, result) if isinstance(result, Finding) else Row(statement, None, result))
+        try:
+            rows.append(Row(statement, checks.run(statement) if checks else None))
+        except Exception as error:
+            rows.append(Row(statement, None, error))
     return tuple(rows)
 
 

@@ -1,7 +1,7 @@
 """The result of checking one printed statement.
 
-A check recomputes a statement and returns a :class:`Finding`. The verdict follows from whether the recomputation agrees
-with the printed statement, through :func:`compare`, :func:`answer`, :func:`unverifiable` or :func:`given`.
+The verdict follows from whether the recomputation agrees with the printed statement, through :func:`compare` or, for an
+item that the documents leave undone, :func:`answer`.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class Finding:
             needed = " or ".join(str(value) for value in _AGREES[self.verdict])
             raise ValueError(
                 f"got verdict {self.verdict.value!r} with agrees={self.agrees}; needed {needed}; let "
-                "compare(), answer() or unverifiable() choose the verdict"
+                "compare() or answer() choose the verdict"
             )
         if self.root and self.verdict not in DISAGREEMENTS:
             raise ValueError(
@@ -161,27 +161,6 @@ def answer(holds: bool, recomputed: str, note: str) -> Finding:
     _require_bool("holds", holds)
     answered = Finding(recomputed, True, Verdict.ANSWERED, note)
     return answered if holds else Finding(recomputed, False, Verdict.OPEN, note)
-
-
-def unverifiable(recomputed: str, note: str) -> Finding:
-    """Record that a statement depends on data that is not in the documents.
-
-    Parameters
-    ----------
-    recomputed : what can still be said; may be empty.
-    note : which data is missing.
-    """
-    return Finding(recomputed, None, Verdict.UNVERIFIABLE, note)
-
-
-def given(note: str) -> Finding:
-    """Record that a statement is a definition, given data or a heading, so that there is nothing to check.
-
-    Parameters
-    ----------
-    note : what it defines or gives.
-    """
-    return Finding("", None, Verdict.GIVEN, note)
 
 
 def _require_bool(name: str, value: object) -> None:

@@ -33,7 +33,6 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
 import sympy as sp
 
 from gpbnb.report.ledger.dotted import DottedMatrix
@@ -69,21 +68,6 @@ class Link:
     left: Any
     symbol: str
     right: Any
-
-    @property
-    def holds(self) -> bool:
-        """Whether the comparison holds exactly; matrices are compared entry by entry."""
-        if self.symbol == "≈":
-            raise ValueError(
-                f"got {self.left} ≈ {self.right}; needed a relation without ≈; compare the two sides in the check"
-            )
-        left, right = self.left, self.right
-        if self.symbol == "==" and isinstance(left, sp.Basic | sp.MatrixBase):
-            difference = left - right
-            zero = sp.simplify(difference)
-            return bool(zero.is_zero_matrix if isinstance(zero, sp.MatrixBase) else zero == 0)
-        compare = next(function for symbol, function in OPERATORS.values() if symbol == self.symbol)
-        return bool(np.all(compare(left, right)))
 
 
 @lru_cache(maxsize=4096)

@@ -33,14 +33,13 @@ import sympy as sp
 from gpbnb.arithmetic.formats import prints_as
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display.tables import scientific
-from gpbnb.report.ledger.agreement import DIGITS, vanishes
 from gpbnb.report.ledger.corrections import intended
 from gpbnb.report.ledger.dotted import DottedMatrix
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare
 from gpbnb.report.ledger.formula import OPERATORS, Link, Number, Part, Relation, Undefined, Words
 from gpbnb.report.ledger.html import chapter
 from gpbnb.report.ledger.largest import allows
-from gpbnb.report.ledger.registry import Checks
+from gpbnb.report.ledger.legibility import charged
 from gpbnb.report.ledger.statements import Statement
 
 Names = Mapping[str, Any]
@@ -53,6 +52,12 @@ EPSILON = sp.Symbol("epsilon")
 _LITERAL = re.compile(r"-?[\d.]+([eE][+-]?\d+)?")
 CLOSE, EQUAL = 1e-2, 1e-9
 """Relative differences that ≈ and = allow in the mode ``close``."""
+
+
+DIGITS = 50
+"""Digits to which two sides are evaluated if they contain exponentials or roots."""
+NOTHING = sp.Float("1e-40", DIGITS)
+"""Largest difference that rounding errors of the evaluation can cause."""
 
 
 @dataclass(frozen=True)
@@ -248,6 +253,23 @@ def _sign_of_terms(x: sp.Expr) -> int:
     return int(signs.pop()) if len(signs) == 1 else 2
 
 
+def vanishes(expression: Any) -> bool:
+    """Whether an expression or every entry of a matrix is zero.
+
+    Rational values are compared exactly. Exponentials and roots of rational values are evaluated to 50 digits. An
+    expression with symbols vanishes if it expands to zero.
+    """
+    if isinstance(expression, sp.MatrixBase):
+        return all(vanishes(entry) for entry in expression)
+    expression = sp.sympify(expression)
+    if expression.free_symbols:
+        return bool(sp.expand(expression) == 0)
+    if expression.is_Rational:
+        return bool(expression == 0)
+    value = sp.N(expression, DIGITS)
+    return bool(value.is_number and abs(value) < NOTHING)
+
+
 # -- rows of data ---------------------------------------------------------------------------------
 
 
@@ -294,6 +316,14 @@ class CheckRow:
         return bool(self.domain) or "printed" in self.also
 
 
+class Checks(dict[str, CheckRow]):
+    """The checks of one topic, by the ids of their statements."""
+
+    def run(self, printed: Statement) -> Finding:
+        """Judge a statement, and decide by the rule of :mod:`gpbnb.report.ledger.legibility` who is charged."""
+        return charged(printed.id, self[printed.id](printed))
+
+
 def read(topic: str, *namespaces: Mapping[str, Any]) -> Checks:
     """Return the checks of a topic, named by its module, from the file of its name; functions come from namespaces."""
     checks = Checks()
@@ -301,8 +331,12 @@ def read(topic: str, *namespaces: Mapping[str, Any]) -> Checks:
     package, _, name = topic.rpartition(".")
     text = (files(package) / f"{name}.csv").read_text(encoding="utf-8")
     for row in csv.DictReader(text.splitlines(), strict=True):
-        ids = row.pop("statements").split()
-        checks.add(*(key for each in ids for key in _ids(each)))(CheckRow(functions, **row))
+        ids = [key for each in row.pop("statements").split() for key in _ids(each)]
+        check = CheckRow(functions, **row)
+        for key in ids:
+            if key in checks:
+                raise ValueError(f"got two rows of {key!r} in {name}.csv; needed one; remove one")
+            checks[key] = check
     return checks
 
 

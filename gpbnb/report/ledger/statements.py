@@ -84,15 +84,6 @@ class Statement:
         """Return the phrase that the document prints for this label."""
         return self._labelled(Words, label).printed
 
-    def claims(self, label: str, meanings: Mapping[str, bool]) -> bool:
-        """Whether the phrase that the document prints for this label is right.
-
-        Parameters
-        ----------
-        meanings : every phrase that could be printed, and whether it would be right.
-        """
-        return meanings[self.says(label)]
-
     def _labelled(self, sort: type[_L], label: str) -> _L:
         for part in self.parts:
             if isinstance(part, sort) and part.label == label:

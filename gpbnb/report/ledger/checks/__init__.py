@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from gpbnb.report.ledger.checks import budget, geometry, integration, inversion, kalman, rolling, rounding
-from gpbnb.report.ledger.registry import Checks
+from gpbnb.report.ledger.judge import Checks
 
 TOPICS: Mapping[str, Checks] = {
     "rounding": rounding.CHECKS,

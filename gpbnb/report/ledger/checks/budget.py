@@ -63,9 +63,9 @@ def open_studies() -> tuple[int, int]:
     return sum(rolling.CHECKS.run(each).verdict is Verdict.ANSWERED for each in left), len(left)
 
 
-def day(printed: Statement, word: str = "") -> date:
+def day(printed: Statement, word: str) -> date:
     """Return a printed day, which may not exist."""
-    return date(*(int(printed.number(f"{word} {part}".strip()).value) for part in ("year", "month", "day")))
+    return date(*(int(printed.number(f"{word} {part}").value) for part in ("year", "month", "day")))
 
 
 def span(start: date, end: date) -> tuple[int, int]:
@@ -82,11 +82,6 @@ def period(printed: Statement) -> Names:
     except ValueError:
         months, days = 0, 0
     return {"duration": months, "months": months, "days": days, "part": 1}
-
-
-def after_the_period(printed: Statement) -> tuple[int, int]:
-    """Return months and days from the end of the period to the date of the report."""
-    return span(day(statement("hung1984.I.report-period"), "to") + timedelta(days=1), day(printed))
 
 
 def previous_contract(printed: Statement) -> Names:

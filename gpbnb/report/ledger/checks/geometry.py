@@ -14,9 +14,8 @@ import sympy as sp
 
 from gpbnb.report.geometry import derivation, experiment, theory
 from gpbnb.report.geometry.derivation import PHI, SEQUENCES, H
-from gpbnb.report.ledger.agreement import vanishes
 from gpbnb.report.ledger.first_order import EPSILON, FirstOrder, matrix, quantity
-from gpbnb.report.ledger.judge import judge, read
+from gpbnb.report.ledger.judge import judge, read, vanishes
 from gpbnb.report.ledger.statements import Statement, statement
 from gpbnb.report.measurement import (
     ARCSEC,

@@ -18,9 +18,8 @@ import sympy as sp
 
 from gpbnb.report.integration import derivation, experiment, theory
 from gpbnb.report.integration.derivation import MU, OMEGA, P22, TAU, TIME, X2, X3, P, T
-from gpbnb.report.ledger.agreement import vanishes
 from gpbnb.report.ledger.formula import Relation
-from gpbnb.report.ledger.judge import read
+from gpbnb.report.ledger.judge import read, vanishes
 from gpbnb.report.ledger.statements import Statement, statement
 
 Names = dict[str, Any]
