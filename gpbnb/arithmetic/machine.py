@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -189,37 +189,64 @@ def code_of(rows: NDArray[Any], formats: NDArray[np.int64]) -> Any:
     """Return operations, and the number of the format of each, as the machine takes them."""
     from gpbnb.arithmetic.kernels import machine
 
-    patterns = _patterns(rows)
+    how = _together(rows)
     skips = np.flatnonzero(rows[:, 0] == _SKIP)
     edges = np.zeros(len(rows) + 1, np.bool_)
-    edges[1:-1] = (np.diff(rows[:, 0]) != 0) | (np.diff(formats) != 0) | (np.diff(patterns) != 0)
+    edges[1:-1] = (np.diff(rows[:, 0]) != 0) | (np.diff(formats) != 0) | (np.diff(how) != 0)
     for each in (skips, skips + 1, skips + 1 + rows[skips, 2]):
         edges[np.minimum(each, len(rows))] = True
     edges[[0, -1]] = True
     begins = np.flatnonzero(edges) if len(rows) else np.zeros(1, np.int64)
     first = begins[:-1]
-    segments = np.stack([first, begins[1:], formats[first], np.maximum(patterns[first], 0) & 3], axis=1)
-    return machine.Code(np.ascontiguousarray(rows, np.uint32), segments.astype(np.int64))
+    segments = np.stack([first, begins[1:], formats[first], how[first] & 3], axis=1)
+    gathered = np.empty((2, max(np.diff(begins), default=0)))
+    operands = np.ascontiguousarray(rows[:, 1:3].T, np.uint32)
+    return machine.Code(np.ascontiguousarray(rows, np.uint32), segments.astype(np.int64), operands, gathered)
 
 
-_FEWEST = 4
-"""Rows in a run from which on a loop over neighbours in memory pays."""
+_FEWEST, _MANY = 4, 24
+"""Fewest rows that run together, and fewest whose operands are not gathered with those of the rows beside them."""
 
 
-def _patterns(rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return a number for each row: 0, or 4 times that of its run of neighbours in memory plus its pattern, 1 to 3."""
-    found = np.zeros(len(rows), np.int64)
-    if len(rows) < _FEWEST:
-        return found
-    code, a, b, _, out = np.diff(rows.astype(np.int64), axis=0).T
-    step = np.select([(a == 1) & (b == 1), (a == 0) & (b == 1), (a == 1) & (b == 0)], [1, 2, 3], 0)
-    step[(code != 0) | (out != 1) | (rows[1:, 0] > CODES["multiply"])] = 0
-    edges = np.flatnonzero(np.diff(step)) + 1
-    begins, ends = np.concatenate([[0], edges]), np.concatenate([edges, [len(step)]])
-    for number, (begin, end) in enumerate(zip(begins.tolist(), ends.tolist(), strict=True), start=1):
-        if step[begin] and end - begin + 1 >= _FEWEST and not found[begin]:
-            found[begin : end + 1] = 4 * number + step[begin]
+def _together(rows: NDArray[Any]) -> NDArray[np.int64]:
+    """Return for each row 4 times the number of its run, plus how it runs; 0 if it runs on its own."""
+    from gpbnb.arithmetic.kernels import machine
+
+    found, number = np.zeros(len(rows), np.int64), 0
+    plain = rows[:, 0] <= CODES["multiply"]
+    listed = rows.tolist()
+    begin = 0
+    while begin < len(rows):
+        code, out = listed[begin][0], listed[begin][4]
+        end = begin
+        while end < len(rows):
+            other, a, b, _, result = listed[end]
+            if other != code or result != out + end - begin or out <= a < result or out <= b < result:
+                break
+            end += 1
+        if plain[begin] and end - begin >= _FEWEST:
+            for first, last, along in _divided(listed, begin, end):
+                number += 1
+                found[first:last] = 4 * number + (machine.NEIGHBOURS if along else machine.GATHERED)
+        begin = max(end, begin + 1)
     return found
+
+
+def _divided(rows: list[list[int]], begin: int, end: int) -> Iterator[tuple[int, int, bool]]:
+    """Yield first, last and whether operands are neighbours, for parts of a run of rows."""
+    waiting, at = begin, begin
+    while at < end:
+        last = at + 1
+        while last < end and all(rows[last][i] == rows[at][i] + last - at for i in (1, 2)):
+            last += 1
+        if last - at >= _MANY or (at, last) == (begin, end):
+            if waiting < at:
+                yield waiting, at, False
+            yield at, last, True
+            waiting = last
+        at = last
+    if waiting < end:
+        yield waiting, end, False
 
 
 _SKIP = CODES["skip"]

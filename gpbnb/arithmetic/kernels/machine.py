@@ -49,8 +49,9 @@ class InTwoWords(NamedTuple):
     """Up to 113 bits or 34 digits: values (places, lanes, 3)."""
 
 
-SCATTERED, MANY_BY_MANY, ONE_BY_MANY, MANY_BY_ONE = range(4)
-"""How the operands of rows lie in memory: anywhere; or both, the second, or the first one after the other."""
+ONE_BY_ONE, GATHERED, NEIGHBOURS = range(3)
+"""How rows of a segment run for one lane: one after the other, since one may take the result of another; together,
+after their operands are gathered; or together, since their operands and results lie one after the other in memory."""
 
 
 class Formats(NamedTuple):
@@ -69,8 +70,12 @@ class Code(NamedTuple):
 
     #: (rows, 5).
     rows: NDArray[np.uint32]
-    #: (segments, 4): first row, end, format, and pattern; rows of a segment have one code.
+    #: (segments, 4): first row, end, format, and how they run; rows of a segment have one code.
     segments: NDArray[np.int64]
+    #: (2, rows), the first two operands of each row.
+    operands: NDArray[np.uint32]
+    #: (2, rows), for the operands of a segment.
+    gathered: NDArray[np.float64]
 
 
 class Places(NamedTuple):
@@ -328,25 +333,12 @@ def _quick_result(operation: Any, short: Any, rule: Any, x: Any, y: Any) -> Any:
 
 @borrowing(forceinline=True)
 def _along(operation: Any, short: Any, rule: Any, low: Any, span: Any, a: Any, b: Any, c: Any) -> Any:
-    """Compute c from a and b, entry by entry; an array of one entry is one operand of all."""
+    """Compute c from a and b, entry by entry."""
     gone = np.int64(0)
-    if a.shape[0] < c.shape[0]:
-        x = a[0]
-        for i in range(c.shape[0]):
-            found, size = _quick_result(operation, short, rule, x, b[i])
-            gone |= np.int64(_outside(size, low, span))
-            c[i] = found + 0.0
-    elif b.shape[0] < c.shape[0]:
-        y = b[0]
-        for i in range(c.shape[0]):
-            found, size = _quick_result(operation, short, rule, a[i], y)
-            gone |= np.int64(_outside(size, low, span))
-            c[i] = found + 0.0
-    else:
-        for i in range(c.shape[0]):
-            found, size = _quick_result(operation, short, rule, a[i], b[i])
-            gone |= np.int64(_outside(size, low, span))
-            c[i] = found + 0.0
+    for i in range(c.shape[0]):
+        found, size = _quick_result(operation, short, rule, a[i], b[i])
+        gone |= np.int64(_outside(size, low, span))
+        c[i] = found + 0.0
     return gone
 
 
@@ -392,13 +384,18 @@ def quick_scalars(formats: Any, code: Any, values: Any, truths: Any) -> Any:
         if operation <= DIVIDE:
             low, span = formats.whole[f, LOW], np.uint64(formats.whole[f, SPAN])
             rule, short, pattern = _rule(formats, f), formats.whole[f, SHORT] != 0, code.segments[s, 3]
-            if pattern == SCATTERED:
+            if pattern == ONE_BY_ONE:
                 gone |= _quick_run(rule, short, low, span, code, begin, end, values)
                 continue
             a, b, out = np.int64(code.rows[begin, 1]), np.int64(code.rows[begin, 2]), np.int64(code.rows[begin, 4])
             count = end - begin
-            first = values[a : a + (1 if pattern == ONE_BY_MANY else count)]
-            second = values[b : b + (1 if pattern == MANY_BY_ONE else count)]
+            first, second = values[a : a + count], values[b : b + count]
+            if pattern == GATHERED:
+                first, second = code.gathered[0, :count], code.gathered[1, :count]
+                lefts, rights = code.operands[0, begin:end], code.operands[1, begin:end]
+                for i in range(count):
+                    first[i] = values[lefts[i]]
+                    second[i] = values[rights[i]]
             gone |= _all_along(operation, short, rule, low, span, first, second, values[out : out + count]) != 0
             continue
         if operation == SKIP:
@@ -504,30 +501,40 @@ def quick_lanes(formats: Any, code: Any, values: Any, truths: Any) -> Any:
 
 
 @borrowing
-def _run_lanes(fmt: Any, code: Any, begin: int, end: int, values: Any, truths: Any) -> Any:
-    """Run rows for each lane in an arithmetic of the scalar operations.
+def _run_segment(fmt: Any, code: Any, begin: int, end: int, values: Any, truths: Any) -> Any:
+    """Run rows of a segment for each lane in an arithmetic of the scalar operations.
 
     Returns the row to go on with, or ~row for one that has no result.
     """
-    o: Any = begin - 1
+    o: Any
+    operation = np.int64(code.rows[begin, 0])
+    if operation == MULTIPLY:  # loops of their own, so that what depends on the format alone is computed once
+        for o in range(begin, end):
+            a, b, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 4]
+            for i in range(values.shape[1]):
+                found = scalar.multiply(fmt, scalar.load(fmt, values, (a, i)), scalar.load(fmt, values, (b, i)))
+                if scalar.lost(fmt, found):
+                    return ~o
+                scalar.put(fmt, values, (out, i), found)
+        return end
+    if operation <= SUBTRACT:
+        for o in range(begin, end):
+            a, b, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 4]
+            for i in range(values.shape[1]):
+                y = scalar.load(fmt, values, (b, i))
+                y = scalar.negative(fmt, y) if operation == SUBTRACT else y
+                found = scalar.add(fmt, scalar.load(fmt, values, (a, i)), y)
+                if scalar.lost(fmt, found):
+                    return ~o
+                scalar.put(fmt, values, (out, i), found)
+        return end
+    o = begin - 1
     while o + 1 < end:
         o += 1
-        operation = np.int64(code.rows[o, 0])
         a, b, c, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 3], code.rows[o, 4]
         if operation == SKIP:
             if not truths[a].any():
                 o += np.int64(b)
-            continue
-        if operation <= MULTIPLY:
-            for i in range(values.shape[1]):
-                x, y = scalar.load(fmt, values, (a, i)), scalar.load(fmt, values, (b, i))
-                if operation == MULTIPLY:
-                    found = scalar.multiply(fmt, x, y)
-                else:
-                    found = scalar.add(fmt, x, scalar.negative(fmt, y) if operation == SUBTRACT else y)
-                if scalar.lost(fmt, found):
-                    return ~o
-                scalar.put(fmt, values, (out, i), found)
             continue
         for i in range(values.shape[1]):
             if operation == COMBINE:
@@ -602,6 +609,18 @@ def _overloaded_far(kind: Any, values: Any) -> Any:
     return alone if values.ndim == 1 else in_lanes
 
 
+@borrowing
+def _run_segments(fmt: Any, code: Any, values: Any, truths: Any) -> Any:
+    """Run all rows for each lane in one format; return how many have results, counted from the first."""
+    done = np.int64(0)
+    for s in range(code.segments.shape[0]):
+        if done < code.segments[s, 1]:
+            done = _run_segment(fmt, code, done, code.segments[s, 1], values, truths)
+        if done < 0:
+            return ~done
+    return code.rows.shape[0]
+
+
 def execute(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
     """Run all rows for each lane; return how many rows have results in every lane, counted from the first.
 
@@ -632,13 +651,13 @@ def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths:
         done = np.int64(0)
         for s in range(code.segments.shape[0]):
             end, given = code.segments[s, 1], formats.whole[code.segments[s, 2]]
-            if s + 1 < code.segments.shape[0] and code.segments[s + 1, 2] == code.segments[s, 2]:
+            if done >= end:
                 continue
             if given[5] != 0:
-                done = _run_lanes(ShortDecimal(given[0], given[1] == AWAY), code, done, end, values, truths)
+                done = _run_segment(ShortDecimal(given[0], given[1] == AWAY), code, done, end, values, truths)
             else:
                 fmt = LimitedDecimal(given[1], given[0], given[2], given[3], given[4] != 0)
-                done = _run_lanes(fmt, code, done, end, values, truths)
+                done = _run_segment(fmt, code, done, end, values, truths)
             if done < 0:
                 return ~done
         return code.rows.shape[0]
@@ -649,12 +668,10 @@ def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths:
         fmt = Wide(
             given[0], given[1], given[2], given[3], given[4], given[5], given[6], lowest, largest, given[13] != 0
         )
-        done = _run_lanes(fmt, code, 0, code.rows.shape[0], values, truths)
-        return ~done if done < 0 else code.rows.shape[0]
+        return _run_segments(fmt, code, values, truths)
 
     def of_double_doubles(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
-        done = _run_lanes(kind, code, 0, code.rows.shape[0], values, truths)
-        return ~done if done < 0 else code.rows.shape[0]
+        return _run_segments(kind, code, values, truths)
 
     if tag is Masks:
         return of_one_lane if values.ndim == 1 else of_lanes
