@@ -106,19 +106,20 @@ def answer_line(found: Sequence[YearAnswer], ax: Axes) -> list[Artist]:
         next(each for each in found if each.source.startswith(source))
         for source in ("Report, own", "The same", "Report, for", "300", "Every")
     )
+    fewest, answer, enough = (float(each.bits or 0) for each in (simulated, years, every))
     artists: list[Artist] = []
-    for height, printed, observed in ((1, own, simulated), (0, formula, years)):
+    for height, printed, seen in ((1, own, fewest), (0, formula, answer)):
         places = [binary_digits(t) for t in printed.decimal]
         artists += ax.plot(places, [height] * 2, "o", mfc="none", mec=REFUTED, ms=9, mew=1.5)
-        artists += ax.plot([observed.bits], [height], "o", color=OBSERVED, ms=8)
+        artists += ax.plot([seen], [height], "o", color=OBSERVED, ms=8)
         marks = [*((place, f"{t} digits", REFUTED) for place, t in zip(places, printed.decimal, strict=True))]
-        for place, words, colour in [*marks, (observed.bits, f"{observed.bits} bits", OBSERVED)]:
+        for place, words, colour in [*marks, (seen, f"{seen:.0f} bits", OBSERVED)]:
             side = "right" if place < BINARY32.precision else "center" if height == 0 else "left"
             artists.append(name(ax, words, (place, height), colour, (0, 11), ha=side))
-    (every_mark,) = ax.plot([every.bits], [0], "|", color=VALID, ms=16, mew=3)
+    (every_mark,) = ax.plot([enough], [0], "|", color=VALID, ms=16, mew=3)
     artists.append(every_mark)
-    artists.append(name(ax, f"{every.bits} bits", (every.bits, 0), VALID, (0, -22), ha="center"))
-    artists += ax.plot([years.bits], [0], "o", mfc="none", mec=BLACK, ms=18, mew=2)
+    artists.append(name(ax, f"{enough:.0f} bits", (enough, 0), VALID, (0, -22), ha="center"))
+    artists += ax.plot([answer], [0], "o", mfc="none", mec=BLACK, ms=18, mew=2)
     for word, fmt in (("binary32", BINARY32), ("binary64", BINARY64)):
         artists.append(ax.axvline(fmt.precision, color=REFERENCE, ls=":"))
         artists.append(name(ax, word, (fmt.precision, -0.75), REFERENCE, (4, 0)))
