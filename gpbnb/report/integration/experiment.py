@@ -1,4 +1,4 @@
-"""Simulate integrals that are exact at the sampling times, and run integrators in t-digit arithmetic."""
+"""Simulate the error of digital integration, exactly in distribution at the sampling times."""
 
 from __future__ import annotations
 
@@ -11,14 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.arithmetic.kernels.scalar import add, load, multiply, round_, store
-from gpbnb.arithmetic.kernels.tags import Double
-from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.report.integration import theory
-from gpbnb.report.integration.arguments import positive_number
 from gpbnb.report.integration.theory import Cycle, Process
 
 Floats = NDArray[np.float64]
@@ -184,117 +178,3 @@ def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> W
     bar = tqdm(values.tolist(), desc="sweep", **BAR)
     runs = [simulate(theory.first_order(1.0, one), 1.0, [cycles], rng, paths) for one in bar]
     return WalkSweep(values, cycles, paths, np.array([run.variance[0] for run in runs]) / cycles)
-
-
-# -- the integrator in t-digit arithmetic ---------------------------------------------------------
-
-
-@compiled
-def _integrate(fmt: Any, half: Any, x: Any, total: Any) -> None:
-    """Apply (2) to each path: add T/2 times the sum of two samples to the accumulator, with every operation rounded.
-
-    x is (samples, paths) in the format, its first row the sample before; `half` and `total` are (1,) and (paths,).
-    """
-    factor = load(fmt, half, 0)
-    for path in range(x.shape[1]):
-        s = load(fmt, total, path)
-        old = load(fmt, x, (0, path))
-        for k in range(1, x.shape[0]):
-            new = load(fmt, x, (k, path))
-            s = add(fmt, s, multiply(fmt, factor, add(fmt, new, old)))
-            old = new
-        store(fmt, total, path, s)
-
-
-@compiled
-def _integrate_rounding(fmt: Any, half: Any, x: Any, total: Any) -> None:
-    """Do the same for float64 samples, each of which is rounded first."""
-    factor = load(fmt, half, 0)
-    for path in range(x.shape[1]):
-        s = load(fmt, total, path)
-        old = round_(fmt, x[0, path])
-        for k in range(1, x.shape[0]):
-            new = round_(fmt, x[k, path])
-            s = add(fmt, s, multiply(fmt, factor, add(fmt, new, old)))
-            old = new
-        store(fmt, total, path, s)
-
-
-class Integrator:
-    """Run the trapezoidal rule (2) in a format, chunk by chunk."""
-
-    def __init__(self, fmt: FloatFormat, period: float, paths: int) -> None:
-        backend = fmt.backend
-        if not isinstance(backend, Compiled):
-            raise ValueError(f"got {fmt}; needed base 2 to 53 bits, base 10 to 18 digits, or base 16 to 13 digits")
-        self.fmt, self.backend = fmt, backend
-        self._half = backend.pack(fmt.array([period / 2]).components)
-        self._total = backend.pack(fmt.array(np.zeros(paths)).components)
-
-    def feed(self, x: Floats) -> None:
-        """Continue with the samples x, (samples, paths); the first row repeats the last row of the previous chunk."""
-        if self.fmt.base == 10:
-            packed = self.backend.pack(self.fmt.array(x).components)
-            _integrate(self.backend.tag, self._half, packed, self._total)
-        else:
-            _integrate_rounding(self.backend.tag, self._half, x, self._total)
-
-    @property
-    def value(self) -> Floats:
-        """Current integrals (paths,), rounded to float64."""
-        return self.backend.to_float(self.backend.unpack(self._total))
-
-
-@dataclass(frozen=True)
-class Emulation:
-    """Errors (paths,) of integrals computed in a format, in the unit of the input times seconds."""
-
-    fmt: FloatFormat
-    omega_bw: float
-    f_c: float
-    duration: float
-    discretization: Floats
-    rounding: Floats
-
-    @property
-    def rms(self) -> theory.Errors:
-        """Root mean square of each of the two errors."""
-        return theory.Errors(*(math.sqrt(float(np.mean(e**2))) for e in (self.discretization, self.rounding)))
-
-    @property
-    def rms_total(self) -> float:
-        """Root mean square of the total error."""
-        return math.sqrt(float(np.mean((self.discretization + self.rounding) ** 2)))
-
-
-def emulate(
-    omega_bw: float,
-    f_c: float,
-    duration: float,
-    formats: Sequence[FloatFormat],
-    rng: np.random.Generator,
-    paths: int = 64,
-    sigma_x: float = 1.0,
-) -> tuple[Emulation, ...]:
-    """Run the integrator in several formats on the same samples, and compare with float64 and the exact integral.
-
-    The rounding error is the difference from the same rule in float64 with unrounded samples. The rounding error of
-    float64 itself is neglected, so formats may have at most 40 bits or 12 decimal digits.
-    """
-    for fmt in formats:
-        if fmt.precision * math.log2(fmt.base) > 40:
-            raise ValueError(
-                f"got {fmt}; needed at most 40 bits, or float64 is no reference; use fewer {digit_unit(fmt.base)}"
-            )
-    process = theory.first_order(sigma_x, omega_bw)
-    cycles = round(positive_number("duration", duration) * positive_number("f_c", f_c))
-    running = [Integrator(fmt, 1 / f_c, paths) for fmt in formats]
-    error, reference, half = np.zeros(paths), np.zeros(paths), np.array([0.5 / f_c])
-    for chunk in chunks(process, f_c, cycles, rng, paths):
-        error = error + chunk.d.sum(axis=0)
-        _integrate_rounding(Double(), half, chunk.x, reference)
-        for one in running:
-            one.feed(chunk.x)
-    return tuple(
-        Emulation(one.fmt, omega_bw, f_c, duration, error, np.asarray(one.value - reference)) for one in running
-    )

@@ -251,16 +251,3 @@ def order(second: bool) -> tuple[str, ...] | None:
         return tuple(TopologicalSorter(dependencies(second)).static_order())
     except CycleError:
         return None
-
-
-def bound_for_size(beta: Fraction, k: int, n: int, m: int, size: Fraction, **faults: bool) -> Fraction:
-    r"""Return bound (125) with :math:`\|x_k\| = B` = size; every line of (125) in a figure uses this function.
-
-    Parameters
-    ----------
-    beta : unit roundoff.
-    k, n, m : steps, states and measurements.
-    size : size in the unit of the result.
-    faults : faults to correct, as for :func:`coefficients`.
-    """
-    return state_bound(size, size, beta, coefficients(k, n, m, **faults))
