@@ -13,6 +13,8 @@ EMPTY = """(kept) => {
 FILL = "for (const [each, parts] of window.emptied) each.replaceChildren(...parts)"
 # These see colours; the others see the same in each scheme.
 OF_COLOURS = ["color-contrast", "link-in-text-block"]
+ALONE = {"runOnly": OF_COLOURS}
+LEFT_OUT = {"rules": {name: {"enabled": False} for name in OF_COLOURS}}
 # The contrast of every text takes nine tenths of the time: three texts of each look, on alike backgrounds, will do.
 VIOLATIONS = """async ([within, rules]) => {
   const layers = new Map([[null, ""]]);
@@ -39,7 +41,7 @@ VIOLATIONS = """async ([within, rules]) => {
   for (const each of chosen) each.dataset.chosen = "";
   axe.configure({ rules: [{ id: "color-contrast", selector: "[data-chosen]" }] });
   // axe asks for style sheets at wrong addresses, for a rule that it does not apply.
-  const options = { resultTypes: ["violations"], preload: { assets: ["media"] }, ...(rules && { runOnly: rules }) };
+  const options = { resultTypes: ["violations"], preload: { assets: ["media"] }, ...rules };
   const found = (await axe.run(within ?? document, options)).violations;
   for (const each of chosen) delete each.dataset.chosen;
   return found.flatMap(({ id, nodes }) => nodes.map(({ target, html }) => `${id}: ${target} ${html.slice(0, 160)}`));
@@ -53,12 +55,16 @@ def script() -> str:
     return Axe().axe_script
 
 
-def violations(page, formulas: int = 0, within: str | None = None) -> list[str]:
-    """What axe finds in the light scheme, with that many formulas at the page's beginning and end, and in the dark."""
+def violations(page, formulas: int = 0, within: str | None = None, colours: bool = True) -> list[str]:
+    """What axe finds in the light scheme, with that many formulas at the page's beginning and end, and in the dark.
+
+    Colours are the same in every size of a window: they may be left out.
+    """
     if not page.evaluate("'axe' in window"):
         page.evaluate(script())
     found = []
-    for scheme, kept, rules in (("light", formulas, None), ("dark", 0, OF_COLOURS)):
+    runs = (("light", formulas, {}), ("dark", 0, ALONE)) if colours else (("light", formulas, LEFT_OUT),)
+    for scheme, kept, rules in runs:
         page.evaluate(EMPTY, kept)
         page.emulate_media(color_scheme=scheme)
         page.wait_for_function(f"document.documentElement.dataset.theme === '{scheme}'")

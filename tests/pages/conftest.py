@@ -93,8 +93,3 @@ def look_at(open_page):
 @pytest.fixture(scope="session", params=[(a, s) for a in tools.pages() for s in tools.SIZES], ids="-".join)
 def page(request, look_at):
     return look_at(*request.param)
-
-
-@pytest.fixture(scope="session", params=tools.pages(), ids=lambda address: f"{address}-paper")
-def paper(request, look_at):
-    return look_at(request.param, "paper")

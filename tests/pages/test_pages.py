@@ -130,27 +130,12 @@ def test_columns_of_tables_have_names(page):
     assert nameless == []
 
 
-CUT = """() => {
-  const paper = document.querySelector("article, main").getBoundingClientRect().right + 1;
-  const ends = (e) => e.getBoundingClientRect().right;
-  const all = [...document.querySelectorAll("article :is(p, pre, img, svg, td, th, li, dt, dd, h1, h2, h3, mjx-math)")];
-  const within = (e) => (e.matches("mjx-math") && e.closest("td, th") ? ends(e.closest("td, th")) + 1 : paper);
-  const cut = all.filter((e) => e.checkVisibility() && ends(e) > Math.min(paper, within(e)));
-  return cut.map((e) => e.textContent.slice(0, 80));
-}"""
-
-
-def test_nothing_is_cut_on_paper(paper):
-    assert paper.evaluate(CUT) == []
-    assert paper.locator(".math:not(:has(mjx-container))").all_text_contents() == []
-
-
 def test_axe_finds_no_violation(page):
-    """Formulas are the same in each look: one look is enough for them, at all of them on one page."""
-    formulas = 0
-    if page.viewport_size == tools.SIZES["desktop"]:
+    """Formulas and colours are the same in each look: one look is enough, at all formulas on one page."""
+    formulas, desktop = 0, page.viewport_size == tools.SIZES["desktop"]
+    if desktop:
         formulas = page.locator("mjx-container").count() if page.url.endswith(LONG_PAGES[0]) else FORMULAS
-    assert axe.violations(page, formulas) == []
+    assert axe.violations(page, formulas, colours=desktop) == []
 
 
 def test_faint_text_is_a_violation(open_page):
@@ -344,6 +329,24 @@ def test_a_chapter_shows_its_text_and_its_formulas_in_time(page, open_page):
         with open_page(urlsplit(page.url).path.removeprefix("/")) as again:
             fastest = {name: min(time, fastest[name]) for name, time in again.evaluate(tools.TIMES).items()}
     assert {name: time for name, time in fastest.items() if time > tools.LONGEST[name]} == {}
+
+
+CUT = """() => {
+  const paper = document.querySelector("article, main").getBoundingClientRect().right + 1;
+  const ends = (e) => e.getBoundingClientRect().right;
+  const all = [...document.querySelectorAll("article :is(p, pre, img, svg, td, th, li, dt, dd, h1, h2, h3, mjx-math)")];
+  const within = (e) => (e.matches("mjx-math") && e.closest("td, th") ? ends(e.closest("td, th")) + 1 : paper);
+  const cut = all.filter((e) => e.checkVisibility() && ends(e) > Math.min(paper, within(e)));
+  return cut.map((e) => e.textContent.slice(0, 80));
+}"""
+
+
+@pytest.mark.parametrize("page", [(a, "phone") for a in PAGES], ids="-".join, indirect=True)
+def test_nothing_is_cut_on_paper(page, look_at):
+    """The last look at a page, which is not as it was before."""
+    paper = look_at(urlsplit(page.url).path.removeprefix("/"), "paper")
+    assert paper.evaluate(CUT) == []
+    assert paper.locator(".math:not(:has(mjx-container))").all_text_contents() == []
 
 
 def test_a_narrow_window_shows_what_a_phone_does(open_page, look_at):
