@@ -204,7 +204,7 @@ def test_the_principles_state_what_the_page_on_wordlength_prints():
     near, *_, far = bits("for origin in", r"away: (\d+) bits")
     cubic = [bits("inverse_precisions", rf"degree 3, {name} .*?(\d+) \|$")[0] for name in ("centred", "from 100")]
     records = bits("for seed in range(20)", r"\d+")
-    (usual,), (ud,) = (bits("precise, 100", rf"^{form} +(\d+) bits") for form in ("innovation", "UD"))
+    (usual,), (ud,) = (bits("precise, sharp", rf"^{form} +(\d+) bits") for form in ("innovation", "UD"))
     first, *_, last = bits("required_precision_by_steps", r"steps: (\d+) bits")
     lost = [after - before for before, after in zip(column(0), column(2), strict=True)]
     text = prose("principles")
