@@ -2,9 +2,7 @@
 
 import dataclasses
 
-import numpy as np
 import pytest
-import sympy
 
 from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare
 
@@ -43,43 +41,22 @@ def test_verdict_must_fit_agreement(verdict, agrees):
             Finding("$1$", agrees, verdict, "see (20)")
 
 
-@pytest.mark.parametrize("agrees", [np.True_, sympy.true, 1, 0, "yes"])
-def test_agreement_must_be_a_real_bool(agrees):
-    for make in (
-        lambda: Finding("1", agrees, Verdict.VERIFIED),
-        lambda: compare(agrees, "1"),
-        lambda: answer(agrees, "1", "here"),
-    ):
-        with pytest.raises(TypeError, match=r"needed a bool.*; use bool\(\.\.\.\)"):
-            make()
-
-
-@pytest.mark.parametrize("make", [compare, lambda agrees, text: answer(agrees, text, "here")])
-def test_no_outcome_is_not_a_comparison(make):
-    with pytest.raises(TypeError, match="None of type NoneType; needed a bool"):
-        make(None, "1")
-
-
 @pytest.mark.parametrize(
-    ("fields", "error", "message"),
+    ("fields", "message"),
     [
-        ((1, True, Verdict.VERIFIED), TypeError, "recomputed=1 of type int; needed a str"),
-        (("1", True, Verdict.VERIFIED, None), TypeError, "note=None of type NoneType; needed a str"),
-        (("1", True, "verified"), TypeError, "verdict='verified' of type str; needed one of"),
-        (("$1", True, Verdict.VERIFIED), ValueError, "recomputed='\\$1' with an unpaired or doubled dollar sign"),
-        (("1", True, Verdict.VERIFIED, "$$a$$"), ValueError, "note='\\$\\$a\\$\\$' with an unpaired or doubled"),
-        (("", True, Verdict.VERIFIED), ValueError, "agrees=True with a blank recomputed"),
-        ((" ", False, Verdict.MISPRINT), ValueError, "agrees=False with a blank recomputed"),
+        (("$1", True, Verdict.VERIFIED), "recomputed='\\$1' with an unpaired or doubled dollar sign"),
+        (("1", True, Verdict.VERIFIED, "$$a$$"), "note='\\$\\$a\\$\\$' with an unpaired or doubled"),
+        (("", True, Verdict.VERIFIED), "agrees=True with a blank recomputed"),
+        ((" ", False, Verdict.MISPRINT), "agrees=False with a blank recomputed"),
         (
             ("1", None, Verdict.UNVERIFIABLE, " "),
-            ValueError,
-            "'unverifiable' without a note; needed a note that says which data",
+            "'unverifiable' without a note; needed one that says which data",
         ),
-        (("1", True, Verdict.ANSWERED), ValueError, "'answered' without a note; needed a note that says where"),
+        (("1", True, Verdict.ANSWERED), "'answered' without a note; needed one that says where"),
     ],
 )
-def test_bad_fields_are_refused(fields, error, message):
-    with pytest.raises(error, match=message):
+def test_bad_fields_are_refused(fields, message):
+    with pytest.raises(ValueError, match=message):
         Finding(*fields)
 
 
@@ -102,24 +79,9 @@ def test_compare_calls_a_disagreement_wrong_unless_told():
     assert compare(False, "4").verdict is Verdict.WRONG
 
 
-@pytest.mark.parametrize(
-    "otherwise", [Verdict.VERIFIED, Verdict.UNVERIFIABLE, Verdict.OPEN, Verdict.ANSWERED, "misprint"]
-)
-@pytest.mark.parametrize("agrees", [True, False])
-def test_compare_refuses_other_verdicts_whatever_the_outcome(agrees, otherwise):
-    with pytest.raises(ValueError, match="needed one of wrong, inconsistent, not reproduced, misprint, ocr"):
-        compare(agrees, "4", otherwise)
-
-
 def test_answer():
     assert answer(True, "4", "here") == Finding("4", True, Verdict.ANSWERED, "here")
     assert answer(False, "4", "here") == Finding("4", False, Verdict.OPEN, "here")
-
-
-@pytest.mark.parametrize("holds", [True, False])
-def test_answer_says_where(holds):
-    with pytest.raises(ValueError, match="without a note"):
-        answer(holds, "4", "")
 
 
 def test_only_a_disagreement_has_a_root_error():

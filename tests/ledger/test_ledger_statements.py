@@ -1,74 +1,32 @@
-"""The inventory: its reader, its selection, and the text itself."""
+"""The statements and their corrections: what each row has, its text, and their selection."""
 
 import re
+from dataclasses import asdict
 
 import pytest
 
 from gpbnb.report.ledger import load_statements, quote, select
-from gpbnb.report.ledger.statements import HEADER, Statement
+from gpbnb.report.ledger.corrections import load_corrections
+from gpbnb.report.ledger.statements import DOCUMENTS, statement
 
-HEAD = ",".join(HEADER)
-GOOD = "hung1984.II.eq14,hung1984,II,4,eq (14),equation,$\\beta_c=2\\beta$,"
 INVENTORY = load_statements()
 
 
-def inventory(tmp_path, *lines, encoding="utf-8"):
-    path = tmp_path / "list.csv"
-    path.write_text("\n".join(lines) + "\n", encoding=encoding)
-    return path
+def test_each_statement_is_complete():
+    assert len({entry.id for entry in INVENTORY}) == len(INVENTORY)
+    for entry in INVENTORY:
+        cells = asdict(entry)
+        assert [name for name, cell in cells.items() if cell != cell.strip() or not (cell or name == "form")] == []
+        assert entry.document in DOCUMENTS
+        assert entry.kind in ("equation", "number", "example", "claim", "figure", "table", "open")
+        assert entry.id.startswith(f"{entry.document}.")
 
 
-def test_reads_what_is_written(tmp_path):
-    quoted = 'savage2016.main.eq2,savage2016,-,analysis,"eq, (2)",claim,"a ""b""",'
-    assert load_statements(inventory(tmp_path, HEAD, GOOD, quoted)) == (
-        Statement("hung1984.II.eq14", "hung1984", "II", "4", "eq (14)", "equation", "$\\beta_c=2\\beta$"),
-        Statement("savage2016.main.eq2", "savage2016", "-", "analysis", "eq, (2)", "claim", 'a "b"'),
-    )
-
-
-@pytest.mark.parametrize(
-    ("lines", "message"),
-    [
-        ([], "line 1: got the header ''"),
-        ([HEAD.replace("item", "name"), GOOD], "line 1: got the header 'id,document,chapter,section,name"),
-        ([HEAD, GOOD, GOOD.replace("eq14", "eq15") + ",more"], "line 3: got 9 fields; needed 8"),
-        ([HEAD, "", GOOD], "line 2: got 0 fields; needed 8"),
-        ([HEAD, GOOD, GOOD], "line 3: got id 'hung1984.II.eq14', which line 2 has already"),
-        ([HEAD, GOOD.replace("equation", "equations")], "line 2: got kind 'equations'; needed one of equation,"),
-        ([HEAD, GOOD.replace("hung1984", "hung1983")], "line 2: got document 'hung1983'; needed one of hung1984,"),
-        (
-            [HEAD, GOOD.replace("hung1984.", "hung1982.")],
-            "line 2: got id 'hung1982.II.eq14'; needed an id that begins with its",
-        ),
-        ([HEAD, GOOD.replace(",4,", ",,")], "line 2: got section=''; needed a text without"),
-        (
-            [HEAD, GOOD.replace(",4,", ", 4,")],
-            "line 2: got section=' 4'; needed a text without leading or trailing blanks",
-        ),
-        ([HEAD, GOOD[:-1] + "$,"], "line 2: got text=.* with an unpaired or doubled dollar sign"),
-        ([HEAD, GOOD.replace("$", "$$")], "line 2: got text=.* with an unpaired or doubled dollar sign"),
-        ([HEAD, GOOD, '"open'], "line 3: unexpected end of data"),
-    ],
-)
-def test_a_bad_line_is_named(tmp_path, lines, message):
-    with pytest.raises(ValueError, match=f"list.csv, {message}"):
-        load_statements(inventory(tmp_path, *lines))
-
-
-def test_a_quoted_line_break_counts_as_a_line(tmp_path):
-    broken = 'hung1984.II.x,hung1984,II,4,x,claim,"a\n\nb",'
-    with pytest.raises(ValueError, match="line 5: got kind"):
-        load_statements(inventory(tmp_path, HEAD, broken, GOOD.replace("equation", "x")))
-
-
-def test_other_encodings_are_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"list\.csv, which is not UTF-8"):
-        load_statements(inventory(tmp_path, HEAD, GOOD[:-1] + "é,", encoding="latin-1"))
-
-
-def test_a_missing_file_is_an_oserror(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        load_statements(tmp_path / "none.csv")
+def test_each_text_has_places_for_parts_of_its_form():
+    corrected = [correction.applied(statement(key)) for key, correction in load_corrections().items()]
+    for entry in (*INVENTORY, *filter(None, corrected)):
+        assert set(re.findall(r"\{\{(\d+)\}\}", entry.text)) <= {str(k + 1) for k in range(len(entry.parts))}, entry.id
+        assert markup_faults(entry.printed) == [], entry.id
 
 
 def sections(entries):
@@ -131,10 +89,6 @@ def markup_faults(printed):
         faults += ["unpaired brace"] * (plain.count("{") != plain.count("}"))
         faults += ["a LaTeX comment"] * ("%" in math.replace(r"\%", ""))
     return faults
-
-
-def test_markup_is_sound():
-    assert {entry.id: markup_faults(entry.printed) for entry in INVENTORY if markup_faults(entry.printed)} == {}
 
 
 @pytest.mark.parametrize("printed", ["$a", r"\beta", "$$", "$ a$", r"$\frac{a$", "$1%$", r"$\{a}$"])

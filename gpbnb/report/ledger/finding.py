@@ -79,37 +79,19 @@ class Finding:
 
     def __post_init__(self) -> None:
         for name, text in (("recomputed", self.recomputed), ("note", self.note)):
-            if not isinstance(text, str):
-                raise TypeError(f"got {name}={text!r} of type {type(text).__name__}; needed a str; format the value")
             if text.count("$") % 2 or "$$" in text:
                 raise ValueError(f"got {name}={text!r} with an unpaired or doubled dollar sign; needed math as $...$")
-        if not isinstance(self.verdict, Verdict):
-            raise TypeError(
-                f"got verdict={self.verdict!r} of type {type(self.verdict).__name__}; needed one of {list(Verdict)}"
-            )
-        if self.agrees is not None and not isinstance(self.agrees, bool):
-            raise TypeError(
-                f"got agrees={self.agrees!r} of type {type(self.agrees).__name__}; needed a bool or None; use bool(...)"
-            )
+        verdict = self.verdict.value
         if self.agrees not in _AGREES[self.verdict]:
             needed = " or ".join(str(value) for value in _AGREES[self.verdict])
-            raise ValueError(
-                f"got verdict {self.verdict.value!r} with agrees={self.agrees}; needed {needed}; let "
-                "compare() or answer() choose the verdict"
-            )
+            raise ValueError(f"got verdict {verdict!r} with agrees={self.agrees}; needed {needed}")
         if self.root and self.verdict not in DISAGREEMENTS:
-            raise ValueError(
-                f"got verdict {self.verdict.value!r} with the root error {self.root!r}; needed no root "
-                "error for this verdict; omit root"
-            )
+            raise ValueError(f"got verdict {verdict!r} with the root error {self.root!r}; needed no root error")
         if self.agrees is not None and not self.recomputed.strip():
-            raise ValueError(
-                f"got agrees={self.agrees} with a blank recomputed text; needed a text that says what was computed"
-            )
+            raise ValueError(f"got agrees={self.agrees} with a blank recomputed text; needed what was computed")
         if self.verdict in _NEEDS_NOTE and not self.note.strip():
             raise ValueError(
-                f"got verdict {self.verdict.value!r} without a note; needed a note that says "
-                f"{_NEEDS_NOTE[self.verdict]}"
+                f"got verdict {verdict!r} without a note; needed one that says {_NEEDS_NOTE[self.verdict]}"
             )
 
 
@@ -121,48 +103,12 @@ def compare(
     otherwise_note: str | None = None,
     root: str = "",
 ) -> Finding:
-    """Judge a printed statement by comparison with what was recomputed.
-
-    Parameters
-    ----------
-    agrees : outcome of the comparison.
-    recomputed : what was computed.
-    otherwise : the verdict if `agrees` is False, one of `DISAGREEMENTS`.
-    note : note for either outcome.
-    otherwise_note : replaces `note` if `agrees` is False.
-    root : id of the root error, used if `agrees` is False.
-
-    Returns
-    -------
-    finding : verified if `agrees`, otherwise `otherwise`.
-    """
-    if otherwise not in DISAGREEMENTS:
-        came = otherwise.value if isinstance(otherwise, Verdict) else otherwise
-        raise ValueError(f"got otherwise={came!r}; needed one of {', '.join(v.value for v in DISAGREEMENTS)}")
-    _require_bool("agrees", agrees)
+    """Return the finding on a statement: verified, or what a disagreement is called, with its note and root error."""
     if agrees:
         return Finding(recomputed, True, Verdict.VERIFIED, note)
     return Finding(recomputed, False, otherwise, note if otherwise_note is None else otherwise_note, root)
 
 
 def answer(holds: bool, recomputed: str, note: str) -> Finding:
-    """Judge an item that the documents leave undone, by checking the answer given here.
-
-    Parameters
-    ----------
-    holds : whether the answer passes its own check.
-    recomputed : the answer.
-    note : where the answer is.
-
-    Returns
-    -------
-    finding : answered if `holds`, otherwise open.
-    """
-    _require_bool("holds", holds)
-    answered = Finding(recomputed, True, Verdict.ANSWERED, note)
-    return answered if holds else Finding(recomputed, False, Verdict.OPEN, note)
-
-
-def _require_bool(name: str, value: object) -> None:
-    if not isinstance(value, bool):
-        raise TypeError(f"got {name}={value!r} of type {type(value).__name__}; needed a bool; use bool(...)")
+    """Return the finding on an item that the documents leave undone: answered if our answer holds, otherwise open."""
+    return Finding(recomputed, holds, Verdict.ANSWERED if holds else Verdict.OPEN, note)

@@ -110,17 +110,6 @@ class Relation:
         tree = self.tree
         return isinstance(tree, ast.Compare) and all(isinstance(op, ast.Eq | ast.Is) for op in tree.ops)
 
-    def terms(
-        self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
-    ) -> tuple[Any, ...]:
-        """Evaluate each term of the last side: ``x == a - b`` has the terms a and -b."""
-        tree = self.tree
-        evaluate = _Evaluation(names or {}, number)
-        return tuple(
-            -evaluate(term) if negative else evaluate(term)
-            for negative, term in _terms(tree.comparators[-1] if isinstance(tree, ast.Compare) else tree)
-        )
-
     def links(
         self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
     ) -> tuple[Link, ...]:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import csv
-import io
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
 from importlib.resources import files
-from importlib.resources.abc import Traversable
 from typing import Any, TypeVar
 
 import sympy as sp
@@ -20,7 +18,6 @@ from gpbnb.report.ledger.formula import Link, Number, Part, Relation, Words, rea
 _L = TypeVar("_L", Number, Words)
 
 DOCUMENTS = ("hung1984", "hung1982", "savage2016")
-KINDS = ("equation", "number", "example", "claim", "figure", "table", "open")
 
 
 @dataclass(frozen=True)
@@ -33,7 +30,7 @@ class Statement:
     document : short name, one of `DOCUMENTS`.
     chapter, section : as numbered there; ``-`` if the document has none.
     item : its name in the document, as in ``eq (20)``.
-    kind : one of `KINDS`.
+    kind : equation, number, example, claim, figure, table or open.
     text : the printed text, with math between single dollar signs; ``{{1}}`` stands for the first part of the form.
     form : the machine-readable form, see :mod:`gpbnb.report.ledger.formula`; empty if there is none.
     """
@@ -93,51 +90,13 @@ class Statement:
 
 
 _PLACE = re.compile(r"\{\{(\d+)\}\}")
-HEADER = tuple(field.name for field in fields(Statement))
-
-
-def load_statements(source: Traversable | None = None) -> tuple[Statement, ...]:
-    """Read and validate the inventory.
-
-    Parameters
-    ----------
-    source : a CSV file, such as a ``pathlib.Path``; by default that of the package.
-
-    Returns
-    -------
-    entries : in the order of the file.
-    """
-    return _stored() if source is None else _read(source)
 
 
 @cache
-def _stored() -> tuple[Statement, ...]:
-    return _read(files(__package__) / "statements.csv")
-
-
-def _read(source: Traversable) -> tuple[Statement, ...]:
-    try:
-        text = source.read_bytes().decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"got {source.name}, which is not UTF-8 ({error}); save it as UTF-8") from error
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    entries: list[Statement] = []
-    seen: dict[str, int] = {}
-    try:
-        header = next(reader, [])
-        if tuple(header) != HEADER:
-            raise ValueError(f"got the header {','.join(header)!r}; needed {','.join(HEADER)!r}")
-        for record in reader:
-            entry = _entry(record)
-            if entry.id in seen:
-                raise ValueError(
-                    f"got id {entry.id!r}, which line {seen[entry.id]} has already; needed a unique id; rename one"
-                )
-            seen[entry.id] = reader.line_num
-            entries.append(entry)
-    except (ValueError, csv.Error) as error:
-        raise ValueError(f"{source.name}, line {max(reader.line_num, 1)}: {error}") from error
-    return tuple(entries)
+def load_statements() -> tuple[Statement, ...]:
+    """Read all statements, in the order of the file."""
+    text = (files(__package__) / "statements.csv").read_text(encoding="utf-8")
+    return tuple(Statement(**row) for row in csv.DictReader(text.splitlines(), strict=True))
 
 
 @cache
@@ -155,38 +114,6 @@ def statement(key: str) -> Statement:
 def quote(key: str) -> str:
     """Return the printed text of the statement `key`; KeyError as for :func:`statement`."""
     return statement(key).printed
-
-
-def _entry(record: list[str]) -> Statement:
-    if len(record) != len(HEADER):
-        raise ValueError(f"got {len(record)} fields; needed {len(HEADER)}; quote a field that contains a comma")
-    entry = Statement(*record)
-    for name, value in zip(HEADER, record, strict=True):
-        if (not value and name != "form") or value != value.strip():
-            raise ValueError(
-                f"got {name}={value!r}; needed a text without leading or trailing blanks; write '-' where there is none"
-            )
-    if entry.document not in DOCUMENTS:
-        raise ValueError(f"got document {entry.document!r}; needed one of {', '.join(DOCUMENTS)}")
-    if entry.kind not in KINDS:
-        raise ValueError(f"got kind {entry.kind!r}; needed one of {', '.join(KINDS)}")
-    if not entry.id.startswith(f"{entry.document}."):
-        raise ValueError(f"got id {entry.id!r}; needed an id that begins with its document: '{entry.document}.…'")
-    check_text(entry)
-    return entry
-
-
-def check_text(entry: Statement) -> None:
-    """Check that the form of a statement can be read and that its text can be typeset with the parts of the form."""
-    if entry.text.count("$") % 2 or "$$" in entry.text:
-        raise ValueError(f"got text={entry.text!r} with an unpaired or doubled dollar sign; needed math as $...$")
-    for place in _PLACE.findall(entry.text):
-        if not 1 <= int(place) <= len(entry.parts):
-            raise ValueError(
-                f"got the place {{{{{place}}}}} in text; needed a number up to {len(entry.parts)}, the "
-                "number of parts of the form"
-            )
-    _ = entry.printed
 
 
 def select(
