@@ -20,12 +20,11 @@ from gpbnb.arithmetic.bounds import above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.check import BEYOND, NotProvedError, prove
+from gpbnb.bounds.check import BEYOND, DERIVED, NotProvedError, prove
 from gpbnb.bounds.gains import Schedule
 from gpbnb.bounds.guess import EXCESS, FilterLimits, Guess, radius_of
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, matrices
 from gpbnb.filters.system import LinearFilter
 from gpbnb.filters.words import WordFormats, integer_program
@@ -42,12 +41,11 @@ FORMS = {
 _KINDS = {MULTIPLY: "multiply", ADD: "add", SUBTRACT: "subtract"}
 RAISED = (1.0, 1.001, 1.003, 1.01, 1.03, 1.1)
 """Factors of a guess that are tried, until the checker proves one."""
-SLOW = (1.01, 1.7)
-"""The same, where an ellipsoid contains old errors, which loses sharpness if two modes are slow."""
+SLOW = (1.02, 1.05, 1.2, 1.5)
+"""The same for filters that settle slowly, where the checker adds effects of old errors that are alike."""
 _NEGLIGIBLE = 2.0**-26
-_WHOLE = 700
-"""If errors are negligible after this many steps, the checker keeps them apart until then."""
-_WHOLE_WORK = 20_000_000
+_LONG, _APART = 700, 64
+"""Steps after which a filter is slow; the age at which errors of two steps may be added, in steps."""
 
 
 class Proof(NamedTuple):
@@ -64,7 +62,8 @@ def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
     For fixed coefficients, the checker says how much larger; otherwise some factors are tried.
     """
     why, content, larger = "", json.loads(written(guess)), np.ones(len(guess.bound))
-    for factor in SLOW if content.get("keep", math.inf) < content["back"] else RAISED:
+    slow = "keep" in content and max(content["back"], content["steps"] or 0) > _LONG
+    for factor in SLOW if slow else RAISED:
         claim = guess._replace(bound=guess.bound * larger * factor)
         text = written(claim)
         try:
@@ -75,6 +74,9 @@ def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
                 guess = guess._replace(state=guess.state * np.maximum(needed, 1))
             elif len(needed):
                 larger = larger * np.maximum(needed, 1)
+            elif str(error).startswith(DERIVED):
+                wider = 2 * factor - 1
+                guess = guess._replace(state=guess.state * wider, innovation=guess.innovation * wider)
         except NotImplementedError as error:
             return Proof(guess.bound, "", f"not covered: {error}")
         else:
@@ -163,7 +165,7 @@ def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | N
         "repeat": given.repeat or 0,
         "period": max(period, 1),
         "first": first + more,
-        "keep": steps if steps is not None else _keep(F[first:], back, first),
+        "keep": _APART,
         "width": [] if width is None else texts(width),
     }
     return _text(_head(model.name, bound, steps, back) | content)
@@ -209,18 +211,6 @@ def _back(F: NDArray[np.float64], *sizes: NDArray[np.float64]) -> int:
     return max(most, 1)
 
 
-def _keep(F: NDArray[np.float64], back: int, first: int) -> int:
-    """Return the number of last steps whose errors the checker keeps apart; an ellipsoid contains all older ones.
-
-    It contains them without much loss if they are negligible, or once all modes but the slowest one have decayed.
-    """
-    if back <= _WHOLE or min(back, first) * first <= _WHOLE_WORK:
-        return back
-    modes = np.sort(np.abs(eigenvalues(_product(F)))) ** (1 / len(F))
-    fast = float(modes[modes < modes[-1] ** 2].max(initial=0.0))
-    return 4 + math.ceil(math.log(1e-3) / math.log(max(fast, 1e-9)))
-
-
 def _width(
     given: Schedule, innovation: NDArray[np.float64], bound: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], int]:
@@ -248,8 +238,8 @@ def _width(
         by = (np.sqrt(np.diag(far @ D @ far.T)) @ inverse) * (inverse @ innovation)
         D, P = a @ D @ a.T, a @ P @ a.T + noise[k]
         off = by * np.sqrt(np.diag(D))
-        # what a step may add to the bound, so that all steps together add a millionth
-        step = 1e-6 * bound * (1 - min(radius_of(whole) ** (1 / len(A)), 1 - 1e-6))
+        # what a step may add to the bound, so that all steps together add a thousandth
+        step = 1e-3 * bound * (1 - min(radius_of(whole) ** (1 / len(A)), 1 - 1e-6))
         share = min(share, float(np.min(step[off > 0] / off[off > 0], initial=math.inf)))
     share = max(share, 2.0**-70)
     rate = max(radius_of(whole), 1e-9) ** 2

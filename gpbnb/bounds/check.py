@@ -14,10 +14,11 @@ the file: filter, format, form, limits. It verifies the answer: the bound b, and
 
     (1) If e_{k-1} lies in a set, e_k lies in its image under F' and the columns. A set is a sum of segments and of
     an ellipsoid {y: |ay|^2 <= a M a' for all a}, which also contains segments g_j after M := s (M/t + sum g_j
-    g_j'/t_j), with s = t + sum t_j, for any t, t_j > 0, by the inequality of Cauchy and Schwarz. The largest size m(r)
-    of r e over a set is a seminorm of the row r, so m(r) <= sum |c_j| m(r_j) + |r - sum c_j r_j| b for any rows r_j,
-    if |e| <= b. Steps are taken in blocks: after j steps, e is P_j e_0 plus the effects of their own w, for the product
-    P_j of the loops; r P_j is near (1 - j/J) r + (j/J) r P_J, so the set need only be moved at the end of a block.
+    g_j'/t_j), with s = t + sum t_j, for any t, t_j > 0, by the inequality of Cauchy and Schwarz. Segments of g + h
+    and g - h contain those of g and h; if these are old and alike, the smaller one joins the ellipsoid. The largest
+    size m(r) of r e over a set is a seminorm of the row r, so m(r) <= sum |c_j| m(r_j) + |r - sum c_j r_j| b for any
+    rows r_j, if |e| <= b. Steps are taken in blocks: after j steps, e is P_j e_0 plus the effects of their own w, for
+    the product P_j of loops; r P_j is near (1 - j/J) r + (j/J) r P_J, so only the end of a block moves the set.
 
     (2) For a row C_0, any rows C_1, ..., C_L with 1 <= L <= k, and R_l = C_l F'_{k-l} - C_{l+1}, telescoping gives
     exactly C_0 e_k = sum_{l<L} (C_l w_{k-l} + R_l e_{k-l-1}) + C_L e_{k-L}. If |e_j| <= b for all j < k, then
@@ -95,6 +96,7 @@ FILES = {
 NUMBER = re.compile(r"-?[0-9]{1,4000}([./][0-9]{1,4000})?", re.ASCII)
 MULTIPLY, ADD, SUBTRACT = "multiply", "add", "subtract"
 BEYOND, LARGER = "a state may exceed its limit", "the error may exceed its bound"
+DERIVED = "a state or an innovation may exceed its limit"
 BLOCK, PEAK = 8, 128  # steps that are taken together, for speed; bits of the shares in (6)
 
 
@@ -693,7 +695,8 @@ class ErrorSet:
 
     def __init__(self, sizes: Any, seen: Any, loops: int, message: str, start: Any = ()) -> None:
         self.sizes, self.loops, self.message, self.n, self.steps = sizes, loops, message, len(sizes), 0
-        self.limits, self.counts = [x << loops for x in sizes + seen], [1] if start else []
+        self.limits, self.groups = [x << loops for x in sizes + seen], [(1, 1)] if start else []
+        self.units = [(max(sizes) << 60) // max(s, 1) for s in sizes]
         self.x = [list(start[i : i + 1]) for i in range(self.n)]
         self.M, self.box, self.one = diagonal(self.n, 0), [0] * self.n, diagonal(self.n, 1 << loops)
 
@@ -718,9 +721,9 @@ class ErrorSet:
         self.box = [up(size(row, self.box), 1 << loops) + len(moved[0]) for row in F]
         self.M = each(lambda x, y: (x >> 2 * loops) + y, around(F, self.M), diagonal(self.n, self.n))
 
-    def add(self, columns: Any, slack: Any, counts: list[int]) -> None:
-        """Add a box, and the columns of as many steps as there are counts."""
-        self.counts, self.box = self.counts + counts, list(map(add, self.box, slack))
+    def add(self, columns: Any, slack: Any, groups: Any) -> None:
+        """Add a box, and the columns of some groups of steps; a group is a number of columns, and one of steps."""
+        self.groups, self.box = self.groups + groups, list(map(add, self.box, slack))
         self.x = [x + [g[i] for g in columns] for i, x in enumerate(self.x)]
 
     def advance(self, steps: Any, keep: int) -> None:
@@ -730,28 +733,51 @@ class ErrorSet:
         self.absorb(keep)
         self.move(P)
         after, box = [*map(self.most, one)], [up(x, 1 << self.loops) for x in before]
-        new = ErrorSet(self.sizes, [], self.loops, "")
+        new, known = ErrorSet(self.sizes, [], self.loops, ""), [(0, row, x) for row, x in zip(one, before, strict=True)]
         for j, (F, columns, slack, seen) in enumerate(steps, 1):
             for row, far, limit in zip(seen, self.through(seen, rows), self.limits[self.n :], strict=False):
                 need(old.most(far) + new.most(row) <= limit, f"{self.message} before step {self.steps + j}")
             new.move(F)
-            new.add(columns, slack, [len(columns)])
+            new.add(columns, slack, [(len(columns), 1)])
             rows = self.through(F, rows)
             for i, row in enumerate(rows):
-                room, ends = self.limits[i] - new.most(one[i]), [(whole - j, one[i], before[i]), (j, P[i], after[i])]
-                within = near(row, ends, whole, box) <= room or old.most(row) <= room
-                need(within, f"{self.message} after step {self.steps + j}")
+                room, (k, *last) = self.limits[i] - new.most(one[i]), known[i]
+                if near(row, [(whole - j, *last), (j - k, P[i], after[i])], whole - k, box) > room:
+                    known[i] = j, row, old.most(row)
+                    need(known[i][2] <= room, f"{self.message} after step {self.steps + j}")
         self.steps += whole
-        self.add(turned(new.x), new.box, new.counts)
+        self.add(turned(new.x), new.box, new.groups)
+
+    def pairs(self, keep: int) -> Any:
+        """Add columns of steps that are alike, as they are old; return segments that contain what this leaves out."""
+        columns, merged, left, groups, at = turned(self.x), list[Any](), list[Any](), list[Any](), 0
+        age, box = sum(steps for _, steps in self.groups), self.box
+        waiting = self.groups[::-1]
+        while waiting:
+            count, steps = waiting.pop()
+            age -= steps
+            old = columns[at : at + count]
+            if waiting and waiting[-1][0] == count and (steps + waiting[-1][1]) * keep <= age - waiting[-1][1]:
+                more = waiting.pop()[1]
+                age, steps = age - more, steps + more
+                for i, (g, h) in enumerate(zip(old, columns[at + count : at + 2 * count], strict=True)):
+                    both = sorted([list(map(add, g, h)), list(map(sub, g, h))], key=lambda x: size(x, self.units))
+                    old[i], box = both[1], [x + abs(y) for x, y in zip(box, both[0], strict=True)]
+                at += count
+            at += count
+            if steps * keep * 16 <= age:
+                left += old
+            else:
+                merged += old
+                groups.append((count, steps))
+        self.x, self.groups, self.box = turned(merged) if merged else [[] for _ in self.x], groups, [0] * self.n
+        return times(diagonal(self.n), box, 1) + left
 
     def absorb(self, keep: int) -> None:
         """Let the ellipsoid contain the box and old segments; the numbers t of (1) are the lengths of all."""
-        old, self.counts = sum(self.counts[:-keep] if keep else self.counts), self.counts[-keep:] if keep else []
-        segments = [*times(diagonal(self.n), self.box, 1), *turned([x[:old] for x in self.x])]
-        self.x, self.box = [x[old:] for x in self.x], [0] * self.n
-        units = [(max(self.sizes) << 60) // max(s, 1) for s in self.sizes]
+        segments = self.pairs(keep)
         sized = ([isqrt(self.M[i][i]) for i in range(self.n)], *segments)
-        own, *lengths = (1 + isqrt(sum([x * x for x in map(mul, g, units)])) for g in sized)
+        own, *lengths = (1 + isqrt(sum([x * x for x in map(mul, g, self.units)])) for g in sized)
         total = (own + sum(lengths)) << 40
         shares, x = [up(total, length) for length in lengths], turned(segments)
         added = across([list(map(mul, row, shares)) for row in x], x)
@@ -864,12 +890,11 @@ class Filter:
         sets = [ErrorSet(self.b, [], self.loops, LARGER)]
         if self.derived:
             rooms = [v - z - 2 * self.missed for v, z in zip(self.V, self.Z, strict=True)]
-            message = "a state or an innovation may exceed its limit"
-            sets.append(ErrorSet(self.X, rooms, self.loops, message, self.model.x0))
+            sets.append(ErrorSet(self.X, rooms, self.loops, DERIVED, self.model.x0))
         moves, back = self.moves(), self.given["back"]
         k, keep = 0, self.given["keep"]
         while k < self.first:  # longer blocks where sets have more segments
-            block = min(max(BLOCK, isqrt(min(k, keep))), self.first - k)
+            block = min(max(BLOCK, isqrt(min(k, 1000))), self.first - k)
             for reach, steps in zip(sets, turned(islice(moves, block)), strict=False):
                 reach.advance(steps, keep)
             k += block

@@ -38,6 +38,9 @@ from gpbnb.filters.system import LinearFilter
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain")
 """Names of the parts of a bound, in the order in which a guarantee lists them."""
 
+EFFORT = 9e6
+"""The most that a proof may take, in about the products of its steps; more if more steps are asked for."""
+
 
 @dataclass(frozen=True, eq=False)
 class Guarantee:
@@ -206,7 +209,7 @@ def guarantee(
     within : limits on the exact filter, from :func:`limits`; limits on the measurements apply to the values before they
         are stored.
     most : the largest number of steps to emulate while the gain settles, 20,000 by default, and fewer for more than 17
-        states.
+        states. A proof takes more steps in proportion to a larger number.
     horizon : the number of steps that the bound covers if no bound holds for ever.
 
     Raises
@@ -238,7 +241,8 @@ def guessed(
     within = sized_limits(within, model.n, model.m)
     if model.steps is not None:
         most, horizon = min(MOST if most is None else most, model.steps), min(horizon, model.steps)
-    found = from_guess(schedule(model, fmt, form, most, horizon), within, horizon)
+    effort = EFFORT * max(MOST if most is None else most, MOST) / MOST
+    found = from_guess(schedule(model, fmt, form, most, horizon), within, horizon, effort)
     if model.steps is not None and found.steps in (None, model.steps):
         found = replace(found, steps=model.steps, why=f"{model.name} describes no more")
     return found
@@ -254,15 +258,20 @@ def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000) -
     return _answered(from_guess(given, within, horizon))
 
 
-def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000) -> Guarantee:
-    """Return what :func:`from_schedule` is going to prove, without a proof."""
+def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000, effort: float = EFFORT) -> Guarantee:
+    """Return what :func:`from_schedule` is going to prove, without a proof; `effort` limits what it may take."""
     within = sized_limits(within, given.program.n, given.program.m, given.x0)
     radius = loop_radius(given) if given.settled else math.nan
     why, for_ever = given.why, given.settled and radius < 1
     if given.settled and not for_ever:
         why = f"the closed loop is not stable: an error grows by a factor of {radius:.6g} a step"
     steps = None if for_ever else horizon if given.settled else min(horizon, given.steps)
-    found = _guess(given, within, steps)
+    slow = "" if isinstance(given.origin, LinearFilter) else _too_slow(given, steps, radius, effort)
+    if slow:
+        none = np.full(given.program.n, np.inf)
+        found = Guess(none, none, np.full(given.program.m, np.inf), np.zeros((given.program.n, 3)), why=slow)
+    else:
+        found = _guess(given, within, steps)
     if not np.isfinite(found.bound).all():
         steps = 0
         if for_ever:
@@ -273,6 +282,23 @@ def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000) -> G
             why = f"no bound was found within the range of {arithmetic(given.fmt)}: a number may exceed the largest"
     derived = FilterLimits(found.state, found.innovation, stored_sizes(given.fmt, within.measurement))
     return Guarantee(found.bound, steps, why, found.parts, derived, given, radius, within, found.lags)
+
+
+def _too_slow(given: Schedule, steps: int | None, radius: float, effort: float) -> str:
+    """Say that a proof would take too many steps, before it is tried; nothing if it may be tried."""
+    n, m = given.program.n, given.program.m
+    most = int(effort / (120 + n**2 * (n + m)))
+    if steps is not None:
+        return "" if steps <= most else f"a proof takes each of {steps} steps; needed at most {most} steps"
+    period = given.steps - given.first
+    later = math.ceil(math.log(2.0**-26) / math.log(min(max(radius, 1e-3), 1 - 1e-15))) * period
+    if given.first + later / 4 <= most:
+        return ""
+    return (
+        f"the filter is too slow for a proof: its gain takes {given.first} steps to settle, and errors take {later} "
+        f"to decay, of which four count as one; needed at most {most} steps; take more process noise, so that it "
+        "forgets sooner, or a larger most="
+    )
 
 
 def _guess(given: Schedule, within: FilterLimits, steps: int | None, dense: bool = False) -> Guess:

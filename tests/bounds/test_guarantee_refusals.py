@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, required_precision
 from gpbnb.bounds.adversary import attack
 from gpbnb.bounds.gains import filter_schedule, schedule
-from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
+from gpbnb.bounds.guarantee import from_guess, from_schedule, guarantee, limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.probable import probable_error
 from gpbnb.bounds.units import largest_errors, stored_sizes
@@ -326,3 +327,13 @@ def test_limits_that_do_not_follow_from_the_measurements_are_infinite() -> None:
     drifting = two_states(Phi=[["5/4", 0], [0, "1/3"]], H=[[0, 1]], x0=[1, 0])
     found = guarantee(drifting, FloatFormat(2, 5), limits(measurement=10), most=2000, horizon=300)
     assert not found.for_ever
+
+
+def test_a_filter_too_slow_for_a_proof_is_refused_before_it_is_tried() -> None:
+    given, within = schedule(two_states(), FORMAT, Form.INNOVATION), limits(2, 1, measurement=1)
+    assert from_guess(given, within, effort=1e4).for_ever
+    slow = from_guess(given, within, effort=1e3)
+    assert slow.steps == 0
+    assert "too slow for a proof: its gain takes" in slow.why
+    assert "needed at most 7 steps; take more process noise" in slow.why
+    assert "each of 8 steps; needed at most 7" in from_guess(replace(given, settled=False), within, 50, 1e3).why
