@@ -36,6 +36,7 @@ _EXACT: dict[str, Callable[..., Any]] = {
     "trunc": math.trunc,
     "rint": round,
     "fmod": lambda x, y: x - y * math.trunc(x / y),
+    "remainder": operator.mod,
     "floor_divide": operator.floordiv,
 }
 """Functions whose exact value is a Fraction."""

@@ -33,6 +33,10 @@ def remainder(x: Any, y: Any) -> Any:
     >>> ((angle + 180) % 360 - 180).to_float()
     array([-170. ,  170. , -179.5])
     """
+    limits = None if x.backend.records else x.format.limits
+    if limits is not None and not limits.subnormal:  # what fmod leaves may be flushed to zero
+        _check_divisor(y)
+        return elementary("remainder", x, y)
     r = fmod(x, y)
     opposite = ((r < 0) & (y > 0)) | ((r > 0) & (y < 0))
     return r + np.where(opposite, y, r.operand(0))

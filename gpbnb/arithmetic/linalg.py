@@ -218,16 +218,40 @@ def lu(a: FloatArray, pivot: bool = False) -> LU:
     ------
     TypeError : `a` is not a FloatArray.
     ValueError : `a` is not a square matrix.
+    OverflowError : the format does not hold the number 1.
     numpy.linalg.LinAlgError : a pivot is zero.
 
     References
     ----------
     hung1984, ch. II, (45)-(58).
     """
-    n = _square(a)
+    _square(a)
+    _identity(a, "ones on the diagonal of the lower factor")
+    return _lu(a, pivot)
+
+
+def _holds_one(fmt: Any) -> bool:
+    """Whether a format has the number 1, as Q15 has not."""
+    try:
+        return bool(fmt.round(1) == 1)
+    except OverflowError:
+        return False
+
+
+def _identity(a: FloatArray, what: str) -> FloatArray:
+    if not (a.backend.records or _holds_one(a.format)):
+        raise OverflowError(
+            f"got {a.format!r}, which does not hold the number 1; needed it for {what}: take a bit before the point"
+        )
+    return a.format.array(np.eye(len(a), dtype=int))
+
+
+def _lu(a: FloatArray, pivot: bool) -> LU:
+    """Factor a matrix; in a format without the number 1, the diagonal of the lower factor is 0."""
+    n, one = len(a), int(a.backend.records or _holds_one(a.format))
     if (compiled := _factored(a, pivot)) is not None:
         factors, order = compiled
-        identity = a.format.array(np.eye(n, dtype=int))
+        identity = a.format.array(one * np.eye(n, dtype=int))
         lower = cast(FloatArray, np.where(np.tri(n, k=-1, dtype=bool), factors, identity))
         return LU(lower, cast(FloatArray, np.triu(cast(Any, factors))), order)
     order = np.arange(n)
@@ -249,8 +273,8 @@ def lu(a: FloatArray, pivot: bool = False) -> LU:
         for i in range(k + 1, n):
             multipliers[i] = _joined(multipliers[i], ratio[i - k - 1 : i - k])
         work = work[1:, 1:] + (-ratio)[:, np.newaxis] * head[1:]
-    zeros, one = a.format.array([0] * n), a.format.array([1])
-    lowers = [_joined(row, one, zeros[i + 1 :]) for i, row in enumerate(multipliers)]
+    zeros, diagonal = a.format.array([0] * n), a.format.array([one])
+    lowers = [_joined(row, diagonal, zeros[i + 1 :]) for i, row in enumerate(multipliers)]
     return LU(_rows(lowers), _rows([_joined(zeros[:i], row) for i, row in enumerate(uppers)]), order)
 
 
@@ -289,7 +313,7 @@ def solve(a: FloatArray, b: FloatArray, pivot: bool = False) -> FloatArray:
     columns = b if b.ndim == 2 else b[:, np.newaxis]
     if (compiled := _solved(a, columns, pivot)) is not None:
         return compiled if b.ndim == 2 else compiled[:, 0]
-    lower, upper, order = lu(a, pivot)
+    lower, upper, order = _lu(a, pivot)
     columns = columns[order]
     reduced = []
     for k in range(n):
@@ -317,14 +341,15 @@ def inv(a: FloatArray, pivot: bool = False) -> FloatArray:
     ------
     TypeError : `a` is not a FloatArray.
     ValueError : `a` is not a square matrix.
+    OverflowError : the format does not hold the number 1.
     numpy.linalg.LinAlgError : a pivot is zero.
 
     References
     ----------
     hung1984, ch. II, (33) and (93).
     """
-    n = _square(a)
-    return solve(a, a.format.array(np.eye(n, dtype=int)), pivot)
+    _square(a)
+    return solve(a, _identity(a, "the columns of the identity"), pivot)
 
 
 def det(a: FloatArray) -> FloatArray:
@@ -353,7 +378,7 @@ def det(a: FloatArray) -> FloatArray:
     """
     n = _square(a)
     try:
-        _, upper, order = lu(a, pivot=True)
+        _, upper, order = _lu(a, pivot=True)
     except np.linalg.LinAlgError:
         return cast(FloatArray, np.zeros_like(cast(Any, a[0, 0])))
     found = cast(FloatArray, np.diagonal(cast(Any, upper))).prod()

@@ -41,7 +41,7 @@ FORMS = {
 _KINDS = {MULTIPLY: "multiply", ADD: "add", SUBTRACT: "subtract"}
 RAISED = (1.0, 1.001, 1.003, 1.01, 1.03, 1.1)
 """Factors of a guess that are tried, until the checker proves one."""
-SLOW = (1.02, 1.05, 1.2, 1.5)
+SLOW = (1.005, 1.03, 1.1, 1.5)
 """The same for filters that settle slowly, where the checker adds effects of old errors that are alike."""
 _NEGLIGIBLE = 2.0**-26
 _LONG, _APART = 700, 64

@@ -237,3 +237,11 @@ def test_sums_that_no_precision_separates_from_a_tie_are_refused() -> None:
     fmt = FloatFormat(2, 24, Rounding.CHOP)
     with pytest.raises(ValueError, match="needed an argument that is smaller, or further from a tie"):
         np.exp(fmt.array(Fraction(-1, 2**70000)))
+
+
+def test_a_remainder_that_is_flushed_on_its_way_is_rounded_once() -> None:
+    """The remainder with the sign of x is below the least number; with the sign of y, it is a number."""
+    unit, fmt = Fraction(1, 1024), FloatFormat(2, 5, "nearest", -6, 10, subnormal=False)
+    x, y = fmt.array([-25 * unit, 25 * unit]), fmt.array([24 * unit, -24 * unit])
+    assert np.fmod(x, y).tolist() == [0, 0]
+    assert np.remainder(x, y).tolist() == [23 * unit, -23 * unit]

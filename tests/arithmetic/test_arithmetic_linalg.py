@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -267,3 +268,18 @@ def test_sums_in_halves_and_in_blocks_are_those_of_their_definition(fmt: FloatFo
             sums = [from_left(products[k : k + block]) for k in range(0, n, block)]
             assert linalg.dot(x, y, "blocked", block=block).to_fractions() == from_left(sums)
         assert np.cumsum(x).to_fractions().tolist()[-1] == from_left(x.to_fractions().tolist())
+
+
+@pytest.mark.parametrize("overflow", ["raise", "saturate", "wrap"])
+def test_a_format_without_the_number_one_has_no_identity(overflow: str) -> None:
+    """Q15 clipped the ones to 32767/32768; what needs no ones is computed."""
+    fmt = FixedFormat(0, 15, overflow=overflow)
+    a = fmt.array([["0.5", "0.25"], ["0.125", "0.5"]])
+    for function in (linalg.lu, linalg.inv):
+        with pytest.raises(OverflowError, match="does not hold the number 1; needed it for"):
+            function(a)
+    assert linalg.det(a) == Fraction(7, 32)
+    x = linalg.solve(a, fmt.array(["0.125", "0.0625"]))
+    assert x.to_float() == pytest.approx([3 / 14, 1 / 14], abs=2**-13)  # four roundings of half a unit, amplified twice
+    wide = replace(fmt, integer_bits=1)
+    assert linalg.inv(wide.array([["2/3"]])).to_float()[0] == pytest.approx([1.5], abs=2**-14)

@@ -330,7 +330,7 @@ def test_limits_that_do_not_follow_from_the_measurements_are_infinite() -> None:
 
 
 def test_a_filter_too_slow_for_a_proof_is_refused_before_it_is_tried() -> None:
-    given, within = schedule(two_states(), FORMAT, Form.INNOVATION), limits(2, 1, measurement=1)
+    given, within = schedule(two_states(), FORMAT, Form.INNOVATION), limits(measurement=1)
     assert from_guess(given, within, effort=1e4).for_ever
     slow = from_guess(given, within, effort=1e3)
     assert slow.steps == 0
