@@ -3,9 +3,11 @@ const SEPARATOR = /(?<=\d)(?:,|\{,\}|\\,|\u2009|\u202f)(?=\d{3}(?!\d))/g; // as 
 const SNIPPET = 240; // characters
 const BLOCKS = "p, li, dd, dt, figcaption, th, td, h1, h2, h3";
 
+let asked = "";
 const parseQuery = Search._parseQuery;
 Search._parseQuery = (query) => {
   const joined = query.replace(SEPARATOR, "");
+  asked = joined.toLowerCase().trim();
   const [, words, excluded, marked, names] = parseQuery(joined);
   for (const number of splitQuery(joined).filter((word) => /^\d+$/.test(word))) {
     words.add(number);
@@ -14,9 +16,10 @@ Search._parseQuery = (query) => {
   return [joined, words, excluded, marked, names];
 };
 
-// Chapters first, then the ledger, then the reference of the package.
-const RANKS = [["book/api", 0], ["book/ledger-", 1000]];
-Scorer.score = ([page, , , , score]) => score + (RANKS.find(([start]) => page.startsWith(start))?.[1] ?? 2000);
+// Titles that contain what was asked, then the front page, chapters, the bibliography, the ledger, the reference of the package.
+const RANKS = [["book/api", 0], ["book/ledger-", 1000], ["book/bibliography", 1500], ["book/index", 3000]];
+const rank = (page) => RANKS.find(([start]) => page.startsWith(start))?.[1] ?? 2000;
+Scorer.score = ([page, title, , , score]) => score + rank(page) + (rank(page) >= 2000 && title.toLowerCase().includes(asked) ? 2000 : 0);
 
 // A formula reads as text where it is a number or a letter, and is left out otherwise.
 function readable(block) {

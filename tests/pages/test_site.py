@@ -55,6 +55,19 @@ def test_the_search_shows_chapters_first_and_the_reference_last(search, words):
     assert ranks == sorted(ranks)
 
 
+@pytest.mark.parametrize(
+    ("words", "pages"),
+    [
+        ("how many digits", ["index", "wordlength"]),
+        ("33 bits", ["index"]),
+        ("Taylor", ["integration"]),
+        ("roll and deroll", ["rolling"]),
+    ],
+)
+def test_the_search_shows_first_what_answers(search, words, pages):
+    assert [each["page"] for each in search(words)][: len(pages)] == [f"book/{page}.html" for page in pages]
+
+
 @pytest.mark.parametrize("words", ["covariance", "deroll", "stagnation"])
 def test_a_snippet_can_be_read(search, words):
     """No TeX, no code, and it begins with a sentence and ends with a whole word."""
