@@ -14,7 +14,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY32, IBM_HEX32, arithmetic, digits
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.display.tables import MOST_ROWS, Table, one_line, scientific, short, with_uncertainty
+from gpbnb.report.display.tables import MOST_ROWS, Table, scientific, short
 
 
 def cells(line):
@@ -58,11 +58,6 @@ def test_no_cell_can_break_the_table():
 
 def test_an_empty_table_has_its_header():
     assert Table("none", ("a",), ()).markdown().splitlines() == ["| a |", "| --- |"]
-
-
-def test_one_line():
-    assert one_line("  a \n b\t c ") == "a b c"
-    assert one_line("") == ""
 
 
 def test_digits_names_base_and_precision():
@@ -174,20 +169,6 @@ def test_a_table_of_more_than_twelve_rows_is_folded():
     )
     assert text.endswith(" |\n\n</details>")
     assert "<details" not in Table("counts", ("name", "k"), rows[:12]).page()
-
-
-@pytest.mark.parametrize(
-    ("value", "uncertainty", "text"),
-    [
-        (0.836, 0.0414, "0.84 ± 0.04"),
-        (59.5, 3.1, "60 ± 3"),
-        (0.0832, 0.00399, "0.083 ± 0.004"),
-        (5.04, 0.096, "5.0 ± 0.1"),
-        (123.4, 25.0, "123 ± 25"),
-    ],
-)
-def test_a_number_is_as_exact_as_its_uncertainty(value, uncertainty, text):
-    assert with_uncertainty(value, uncertainty) == text
 
 
 def test_every_table_of_the_book_is_one_of_this_class():

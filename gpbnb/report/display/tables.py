@@ -191,14 +191,6 @@ def short(value: float, figures: int = 2) -> str:
     return scientific(rounded, figures)
 
 
-def with_uncertainty(value: float, uncertainty: float) -> str:
-    """Format a number with the decimals that its uncertainty, rounded to one digit, has: ``0.84 ± 0.04``."""
-    places = max(0, -math.floor(math.log10(uncertainty)))
-    if float(f"{uncertainty:.{places}f}") >= 10.0 ** (1 - places):  # 0.096 rounds to 0.1
-        places = max(0, places - 1)
-    return f"{value:.{places}f} ± {uncertainty:.{places}f}"
-
-
 def one_line(text: str) -> str:
     """Fold white space, line ends included, into single spaces."""
     return " ".join(text.split())
