@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from gpbnb.report.ledger.formula import Words
+from gpbnb.report.ledger.legibility import load_legibility
 from gpbnb.report.ledger.statements import DOCUMENTS, Statement, load_statements
 
 OWN_WORDS = Path(__file__).with_name("own_words.csv")
@@ -56,3 +57,18 @@ def test_each_quotation_is_in_its_document():
         listed = Counter((row["id"], row["words"]) for row in csv.DictReader(lines))
     assert sorted(missing - listed) == [], "not in the document, nor in own_words.csv"
     assert sorted(listed - missing) == [], "in own_words.csv, but in the document or in no statement"
+
+
+def test_each_damage_quotes_the_characters_of_the_scan():
+    damages = [(key, part) for key, damage in load_legibility().items() for part in damage.scan.split("; ")]
+    missing = [each for each in damages if letters(each[1]) not in scan(each[0].partition(".")[0])]
+    assert [key for key, _ in missing] == ["hung1984.II.s11-3.claim-e-defined"]  # says that a letter is missing
+
+
+def test_each_statement_is_filed_where_its_id_says():
+    for row in load_statements():
+        if number := re.search(r"\.eq(\d+[a-z]?)$", row.id):
+            assert row.item == f"eq ({number[1]})", row.id
+        if section := re.search(r"\.s(\d[\d-]*)\.", row.id):
+            assert row.section == section[1].replace("-", "."), row.id
+        assert row.id.split(".")[0] == row.document
