@@ -28,7 +28,7 @@ class Ledger(SphinxDirective):
     ``roots`` the root errors, and ``root-squares`` the squares of what each affects; ``squares`` every statement as a
     square; ``argument`` how wrong statements pass from one part of the documents to the next; ``correction`` the main
     result above its correction; ``timeline`` the history, with sources; ``claims`` the principal claims;
-    ``counts BY`` counts by document, chapter or kind.
+    ``counts BY`` counts by document, chapter or kind; ``documents`` the bibliographic record of each document.
     """
 
     required_arguments = 1
@@ -44,6 +44,8 @@ class Ledger(SphinxDirective):
             for table in (found for node in parsed for found in node.findall(nodes.table)):
                 table["classes"].append("counts")
             return parsed
+        if what == "documents":
+            return self.parse_text_to_nodes(ledger.document_table().page())
         if what == "timeline":
             from gpbnb.report.gravity_probe_b import timeline
 

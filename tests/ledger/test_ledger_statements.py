@@ -34,7 +34,7 @@ def sections(entries):
 
 
 def test_quotes_are_what_the_inventory_has():
-    assert quote("hung1984.I.contract") == "the study was supported under contract NA58-34426"
+    assert quote("hung1984.II.s1.claim-main-activity") == "Kalman filtering is the main activity in GP-B data reduction"
     assert all(quote(entry.id) == entry.printed for entry in INVENTORY[::100])
     with pytest.raises(KeyError, match=r"'hung1984\.I\.none'; needed the id of a statement"):
         quote("hung1984.I.none")
@@ -67,7 +67,7 @@ def test_select_sections_takes_what_is_below_but_not_what_begins_alike():
             {"document": "hung1983"},
             "got document 'hung1983', which no entry has; needed one of hung1984, hung1982, savage2016",
         ),
-        ({"document": "hung1984", "chapter": "IV"}, "got chapter 'IV', which no entry has; needed one of -, I, II"),
+        ({"document": "hung1984", "chapter": "IV"}, "got chapter 'IV', which no entry has; needed one of I, II, III"),
         ({"chapter": "IV", "sections": [1]}, "got section '1', which no entry has; needed one of -"),
         ({"document": "hung1984", "sections": ["9", "99"]}, "got section '99', which no entry has"),
         ({"sections": []}, "got an empty sections"),

@@ -10,6 +10,7 @@
 
 from gpbnb.report.ledger.checking import Row, counts, examine
 from gpbnb.report.ledger.checks import TOPICS
+from gpbnb.report.ledger.documents import document_table
 from gpbnb.report.ledger.html import CHAPTERS, Html
 from gpbnb.report.ledger.legibility import load_legibility
 from gpbnb.report.ledger.page import (
@@ -43,6 +44,7 @@ __all__ = [
     "claim_table",
     "count_table",
     "counts",
+    "document_table",
     "error_table",
     "examine",
     "ledger_page",

@@ -48,7 +48,7 @@ PAGES = (
         "ledger-1984-1",
         "Ledger: report of 1984, rounding and inversion in general",
         "hung1984",
-        r"title|I|II\.([1-9]|9\..*|10)",
+        r"I|II\.([1-9]|9\..*|10)",
     ),
     LedgerPage("ledger-1984-2", "Ledger: report of 1984, inversion by elimination", "hung1984", r"II\.11.*"),
     LedgerPage("ledger-1984-3", "Ledger: report of 1984, Kalman filter", "hung1984", r"II\.1[234]"),

@@ -47,16 +47,6 @@ def where(document: str, item: str) -> str:
     return found
 
 
-def name_of_the_experiment() -> Names:
-    """Return which names of the experiment every statement of hung1982 that names it contains."""
-    texts = [each.text for each in printed_in("hung1982") if "GP-B " in each.text and each.chapter.startswith("I")]
-    return {"experiment": lambda name: bool(texts) and all(name in text for text in texts), "count": len(texts)}
-
-
-def chapters() -> str:
-    return ", ".join(dict.fromkeys(each.chapter for each in printed_in("hung1984") if each.chapter != "-"))
-
-
 def open_studies() -> tuple[int, int]:
     """Return how many of the studies that ch. III leaves open are answered, and their number."""
     left = [each for each in printed_in("hung1984") if each.chapter == "III" and each.kind == "open"]
