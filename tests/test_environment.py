@@ -10,6 +10,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+import gpbnb
+
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 # Each file that pins, and the groups of requirements that it pins; "" is the package itself.
@@ -102,3 +104,8 @@ def test_make_compiles_every_extra():
 
 def test_every_group_is_pinned_once():
     assert sorted(group for groups in LOCKS.values() for group in groups) == sorted(["", *PROJECT["dependency-groups"]])
+
+
+def test_the_version_is_the_same_everywhere():
+    cited = re.search(r"^version: (.+)$", (ROOT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE)
+    assert PROJECT["project"]["version"] == gpbnb.__version__ == cited[1]

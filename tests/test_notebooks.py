@@ -57,6 +57,13 @@ def test_there_are_notebooks():
     assert PATHS
 
 
+def test_every_page_is_in_the_contents():
+    """A page that is in none is not built."""
+    contents = (BOOK.parent / "_toc.yml").read_text(encoding="utf-8")
+    listed = {Path(name).stem for name in re.findall(r"(?:file|root): (\S+)", contents)}
+    assert listed == {path.stem for path in [*PATHS, *BOOK.glob("*.md")]}
+
+
 @each_notebook
 def test_every_cell_was_executed_in_order(path):
     cells = code_cells(path)
