@@ -130,13 +130,7 @@ def stays(function: Callable[P, Result]) -> Callable[P, Result]:
 
 
 def check_exit(x: Any, exit: str) -> None:
-    """Refuse to convert the array `x` while the precision of a function is searched.
-
-    Raises
-    ------
-    TypeError : the precision is being searched; the message names the conversion, a key of :data:`INSTEAD`, and says
-        what to write instead.
-    """
+    """Refuse to convert the array `x` while the precision of a function is searched."""
     fmt, state = x.format, _state.get()
     run = state.run or _running.get(id(fmt))
     if run is None or state.lifted or state.into == fmt:

@@ -81,12 +81,7 @@ NAMED = {
 
 
 def format_named(given: Any) -> Any:
-    """Return the format that a name means, such as "float32", "Q15" or "Q3.12"; anything else as it is.
-
-    Raises
-    ------
-    ValueError : no such format.
-    """
+    """Return the format that a name means, such as "float32", "Q15" or "Q3.12"; anything else as it is."""
     if not isinstance(given, str):
         return given
     found = format_parts(given)

@@ -60,10 +60,6 @@ def smallest_precision(
     -------
     fmt : the format, or None if no precision up to `largest` meets the requirement.
 
-    Raises
-    ------
-    ValueError : `largest` is below `least`.
-
     Examples
     --------
     >>> from gpbnb.arithmetic.formats import FloatFormat
@@ -146,10 +142,6 @@ class Search(Generic[Kind]):
     least : lowest precision to try.
     proof : function that returns the outcome that is proved in a format, where `error` is a guess. It is asked of the
         answer alone; if it proves no answer, the search goes on above it.
-
-    Raises
-    ------
-    ValueError : `largest` is below `least`.
     """
 
     def __init__(

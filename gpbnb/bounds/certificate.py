@@ -102,10 +102,6 @@ def of_operations(
     ----------
     measurement : (m,), limits on the inputs as given.
     exact : what its states are compared with, "as stored" or "as given".
-
-    Raises
-    ------
-    ValueError : a filter that limits its values.
     """
     program = made.program
     if not {*program.operations[:, 0].tolist()} <= {*_KINDS}:

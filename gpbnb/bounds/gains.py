@@ -90,10 +90,6 @@ def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Sched
 
     Its coefficients come from :meth:`~gpbnb.filters.system.LinearFilter.stored`, so they are fixed even if the format
     rounds at random. Each operation is then off by less than a unit in the last place, as with directed rounding.
-
-    Raises
-    ------
-    ValueError : a filter that limits its values, which is not linear.
     """
     if not made.program.is_linear:
         raise ValueError(f"got {made.name}, which limits its values; needed a linear filter for a schedule")
@@ -133,12 +129,7 @@ def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
 
 
 def check_deterministic(fmt: FloatFormat | FixedFormat) -> None:
-    """Reject stochastic rounding of a filter that computes its gain.
-
-    Raises
-    ------
-    ValueError : the format rounds at random.
-    """
+    """Reject stochastic rounding of a filter that computes its gain."""
     if fmt.rounding is Rounding.STOCHASTIC:
         raise ValueError(
             "got stochastic rounding for a Kalman filter; needed another rounding: its computed gain depends on the "
@@ -163,11 +154,6 @@ def schedule(
     most : largest number of steps to try, 20,000 by default, and fewer for more than 17 states, whose covariances
         seldom repeat. A model with `steps` is continued with the cycles of its matrices.
     horizon : number of steps to return if the gain does not settle; by default all that were tried.
-
-    Raises
-    ------
-    ValueError : the format or the form has no compiled loops, or a covariance is not definite in it; stochastic
-        rounding.
     """
     form = compiled_form(form)
     check_deterministic(fmt)

@@ -146,11 +146,6 @@ def sized_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] =
     Parameters
     ----------
     x0 : (n,), the exact first estimate; the exact filter must be within its limits from the beginning.
-
-    Raises
-    ------
-    TypeError : `within` is not a result of :func:`limits`.
-    ValueError : limits for another number of states or measurements, or a first estimate beyond its limit.
     """
     if not isinstance(within, FilterLimits):
         raise TypeError(f"got within={within!r}; needed the result of limits(...)")
@@ -173,13 +168,7 @@ def sized_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] =
 
 
 def check_within(within: Any, basis: str) -> None:
-    """Reject limits for an answer that does not use them, or limits that are none.
-
-    Raises
-    ------
-    TypeError : `within` is not a result of :func:`limits`.
-    ValueError : limits with the basis "emulation" or "bound".
-    """
+    """Reject limits for an answer that does not use them, or limits that are none."""
     if within is not None and not isinstance(within, FilterLimits):
         raise TypeError(f"got within={within!r}; needed the result of limits(...)")
     if within is not None and basis in ("emulation", "bound"):
@@ -211,12 +200,6 @@ def guarantee(
     most : the largest number of steps to emulate while the gain settles, 20,000 by default, and fewer for more than 17
         states. A proof takes more steps in proportion to a larger number.
     horizon : the number of steps that the bound covers if no bound holds for ever.
-
-    Raises
-    ------
-    TypeError : `within` is not a result of :func:`limits`, or `fmt` is not a format.
-    ValueError : the format has no compiled loops, or rounds stochastically; a covariance is not definite when the
-        format stores it; limits for another filter; a first estimate beyond its limit.
     """
     return _answered(guessed(model, fmt, within, form, most, horizon))
 
@@ -249,12 +232,7 @@ def guessed(
 
 
 def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000) -> Guarantee:
-    """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`.
-
-    Raises
-    ------
-    TypeError, ValueError : for a reason given in :func:`sized_limits`.
-    """
+    """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`."""
     return _answered(from_guess(given, within, horizon))
 
 

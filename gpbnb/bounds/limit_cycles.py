@@ -104,12 +104,6 @@ def limit_cycles(
         the error bound around the state of rest, which no cycle without an overflow can leave. Cycles with an overflow,
         in a format that saturates or wraps, are found only if this is True.
 
-    Raises
-    ------
-    TypeError : `system` is not a LinearSystem, or `words` are not WordFormats.
-    ValueError : the stored system is not stable, or it limits its values and is therefore not linear.
-    OverflowError : an input or a coefficient beyond the range of its format.
-
     Examples
     --------
     An integer smoother that rounds down, with the constant input 512, can come to rest at any of four outputs:

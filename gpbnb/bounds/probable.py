@@ -39,12 +39,7 @@ class StepRoundings(NamedTuple):
 
 
 def separate_roundings(found: Guarantee) -> StepRoundings:
-    """Return the roundings of a period, one by one, even if operations have the same effect.
-
-    Raises
-    ------
-    ValueError : the guarantee does not hold for ever.
-    """
+    """Return the roundings of a period, one by one, even if operations have the same effect."""
     if not found.for_ever:
         raise ValueError(
             f"got a guarantee for {found.steps} steps: {found.why}; needed one that holds for ever, whose gain settles"
@@ -60,10 +55,6 @@ def probable_error(found: Guarantee) -> NDArray[np.float64]:
     """Return the standard deviation of each state's rounding error, the largest over a period; (n,).
 
     Values are assumed to be as large as their limits allow; smaller values have smaller rounding errors.
-
-    Raises
-    ------
-    ValueError : the guarantee does not hold for ever.
     """
     F, G, errors = separate_roundings(found)
     noise = np.einsum("kig,kg,kjg->kij", G, errors**2 / 3, G)
@@ -81,12 +72,7 @@ def probable_error(found: Guarantee) -> NDArray[np.float64]:
 def probable_output_errors(
     system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Estimate the error of each output, (p,): three standard deviations of roundings, and bounds of errors of storing.
-
-    Raises
-    ------
-    ValueError, OverflowError : as for :func:`gpbnb.bounds.system.output_errors`.
-    """
+    """Estimate the error of each output, (p,): three deviations of roundings, and bounds of errors of storing."""
     whole, made, n = guessed_errors(system, fmt, largest), system.as_filter(), system.n
     found = from_guess(filter_schedule(made, fmt), limits(measurement=largest))
     return np.asarray(whole - found.bound[n:] + 3 * probable_error(found)[n:])

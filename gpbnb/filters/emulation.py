@@ -137,13 +137,6 @@ def emulate(
     -------
     The *errors* of the estimate in ``state``, of the gain and of the covariance at the checkpoint steps, and in
     ``estimate`` the estimates. If the run ended early, ``reason`` says why, and only the steps before are there.
-
-    Raises
-    ------
-    TypeError : `model` is not a model, or `fmt` is not a format.
-    ValueError : there are no measurements; a checkpoint step is beyond the run; `sums`, `compensated` or formats for
-        blocks are combined with known inputs, or with a form without compiled loops; or `sums` or `compensated` with a
-        nonlinear model.
     """
     form = form_named(form)
     if not isinstance(model, LinearModel | NonlinearModel):

@@ -107,10 +107,6 @@ def smooth_covariances(
     form : Form.INNOVATION or Form.JOSEPH.
     models, z : the matrices and the measurement (m, 1) of each step.
     x (n, 1), P (n, n) : the first estimate and its covariance, before the first step.
-
-    Raises
-    ------
-    ZeroDivisionError : a pivot of an innovation covariance or a predicted covariance is zero.
     """
     times, rounded, passed = algebra.times, algebra.rounded, []
     for model, measured in zip(models, z, strict=True):
@@ -141,10 +137,6 @@ def smooth_roots(
     models, z : the matrices and the measurement (m,) of each step.
     x (n,), S (n, n) : the first estimate and a root of its covariance, before the first step.
     identity : (n, n).
-
-    Raises
-    ------
-    ZeroDivisionError : a predicted covariance is singular.
     """
     passed: list[_PassedRoot] = []
     for model, measured in zip(models, z, strict=True):

@@ -70,15 +70,7 @@ def traced(run: Function) -> TracedFunction | FixedIntervalSmoother:
 
 
 def function_strategy(run: Function, data: Data, tolerance: Any, base: int, most: int) -> EmulatedFunction:
-    """Compute the reference of a function in more digits than `most`, and return the strategy that compares with it.
-
-    Raises
-    ------
-    ValueError : outputs for fewer or more steps than inputs; a reference that depends on its digits, for example
-        because a comparison decides between very different results.
-    TypeError : the function leaves the format: it converts numbers to floats, NumPy arrays, text or another format; see
-        :mod:`gpbnb.arithmetic.exits`.
-    """
+    """Compute the reference of a function in more digits than `most`, and return the strategy that compares with it."""
     inputs, steps = None if data.z is None else real_numbers(data.z), data.steps
     if isinstance(run, FixedIntervalSmoother):
         if inputs is not None or steps != len(run.z):

@@ -60,12 +60,7 @@ class Data(NamedTuple):
 
 
 def tolerances_of(tolerance: Any, count: int, what: str) -> NDArray[np.float64]:
-    """Return the tolerance of each of `count` states or outputs, rounded down.
-
-    Raises
-    ------
-    ValueError : a tolerance that is not a number above 0, or of another shape; none is finite.
-    """
+    """Return the tolerance of each of `count` states or outputs, rounded down."""
     needed = f"needed an error above 0 for each of the {count} {what}, one finite"
     try:
         given = np.asarray(tolerance)

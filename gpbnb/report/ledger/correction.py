@@ -31,10 +31,6 @@ def marked(relation: Relation, marks: Mapping[str, str]) -> str:
     ----------
     relation : a printed or corrected relation.
     marks : part, in the notation of :mod:`gpbnb.report.ledger.formula` → letter.
-
-    Raises
-    ------
-    ValueError : a part does not occur in the relation, or is a sum.
     """
     marking = _Marking({ast.unparse(ast.parse(part, mode="eval").body): letter for part, letter in marks.items()})
     latex = typeset_tree(marking.visit(deepcopy(relation.tree)), 0)

@@ -57,10 +57,6 @@ def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilt
     model : a model with constant matrices.
     z : (steps, m), typical measurements.
     margin : factor by which later numbers may exceed those of this run.
-
-    Raises
-    ------
-    ValueError : a model whose matrices change.
     """
     model.refuse_inputs("fixed point")
     if model.cycle != 1:
@@ -98,10 +94,6 @@ def emulated(
     z : (steps, m), measurements in the units of the model; the converter rounds them into the format for both filters.
     coefficient_bits : significant bits of each coefficient; each coefficient has its own binary point.
     wide : whether sums of products are kept exactly in a long accumulator and rounded once.
-
-    Raises
-    ------
-    OverflowError : a number overflows and the format neither saturates nor wraps; names operation and step.
     """
     made = integer_program(given.filter, _words(given.filter, fmt, coefficient_bits, wide))
     program, unit = given.filter.program, float(fmt.unit)
@@ -123,10 +115,6 @@ def bound_per_unit(
 
     The bound is proportional to the largest error of a rounding. It holds for all measurements, as long as nothing
     overflows. For the parameters, see :func:`emulated`.
-
-    Raises
-    ------
-    ValueError : the filter is not stable.
     """
     ones = FixedFormat(1, 0, Rounding.DOWN)
     found = bounded_rounding(given.filter, _words(given.filter, ones, coefficient_bits, wide))
@@ -143,10 +131,6 @@ def required_bits(
     z : (steps, m), measurements.
     tolerance : largest acceptable error of each state in its unit; infinite if its accuracy does not matter.
     basis : "emulation" of these measurements; or "guarantee", for all measurements that do not overflow.
-
-    Raises
-    ------
-    ValueError : the filter is not stable; a tolerance that is not positive.
     """
     goal, like = (
         tolerances_of(tolerance, given.filter.program.n, "states"),
