@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 
 import gpbnb
+from gpbnb.interrupts import interruptible
 
 COMMANDS = {
     "wordlength": "how many digits your own filter needs, with a report",
@@ -41,11 +42,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.command not in COMMANDS:
         parser.error(f"got {given.command!r}; needed one of {', '.join(COMMANDS)}")
     sys.argv = [given.command, *given.arguments]
+    return interruptible(f"python -m gpbnb {given.command}", lambda: _run(given.command))
+
+
+def _run(command: str) -> int:
     try:
-        runpy.run_module(f"gpbnb.{given.command}", run_name="__main__", alter_sys=False)
-    except KeyboardInterrupt:
-        print(f"python -m gpbnb {given.command}: interrupted", file=sys.stderr)
-        return 130
+        runpy.run_module(f"gpbnb.{command}", run_name="__main__", alter_sys=False)
     except ImportError as error:
         if "gpbnb[report]" not in str(error):
             raise
@@ -55,4 +57,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interruptible("python -m gpbnb", main))

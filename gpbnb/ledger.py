@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from gpbnb.interrupts import interruptible
 from gpbnb.report.ledger_options import ledger_parser
 
 
@@ -14,4 +15,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(interruptible("python -m gpbnb.ledger", main))

@@ -946,6 +946,8 @@ def main(arguments: Any = None) -> int:
     except (NotProvedError, NotImplementedError) as error:
         print(f"not {'proved' if isinstance(error, NotProvedError) else 'covered'}: {error}")
         return 1
+    except KeyboardInterrupt:
+        parser.exit(130, f"{parser.prog}: interrupted\n")
     except (ValueError, RecursionError) as error:
         parser.error(f"got a file that is not JSON: {error}")
     return 0

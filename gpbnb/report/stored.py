@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
+from gpbnb.interrupts import interruptible
 from gpbnb.report.gravity_probe_b import horizon, threshold, year
 from gpbnb.report.guarantees import certificates, filters, gappa, scalar, survey, table
 from gpbnb.report.inversion import experiment as inversion
@@ -37,4 +38,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(interruptible("python -m gpbnb.report.stored", main))

@@ -7,19 +7,13 @@ import sys
 from collections.abc import Sequence
 
 from gpbnb.files import replace_file
+from gpbnb.interrupts import interruptible
 from gpbnb.wordlength.options import printable, read
-
-INTERRUPTED = 130
-"""Exit status of an interrupted command, as shells have it."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
-    try:
-        return _run(arguments)
-    except KeyboardInterrupt:
-        print("python -m gpbnb.wordlength: interrupted", file=sys.stderr)
-        return INTERRUPTED
+    return interruptible("python -m gpbnb.wordlength", lambda: _run(arguments))
 
 
 def _run(arguments: Sequence[str] | None) -> int:

@@ -31,7 +31,7 @@ def test_a_number_is_missing_only_with_a_reason_and_every_row_has_its_source():
 
 
 def test_the_lead_lag_controller_is_that_of_the_program_in_a_plain_loop():
-    r, system, fmt = floating(2, 24, "nearest"), comparison.lead_lag(), comparison.SINGLE
+    r, system, fmt = floating(2, 24, "even"), comparison.lead_lag(), comparison.SINGLE
     bound, rng, worst = comparison.output_errors(system, fmt, 1.0)[0], np.random.default_rng(2), Fraction(0)
     u = np.concatenate([np.ones(600), rng.uniform(-1, 1, 600)])
     found = system.outputs(u.reshape(-1, 1), fmt)[:, 0, 0]

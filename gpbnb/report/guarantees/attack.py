@@ -21,6 +21,7 @@ from gpbnb.bounds.system import output_errors
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats, run_words
+from gpbnb.interrupts import interruptible
 from gpbnb.report.guarantees.filters import examine
 from gpbnb.report.guarantees.random_filters import DETERMINISTIC
 
@@ -160,4 +161,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(interruptible("python -m gpbnb.report.guarantees.attack", main))

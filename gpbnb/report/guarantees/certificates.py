@@ -17,6 +17,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.guarantee import Guarantee, guarantee, limits
 from gpbnb.filters.forms import Form
+from gpbnb.interrupts import interruptible
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.table import CASES, FORMAT, case_guarantee
 from gpbnb.sweeps import Column, Sweep
@@ -168,4 +169,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(interruptible("python -m gpbnb.report.guarantees.certificates", main))

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.linear import error_coefficients, peak_gain
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.program import Builder
@@ -19,7 +20,7 @@ from gpbnb.filters.system import LinearFilter, LinearSystem
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.guarantees.published import fixif_longitudinal
 
-SINGLE, DOUBLE = FloatFormat(2, 24), FloatFormat(2, 53)
+SINGLE, DOUBLE = FloatFormat(2, 24, Rounding.EVEN), FloatFormat(2, 53, Rounding.EVEN)
 
 
 class PublishedNumber(NamedTuple):

@@ -181,7 +181,7 @@ COLUMNS = tuple(
 
 
 def compute(case: GuaranteeCase) -> GuaranteeRow:
-    """Compute the guarantee in binary32, an attack on it, and the precision that each basis requires."""
+    """Compute the guarantee in 24 bits, an attack on it, and the precision that each basis requires."""
     made = case.make()
     begin = time.process_time()
     found = case_guarantee(case, made, FORMAT)
@@ -245,7 +245,7 @@ def _bits(
     tolerance: NDArray[np.float64],
     known: NDArray[np.float64],
 ) -> str:
-    """Return the bits that a basis requires, empty if it does not apply; `known` holds its errors in binary32."""
+    """Return the bits that a basis requires, empty if it does not apply; `known` holds its errors in 24 bits."""
     finite = case.horizon is not None
     if basis == "bound" or (basis == "emulation" and isinstance(made, LinearModel)):
         if not isinstance(made, LinearModel):
@@ -351,7 +351,7 @@ def table() -> Table:
         limit = f"{case.state[worst]:g}" if case.state else f"input: {case.measurement:g}"
         numbers = (cell or "–" for cell in (each.bound, each.ratio, each.ceiling, each.probable, each.scatter))
         body.append((each.name, case.states[worst].removesuffix(", no unit"), limit, *numbers))
-    return Table("guarantees of some filters in binary32", header, tuple(body))
+    return Table("guarantees of some filters in 24 bits", header, tuple(body))
 
 
 def bits_table() -> Table:
