@@ -109,6 +109,8 @@ def test_models_with_inputs(letter, value):
 def test_surveys_of_records(name, value):
     asked = {"model": MODEL, "records": [Z], "tolerance": 0.1, "formats": [FloatFormat(2, 8)]} | {name: value}
     found = []
+    if name == "model" and isinstance(value, str):  # a path, and OSError is documented
+        return
     if accepted(lambda: found.append(survey_records(**asked))):
         assert found[0].ratios.size
         assert not np.isnan(found[0].ratios).any()
@@ -140,10 +142,10 @@ def test_linear_systems(letter, value):
 
 
 @MANY
-@given(st.sampled_from(["steps", "tolerance", "base", "rounding", "form", "basis", "z", "seed", "within"]), matrices)
+@given(st.sampled_from(["tolerance", "base", "rounding", "form", "basis", "z", "seed", "within"]), matrices)
 def test_questions(name, value):
     """What is accepted gives an answer whose precisions were tried: no silent result."""
-    asked = {"model": MODEL, "steps": 3, "tolerance": 0.1, "z": None if name == "seed" else Z} | {name: value}
+    asked = {"model": MODEL, "tolerance": 0.1, "z": 3 if name == "seed" else Z} | {name: value}
     found = []
     message = refusal(lambda: found.append(required_precision(**asked)))
     if message is not None:
@@ -152,7 +154,7 @@ def test_questions(name, value):
     (found,) = found
     assert isinstance(found, Requirement)
     assert found.tried
-    assert not isinstance(value, bool) or name not in ("steps", "tolerance", "base", "form")
+    assert not isinstance(value, bool) or name not in ("z", "tolerance", "base", "form")
     assert found.format is None or dict(found.tried)[found.digits] <= 1
 
 
@@ -195,14 +197,14 @@ def test_budgets(text):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"z": "1e999999"}, "measurements: got a number with the power of ten 999999; needed a power of at most"),
-        ({"z": "1e99999"}, "got a single number; needed one measurement for each of the 3 steps"),
+        ({"z": [["1e999999"]]}, "got a number with the power of ten 999999; needed a power of at most"),
+        ({"z": "1e99999"}, "got '1e99999' for z; needed measurements or inputs"),
         ({"z": np.full((3, 1), np.inf)}, "got inf for measurement 0 of step 1"),
     ],
 )
 def test_measurements_that_are_none(given, message):
     with pytest.raises(ValueError, match=message):
-        required_precision(**{"model": MODEL, "steps": 3, "tolerance": 0.1, "z": Z} | given)
+        required_precision(**{"model": MODEL, "z": Z, "tolerance": 0.1} | given)
 
 
 @pytest.mark.parametrize("model", [MODEL, LinearSystem([["0.3"]], [["0.1"]])])
@@ -213,7 +215,7 @@ def test_a_tolerance_that_no_precision_meets_gives_no_warning(model):
 
 
 def test_too_many_steps_are_refused_before_they_are_simulated():
-    with pytest.raises(ValueError, match="got 1,000,000,000,000 steps to simulate; needed at most"):
+    with pytest.raises(ValueError, match=r"got 1000000000000 steps; needed .* at most 100,000,000"):
         required_precision(MODEL, 10**12, 0.1)
 
 

@@ -504,7 +504,8 @@ class Linear:
         sound = not self.words or ({each["base"] for each in formats} == {2} and not kept_wide)
         need(sound, "words with another base, or states that are not stored")
         self.operations = list(zip(made["operations"], wide, strict=True))
-        self.c = [Fraction(kept.store(x), kept.unit) for x in c]
+        exactly = {Fraction(1), Fraction(-1)} if self.words else set()  # nothing is multiplied
+        self.c = [x if x in exactly else Fraction(kept.store(x), kept.unit) for x in c]
         if kept.rounding == "stochastic":  # the file states what was drawn, which is next to the given numbers
             self.c, near = made["stored"], [up(abs(x).numerator * a.unit, x.denominator) for x in c]
             sound = all(kept.store(x) == x * a.unit for x in self.c)

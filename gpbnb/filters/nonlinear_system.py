@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,11 +22,12 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.interpreting import Call
 from gpbnb.arithmetic.machine import CODES
+from gpbnb.arithmetic.named import format_named
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.model import real_numbers
-from gpbnb.filters.named import checked_name, whole_number
+from gpbnb.filters.named import checked_name, sized, whole_number
 from gpbnb.filters.program import (
     ADD,
     AT_LEAST,
@@ -106,6 +108,12 @@ class NonlinearSystem:
             raise TypeError(f"got a step {type(step).__name__}; needed a function step(fmt, x, u)")
         checked_name(name)
         try:
+            signature(step).bind(*"fxu")
+        except TypeError as error:
+            raise TypeError(f"got a step with other arguments: {error}; needed step(fmt, x, u)") from None
+        except ValueError:  # a function of C without a signature
+            pass
+        try:
             first = exact(x0)
         except (TypeError, ValueError) as error:
             raise type(error)(f"x0: {error}") from None
@@ -117,7 +125,7 @@ class NonlinearSystem:
             object.__setattr__(self, key, value)
 
     def __repr__(self) -> str:
-        return f"NonlinearSystem {self.name!r}, {self.n} states, {self.m} inputs"
+        return f"NonlinearSystem {self.name!r}, {sized(self.n, 'state', ())}; {sized(self.m, 'input', ())}"
 
     @property
     def n(self) -> int:
@@ -141,6 +149,9 @@ class NonlinearSystem:
         ValueError, TypeError : inputs of another shape; a step that does not return states (n,) and outputs (p,).
         OverflowError, ZeroDivisionError, NegativeRootError : an operation has no result in the format.
         """
+        fmt = format_named(fmt)
+        if not callable(getattr(fmt, "array", None)):
+            raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or a name")
         found: FloatArray = self._whole_run(fmt, self.inputs_in(fmt, u))
         return found
 

@@ -22,7 +22,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
-from gpbnb.arithmetic.named import arithmetic
+from gpbnb.arithmetic.named import arithmetic, format_named
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.filters.kernels.linear import advance
 from gpbnb.filters.model import real_numbers
@@ -526,7 +526,7 @@ class LinearSystem:
         """Return this system as the linear filter that a guarantee needs, whose last p states are the outputs."""
         return self.made if self.made is not None else state_space(self.A, self.B, self.C, self.D, self.name)
 
-    def outputs(self, u: Any, fmt: FloatFormat | None = None) -> NDArray[np.float64]:
+    def outputs(self, u: Any, fmt: FloatFormat | FixedFormat | str | None = None) -> NDArray[np.float64]:
         """Return the outputs of a run with every operation rounded to a format, or without a format in double-double.
 
         Parameters
@@ -550,7 +550,7 @@ class LinearSystem:
         out = np.ascontiguousarray(self._run(u, fmt)[:, self.n :])
         return out if fmt is None else self._widened(out)
 
-    def states(self, u: Any, fmt: FloatFormat) -> NDArray[np.float64]:
+    def states(self, u: Any, fmt: FloatFormat | FixedFormat | str) -> NDArray[np.float64]:
         """Return states and outputs after each step, (steps, n + p, 2), as :meth:`outputs` computes them.
 
         Raises
@@ -559,8 +559,14 @@ class LinearSystem:
         """
         return self._widened(self._run(u, fmt), 0)
 
-    def _run(self, u: Any, fmt: FloatFormat | None) -> NDArray[Any]:
+    def _run(self, u: Any, fmt: Any) -> NDArray[Any]:
         """Return packed states and outputs after each step, (steps, n + p)."""
+        fmt = format_named(fmt)
+        if not isinstance(fmt, FloatFormat | FixedFormat | None):
+            raise TypeError(
+                f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or a name; emulate(system, u, fmt) takes "
+                "WordFormats, too"
+            )
         given, inputs = self.as_filter(), system_inputs(self, u)
         start = np.concatenate([self.x0, exact([0] * self.p)])
         if fmt is None:
@@ -600,7 +606,7 @@ class LinearSystem:
             return f"the system is stable, but as stored in {arithmetic(fmt)} it is not, since A has {growing}"
         return ""
 
-    def _beyond(self, fmt: FloatFormat | None) -> str:
+    def _beyond(self, fmt: FloatFormat | FixedFormat | None) -> str:
         """Return why a number cannot be stored, and what to do about it."""
         what = "a number beyond the range of float64"
         if fmt is not None and (fmt.limits is not None or fmt.base == 10):

@@ -163,12 +163,15 @@ class IntegerProgram(NamedTuple):
 
 
 def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
-    """Store the coefficients of a filter in words."""
+    """Store the coefficients of a filter in words; a coefficient of 1 or -1 is exact, as nothing is multiplied."""
     program = made.program
     limits = {a for code, a, _ in program.operations.tolist() if code >= AT_LEAST}
     stored = np.empty(len(made.coefficients), dtype=object)
     for i, value in enumerate(made.coefficients):
         fmt = words.data if i in limits else words.coefficients if words.coefficients is not None else words.data
+        if abs(value) == 1 and i not in limits:
+            stored[i] = value
+            continue
         try:
             stored[i] = FloatFormat(2, fmt).round(value) if isinstance(fmt, int) else fmt.strict.round(value)
         except OverflowError:

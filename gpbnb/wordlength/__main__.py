@@ -23,10 +23,11 @@ def _run(arguments: Sequence[str] | None) -> int:
         given = read(arguments)
         # These imports take a second, and help and refusals need none of them.
         from gpbnb.arithmetic.named import format_text
-        from gpbnb.wordlength.running import answer, certificate, read_files, uncovered, write, write_code_of
+        from gpbnb.wordlength.running import answer, certificate, read_files, uncovered, write, write_code_of, write_run
 
         asked = read_files(given)
-        report = answer(asked, command, lambda text: print(text, file=sys.stderr, flush=True))
+        tell = (lambda text: None) if given.quiet else (lambda text: print(text, file=sys.stderr, flush=True))
+        report = answer(asked, command, tell)
         proof = certificate(asked, report) if given.certificate else None
     except (ValueError, OSError, ArithmeticError, ImportError) as error:
         print(f"{program}: {error}", file=sys.stderr)
@@ -44,6 +45,9 @@ def _run(arguments: Sequence[str] | None) -> int:
         if proof is not None:
             replace_file(given.certificate, proof.text.encode())
             print(f"certificate: {given.certificate}, for {format_text(proof.fmt)}", flush=True)
+        option = f"--csv {given.csv}"
+        if given.csv and report.met:
+            write_run(asked, report, given.csv)
         option = f"--code {given.code}"
         if given.code and report.met:
             code = write_code_of(asked, report)

@@ -118,12 +118,13 @@ def guarantee(
 
 def _of_system(system: LinearSystem, fmt: Any, largest: NDArray[np.float64], horizon: int) -> OutputGuarantee:
     linear = system.as_filter().program.is_linear
+    words = WordFormats(fmt) if linear and isinstance(fmt, FixedFormat) else fmt
     why = system.unstable() if linear else ""
     steps = horizon if why else None
     for tried in (steps, horizon) if not linear else (steps,):
         try:
-            if isinstance(fmt, WordFormats):
-                proof = WordGuarantee(system, largest, tried).proof(fmt)
+            if isinstance(words, WordFormats):
+                proof = WordGuarantee(system, largest, tried).proof(words)
             elif linear:
                 proof = output_proof(system, fmt, largest, tried)
             else:

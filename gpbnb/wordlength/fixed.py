@@ -44,6 +44,7 @@ LONGEST_COEFFICIENT = 53
 MORE_INTEGER_BITS = 40
 """Integer bits beyond those of the model and its data that a run in fixed point may need."""
 
+_WIDER = "; needed more integer bits: without like=, the search finds as many as a run needs"
 _SCALED = "with its sections scaled by powers of two (scale=True; in a TOML file, scale = true beside sos)"
 
 
@@ -149,7 +150,8 @@ class _FixedSearch:
         def rejection(bits: int) -> str:
             text = digits_text(bits, kind="fraction")
             if reasons[bits]:
-                return f"{text} {'fails' if bits == 1 else 'fail'}: {reasons[bits]}"
+                cure = "" if self.widens or "overflow" not in reasons[bits] else _WIDER
+                return f"{text} {'fails' if bits == 1 else 'fail'}: {reasons[bits]}{cure}"
             return f"{text} {'gives' if bits == 1 else 'give'} {ratios[bits]:.3g} times the tolerance"
 
         known, needed = asked.evidence(ends)

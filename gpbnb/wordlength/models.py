@@ -1,13 +1,14 @@
-"""Read a model from a TOML file or from an object of SciPy, python-control or FilterPy, without importing these."""
+"""Read a model from a file or from an object of SciPy, python-control, FilterPy or OpenCV, without importing these."""
 
 from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 import tomllib
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
 from types import MappingProxyType
@@ -41,6 +42,9 @@ DESIGN = ("b", "a", "sos", "structure", "pairing", "order", "scale")
 NAMES = {f"{kind}s": f"{kind}_names" for kind in ("state", "measurement", "input", "output")}
 """Keys that list names in a TOML file, each perhaps with a unit, and the arguments of the models for them."""
 
+PID = ("Kp", "Ki", "Kd", "leak", "limits", "integral_limits", "back_calculation")
+"""Keys of a controller in a TOML file; only ``Kp`` and ``Ki`` are needed. See :meth:`gpbnb.LinearSystem.pid`."""
+
 FILTERS = ("KalmanFilter", "SquareRootKalmanFilter", "FadingKalmanFilter")
 """Classes of FilterPy that are read; their estimates after ``predict()`` and ``update(z)`` are those of the model."""
 
@@ -64,7 +68,9 @@ class Estimator(Protocol):
         """Number of states."""
 
 
-ModelSource: TypeAlias = str | Path | Mapping[str, Any] | LinearModel | LinearSystem | Discrete | Estimator
+ModelSource: TypeAlias = (
+    str | Path | Mapping[str, Any] | Sequence[Any] | NDArray[Any] | LinearModel | LinearSystem | Discrete | Estimator
+)
 """What a model is read from."""
 
 
@@ -90,13 +96,14 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
 
     Parameters
     ----------
-    source : the path of a TOML file, or a mapping with the same keys: Phi, H, Q, R, x0 and P0 for a Kalman filter;
-        A, B and optionally C, D and x0 for a linear system; b and a, or sos, for a digital filter. Lists of names are
-        optional: states, measurements, inputs, outputs. Or a discrete StateSpace or TransferFunction of
-        ``scipy.signal`` or python-control, or a ZerosPolesGain of ``scipy.signal``; it is read as a linear system that
-        starts at rest. Or a KalmanFilter, SquareRootKalmanFilter or FadingKalmanFilter of FilterPy; its current
-        estimate becomes the first estimate, and a step means ``predict()`` or ``predict(u)``, then ``update(z)``,
-        without other arguments. A model of this package is returned as it is.
+    source : the path of a TOML, JSON, NPZ or MAT file, or a mapping with the same keys: Phi, H, Q, R, x0 and P0 for a
+        Kalman filter; A, B and optionally C, D and x0 for a linear system; b and a, or sos, for a digital filter; Kp
+        and Ki for a controller. Lists of names are optional: states, measurements, inputs, outputs. Or (b, a), or
+        sections (sections, 6). Or a discrete StateSpace or TransferFunction of ``scipy.signal`` or python-control, or a
+        ZerosPolesGain of ``scipy.signal``; it is read as a linear system that starts at rest. Or a KalmanFilter,
+        SquareRootKalmanFilter or FadingKalmanFilter of FilterPy, or a KalmanFilter of OpenCV; its current estimate
+        becomes the first estimate, and a step means ``predict()`` or ``predict(u)``, then ``update(z)`` or
+        ``correct(z)``, without other arguments. A model of this package is returned as it is.
     u : (steps, p), known inputs of a Kalman filter, in place of those in `source`; the source must have B.
     structure : structure of a digital filter, or of a TransferFunction or ZerosPolesGain of ``scipy.signal``; one of
         :data:`gpbnb.filters.structures.STRUCTURES`. By default, the structure that the file names; for an object, state
@@ -116,6 +123,8 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
     >>> model.name, model.n
     ('halves', 1)
     """
+    if isinstance(source, tuple | list | np.ndarray):
+        source = _coefficients(source)
     if isinstance(source, (str, Path, Mapping)):
         return _from_mapping(*_read(source), u, structure)
     library, kind = type(source).__module__.partition(".")[0], type(source).__name__
@@ -132,6 +141,14 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
         raise ValueError(f"got inputs for a {kind}; needed a TOML file, a mapping or a filter of FilterPy with B")
     if own:
         return source
+    if library == "cv2" and kind == "KalmanFilter":
+        return _from_opencv(source)
+    if library in _UPDATE_FIRST:
+        raise TypeError(
+            f"got a {kind} of {library}, which starts with an update; needed a filter that starts with a prediction: "
+            f"copy its matrices into LinearModel(Phi, H, Q, R, x0, P0, steps=...), where Phi is a function of the step "
+            "that is the identity for step 0, and Q one that is zero there"
+        )
     if kind.removesuffix("Continuous").removesuffix("Discrete") in SYSTEMS.get(library, ()):
         return _from_system(source, library, structure)
     raise TypeError(
@@ -139,6 +156,32 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
         f"scipy.signal or python-control, or a {', '.join(FILTERS)} of FilterPy; write the matrices of another class, "
         f"or of one derived from these, as a mapping with the keys {', '.join(KALMAN)}, or {', '.join(SYSTEM)}"
     )
+
+
+_UPDATE_FIRST = ("statsmodels", "pykalman", "simdkalman")
+
+
+def _coefficients(source: Any) -> Mapping[str, Any]:
+    """Return b and a, or second-order sections, as a mapping."""
+    if len(source) == 2 and not isinstance(source, np.ndarray):
+        return {"b": source[0], "a": source[1]}
+    if np.ndim(source) == 2 and np.shape(source)[1] == 6:
+        return {"sos": source}
+    raise ValueError(
+        f"got a {type(source).__name__} of shape {np.shape(source)}; needed (b, a), or sections of shape (sections, 6)"
+    )
+
+
+def _from_opencv(given: Any) -> LinearModel:
+    """Read a filter of OpenCV, whose step is ``predict()``, then ``correct(z)``."""
+    control = given.controlMatrix
+    if control is not None and np.any(control):
+        raise ValueError(
+            "got a KalmanFilter of OpenCV with a controlMatrix; needed none: write a LinearModel with B and u"
+        )
+    F, H = given.transitionMatrix, given.measurementMatrix
+    Q, R, x, P = given.processNoiseCov, given.measurementNoiseCov, given.statePost, given.errorCovPost
+    return LinearModel(F, H, Q, R, np.asarray(x).reshape(-1), P, "KalmanFilter", repair=True)
 
 
 def _from_filterpy(given: Any, u: Any) -> LinearModel:
@@ -230,7 +273,38 @@ def read_filter(source: str | Path | Mapping[str, Any], u: Numbers | None = None
 
 def _read(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
     """Return the entries of a source, and where they stand."""
-    return (source, "the mapping") if isinstance(source, Mapping) else (_toml(Path(source)), Path(source).name)
+    if isinstance(source, Mapping):
+        return source, "the mapping"
+    path = Path(source)
+    return _READERS.get(path.suffix.lower(), _toml)(path), path.name
+
+
+def _npz(path: Path) -> dict[str, Any]:
+    with np.load(path, allow_pickle=False) as found:
+        return {key: found[key] for key in found.files}
+
+
+def _mat(path: Path) -> dict[str, Any]:
+    try:
+        from scipy import io as matlab
+    except ImportError:
+        raise ValueError(
+            f"{path.name}: a MAT file needs SciPy: install it, or save the matrices as NPZ or JSON"
+        ) from None
+    found = {key: value for key, value in matlab.loadmat(path).items() if not key.startswith("__")}
+    rows = {key: np.ravel(value) for key, value in found.items() if key in ("b", "a", "x0")}
+    scalars = {key: value.item() for key, value in found.items() if key in PID and value.size == 1}
+    return found | rows | scalars
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(_text(path), parse_float=Decimal)
+    except ValueError as error:
+        raise ValueError(f"{path.name} is not JSON: {error}") from None
+    if not isinstance(found, dict):
+        raise ValueError(f"{path.name}: got a {type(found).__name__}; needed an object with {_KEYS}")
+    return found
 
 
 def _is_design(given: Mapping[str, Any]) -> bool:
@@ -288,6 +362,10 @@ def _in_structure(given: Any, kind: str, library: str, structure: str) -> Linear
     )
 
 
+_KEYS = f"{', '.join(KALMAN)}, or {', '.join(SYSTEM)}, or b and a, or sos, or Kp and Ki"
+_READERS = {".npz": _npz, ".mat": _mat, ".json": _json}
+"""How files of other tools are read; all others are TOML."""
+
 MOST_BYTES = 2**28
 """Largest size of a file that is read; a device may have no end."""
 
@@ -313,7 +391,10 @@ def _toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(text, parse_float=Decimal)
     except ValueError as error:  # also an integer too long for Python
-        raise ValueError(f"{path.name} is not TOML: {error}") from None
+        raise ValueError(
+            f"{path.name} is not TOML: {error}; needed a TOML file with {_KEYS}; NPZ, MAT and JSON files with these "
+            "names are read, too"
+        ) from None
     except ArithmeticError:
         raise ValueError(f"{path.name}: got an exponent that is too long; needed numbers such as 1e-3") from None
     except RecursionError:
@@ -336,6 +417,8 @@ def _from_mapping(given: Mapping[str, Any], where: str, u: Any, structure: str |
                 f"{where}: got known inputs for a linear system; needed none: its measurements are its inputs"
             )
         given = {**given, "u": u}
+    if "Kp" in given:
+        return _controller(given, where, structure)
     needed = KALMAN if kalman else SYSTEM
     own = ("states", "measurements", "inputs") if kalman else ("states", "inputs", "outputs")
     allowed = {*needed, *own, *INPUTS, "name", "repair"} if kalman else {*needed, *own, "C", "D", "x0", "name"}
@@ -346,7 +429,8 @@ def _from_mapping(given: Mapping[str, Any], where: str, u: Any, structure: str |
         more = f", with {', '.join((*INPUTS, *own, 'name'))} if it has them" if kalman else ""
         raise ValueError(
             f"{where}: {'; '.join(problems)}; needed {', '.join(KALMAN)} for a Kalman filter{more}, "
-            f"{', '.join(SYSTEM)} and optionally C, D, x0 for a linear system, or b and a, or sos, for a digital filter"
+            f"{', '.join(SYSTEM)} and optionally C, D, x0 for a linear system, b and a, or sos, for a digital filter, "
+            "or Kp and Ki for a controller"
         )
     arguments: dict[str, Any] = {"repair": True} if kalman else {}
     arguments |= {"name": where.removesuffix(".toml")}
@@ -355,6 +439,17 @@ def _from_mapping(given: Mapping[str, Any], where: str, u: Any, structure: str |
         raise ValueError(f"{where}: got name {arguments['name']!r}; needed text")
     try:
         return LinearModel(**arguments) if kalman else LinearSystem(**arguments)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{where}: {error}") from None
+
+
+def _controller(given: Mapping[str, Any], where: str, structure: str | None) -> LinearSystem:
+    if unknown := sorted(map(str, set(given) - {*PID, "name"})):
+        raise ValueError(f"{where}: {', '.join(unknown)} unknown; needed Kp, Ki and perhaps {', '.join(PID[2:])}")
+    if "Ki" not in given:
+        raise ValueError(f"{where}: Ki missing; needed Kp and Ki")
+    try:
+        return LinearSystem.pid(**{"name": where.removesuffix(".toml")} | dict(given))
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None
 

@@ -40,7 +40,8 @@ B and u (or --inputs) and known offsets b of the states and d of the measurement
 and perhaps structure, such as "direct form I", "cascade of direct form II transposed", "lattice" or "all"; its
 structures are compared side by side, and with "all", the one that needs the fewest digits (in fixed point, the
 shortest word) gives the answer and the code. Beside sos, there may be pairing, order, and scale = true, which scales
-the sections of a cascade by powers of two. Numbers are read as decimals.
+the sections of a cascade by powers of two. A controller has Kp and Ki, and perhaps Kd, leak, limits, integral_limits,
+back_calculation. Numbers are read as decimals. NPZ, MAT and JSON files with the same names are read, too.
 With --form "constant gain", a Kalman filter is the linear system with the gain that it approaches; its inputs are the
 measurements.
 The file may name states, measurements, inputs and outputs, each with its unit: states = ["tilt (°)", "rate (°/s)"].
@@ -70,7 +71,7 @@ def parser() -> argparse.ArgumentParser:
     )
     made.register("action", None, _Once)  # for the options that are stored
     made.add_argument("--version", action="version", version=f"gpbnb {gpbnb.__version__}")
-    made.add_argument("model", type=Path, help="TOML file")
+    made.add_argument("model", type=Path, help="TOML, JSON, NPZ or MAT file")
     made.add_argument(
         "--tolerance",
         required=True,
@@ -93,11 +94,14 @@ def parser() -> argparse.ArgumentParser:
         help="of the simulated inputs: height of a step or sine, standard deviation of noise; one number, or one for "
         "each input; default: 1",
     )
-    made.add_argument("--steps", metavar="N", help="number of steps to simulate; default: 1000")
+    made.add_argument(
+        "--steps", metavar="N", help="number of steps to simulate; default: 1000, or as many as there are known inputs"
+    )
+    made.add_argument("--seed", metavar="N", help="seed of what is simulated; default: 0")
     made.add_argument(
         "--format",
         metavar="NAME",
-        help=f"judge one format in place of a search: {', '.join(_FORMATS)}, Q15, or fixed 4.12 with 4 integer "
+        help=f"judge one format in place of a search: {', '.join(_FORMATS)}, Q15, or Q3.12 with 3 integer "
         "bits and 12 fraction bits",
     )
     made.add_argument("--digits", metavar="N", help="judge this precision in place of a search")
@@ -139,6 +143,13 @@ def _add_files(made: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="for the basis guarantee: JSON file to write, which python -m gpbnb.bounds.check verifies on its own",
     )
+    made.add_argument(
+        "--csv",
+        type=Path,
+        metavar="FILE",
+        help="CSV file to write: each step of a run in the answer, with its estimates or outputs and their errors",
+    )
+    made.add_argument("--quiet", action="store_true", help="write nothing but the answer: no progress")
     made.add_argument(
         "--code",
         type=Path,
@@ -182,7 +193,7 @@ def read(arguments: Sequence[str] | None) -> argparse.Namespace:
     given = parser().parse_args(arguments)
     for name in ("tolerance", "level", *QUANTITIES):
         _replace(given, name, _numbers, "numbers with commas between: 0.01,inf")
-    for name in ("steps", "digits", "base", "emin", "emax", "coefficients"):
+    for name in ("steps", "seed", "digits", "base", "emin", "emax", "coefficients"):
         _replace(given, name, plain_integer, "a whole number")
     _replace(given, "rounding", lambda text: rounding_named(text).value)
     if given.form and plain_name(given.form) == plain_name(CONSTANT_GAIN):
@@ -193,10 +204,10 @@ def read(arguments: Sequence[str] | None) -> argparse.Namespace:
     if given.format in WITHOUT_LOOPS:
         raise ValueError(
             f"got --format {given.format}, which has no compiled loops; needed one of {', '.join(_FORMATS)}, Q15, or "
-            "fixed 4.12; to search up to 53 bits or 18 decimal digits, leave --format away"
+            "Q3.12; to search up to 53 bits or 18 decimal digits, leave --format away"
         )
     sources = [each for each in (given.model, given.measurements, given.inputs) if each]
-    check_files(given.report, sources, given.certificate)
+    check_files(given.report, sources, given.certificate, given.csv)
     for source in sources:
         try:
             source.open("rb").close()
@@ -231,7 +242,7 @@ def _check(given: argparse.Namespace) -> None:
         if others := [f"--{name}" for name in names if getattr(given, name) is not None]:
             raise ValueError(
                 f"got --fixed and {', '.join(others)}; needed --fixed alone, which searches the fraction bits; to "
-                "judge one format, leave out --fixed and write --format Q15 or --format 'fixed 4.12'"
+                "judge one format, leave out --fixed and write --format Q15 or --format Q3.12"
             )
         if others := [f"--basis {each}" for each in given.basis or () if each not in FIXED_BASES]:
             raise ValueError(
@@ -257,7 +268,13 @@ def _check(given: argparse.Namespace) -> None:
         raise ValueError(f"got {limited} without a basis that uses limits; needed --basis guarantee or probable")
 
 
-def check_files(report: Path | None, sources: Sequence[Path], certificate: Path | None = None) -> None:
+WRITTEN = "# Written by gpbnb"
+"""How a CSV file of the command begins."""
+
+
+def check_files(
+    report: Path | None, sources: Sequence[Path], certificate: Path | None = None, run: Path | None = None
+) -> None:
     """Reject one file for two purposes, and a file that cannot be written, before anything is computed.
 
     Raises
@@ -271,6 +288,10 @@ def check_files(report: Path | None, sources: Sequence[Path], certificate: Path 
         written = [(f"--report {report}", report), (f"--report {report}", report.with_suffix(".json"))]
     if certificate:
         written.append((f"--certificate {certificate}", certificate))
+    if run:
+        written.append((f"--csv {run}", run))
+        if run.is_file() and run not in sources and not run.read_bytes().startswith(WRITTEN.encode()):
+            raise ValueError(f"got --csv {run}, which gpbnb has not written; needed another name")
     for option, path in written:
         try:
             path.resolve().exists()

@@ -39,6 +39,12 @@ DEFAULT_STEPS = 1000
 """Steps that are simulated if no number is given."""
 
 
+def usual_steps(model: LinearModel | LinearSystem) -> int:
+    """Return the number of steps to simulate if none is given: those that a model describes, or the default."""
+    described = model.steps if isinstance(model, LinearModel) else None
+    return DEFAULT_STEPS if described is None else described
+
+
 @dataclass(frozen=True)
 class Answer:
     """One search as plain numbers; `tried` holds precision and error / tolerance, None if there is no number."""
@@ -152,6 +158,7 @@ class Question:
     choose : whether the structure that needs the fewest digits on the first basis gives the answer, in place of the
         first structure.
     lacking : structures that the filter does not have, each with the reason.
+    seed : seed of simulated measurements.
     """
 
     model: LinearModel | LinearSystem
@@ -172,13 +179,14 @@ class Question:
     coefficient_bits: int | None = None
     choose: bool = False
     lacking: Mapping[str, str] = field(default_factory=dict)
+    seed: int = 0
 
     @property
     def count(self) -> int:
         """Number of steps."""
         if self.steps is not None:
             return self.steps
-        return DEFAULT_STEPS if self.z is None else len(self.z)
+        return usual_steps(self.model) if self.z is None else len(self.z)
 
     def parts(self) -> list[_Part]:
         """Return the single questions, one for each basis and form or structure.
@@ -211,7 +219,7 @@ class Question:
         if isinstance(self.model, LinearSystem):
             return self.z
         if self.z is None:
-            return simulated_measurements(self.model, whole_number("steps", self.count))
+            return simulated_measurements(self.model, whole_number("steps", self.count), self.seed)
         if {*self.bases} & {"guarantee", "probable"} and self.model.without_missing(self.z)[0] is not self.model:
             raise ValueError(
                 "got measurements of which some are missing, and a basis that holds for ever; needed measurements "
@@ -321,7 +329,9 @@ def study(
     is_filter = isinstance(model, LinearModel)
     width = model.p if isinstance(model, LinearSystem) else model.n
     tolerances = tolerances_of(asked.tolerance, width, "outputs")
-    origin = "given" if asked.z is not None else "simulated by the model, seed 0" if z is not None else "none"
+    origin = (
+        "given" if asked.z is not None else f"simulated by the model, seed {asked.seed}" if z is not None else "none"
+    )
     return Report(
         name=model.name,
         kind="Kalman filter" if is_filter else "linear system",

@@ -28,9 +28,10 @@ from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.bounding import guarantee
 from gpbnb.wordlength.c_files import refuse_others
 from gpbnb.wordlength.code import VECTORS, write_code
+from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
-from gpbnb.wordlength.options import QUANTITIES
-from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, part_label, study
+from gpbnb.wordlength.options import QUANTITIES, WRITTEN
+from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, part_label, study, usual_steps
 from gpbnb.wordlength.required import judge
 
 
@@ -116,6 +117,7 @@ def answer(asked: CommandInput, command: str, tell: Callable[[str], Any]) -> Rep
         given.coefficients,
         source.compares_all,
         source.lacking if len(source.structures) > 1 else {},
+        given.seed or 0,
     )
     return study(question, asked.origin, command, tell)
 
@@ -166,10 +168,10 @@ def _inputs(
         if given.simulate and given.form == CONSTANT_GAIN:
             raise _simulates_itself(given)
         if given.form == CONSTANT_GAIN and z is None:
-            z = simulated_measurements(cast(LinearModel, own), given.steps or DEFAULT_STEPS)
-            return z, "simulated by the model, seed 0"
+            z = simulated_measurements(cast(LinearModel, own), given.steps or usual_steps(own), given.seed or 0)
+            return z, f"simulated by the model, seed {given.seed or 0}"
         if given.simulate:
-            z = simulated_inputs(given.simulate, _level(given), given.steps or DEFAULT_STEPS, model.m)
+            z = simulated_inputs(given.simulate, _level(given), given.steps or DEFAULT_STEPS, model.m, given.seed or 0)
             source = f"simulated, {given.simulate} of level {_shown(_level(given))}"
         if z is None and (given.fixed or {"emulation", "bound"} & {*bases}):
             raise ValueError(
@@ -253,7 +255,7 @@ def write_code_of(asked: CommandInput, report: Report) -> WrittenCode:
         form = report.structure if source.design else None
         return WrittenCode(write_code(model, fmt, given.code, form=form, within=within), fmt)
     if z is None:
-        z = simulated_measurements(own, given.steps or DEFAULT_STEPS)
+        z = simulated_measurements(own, given.steps or usual_steps(own), given.seed or 0)
     vectors = None if np.isnan(z[:VECTORS]).any() else z[:VECTORS]
     return WrittenCode(write_code(own, fmt, given.code, form=given.form, inputs=vectors, within=within), fmt)
 
@@ -290,6 +292,27 @@ def write(report: Report, page: Path) -> None:
     """
     replace_file(page, report.to_html().encode())
     replace_file(page.with_suffix(".json"), f"{report.to_json()}\n".encode())
+
+
+def write_run(asked: CommandInput, report: Report, file: Path) -> None:
+    """Write each step of a run in the format of the answer as CSV: estimates or outputs, and their errors.
+
+    Raises
+    ------
+    OSError : the file cannot be written.
+    """
+    given, source = asked.options, asked.source
+    model = source.structures.get(report.structure, source.model)
+    data = report.steps if asked.z is None else asked.z
+    form = _form(given) if isinstance(model, LinearModel) else None
+    run = emulate(model, data, report.formats, form=form, seed=given.seed or 0)
+    numbers = run.x if isinstance(model, LinearModel) else run.y
+    kind = "output" if run.form is None else "state"
+    names = report.names or [f"{kind} {i}" for i in range(run.errors.shape[1])]
+    lines = [WRITTEN, ",".join(["step", *names, *(f"error of {name}" for name in names)])]
+    values = np.zeros((0, len(names))) if numbers is None else numbers.to_float()
+    lines += [",".join(map(repr, [k, *row])) for k, row in enumerate(np.hstack([values, run.errors]).tolist(), 1)]
+    replace_file(file, ("\n".join(lines) + "\n").encode())
 
 
 def _level(given: argparse.Namespace) -> Any:

@@ -56,6 +56,8 @@ def strategy_for(
     ------
     ValueError, TypeError, OverflowError : for a reason given in :func:`gpbnb.required_precision`.
     """
+    if within is not None and not isinstance(within, FilterLimits):
+        raise TypeError(f"got within={within!r}; needed the result of limits(...)")
     if within is not None and basis in ("emulation", "bound"):
         raise ValueError(
             f'got limits and basis "{basis}", which takes the measurements as they are; needed no limits; leave out '
@@ -78,7 +80,7 @@ def strategy_for(
 
 def measured(model: AnyModel, data: Data) -> tuple[AnyModel, NDArray[Any]]:
     """Return a model for the measurements that are present, and the measurements (steps, m), perhaps simulated."""
-    z = simulated(model, data.steps, data.seed) if data.z is None else data.z
+    z = _simulated(model, data) if data.z is None else data.z
     sound, filled = model.without_missing(z)
     found = np.asarray(filled)
     if found.ndim != 2 or found.shape[1] != model.m or not len(found):
@@ -99,6 +101,17 @@ def measured(model: AnyModel, data: Data) -> tuple[AnyModel, NDArray[Any]]:
         )
     sound.check_steps(len(found))
     return sound, found
+
+
+def _simulated(model: AnyModel, data: Data) -> NDArray[Any]:
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return simulated(model, data.steps, data.seed)
+    except OverflowError:
+        raise ValueError(
+            f"the simulated measurements of {model.name} grow beyond float64: it is not stable; give measurements, or "
+            "fewer steps"
+        ) from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,6 +357,8 @@ class BoundedSystem(Strategy):
         return self._outcome(fmt, lambda each: output_errors(self.system, each, self.largest, self.steps), proves=True)
 
     def _outcome(self, fmt: Any, bounds: Callable[[Any], NDArray[np.float64]], proves: bool = False) -> Outcome:
+        if isinstance(fmt, FixedFormat) and self.system.as_filter().program.is_linear:
+            fmt = WordFormats(fmt)
         try:
             if isinstance(fmt, WordFormats):
                 return _share((self._words.errors if proves else self._words.guessed)(fmt), self.tolerances)
@@ -403,7 +418,7 @@ def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, w
     if within is None:
         if basis == "probable":
             raise ValueError(f'got basis "{basis}" without limits; needed within=limits(measurement=...)')
-        most = all_above(np.abs(u).max(axis=0))
+        most = all_above(np.abs(np.asarray(u)).max(axis=0))
     else:
         most = largest_inputs(system, within)
         if u is not None:

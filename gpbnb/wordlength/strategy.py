@@ -68,7 +68,7 @@ def tolerances_of(tolerance: Any, count: int, what: str) -> NDArray[np.float64]:
             raise ValueError("no real numbers")
         negative = [-_exactly(each) for each in given.ravel().tolist()]
         tolerances = -all_above(np.array(negative, dtype=object)).reshape(given.shape)
-    except (TypeError, ValueError, OverflowError):
+    except (TypeError, ValueError, ArithmeticError):
         raise ValueError(f"got tolerance {tolerance!r}; {needed}") from None
     if tolerances.shape not in ((), (1,), (count,)):
         got = f"tolerance {tolerance}" if tolerances.size <= 2 * count else "a tolerance"

@@ -18,6 +18,9 @@ from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.models import SYSTEMS, read_model
 from gpbnb.wordlength.strategy import Data
 
+MOST_STEPS = 100_000_000
+"""Largest number of steps to simulate."""
+
 FILTER, DRIVEN, NONLINEAR, SYSTEM, LIMITED, STEP, SMOOTHER, FUNCTION = KINDS = (
     "a Kalman filter",
     "a Kalman filter with known inputs",
@@ -115,8 +118,8 @@ def data_of(model: Any, z: Any, seed: int = 0) -> Data:
     """
     if isinstance(z, str | Path) or z is None:
         raise ValueError(f"got {z!r} for z; needed measurements or inputs, (steps, m), or a number of steps")
-    if np.ndim(z) == 0 and not hasattr(z, "to_fractions"):
-        return Data(None, whole_number("steps", z), whole_number("seed", seed, 0))
+    if not isinstance(z, list | tuple) and not hasattr(z, "to_fractions") and np.ndim(z) == 0:
+        return Data(None, whole_number("steps", z, most=MOST_STEPS), whole_number("seed", seed, 0))
     given = z if hasattr(z, "to_fractions") or isinstance(z, np.ma.MaskedArray) else real_numbers(z)
     if given.ndim == 1 and getattr(model, "m", 0) == 1:
         given = given.reshape(-1, 1)

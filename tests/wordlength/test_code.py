@@ -417,10 +417,8 @@ def test_a_name_that_c_does_not_take_is_refused(name, tmp_path):
 
 
 def test_other_objects_are_refused(tmp_path):
-    with pytest.raises(
-        TypeError, match="got a dict; needed a LinearSystem, a FilterDesign, a LinearModel or a NonlinearSystem"
-    ):
-        write_code({}, BINARY32, tmp_path)
+    with pytest.raises(TypeError, match="got a int; needed the path of a TOML file"):
+        write_code(3, BINARY32, tmp_path)
     with pytest.raises(TypeError, match="got the format 32"):
         write_code(BIQUAD, 32, tmp_path)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from small_filter import unscaled
 
-from gpbnb import BINARY64, FloatFormat, LinearSystem, WordFormats, required_precision
+from gpbnb import BINARY64, FloatFormat, LinearSystem, WordFormats, emulate, guarantee, limits, required_precision
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.words import largest_rounding
@@ -180,3 +180,17 @@ def test_a_scaled_filter_gets_the_integer_bits_of_its_run_in_the_format():
     found = fixed_point.required_bits(given, z * 0.9999, 0.02)
     assert found.met
     assert np.abs(fixed_point.emulated(given, z * 0.9999, found.format)).max() <= 0.02
+
+
+@pytest.mark.parametrize("a1", ["-0.9", "-1"])
+def test_a_coefficient_of_one_is_not_multiplied_and_needs_no_integer_bits(a1):
+    """y <- u - a1 y, in integers: u = 0.1 in Q15, and a product that is rounded only if it is one."""
+    system, fmt = LinearSystem.from_coefficients([1], [1, a1], "direct form I"), FixedFormat(0, 15)
+    u, y, seen = round(0.1 * 2**15), 0, []
+    for _ in range(8):
+        y = u + (y if a1 == "-1" else math.floor(Fraction(round(0.9 * 2**15) * y, 2**15) + Fraction(1, 2)))
+        seen.append(y)
+    run = emulate(system, [0.1] * 8, fmt)
+    assert (run.y.to_float().ravel() * 2**15).tolist() == seen
+    bound = guarantee(system, fmt, limits(measurement=0.05), horizon=8)
+    assert np.abs(emulate(system, [0.05] * 8, fmt).errors).max() <= bound.bound[0] < 1e-3

@@ -28,6 +28,7 @@ from gpbnb import (
 )
 from gpbnb.names import format_parts
 from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.fixed import _WIDER
 from gpbnb.wordlength.models import read_measurements
 from gpbnb.wordlength.required import judge
 
@@ -317,7 +318,7 @@ def test_fraction_bits_of_a_kalman_filter_end_with_the_compiled_loops():
     reason = emulate(tracker, z, FixedFormat(8, 20), form="UD").reason
     assert "use more integer bits" in reason
     most = "43 fraction bits are the most with compiled loops"
-    assert found.why == f"43 fraction bits fail: the run is refused: {reason}; {most}"
+    assert found.why == f"43 fraction bits fail: the run is refused: {reason}{_WIDER}; {most}"
     assert required_precision(tracker, z, 1e-2, kind="fixed", like=FixedFormat(30, 8), form="UD").met
     with pytest.raises(ValueError, match="got 60 bits in fixed point; needed at most 51 for compiled loops"):
         required_precision(tracker, z, 1e-2, kind="fixed", like=FixedFormat(60, 8), form="UD")

@@ -1,0 +1,130 @@
+"""Files and objects of other tools, and what the command writes about a run."""
+
+from __future__ import annotations
+
+import json
+import sys
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import io, signal
+
+from gpbnb import LinearModel, LinearSystem, emulate, read_model, required_precision
+from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.models import read_measurements
+
+B, A = signal.butter(4, 0.1)
+SOS = signal.butter(4, 0.1, output="sos")
+WALK = "Phi = [[0.9]]\nH = [[1]]\nQ = [[0.01]]\nR = [[1]]\nx0 = [0]\nP0 = [[1]]\n"
+
+
+def outputs(system):
+    return system.outputs(np.eye(40, 1))[:, 0, 0]
+
+
+@pytest.mark.parametrize(("entries", "design"), [({"b": B, "a": A}, (B, A)), ({"sos": SOS}, SOS)])
+@pytest.mark.parametrize("suffix", [".npz", ".mat", ".json"])
+def test_a_filter_is_the_same_from_every_file_and_from_its_arrays(suffix, entries, design, tmp_path):
+    path = tmp_path / f"low{suffix}"
+    if suffix == ".npz":
+        np.savez(path, **entries)
+    elif suffix == ".mat":
+        io.savemat(path, entries)
+    else:
+        path.write_text(json.dumps({key: value.tolist() for key, value in entries.items()}))
+    expected = outputs(read_model({key: value.tolist() for key, value in entries.items()}))
+    # JSON has decimals, which are read exactly, as those of TOML are.
+    assert np.allclose(outputs(read_model(path)), expected, rtol=1e-9, atol=1e-12)
+    assert np.array_equal(outputs(read_model(design)), expected)
+
+
+def test_a_kalman_filter_from_arrays_in_a_file(tmp_path):
+    given = {"Phi": [[0.5]], "H": [[1]], "Q": [[1]], "R": [[2]], "x0": [0], "P0": [[1]]}
+    np.savez(tmp_path / "walk.npz", **given)
+    io.savemat(tmp_path / "walk.mat", given)
+    for name in ("walk.npz", "walk.mat"):
+        found = read_model(tmp_path / name)
+        assert [getattr(found, key).ravel().tolist() for key in given] == [
+            np.ravel(each).tolist() for each in given.values()
+        ]
+
+
+def test_a_controller_is_read(tmp_path):
+    (tmp_path / "pi.toml").write_text('Kp = "0.8"\nKi = 0.05\nlimits = [-1, 1]\n')
+    e = np.linspace(-3, 3, 20)[:, None]
+    found, expected = read_model(tmp_path / "pi.toml"), LinearSystem.pid("0.8", "0.05", limits=(-1, 1))
+    assert np.array_equal(found.outputs(e), expected.outputs(e))
+    assert found.name == "pi"
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"Kp": 1}, "Ki missing; needed Kp and Ki"),
+        ({"Kp": 1, "Ki": 1, "Kx": 1}, "Kx unknown; needed Kp, Ki and perhaps Kd, leak, limits"),
+        ({"Kp": 1, "Ki": 1, "limits": [2, 1]}, "limits"),
+        ([[1, 2, 3]], r"got a list of shape \(1, 3\); needed \(b, a\), or sections"),
+        ("bad.json", r"bad.json is not JSON"),
+        ("list.json", r"list.json: got a list; needed an object with Phi"),
+        ("sos.csv", r"sos.csv is not TOML: .*; needed a TOML file with .*; NPZ, MAT and JSON files"),
+    ],
+)
+def test_what_cannot_be_read_is_refused_with_what_can(given, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in (("bad.json", "{"), ("list.json", "[1]"), ("sos.csv", "1,2,3\n")):
+        (tmp_path / name).write_text(text)
+    with pytest.raises(ValueError, match=message):
+        read_model(given)
+
+
+def of_class(name, library, **attributes):
+    """An object of a class that another library would have."""
+    module = ModuleType(library)
+    return type(name, (SimpleNamespace,), {"__module__": module.__name__})(**attributes)
+
+
+def test_a_filter_of_opencv_is_read_and_others_say_how_to_be():
+    one = np.ones((1, 1), np.float32)
+    given = {"transitionMatrix": one / 2, "measurementMatrix": one, "processNoiseCov": one, "measurementNoiseCov": one}
+    given |= {"errorCovPost": one, "statePost": 3 * one, "controlMatrix": None}
+    found = read_model(of_class("KalmanFilter", "cv2", **given))
+    assert isinstance(found, LinearModel)
+    assert found.x0.tolist() == [3]
+    x, P = 1.5, 0.25 + 1  # predict, then correct
+    assert emulate(found, [2], "float64").x.to_float()[0, 0] == pytest.approx(x + P / (P + 1) * (2 - x))
+    with pytest.raises(ValueError, match="with a controlMatrix; needed none"):
+        read_model(of_class("KalmanFilter", "cv2", **given | {"controlMatrix": one}))
+    with pytest.raises(
+        TypeError, match="of statsmodels, which starts with an update; needed a filter that starts with"
+    ):
+        read_model(of_class("KalmanFilter", "statsmodels"))
+
+
+def test_the_command_writes_a_run_and_keeps_quiet(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "walk.toml").write_text(WALK)
+    asked = ["walk.toml", "--tolerance", "0.01", "--steps", "30", "--basis", "emulation", "--csv", "run.csv"]
+    assert main([*asked, "--quiet", "--seed", "3"]) == 0
+    printed = capsys.readouterr()
+    model = read_model(tmp_path / "walk.toml")
+    answer = required_precision(model, 30, "0.01", seed=3)
+    assert (printed.out, printed.err) == (f"{answer}\n", "")
+    run = emulate(model, 30, answer.format, seed=3)
+    rows = np.array(read_measurements(tmp_path / "run.csv"))
+    assert np.array_equal(rows[:, 1:], np.hstack([run.x.to_float(), run.errors]))
+    assert main(asked) == 0  # it may replace its own file
+    assert "emulation" in capsys.readouterr().err
+    (tmp_path / "run.csv").write_text("1\n")
+    assert main(asked) == 2
+    assert "got --csv run.csv, which gpbnb has not written; needed another name" in capsys.readouterr().err
+    assert (tmp_path / "run.csv").read_text() == "1\n"
+
+
+def test_known_inputs_set_the_number_of_steps(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "walk.toml").write_text(f"{WALK}B = [[1]]\n")
+    (tmp_path / "u.csv").write_text("0.5\n" * 20)
+    assert main(["walk.toml", "--tolerance", "0.01", "--basis", "emulation", "--inputs", "u.csv"]) == 0
+    assert "observed in 20 steps" in capsys.readouterr().out
+    assert "statsmodels" not in sys.modules
