@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from gpbnb.report import evidence
@@ -43,3 +45,8 @@ def test_a_worst_error_beyond_its_bound_is_wrong(monkeypatch):
     rows = [row for row in evidence.scalar.load() if row.result == "compared"][:3]
     monkeypatch.setattr(evidence.scalar, "load", lambda: (*rows[:2], rows[2]._replace(ratio="1.01")))
     assert evidence.true_errors() == Checked(3, 1)
+
+
+def test_nothing_that_the_page_counts_disagrees():
+    page = Path(__file__).resolve().parents[1] / "book" / "trust.ipynb"
+    assert "In each row, disagreements: 0." in page.read_text(encoding="utf-8")

@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees import filters, scalar, survey
-from gpbnb.report.ledger.checks import TOPICS
-from gpbnb.report.ledger.statements import load_statements
 
 
 class Checked(NamedTuple):
@@ -66,12 +64,6 @@ def true_errors() -> Checked:
     """Count filters whose worst error is known exactly, and those whose bound is smaller."""
     rows = [row for row in scalar.load() if row.result == "compared"]
     return Checked(len(rows), sum(float(row.ratio) > 1 for row in rows))
-
-
-def statements() -> int:
-    """Count the printed statements that a check reads, so that an altered one must be rejected."""
-    judged = {key for checks in TOPICS.values() for key, check in checks.items() if check.takes_statement}
-    return sum(bool(each.form) and each.id in judged for each in load_statements())
 
 
 def table(found: dict[str, tuple[str, Checked]]) -> Table:
