@@ -118,7 +118,7 @@ def test_the_error_of_a_trapezoid_is_that_beside_a_fine_integral():
 def test_simulated_errors_have_the_exact_variance(process):
     n = [12, 24, 120]
     run = experiment.simulate(process, 2.0, n, rng(8), 3000)
-    expected = theory.rule_variance(process, 2.0, theory.RULES["trapezoidal"], n[-1])[n]
+    expected = theory.trapezoid_variance(process, 2.0, n[-1])[n]
     assert np.abs(run.deviations(expected)).max() < 4
     assert run.relative_standard_error == pytest.approx(math.sqrt(2 / 3000))
 

@@ -9,7 +9,6 @@ The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -19,7 +18,7 @@ import mpmath
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gpbnb.report.integration.arguments import Floats, cycle_counts, positive_number
+from gpbnb.report.integration.arguments import Floats, positive_number
 from gpbnb.report.integration.walk import discretize, walk_factor
 
 # -- other inputs ---------------------------------------------------------------------------------
@@ -51,11 +50,10 @@ class Process:
         total: Any = sum(2 * c * p / (p * p + s * s) for c, p in zip(self.weights, self.poles, strict=True))
         return np.asarray(self.sigma**2 * np.real(total))
 
-    def folded(self, period: float, theta: Fraction = Fraction(0)) -> float:
-        r"""Sum the density at :math:`2\pi f_c(k+\theta)` over all k, except k = 0 if :math:`\theta = 0`.
+    def folded(self, period: float) -> float:
+        r"""Sum the density at :math:`2\pi kf_c` over all k except 0, in as many digits as the sum cancels.
 
-        Poisson's formula, :math:`\sum_kS(2\pi f_c(k+\theta)) = T\sum_nR(nT)\cos2\pi n\theta`, is evaluated in as many
-        digits as it cancels.
+        Poisson's formula gives :math:`\sum_kS(2\pi kf_c) = T\sum_nR(nT)`.
         """
         mu = max(abs(p) for p in self.poles) * period
         total = mpmath.mpf(0)
@@ -63,11 +61,7 @@ class Process:
             # Weights rounded to float64 would not cancel; for a resonance, exact ones follow from the drift.
             for c, p in _exact_modes(self):
                 z = p * mpmath.mpf(period)
-                if theta == 0:
-                    total += mpmath.re(c * (mpmath.coth(z / 2) - 2 / z))
-                else:
-                    angle = 2 * mpmath.pi * theta.numerator / theta.denominator
-                    total += mpmath.re(c * mpmath.sinh(z) / (mpmath.cosh(z) - mpmath.cos(angle)))
+                total += mpmath.re(c * (mpmath.coth(z / 2) - 2 / z))
             return float(total * period) * self.sigma**2
 
 
@@ -152,79 +146,19 @@ def _moments(process: Process, period: float) -> tuple[Floats, Floats]:
     return step, noise
 
 
-# -- other integrators ----------------------------------------------------------------------------
+# -- the random walk ------------------------------------------------------------------------------
+
+TRAPEZOID = (Fraction(1, 2), Fraction(1, 2))
+"""Weights of the new and of the old sample in (2), times T."""
 
 
-@dataclass(frozen=True)
-class Rule:
-    r"""An integration rule: at step r of a period it adds :math:`T\sum_j w_{rj}\,x_{n-j}`."""
+def walk_rate(process: Process, f_c: float) -> float:
+    r"""Return the random walk of the trapezoidal rule for any input: growth of the error variance per second.
 
-    name: str
-    weights: tuple[tuple[Fraction, ...], ...]
-
-    @property
-    def period(self) -> int:
-        """Number of steps after which the rule repeats."""
-        return len(self.weights)
-
-    @property
-    def memory(self) -> int:
-        """Number of past cycles whose samples the rule uses."""
-        return max(1, *(len(step) - 1 for step in self.weights))
-
-    def sample_weights(self) -> tuple[Fraction, ...]:
-        """Return the total weight of each sample in a period; their mean is 1."""
-        total = [Fraction(0)] * self.period
-        for r, step in enumerate(self.weights):
-            for j, w in enumerate(step):
-                total[(r + 1 - j) % self.period] += w
-        return tuple(total)
-
-    def harmonics(self) -> tuple[complex, ...]:
-        r"""Return the Fourier coefficients :math:`W_0 \dots W_{p-1}` of :meth:`sample_weights`; W_0 is 1."""
-        p, total = self.period, self.sample_weights()
-        turn = [complex(math.cos(2 * math.pi * k / p), -math.sin(2 * math.pi * k / p)) for k in range(p)]
-        return tuple(sum(float(a) * turn[m * i % p] for i, a in enumerate(total)) / p for m in range(p))
-
-
-def _rule(name: str, *steps: Sequence[str]) -> Rule:
-    return Rule(name, tuple(tuple(map(Fraction, step)) for step in steps))
-
-
-#: Integrators by name. All but the closed Newton-Cotes rules give every sample a total weight of 1.
-RULES = {
-    rule.name: rule
-    for rule in (
-        _rule("rectangular, old sample", ["0", "1"]),
-        _rule("rectangular, new sample", ["1"]),
-        _rule("trapezoidal", ["1/2", "1/2"]),
-        _rule("Adams-Bashforth 2", ["0", "3/2", "-1/2"]),
-        _rule("Adams-Moulton 3", ["5/12", "8/12", "-1/12"]),
-        _rule("two speeds, 4 samples", [], [], [], ["1/2", "1", "1", "1", "1/2"]),
-        _rule("Simpson", [], ["1/3", "4/3", "1/3"]),
-        _rule("Simpson 3/8", [], [], ["3/8", "9/8", "9/8", "3/8"]),
-        _rule("Boole", [], [], [], ["14/45", "64/45", "24/45", "64/45", "14/45"]),
-    )
-}
-
-
-def walk_rate(process: Process, f_c: float, rule: Rule = RULES["trapezoidal"]) -> float:
-    r"""Return the random walk for any rule and input: growth of the error variance per second.
-
-    .. math:: \dot P_{ee} = \sum_{k\ne0} S(2\pi kf_c) +
-        \sum_{m=1}^{p-1} |W_m|^2 \sum_k S\bigl(2\pi f_c(k+\tfrac mp)\bigr)
-
-    It is the part of the input's spectrum S that sampling folds down to frequency zero: at multiples of :math:`f_c`
-    for every rule, and between them for a rule that weighs the samples unequally.
+    It is the part of the input's spectrum S that sampling folds down to frequency zero,
+    :math:`\dot P_{ee} = \sum_{k\ne0} S(2\pi kf_c)`.
     """
-    period = 1 / positive_number("f_c", f_c)
-    harmonics = rule.harmonics()
-    total = 0.0
-    for m, weight in enumerate(harmonics):
-        size = 1.0 if m == 0 else abs(weight) ** 2
-        if size > 1e-30:
-            total += size * process.folded(period, Fraction(m, rule.period))
-    return total
+    return process.folded(1 / positive_number("f_c", f_c))
 
 
 def _exact_modes(process: Process) -> list[tuple[Any, Any]]:
@@ -238,63 +172,13 @@ def _exact_modes(process: Process) -> list[tuple[Any, Any]]:
     return [(mpmath.mpc(1, -zeta / damped), omega * mpmath.mpc(zeta, -damped))]
 
 
-def rule_variance(process: Process, f_c: float, rule: Rule, n: int) -> Floats:
-    """Return the error variance of a rule after 0 … n cycles, from the exact covariance recursion of its state.
-
-    The state consists of z, the past samples that the rule uses, and the error. Within a period, the error includes
-    samples that the rule has not added yet.
-    """
-    n = int(cycle_counts(n))
-    step = exact_step(process, f_c)
-    m, h = len(process.drift), rule.memory
-    size = m + h + 1  # z_n, x_{n-1} … x_{n-h}, e
-    period = 1 / f_c
-    covariance = _past(process, period, h)
-    variance = np.zeros(n + 1)
-    moves = [_moves(step, [float(w) for w in weights], m, h, period) for weights in rule.weights]
-    state = np.zeros((size, size))
-    state[: m + h, : m + h] = covariance
+def trapezoid_variance(process: Process, f_c: float, n: int) -> Floats:
+    """Return the error variance of the trapezoidal rule after 0 … n cycles, by recursion, from the steady state."""
+    step, m = exact_step(process, f_c), len(process.drift)
+    move, state, variance = np.eye(m + 1), np.zeros((m + 1, m + 1)), np.zeros(n + 1)
+    move[:, :m] = step.a
+    state[:m, :m] = process.sigma**2 * np.eye(m)
     for k in range(n):
-        a, b = moves[k % rule.period]
-        state = a @ state @ a.T + b @ b.T
+        state = move @ state @ move.T + step.b @ step.b.T
         variance[k + 1] = state[-1, -1]
     return variance
-
-
-def _past(process: Process, period: float, h: int) -> Floats:
-    """Return the steady-state covariance of z_0, x_{-1} … x_{-h}, computed forwards from the oldest sample."""
-    m = len(process.drift)
-    a, b = exact_step(process, 1 / period)
-    move, drive = np.zeros((m + h, m + h)), np.zeros((m + h, m + 1))
-    move[:m, :m], drive[:m] = a[:m], b[:m]
-    move[m, 0] = 1.0
-    for j in range(1, h):
-        move[m + j, m + j - 1] = 1.0
-    covariance = np.zeros((m + h, m + h))
-    covariance[:m, :m] = process.sigma**2 * np.eye(m)
-    for _ in range(h):
-        covariance = move @ covariance @ move.T + drive @ drive.T
-    return covariance
-
-
-def _moves(step: Cycle, weights: Sequence[float], m: int, h: int, period: float) -> tuple[Floats, Floats]:
-    """Return one cycle of the state of :func:`rule_variance`: the transition matrix, and the factor of the noise."""
-    size = m + h + 1
-    move, drive = np.zeros((size, size)), np.zeros((size, m + 1))
-    move[:m, :m], drive[:m] = step.a[:m], step.b[:m]
-    move[m, 0] = 1.0
-    for j in range(1, h):
-        move[m + j, m + j - 1] = 1.0
-    # e_n = e_{n-1} + d_n + T Σ (w_j - trapezoid's) x_{n-j}; x_n from the new z, x_{n-1} from the old.
-    move[-1, -1] = 1.0
-    move[-1, :m], drive[-1] = step.a[m], step.b[m]
-    for j in range(h + 1):
-        w = period * ((weights[j] if j < len(weights) else 0.0) - (0.5 if j < 2 else 0.0))
-        if j == 0:
-            move[-1, :m] += w * step.a[0]
-            drive[-1] += w * step.b[0]
-        elif j == 1:
-            move[-1, 0] += w
-        else:
-            move[-1, m + j - 2] += w
-    return move, drive

@@ -1,14 +1,13 @@
 """Closed forms for the error of digital integration: the names of the modules `walk`, `inputs` and `precision`."""
 
 from gpbnb.report.integration.inputs import (
-    RULES,
+    TRAPEZOID,
     Cycle,
     Process,
-    Rule,
     exact_step,
     first_order,
     resonant,
-    rule_variance,
+    trapezoid_variance,
     walk_rate,
 )
 from gpbnb.report.integration.precision import (
@@ -40,12 +39,11 @@ from gpbnb.report.integration.walk import (
 )
 
 __all__ = [
-    "RULES",
+    "TRAPEZOID",
     "Cycle",
     "Discretization",
     "Errors",
     "Process",
-    "Rule",
     "SavageRecursion",
     "approximation_ratio",
     "best_rate",
@@ -64,10 +62,10 @@ __all__ = [
     "random_walk",
     "required_rate",
     "resonant",
-    "rule_variance",
     "savage_recursion",
     "settling_cycles",
     "stall_rate",
+    "trapezoid_variance",
     "two_errors",
     "validity",
     "walk_factor",

@@ -112,9 +112,9 @@ def more_noise(patch):
 
 DEPENDS = [
     ("sabstract.random-walk", times(theory, "walk_rate", 1.001)),
-    ("sabstract.random-walk", times(theory, "rule_variance", 1.001)),
+    ("sabstract.random-walk", times(theory, "trapezoid_variance", 1.001)),
     ("sanalysis.aim", changed_steady),
-    ("eq2", replace(theory, "RULES", {"trapezoidal": theory.RULES["rectangular, old sample"]})),
+    ("eq2", replace(theory, "TRAPEZOID", (0, 1))),
     ("eq7", times(derivation, "transition_matrix", 2)),
     ("sanalysis.uncorrelated-q", times(derivation, "transition_matrix", 2)),
     ("sanalysis.easily-shown", times(derivation, "transition_matrix", 2)),

@@ -268,7 +268,7 @@ def growth() -> Names:
     """How the variance grows for two inputs, and variances for an input whose spectrum has a sharp edge."""
     f_c, uneven = 2.0, 0.0
     for process in (theory.first_order(1.0, 1.0), theory.resonant(1.0, 3.0, 0.2)):
-        variance = theory.rule_variance(process, f_c, theory.RULES["trapezoidal"], 400)
+        variance = theory.trapezoid_variance(process, f_c, 400)
         grown = (variance[400] - variance[200]) * f_c / 200
         uneven = max(uneven, abs(float(grown) / theory.walk_rate(process, f_c) - 1))
     return {"growth": "a random walk type error" if uneven < 1e-9 else "another error", "edge": _EDGE,
@@ -305,7 +305,7 @@ def density_at_edge() -> float:
 
 def trapezoids() -> list[Names]:
     samples, period = [sp.Rational(v) for v in ("1", "3", "-2", "11/2")], sp.Rational(1, 4)
-    before, now = map(sp.Rational, theory.RULES["trapezoidal"].weights[0])
+    before, now = map(sp.Rational, theory.TRAPEZOID)
     found = []
     for k in range(1, 4):
         start = sp.Rational(k, 3)
