@@ -149,13 +149,6 @@ def test_bad_arguments_are_explained_with_status_2(ledger, complete, arguments, 
     assert done.stdout == b""
 
 
-def test_a_check_of_no_statement_is_explained_with_status_2(ledger, topic):
-    done = ledger(topic("stray_topic", 'CHECKS["hung1984.II.eq999"] = lambda printed: compare(True, "1")\n'))
-    assert done.returncode == 2
-    assert "needed an id from statements.csv" in done.stderr.decode()
-    assert "Traceback" not in done.stderr.decode()
-
-
 def test_a_check_that_raises_is_named_and_hides_no_other(ledger, topic):
     name = topic(
         "raising_topic",

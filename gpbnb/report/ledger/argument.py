@@ -11,8 +11,9 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from gpbnb.report.display import style
 from gpbnb.report.display.vector import element
-from gpbnb.report.ledger.checking import Row, owners
+from gpbnb.report.ledger.checking import Row
 from gpbnb.report.ledger.html import Html
+from gpbnb.report.ledger.page import topics
 from gpbnb.report.ledger.roots import by_root
 
 PLACES = {
@@ -60,7 +61,7 @@ class Stage(NamedTuple):
 def stages(rows: Iterable[Row]) -> dict[str, Stage]:
     """Count the statements of each part, by topic."""
     rows = list(rows)
-    topic_of = owners([row.statement for row in rows])
+    topic_of = topics()
     found = {}
     for topic in PLACES:
         inside = [row for row in rows if topic_of.get(row.statement.id) == topic]
@@ -72,13 +73,13 @@ def stages(rows: Iterable[Row]) -> dict[str, Stage]:
 def inherited(rows: Iterable[Row]) -> dict[tuple[str, str], int]:
     """Count the wrong statements of a part whose root error was made in an earlier part: (later, earlier) → number."""
     rows = list(rows)
-    topic_of = owners([row.statement for row in rows])
+    topic_of = topics()
     order = [*PLACES]
     found: Counter[tuple[str, str]] = Counter()
     for spoiled in by_root(rows).values():
-        topics = [topic_of[row.statement.id] for row in spoiled if row.outcome == "wrong"]
-        first = min(topics, key=order.index, default="")
-        found.update((topic, first) for topic in topics if topic != first)
+        parts = [topic_of[row.statement.id] for row in spoiled if row.outcome == "wrong"]
+        first = min(parts, key=order.index, default="")
+        found.update((part, first) for part in parts if part != first)
     return dict(found)
 
 

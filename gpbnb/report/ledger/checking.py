@@ -31,35 +31,6 @@ class Row:
         return MISSING if self.error is None else FAILED
 
 
-def owners(statements: Iterable[Statement], topics: Mapping[str, Checks] = TOPICS) -> dict[str, str]:
-    """Find the topic whose checks judge each statement.
-
-    Parameters
-    ----------
-    statements : all statements.
-    topics : the checks of each topic.
-
-    Returns
-    -------
-    owners : statement id → name of the topic.
-    """
-    known = {statement.id for statement in statements}
-    found: dict[str, str] = {}
-    for topic, checks in topics.items():
-        for key in checks:
-            if key not in known:
-                raise ValueError(
-                    f"got a check of {key!r} in {topic}; needed an id from statements.csv; correct the id "
-                    "or add the statement"
-                )
-            if key in found:
-                raise ValueError(
-                    f"got checks of {key!r} in {found[key]} and in {topic}; needed one check per statement; remove one"
-                )
-            found[key] = topic
-    return found
-
-
 def examine(
     statements: Iterable[Statement],
     topics: Mapping[str, Checks] = TOPICS,

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from gpbnb.files import replace_file
-from gpbnb.report.ledger.checking import FAILED, MISSING, Row, counts, examine, owners
+from gpbnb.report.ledger.checking import FAILED, MISSING, Row, counts, examine
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.render import FORMATS, describe
 from gpbnb.report.ledger.statements import Statement, load_statements, select
@@ -24,10 +24,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = ledger_parser()
     arguments = parser.parse_args(argv)
     try:
-        inventory = load_statements()
-        chosen = select(inventory, arguments.document, arguments.chapter, arguments.section)
+        chosen = select(load_statements(), arguments.document, arguments.chapter, arguments.section)
         _check_output(arguments.output)
-        owners(inventory, TOPICS)
     except (OSError, ValueError) as error:
         parser.error(str(error))
     rows = examine(chosen, TOPICS, _progress)
