@@ -18,6 +18,7 @@ from gpbnb.arithmetic.kernels import scalar
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits, select
 from gpbnb.arithmetic.kernels.compiling import borrowing, compiled, inner
 from gpbnb.arithmetic.kernels.processor import fused_sum
+from gpbnb.arithmetic.kernels.rows import copy_row, same_rows
 from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, EVEN, ODD, UP, DoubleDouble, LimitedDecimal, ShortDecimal, Wide
 from gpbnb.arithmetic.rounding import DRAW_BITS
 
@@ -533,8 +534,10 @@ def _run_segment(fmt: Any, code: Any, begin: int, end: int, values: Any, truths:
         o += 1
         a, b, c, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 3], code.rows[o, 4]
         if operation == SKIP:
-            if not truths[a].any():
-                o += np.int64(b)
+            holds = False
+            for i in range(values.shape[1]):
+                holds |= truths[a, i] != 0
+            o += np.int64(0) if holds else np.int64(b)
             continue
         for i in range(values.shape[1]):
             if operation == COMBINE:
@@ -717,7 +720,7 @@ def advance(
     states_at, outputs, kept_at, before = places.states, places.after, places.kept, kept.before
     after = before.copy()
     for j in range(outputs.shape[0]):
-        after[j] = values[states_at[j]]
+        copy_row(values, states_at[j], after, j)
     notes[DONE], notes[ROW] = 0, -1
     for step in range(own.shape[0]):
         for g in range(feeds.feeds.shape[0]):
@@ -725,29 +728,30 @@ def advance(
             if members > 1 or step == 0:
                 begin += count * ((first + step) % members)
                 for j in range(count):
-                    values[place + j] = feeds.table[begin + j]
+                    copy_row(feeds.table, begin + j, values, place + j)
         for j in range(own.shape[1]):
-            values[places.own + j] = own[step, j]
+            copy_row(own[step], j, values, places.own + j)
         notes[ROW] = 0
         done = execute(kind, formats, code, values, truths, distant | far(kind, after))
         if done < code.rows.shape[0]:
             notes[ROW] = done
             return
         for j in range(outputs.shape[0]):
-            after[j] = values[outputs[j]]
+            copy_row(values, outputs[j], after, j)
         for j in range(kept_at.shape[0]):
-            kept.numbers[step, j] = values[kept_at[j]]
+            copy_row(values, kept_at[j], kept.numbers[step], j)
         for j in range(outputs.shape[0]):
-            values[states_at[j]] = after[j]
-        kept.truths[step] = truths[places.truth]
+            copy_row(after, j, values, states_at[j])
+        copy_row(truths, places.truth, kept.truths, step)
         notes[DONE] = step + 1
         if cycle > 0:
             notes[SINCE] += 1
-            if notes[SINCE] % cycle == 0 and np.array_equal(after, before):
+            if notes[SINCE] % cycle == 0 and same_rows(after, before):
                 notes[CYCLE] = notes[SINCE]
                 return
             if notes[SINCE] == notes[LASTS]:
-                before[:] = after
+                for j in range(outputs.shape[0]):
+                    copy_row(after, j, before, j)
                 notes[SINCE] = 0
                 notes[LASTS] += cycle * (notes[LASTS] // (8 * cycle) + 1)
     notes[ROW] = -1
