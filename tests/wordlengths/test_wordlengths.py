@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 import small_filter
 from tabulated import by_header
 
-from gpbnb import Requirement, required_precision
+from gpbnb import required_precision
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.inverse import smallest_precision
@@ -29,8 +28,6 @@ from tests.surveying import survey
 TILT = examples.tilt()
 Z = examples.tilt_measurements(300)
 TOLERANCE = (0.01, math.inf, math.inf)
-FOUND = Requirement(FloatFormat(2, 17), "emulation", 300, ((16, 2.0), (17, 0.5), (18, 0.4)))
-NONE = replace(FOUND, fmt=None)
 
 
 # -- examples -----------------------------------------------------------------------------------------
