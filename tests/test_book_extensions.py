@@ -376,11 +376,12 @@ def test_a_work_that_a_description_names_keeps_its_year():
     assert metadata.description(page_with(f"{text} [Savage, 2016].")) == f"{text.replace('[1984]', '(1984)')}."
 
 
-def test_a_chapter_is_described_by_its_question():
+@pytest.mark.parametrize("opening", ["The question.", "Question."])
+def test_a_chapter_is_described_by_its_question(opening):
     """Its first paragraph may begin an argument that only the page explains."""
     document = page_with("The figure shows one run in detail, with all of its errors.")
     box = nodes.admonition()
-    box += nodes.paragraph("", "The question. How far can rounding move the estimate of a filter in a year?")
+    box += nodes.paragraph("", f"{opening} How far can rounding move the estimate of a filter in a year?")
     document[0] += box
     assert metadata.description(document) == "How far can rounding move the estimate of a filter in a year?"
 

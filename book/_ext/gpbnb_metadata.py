@@ -31,7 +31,7 @@ SHORTEST, LONGEST = 50, 260
 """Characters in a description."""
 CITATION = re.compile(r"\s*\[[^\]]*[^\W\d][^\]]*\d{4}\w?\]")
 YEAR = re.compile(r"\[(\d{4}\w?)\]")
-QUESTION = "The question."
+QUESTION = re.compile(r"^(?:The q|Q)uestion\.")
 """How the box that opens a chapter begins."""
 
 
@@ -49,8 +49,8 @@ def sentences(text: str) -> str:
 def description(doctree: nodes.document) -> str:
     """Return the question of a chapter, or else the first sentences of a page; empty if there are none."""
     paragraphs = list(doctree.findall(nodes.paragraph))
-    asked = [each.astext() for each in paragraphs if each.astext().startswith(QUESTION)]
-    texts = [text.removeprefix(QUESTION) for text in asked]
+    asked = [each.astext() for each in paragraphs if QUESTION.match(each.astext())]
+    texts = [QUESTION.sub("", text) for text in asked]
     texts += [each.astext() for each in paragraphs if isinstance(each.parent, nodes.section)]
     return next((kept for text in texts if len(kept := sentences(text)) >= SHORTEST), "")
 
