@@ -11,5 +11,9 @@ from gpbnb.report.display.tables import Table
 def document_table() -> Table:
     """Tabulate title, author, date, numbers and remarks of the documents."""
     text = (files(__package__) / "documents.csv").read_text(encoding="utf-8")
-    header, *body = csv.reader(text.splitlines(), strict=True)
-    return Table(f"{len(body)} documents", tuple(header), tuple(map(tuple, body)))
+    body = []
+    for each in csv.DictReader(text.splitlines(), strict=True):
+        contract = f"contract {each['contract']}" if each["contract"] else ""
+        numbers = "; ".join(filter(None, (each["date"], each["number"], contract)))
+        body.append((each["document"], f"{each['title']}. {each['author']}.", numbers, each["remarks"]))
+    return Table(f"{len(body)} documents", ("document", "title and author", "date and numbers", "remarks"), tuple(body))

@@ -59,7 +59,7 @@ def test_each_numbered_equation_has_its_entry():
 
 def test_only_what_the_scan_has_lost_has_no_form(rows):
     told = {"hung1984.II.s10.claim-two-steps", "hung1982.III.s10.claim-two-steps"}  # plans, in words
-    lost = {row.statement.id for row in rows if not row.statement.form} - told
+    lost = {row.statement.id for row in rows if not row.statement.form and "wording" not in row.finding.note} - told
     assert lost == {row.statement.id for row in rows if row.finding.verdict is Verdict.UNVERIFIABLE}
 
 

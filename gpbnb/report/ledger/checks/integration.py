@@ -385,14 +385,6 @@ def variance_of_q() -> tuple[float, float]:
     return float(found), float(derivation.noise("right")[0, 0].subs({P: 1, OMEGA: 1, T: 1}))
 
 
-def easily_shown() -> Names:
-    """Whether (7) solves the derivative of (6) and begins with the identity."""
-    ours, a = derivation.transition_matrix(), sp.Matrix([[-OMEGA, 0], [1, 0]])
-    solves = vanishes((ours.diff(T) - a * ours).applyfunc(sp.simplify)) and ours.subs(T, 0) == sp.eye(2)
-    follows = solves and vanishes((ours - derivation.printed_transition()).applyfunc(sp.simplify))
-    return {"from": "easily shown" if follows else "easily refuted"}
-
-
 def uncorrelated() -> Names:
     """Whether the noise of a cycle is correlated with x_1 at a time t before it, by the covariance of x_1."""
     phi, together = derivation.transition_matrix(), P * sp.exp(-OMEGA * (TIME + TAU))
