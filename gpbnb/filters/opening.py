@@ -135,6 +135,10 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
             lost = next((letter for letter, *arrays in given if not factored(letter, *arrays)), "")
     except ZeroDivisionError:
         lost = "R"
+    except OverflowError as error:
+        what = "the inverse of R" if form is Form.HUNG_SECOND_GAIN else "factors of covariances"
+        where = "double-double" if fmt is None else format_text(fmt)
+        raise OverflowError(f"{error} in {what}; needed numbers within the range of {where}; scale the model") from None
     if lost:
         words, unit = ("double-double", "bits") if fmt is None else (format_text(fmt), digit_unit(fmt.base))
         kind = "positive definite" if lost == "R" else "positive semidefinite"

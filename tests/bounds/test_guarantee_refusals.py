@@ -21,6 +21,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.filters.system import state_space
 from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
+from gpbnb.report.guarantees.random_filters import draw
 
 FORMAT = FloatFormat(2, 11)
 Asked = Callable[[LinearModel, Any, FloatFormat], Any]
@@ -337,3 +338,10 @@ def test_a_filter_too_slow_for_a_proof_is_refused_before_it_is_tried() -> None:
     assert "too slow for a proof: its gain takes" in slow.why
     assert "needed at most 7 steps; take more process noise" in slow.why
     assert "each of 8 steps; needed at most 7" in from_guess(replace(given, settled=False), within, 50, 1e3).why
+
+
+def test_an_inverse_beyond_the_range_is_named() -> None:
+    """In base 10, the compiled loops also stop at a subnormal number."""
+    given = draw(166)
+    with pytest.raises(OverflowError, match="in the inverse of R; needed numbers within the range of 5 decimal digits"):
+        guarantee(given.model, given.fmt, given.within, given.form)
