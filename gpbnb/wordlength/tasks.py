@@ -105,7 +105,9 @@ def admitted(model: Any, *tasks: str) -> Any:
         if kind in CANNOT[task]:
             name = getattr(found, "name", getattr(found, "__name__", ""))
             name = f"{name}, {kind}," if name and name != kind else kind
-            raise ValueError(f"{name} cannot {task}; use {CANNOT[task][kind]}")
+            way = CANNOT[task][kind]
+            verb = "" if way.split()[0] in ("ask", "leave", "write") else "use "
+            raise ValueError(f"{name} cannot {task}; {verb}{way}")
     return found
 
 

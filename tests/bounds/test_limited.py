@@ -56,7 +56,7 @@ def test_an_integral_without_limits_or_leak_has_no_bound_for_ever():
     found = required_precision(system, e, 0.01, basis="bound")
     assert found.steps == 10
     assert str(found).endswith("proved for this run of 10 steps")
-    with pytest.raises(ValueError, match="a linear system with limits, cannot have a probable error; use"):
+    with pytest.raises(ValueError, match="a linear system with limits, cannot have a probable error; ask"):
         required_precision(system, 10, 0.01, basis="probable", within=limits(measurement=1))
 
 

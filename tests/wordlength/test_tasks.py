@@ -186,7 +186,7 @@ def test_a_task_works_or_names_its_way(name, task, tmp_path):
     kind = kind_of(admitted(model))
     needs = next((each for each in ([needs] if isinstance(needs, str) else needs) if kind in CANNOT.get(each, ())), "")
     if needs:
-        with pytest.raises(ValueError, match=rf"{kind},? cannot {needs}; use ") as refused:
+        with pytest.raises(ValueError, match=rf"{kind},? cannot {needs}; ") as refused:
             does(model, tmp_path / "c")
         assert str(refused.value).endswith(CANNOT[needs][kind])
     elif (task, name) in FURTHER:
