@@ -60,12 +60,6 @@ class Ledger(SphinxDirective):
                 return ledger.ledger_page(rows, page).html
             case "errors":
                 return ledger.error_table(ledger.select_topic(rows, detail, *map(verdict, ERRORS))).html
-            case "printed":
-                title, _, names = detail.rpartition(": ")
-                chosen_rows = [row for row in rows if row.statement.id in names.split()]
-                if len(chosen_rows) != len(names.split()):
-                    raise self.error(f"unknown statement in {names!r}")
-                return ledger.printed_table(chosen_rows, title).html
             case "verdict":
                 chosen = verdict(detail)
                 return ledger.note_table(row for row in rows if row.finding and row.finding.verdict is chosen).html

@@ -45,7 +45,7 @@ SLOW = (1.005, 1.03, 1.1, 1.5)
 """The same for filters that settle slowly, where the checker adds effects of old errors that are alike."""
 _NEGLIGIBLE = 2.0**-26
 _LONG, _APART = 700, 64
-"""Steps after which a filter is slow; the age at which errors of two steps may be added, in steps."""
+"""Steps after which a filter is slow; the age at which errors of two steps of a slow filter may be added, in steps."""
 
 
 class Proof(NamedTuple):
@@ -161,7 +161,7 @@ def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | N
         "repeat": given.repeat or 0,
         "period": max(period, 1),
         "first": first + more,
-        "keep": _APART,
+        "keep": _APART if max(back, steps or 0) > _LONG else steps or back,
         "width": [] if width is None else texts(width),
     }
     return _text(_head(model.name, bound, steps, back) | content)
@@ -234,8 +234,8 @@ def _width(
         by = (np.sqrt(np.diag(far @ D @ far.T)) @ inverse) * (inverse @ innovation)
         D, P = a @ D @ a.T, a @ P @ a.T + noise[k]
         off = by * np.sqrt(np.diag(D))
-        # what a step may add to the bound, so that all steps together add a thousandth
-        step = 1e-3 * bound * (1 - min(radius_of(whole) ** (1 / len(A)), 1 - 1e-6))
+        # what a step may add to the bound, so that all steps together add a millionth
+        step = 1e-6 * bound * (1 - min(radius_of(whole) ** (1 / len(A)), 1 - 1e-6))
         share = min(share, float(np.min(step[off > 0] / off[off > 0], initial=math.inf)))
     share = max(share, 2.0**-70)
     rate = max(radius_of(whole), 1e-9) ** 2

@@ -287,7 +287,7 @@ def _exact_run(
         if run.steps < steps:
             return _Exact(run, False, run.steps)
         K = run.G[first - period : steps, ..., 0].reshape(2, period, -1)
-        if (np.abs(K[1] - K[0]) <= 1e-2 * unit * np.abs(K[1]).max(axis=0)).all():
+        if (np.abs(K[1] - K[0]) <= 1e-4 * unit * np.abs(K[1]).max(axis=0)).all():
             return _Exact(run, True, first)
         if steps >= most:
             return _Exact(run, False, run.steps)

@@ -36,7 +36,7 @@ ROUNDING, LOOP, GAIN = range(3)
 EXCESS = 1 + 2.0**-20
 """Factor by which a guess is larger than the sums, so that the checker may round outwards."""
 
-_BLOCK, _LAGS, _WORK = 64, 1_024, 300_000
+_BLOCK, _LAGS, _WORK = 64, 1_024, 1_200_000
 """Powers of a loop that are computed at a time; most lags that are summed one by one, and times squared states."""
 _LOSS = 16.0
 """Largest factor by which sums over twice as many lags may grow, once these are many."""
@@ -199,7 +199,8 @@ def columns(program: Program, steps: Steps, h: Array) -> Array:
 @np.errstate(over="ignore", invalid="ignore")
 def lags_of(F: Array, G: Array, steps: int | None) -> int:
     """Return how many lags are summed one by one, a power of two: all that count, unless they take too long."""
-    most, lags, P, T = max(_LAGS, _WORK // len(F) ** 2), 1, F, np.abs(G).sum(axis=1)
+    most = max(_LAGS, _WORK // len(F) ** 2) if radius_of(F) < 1 else _LAGS
+    lags, P, T = 1, F, np.abs(G).sum(axis=1)
     most = most if steps is None else min(most, steps)
     while lags < most and not (np.abs(P) @ T <= _LEFT * T).all():
         P, T, lags = P @ P, T + np.abs(P) @ T, 2 * lags

@@ -149,7 +149,7 @@ class NonlinearSystem:
         ValueError, TypeError : inputs of another shape; a step that does not return states (n,) and outputs (p,).
         OverflowError, ZeroDivisionError, NegativeRootError : an operation has no result in the format.
         """
-        fmt = format_named(fmt)
+        fmt = format_named(fmt) if type(fmt) is str else fmt  # isinstance would ask a traced format for its class
         if not callable(getattr(fmt, "array", None)):
             raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or a name")
         found: FloatArray = self._whole_run(fmt, self.inputs_in(fmt, u))

@@ -102,7 +102,7 @@ def guarantee(
     --------
     >>> from gpbnb import LinearSystem, limits
     >>> guarantee(LinearSystem.smoother("1/8"), "float32", limits(measurement=10))
-    within 5.44e-06 for ever; in BINARY32
+    within 6.2e-06 for ever; in BINARY32
     """
     given = admitted(model, "have a guarantee", "" if form is None else "have a form")
     named: Any = format_named(fmt)

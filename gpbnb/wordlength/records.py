@@ -142,7 +142,7 @@ def survey_records(
     3 records in each format
     format    within the tolerance  largest error / tolerance
     4 bits                      0%                       15.7
-    BINARY32                  100%                   1.13e-05
+    BINARY32                  100%                   7.39e-06
     """
     given = admitted(model, TASK_OF_BASIS[checked_basis(basis)], "" if form is None else "have a form")
     chosen, chunk = form_named(form or Form.INNOVATION), whole_number("chunk", chunk)

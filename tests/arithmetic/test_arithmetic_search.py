@@ -9,7 +9,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.search import Search, smallest_precision
+from gpbnb.arithmetic.search import Outcome, Search, smallest_precision
 
 
 def among(good, calls=None):
@@ -67,7 +67,7 @@ def test_whatever_meets_the_requirement_the_answer_qualifies_and_the_next_lower_
 )
 def test_above_an_answer_that_is_refuted_every_precision_is_tried(missed, answer, irregular):
     """In base 10, up to 18 digits, of which 5 and fewer miss the tolerance."""
-    found = Search(lambda fmt: (1 + (fmt.precision < 6 or fmt.precision in missed), ""), FloatFormat(10, 5), (7, 16))
+    found = Search(lambda fmt: Outcome(1 + (fmt.precision < 6 or fmt.precision in missed)), FloatFormat(10, 5), (7, 16))
     assert found.fmt == (None if answer is None else FloatFormat(10, answer))
     assert found.irregular == tuple(irregular)
     assert not found.undecided
@@ -103,10 +103,16 @@ def test_an_empty_range_is_refused():
 def test_the_reason_is_that_of_the_highest_precision_below_the_answer_that_has_one():
     def error(fmt):
         t = fmt.precision
-        return (0.5, "") if t >= 40 else (2.0, "") if t == 39 else (math.inf, f"the run stops at step {t}")
+        return (
+            (0.5, "", False)
+            if t >= 40
+            else (2.0, "", False)
+            if t == 39
+            else (math.inf, f"the run stops at step {t}", False)
+        )
 
     found = Search(error, FloatFormat(2, 5), ())
     stopped = [digits for digits, _ in found.tried if digits < 39]
     assert len(stopped) > 1
     assert found.why == f"in {max(stopped)} bits the run stops at step {max(stopped)}"
-    assert Search(lambda fmt: (0.5, ""), FloatFormat(2, 5), ()).why == ""
+    assert Search(lambda fmt: Outcome(0.5), FloatFormat(2, 5), ()).why == ""

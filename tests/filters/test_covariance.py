@@ -121,8 +121,8 @@ def test_cycles_and_answers_report_their_repairs():
     found = model([np.eye(2), not_quite(2)])
     assert [(each.letter, each.member) for each in found.repairs] == [("Q", 1)]
     answer = required_precision(found, 5, 0.1)
-    assert answer.repairs == tuple(str(each) for each in found.repairs)
-    assert answer.repairs[0] in str(answer)
+    assert answer.notes == tuple(str(each) for each in found.repairs)
+    assert answer.notes[0] in str(answer)
 
 
 @pytest.mark.parametrize(

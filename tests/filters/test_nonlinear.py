@@ -354,7 +354,7 @@ def test_a_lost_root_stops_the_run_and_says_why():
 
 @pytest.mark.parametrize("basis", ["bound", "guarantee", "probable"])
 def test_no_guarantee_is_claimed(basis):
-    with pytest.raises(ValueError, match='a nonlinear filter, cannot .*; ask with basis="emulation"'):
+    with pytest.raises(ValueError, match=r'a nonlinear filter, cannot .*; ask with basis="emulation"'):
         required_precision(by_functions(), 5, 0.01, basis=basis)
     with pytest.raises(ValueError, match="emulation"):
         survey_records(by_functions(), [RECORD], 0.01, [FloatFormat(2, 24)], basis="bound")

@@ -213,18 +213,11 @@ def test_quotation_marks_stay_and_what_would_be_markup_does_not():
     )
 
 
-def test_printed_statements_are_collapsed_under_their_title():
-    html = ledger.printed_table(ROWS[:3], "Three <equations>").html
-    assert html.startswith('<details class="derivation"><summary>Three &lt;equations&gt;</summary>')
-    assert [a["href"] for a in Elements(html).all("a")] == [page.address(row.statement) for row in ROWS[:3]]
-
-
 def test_each_table_has_a_title_and_names_its_columns():
     root = next(iter(ledger.load_roots()))
     spoiled = Row(STATEMENTS[0], compare(False, "1", Verdict.WRONG, root=root))
     expected = {
         ledger.error_table(ROWS[:3]): ("2 statements that disagree", ["Error", "Verdict", "Statements affected"]),
-        ledger.printed_table(ROWS[:3], "three"): ("three", ["Statement", "As printed"]),
         ledger.root_table([spoiled]): (
             "1 root errors",
             ["Root error", "Statements", "Explanation and affected statements"],

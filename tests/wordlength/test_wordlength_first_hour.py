@@ -303,7 +303,7 @@ def test_an_overflow_names_the_numbers_that_are_too_large():
     large = LinearSystem([["0.5"]], [["0.25"]], C=[[3]], state_names=["level"])
     assert "got C1_1 = 3, beyond the range" in str(judge(large, FixedFormat(0, 15), [[0], [0]], 1))
     sections = LinearSystem.from_coefficients([1, 2, 1], [1, "-1.5", "0.75"])
-    assert "got b0 = 1, beyond the range" in str(judge(sections, FixedFormat(0, 15), [[0], [0]], 1))
+    assert "got b1 = 2, beyond the range" in str(judge(sections, FixedFormat(0, 15), [[0], [0]], 1))
 
 
 def test_fraction_bits_of_a_kalman_filter_end_with_the_compiled_loops():

@@ -241,17 +241,7 @@ def error_table(rows: Iterable[Row]) -> Html:
     ordered = sorted(groups.values(), key=lambda group: (_seriousness(group[0]), -len(group)))
     header = ("Error", "Verdict", "Statements affected")
     table = _wrapped(header, [_error(group) for group in ordered], "ledger-errors")
-    return Html(f"{len(found)} statements that disagree", table)
-
-
-def printed_table(rows: Iterable[Row], title: str) -> Html:
-    """Show statements as printed, collapsed under a title."""
-    lines = [
-        f'<tr><th scope="row">{_link(row)}</th><td>{typeset(row.statement.printed)}</td></tr>'
-        for row in in_reading_order(rows)
-    ]
-    table = _wrapped(("Statement", "As printed"), lines, "ledger-printed")
-    return Html(title, f'<details class="derivation"><summary>{escape(title)}</summary>\n{table}</details>')
+    return _folded(f"{len(found)} statements that disagree", table, len(ordered))
 
 
 def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
