@@ -95,6 +95,13 @@ def applying(css: str, names: set[str]) -> str:
     return "".join(kept)
 
 
+def write_light_pages(folder: Path) -> None:
+    """Leave out the marks of names, brackets and spaces in code, which have the colour of the code around them."""
+    for page in folder.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        page.write_text(re.sub(r'<span class="[npw]">([^<]*)</span>', r"\1", text), encoding="utf-8")
+
+
 def write_light_styles(folder: Path) -> None:
     """Rewrite each style sheet of a built book."""
     names = set(PUT_TOGETHER)
@@ -134,6 +141,7 @@ def lighten(app: Sphinx, error: Exception | None) -> None:
         for found in folder.glob(pattern):
             shutil.rmtree(found) if found.is_dir() else found.unlink()
     copy_mathjax(folder)
+    write_light_pages(folder)
     write_light_styles(folder)
 
 

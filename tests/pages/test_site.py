@@ -162,8 +162,8 @@ def test_no_page_loads_more_than_it_uses(page):
 
 @on_a_desktop
 def test_no_page_is_heavier_than_its_limit(page):
-    if "search.html" in page.url or tools.REFERENCE in page.url:
-        pytest.skip("the page of results loads the index, and the reference may be heavier")
+    if "search.html" in page.url:
+        pytest.skip("the page of results loads the index")
     loaded = dict(page.evaluate(LOADED))
     assert sum(loaded.values()) <= HEAVIEST, sorted(loaded.items(), key=lambda each: -each[1])[:8]
 
