@@ -600,7 +600,6 @@ def solved_columns() -> Names:
     return {"times": "n times" if same == n else "", "count": n}
 
 
-@cache
 def pivoting() -> Names:
     swap = FOUR.array([[0, 1], [1, 0]])
     try:
