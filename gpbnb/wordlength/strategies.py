@@ -16,7 +16,7 @@ from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.search import Outcome
-from gpbnb.bounds.guarantee import Guarantee, guarantee, guessed, sized_limits
+from gpbnb.bounds.guarantee import Guarantee, check_within, guarantee, guessed, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.probable import probable_error, probable_output_errors
 from gpbnb.bounds.system import guessed_errors, output_errors
@@ -56,13 +56,7 @@ def strategy_for(
     ------
     ValueError, TypeError, OverflowError : for a reason given in :func:`gpbnb.required_precision`.
     """
-    if within is not None and not isinstance(within, FilterLimits):
-        raise TypeError(f"got within={within!r}; needed the result of limits(...)")
-    if within is not None and basis in ("emulation", "bound"):
-        raise ValueError(
-            f'got limits and basis "{basis}", which takes the measurements as they are; needed no limits; leave out '
-            'within=, or ask with basis "guarantee" or "probable"'
-        )
+    check_within(within, basis)
     if isinstance(model, LinearSystem):
         return _of_system(model, data, tolerance, basis, within)
     if not isinstance(model, LinearModel | NonlinearModel):
