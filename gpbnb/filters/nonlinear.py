@@ -27,12 +27,6 @@ Function = Callable[..., Any]
 
 Method = Literal["extended", "unscented"]
 
-NO_GUARANTEE = (
-    "a bound needs a contraction that holds for every state, and the Jacobians of a nonlinear filter change with its "
-    'own estimate; ask for the basis "emulation", and survey many records'
-)
-"""Why nothing but emulation answers for a nonlinear filter."""
-
 
 class SigmaPoints(NamedTuple):
     r"""How an unscented filter spreads its points, :math:`\pm\sqrt{(n + \lambda)P}` around the estimate.
