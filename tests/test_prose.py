@@ -41,7 +41,7 @@ NOT_PROSE = re.compile(
             r"\(\d{1,3}[a-z]?\)",  # numbers of equations
             r"\b(?:[Ss]ections?|Table|Fig\.|Figure) [\dIVX][\w.-]*(?:(?:,| to| and) \d[\w.]*)*",
             r"\b(?:1982|1984|2016)\b",  # the documents
-            r"^\d+\. ",  # numbers of a list
+            r"^(?:#+ )?\d+\. ",  # numbers of a list or a heading
         )
     ),
     re.DOTALL | re.MULTILINE,
@@ -163,7 +163,6 @@ def near(number: float) -> Any:
 COMPUTED: dict[tuple[str, str], Callable[[], Any]] = {
     ("budget", "be a quarter larger"): lambda: budget.equal_error(1.253, 44) / budget.equal_error(1, 44) == near(1.25),
     ("guarantee", "more than half of the"): lambda: min(printed("guarantee", "outcome.ratios")) > 50,
-    ("principles", "more than three hundred times"): lambda: 300 < 1 / (6 * FloatFormat(10, 4).unit_roundoff) < 400,
     ("mission", "finer than ten digits, coarser than eleven"): lambda: (
         FloatFormat(10, 10).unit_roundoff > Fraction(2) ** -int(glued("mission", "mission_bits"))
         and FloatFormat(10, 11).unit_roundoff < Fraction(2) ** -int(glued("mission", "mission_bits"))
@@ -192,32 +191,6 @@ def test_a_typed_quantity_is_what_is_computed(page, phrase):
     formulas = re.sub(r"\s+", " ", " ".join(re.findall(r"\$\$.*?\$\$|\$[^$]*\$", source(page), re.DOTALL)))
     assert phrase in prose(page) or phrase in formulas, "drop it from COMPUTED"
     assert COMPUTED[page, phrase]()
-
-
-def test_the_principles_state_what_the_page_on_wordlength_prints():
-    def bits(code: str, pattern: str) -> list[int]:
-        return [int(each) for each in re.findall(pattern, output("wordlength", code), re.MULTILINE)]
-
-    def column(k: int) -> list[int]:
-        return bits("a minute, chopped", "[a-zD)] +" + r"\d+ +" * k + r"(\d+)")
-
-    near, *_, far = bits("for origin in", r"away: (\d+) bits")
-    cubic = [bits("inverse_precisions", rf"degree 3, {name} .*?(\d+) \|$")[0] for name in ("centred", "from 100")]
-    records = bits("for seed in range(20)", r"\d+")
-    (usual,), (ud,) = (bits("precise, sharp", rf"^{form} +(\d+) bits") for form in ("innovation", "UD"))
-    first, *_, last = bits("required_precision_by_steps", r"steps: (\d+) bits")
-    lost = [after - before for before, after in zip(column(0), column(2), strict=True)]
-    text = prose("principles")
-    for phrase in (
-        f"A tracker needs {near} bits with coordinates from its starting point, and {far} with coordinates from",
-        f"saves {cubic[1] - cubic[0]} bits in the normal matrix",
-        f"costs the tilt filter {min(lost)} to {max(lost)} bits",
-        f"costs {column(1)[0] - column(1)[2]} bits over ten minutes",
-        f"the UD form needs {ud} bits where the innovation form needs {usual}",
-        f"need from {min(records)} to {max(records)} bits",
-        f"needs {first} bits for its first ten steps, {last} for ten thousand",
-    ):
-        assert phrase in text
 
 
 @pytest.mark.parametrize("phrase", README)
