@@ -136,6 +136,57 @@ def mean(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     return x.sum(axis, keepdims) / x.format.array(count)
 
 
+def var(x: Any, axis: int | None = None, ddof: int = 0, keepdims: bool = False) -> Any:
+    """Return the mean square of the differences from :func:`mean`; their number minus `ddof` divides the sum."""
+    rest, count = x - mean(x, axis, keepdims=True), len(lines(x, axis))
+    if not ddof < count:
+        raise ValueError(f"got ddof={ddof} for {count} entries; needed fewer than there are entries")
+    return (rest * rest).sum(axis, keepdims) / x.format.array(count - ddof)
+
+
+def interp(x: Any, at: Any, nodes: Any, values: Any) -> Any:
+    r"""Interpolate between increasing nodes :math:`x_k`: :math:`(x - x_k)\frac{f_{k+1} - f_k}{x_{k+1} - x_k} + f_k`.
+
+    Each of the five operations is rounded once. Beyond the first and last node, the values there are returned.
+    """
+    at, values = x.operand(at), x.operand(values)
+    if isinstance(nodes, type(x)):
+        raise TypeError("interp: got nodes of a format; needed plain numbers, which each format holds exactly")
+    given = exact(nodes)
+    if given.ndim != 1 or given.shape != values.shape or len(given) < 2 or not (given[1:] > given[:-1]).all():
+        raise ValueError(
+            f"interp: got nodes of shape {given.shape} and values of shape {values.shape}; needed as many increasing "
+            "nodes as values, two or more"
+        )
+    made = x.operand(nodes)
+    slopes = diff(values) / diff(made)
+    node, value, slope = made[0], values[0], slopes[0]
+    for k in range(1, len(slopes)):
+        beyond = at >= made[k]
+        node, value, slope = (
+            np.where(beyond, new[k], old) for new, old in ((made, node), (values, value), (slopes, slope))
+        )
+    inside = slope * (clip(at, made[0], made[-1]) - node) + value
+    return np.where(at >= made[-1], values[-1], np.where(at <= made[0], values[0], inside))
+
+
+def convolve(x: Any, a: Any, v: Any, mode: str = "full") -> Any:
+    """Return the sums of products ``a[i] v[k - i]``, each from left to right in i."""
+    a, v = x.operand(a), x.operand(v)
+    if a.ndim != 1 or v.ndim != 1 or not a.size or not v.size or mode not in ("full", "same", "valid"):
+        raise ValueError(
+            f"convolve: got shapes {a.shape} and {v.shape} and mode {mode!r}; needed two vectors, and one of 'full', "
+            "'same' and 'valid'"
+        )
+    short, length = sorted((len(a), len(v)))
+    first, count = {
+        "full": (0, length + short - 1), "same": ((short - 1) // 2, length), "valid": (short - 1, length - short + 1)
+    }[mode]  # fmt: skip
+    spans = [(k, max(0, k - len(v) + 1), min(k + 1, len(a))) for k in range(first, first + count)]
+    turned = np.flip(v)
+    return np.stack([a[low:high] @ turned[len(v) - 1 - k + low : len(v) - 1 - k + high] for k, low, high in spans])
+
+
 def largest(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     """Return the largest entry; nothing is rounded."""
     return kept(x, _chosen(x, axis, operator.gt), axis, keepdims)

@@ -294,7 +294,7 @@ class NumPyProtocols:
 
 
 _OTHER_NAMES = {
-    "std": "mean", "var": "mean", "average": "mean", "cumprod": "prod", "inner": "dot", "vdot": "dot",
+    "average": "mean", "cumprod": "prod", "inner": "dot", "vdot": "dot",
     "tensordot": "einsum", "conjugate": "copy", "conj": "copy", "real": "copy",
     "array_equiv": "array_equal", "ediff1d": "diff", "lexsort": "argsort", "full": "full_like",
     "flat": "ravel", "nbytes": "size", "dtype": "format", "put": "at", "fill": "at", "itemset": "at",
@@ -422,11 +422,13 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "argsort": lambda x, a, axis=-1: a.argsort(axis),
     "array_equal": _array_equal,
     "around": lambda x, a, decimals=0: functions.decimals(a, decimals),
+    "convolve": functions.convolve,
     "cross": functions.cross,
     "diff": lambda x, a, n=1, axis=-1: functions.diff(a, n, axis),
     "dot": _dot,
     "fix": lambda x, a: elementary("trunc", a),
     "full_like": lambda x, a, fill_value: functions.full_like(a, fill_value),
+    "interp": functions.interp,
     "isclose": lambda x, a, b, rtol=1e-5, atol=1e-8: functions.isclose(a, b, rtol, atol),
     "ndim": lambda x, a: a.ndim,
     "outer": lambda x, a, b: x.operand(a).reshape(-1, 1) * x.operand(b).reshape(1, -1),
@@ -451,6 +453,8 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "size": lambda x, a: a.size,
     "sum": lambda x, a, axis=None, keepdims=False: a.sum(axis, keepdims),
     "trace": lambda x, a: a.trace(),
+    "std": lambda x, a, axis=None, ddof=0, keepdims=False: functions.var(a, axis, ddof, keepdims).sqrt(),
+    "var": lambda x, a, axis=None, ddof=0, keepdims=False: functions.var(a, axis, ddof, keepdims),
     "where": _where,
     "zeros_like": lambda x, a: functions.full_like(a, 0),
 }

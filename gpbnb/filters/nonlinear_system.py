@@ -165,7 +165,8 @@ class NonlinearSystem:
         given = u if isinstance(u, FloatArray) else real_numbers(u)
         rows = given.reshape(-1, 1) if given.ndim == self.m == 1 else given
         if rows.ndim != 2 or rows.shape[1] != self.m or not len(rows):
-            raise ValueError(f"got inputs of shape {given.shape}; needed (steps, {self.m})")
+            way = f"; or NonlinearSystem(..., m={given.shape[1]})" if given.ndim == 2 and len(given) else ""
+            raise ValueError(f"got inputs of shape {given.shape}; needed (steps, {self.m}){way}")
         found: FloatArray = fmt.array(rows)
         return found
 

@@ -149,7 +149,7 @@ def outputs_of(
         return found.reshape(1, 1)
     if found.ndim == 1:
         found = found.reshape(-1, 1)
-    if found.ndim != 2 or not found.size or steps not in (None, len(found)):
+    if found.ndim != 2 or not found.size or (z is None and steps not in (None, len(found))):
         raise ValueError(
             f"got outputs of shape {found.shape} from the function; needed ({steps or 'steps'},) or "
             f"({steps or 'steps'}, p), one output or more for each step"

@@ -439,7 +439,7 @@ class TestLeavingTheFormat:
             (lambda x: x.norm(), r"write np\.linalg\.norm\(x\)"),
             (lambda x: x.nanmax(), r"the nearest is x\.max"),
             (lambda x: np.nanmin(x), r"the nearest is np\.min"),
-            (lambda x: np.std(x), "the nearest is np.mean"),
+            (lambda x: np.average(x), "the nearest is np.mean"),
             (lambda x: np.cumprod(x), "the nearest is np.prod"),
         ],
     )

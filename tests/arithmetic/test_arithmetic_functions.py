@@ -52,6 +52,49 @@ def test_means_cumulative_sums_and_traces_add_from_left_to_right(fmt):
     assert np.trace(x).item() == from_left(fmt, rows.diagonal()) == x.trace().item()
 
 
+@pytest.mark.parametrize("axis", [None, 0, 1])
+def test_variances_are_means_of_squares_of_rounded_differences(fmt, axis):
+    x = drawn(fmt, 4, 6)
+    rows = {None: [x.to_fractions().ravel()], 0: x.to_fractions().T, 1: x.to_fractions()}[axis]
+    for ddof in (0, 1):
+        expected = []
+        for row in rows:
+            center = fmt.round(from_left(fmt, row) / len(row))
+            squares = [fmt.round(fmt.round(each - center) ** 2) for each in row]
+            expected.append(fmt.round(from_left(fmt, squares) / (len(row) - ddof)))
+        assert np.ravel(np.var(x, axis=axis, ddof=ddof)).tolist() == expected
+        assert np.array_equal(np.std(x, axis=axis, ddof=ddof), np.sqrt(np.var(x, axis=axis, ddof=ddof)))
+
+
+def test_interpolation_rounds_each_of_five_operations(fmt):
+    nodes, values = [-3, -0.5, 1, 2.5], drawn(fmt, 4)
+    f = values.to_fractions()
+    for at in [*np.linspace(-3.5, 3, 27).tolist(), *nodes]:
+        x = fmt.round(Fraction(at))
+        k = max((k for k in range(3) if x >= Fraction(nodes[k])), default=0)
+        low, high = Fraction(nodes[k]), Fraction(nodes[k + 1])
+        slope = fmt.round(fmt.round(f[k + 1] - f[k]) / fmt.round(high - low))
+        expected = fmt.round(fmt.round(slope * fmt.round(x - low)) + f[k])
+        expected = f[0] if x <= Fraction(nodes[0]) else f[-1] if x >= Fraction(nodes[-1]) else expected
+        assert np.interp(fmt.array(at), nodes, values).item() == expected
+
+
+@pytest.mark.parametrize("mode", ["full", "same", "valid"])
+@pytest.mark.parametrize("lengths", [(7, 3), (3, 7), (6, 4), (4, 4), (5, 1)])
+def test_convolutions_sum_from_left_to_right(fmt, mode, lengths):
+    a, v = (drawn(fmt, n) for n in lengths)
+    first, second = a.to_fractions(), v.to_fractions()
+    full = [
+        from_left(fmt, [fmt.round(first[i] * second[k - i]) for i in range(len(a)) if 0 <= k - i < len(v)])
+        for k in range(len(a) + len(v) - 1)
+    ]
+    start = {"full": 0, "same": (min(lengths) - 1) // 2, "valid": min(lengths) - 1}[mode]
+    assert np.convolve(a, v, mode).tolist() == full[start : start + len(np.convolve(a.to_float(), v.to_float(), mode))]
+    exactly = [int(each) for each in np.convolve(range(1, len(a) + 1), range(1, len(v) + 1), mode)]
+    whole = FloatFormat(2, 53)
+    assert np.convolve(whole.array(range(1, len(a) + 1)), list(range(1, len(v) + 1)), mode).tolist() == exactly
+
+
 def test_choosing_and_moving_rounds_nothing(fmt):
     x = drawn(fmt, 3, 4)
     rows = x.to_fractions()
