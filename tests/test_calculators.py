@@ -75,15 +75,14 @@ def kalman_reference(given):
     counts = [report_bounds.coefficients(k, n, m, **faults) for faults in report_bounds.CORRECTIONS.values()]
     pairs = [(Fraction(a), Fraction(b)) for a, b in counts]
     pairs.append((pairs[-1][0], min(pairs[-1][1], 2 * pairs[-1][0] * memory)))
-    fmt, found = number_format(given), {"memory": (memory, 10 * U * float(memory))}
+    found = {"memory": (memory, 10 * U * float(memory))}
     for i, (a, b) in enumerate(pairs, 1):
         size = a * x + b * u
-        digits = report_bounds.precision_for_coefficient(size, goal, fmt.base, fmt.rounding)
+        digits = report_bounds.precision_for_coefficient(size, goal, given["b"])
         # A tie within 1e-14 of the goal, 30 times what rounding of the size can do, may go either way.
-        near = (FloatFormat(fmt.base, digits + more, fmt.rounding).unit_roundoff for more in (-1, 0) if digits + more)
+        near = (FloatFormat(given["b"], digits + more).unit_roundoff for more in (-1, 0) if digits + more)
         tie = any(abs(float(size * beta / goal) - 1) < 1e-14 for beta in near)
-        exact = {f"a{i}": a, f"b{i}": b, f"bound{i}": size * fmt.unit_roundoff}
-        found |= {name: (value, 30 * U * float(value)) for name, value in exact.items()}
+        found |= {name: (value, 30 * U * float(value)) for name, value in ((f"a{i}", a), (f"b{i}", b))}
         found[f"digits{i}"] = (digits, float(tie))
     return found
 
@@ -220,7 +219,7 @@ def test_forgotten_inputs_are_bounded_term_by_term(k, n, m):
     loops = [report_bounds.transition_count(n, m) + j * more for j in range(k)]
     counts = [sum(loops[i:]) + report_bounds.input_count(n, m) + (i - 1) * more for i in range(1, k + 1)]
     for f in (0.0, 0.3, 0.97, 1.0):
-        given = {"k": k, "n": n, "m": m, "x": 1, "u": 1, "f": f, "b": 10, "t": 9, "chop": 0, "goal": 1}
+        given = {"k": k, "n": n, "m": m, "x": 1, "u": 1, "f": f, "b": 10, "goal": 1}
         last = float(kalman_reference(given)["b5"][0])
         total = sum((sum(loops) + a) * f ** (k - i) for i, a in enumerate(counts, 1))
         assert total <= last * (1 + 1e-12)

@@ -25,10 +25,9 @@
     return { beta, sharper: beta / (1 + beta), total, gamma: total < 1 ? total / (1 - total) : NaN };
   }
 
-  // (125) as printed, after each correction, and with inputs that a closed loop of norm f forgets.
+  // Digits that (125) asks for as printed, after each correction, and with inputs that a closed loop of norm f forgets.
   function kalman(given) {
     const { k, n, m, x, u, f, goal } = given;
-    const beta = unit(given, given.t);
     const memory = f < 1 ? -Math.expm1(k * Math.log(f)) / (1 - f) : k;
     const once = k * (3 * m + 6 * n + 5);
     const carried = (k * (k * (m + 3 * n + 2) + 5 * m + 9 * n + 8)) / 2;
@@ -40,13 +39,13 @@
       [carried, inputs],
       [carried, Math.min(inputs, 2 * carried * memory)],
     ];
-    const found = { beta, memory };
+    const found = { memory };
     rows.forEach(([a, b], i) => {
       const size = a * x + b * u;
       let digits = 1;
       while (digits <= MOST_DIGITS && !(size * unit(given, digits) <= goal)) digits++;
       if (digits > MOST_DIGITS) digits = NaN;
-      Object.assign(found, { [`a${i + 1}`]: a, [`b${i + 1}`]: b, [`bound${i + 1}`]: beta * size, [`digits${i + 1}`]: digits });
+      Object.assign(found, { [`a${i + 1}`]: a, [`b${i + 1}`]: b, [`digits${i + 1}`]: digits });
     });
     return found;
   }
@@ -110,8 +109,8 @@
   const limit = (x) => (x !== 0 && (Math.abs(x) >= 1e6 || Math.abs(x) < 1e-3) ? x.toExponential().replace("+", "") : String(x));
   const fill = (template, values) =>
     template.replace(/\{(\w+)\}/g, (_, name) => (typeof values[name] === "string" ? values[name] : show(values[name])));
-  const taken = ({ whole, least, most }) =>
-    `${whole === undefined ? "a number" : "a whole number"} from ${limit(Number(least))} to ${limit(Number(most))}`;
+  const range = ({ least, most }) => `${limit(Number(least))} to ${limit(Number(most))}`;
+  const taken = (given) => `${given.whole === undefined ? "a number" : "a whole number"} from ${range(given)}`;
 
   // A number as typed, or an error: what came, what is needed, the cure.
   function read(field) {
@@ -187,21 +186,21 @@
     for (const [name, value] of Object.entries({ type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: false })) {
       field.setAttribute(name, value);
     }
-    const range = html("input", { type: "range", id: `${id}-slider`, "aria-label": `${words}, slider`, min: low, max: high, step });
-    range.addEventListener("input", () => {
-      const position = range.valueAsNumber;
+    const bar = html("input", { type: "range", id: `${id}-slider`, "aria-label": `${words}, slider`, min: low, max: high, step });
+    bar.addEventListener("input", () => {
+      const position = bar.valueAsNumber;
       const value = log === undefined ? Number(position.toPrecision(6)) : Number((10 ** position).toPrecision(3));
       const within = Math.min(field.dataset.most, Math.max(field.dataset.least, whole === undefined ? value : Math.round(value)));
       field.value = String(within);
       field.dispatchEvent(new Event("input"));
     });
-    box.append(range, html("small", { id: `${id}-hint` }, taken(field.dataset)), html("p", { class: "calculator-error", id: `${id}-error` }));
+    box.append(bar, html("small", { id: `${id}-hint` }, range(field.dataset)), html("p", { class: "calculator-error", id: `${id}-error` }));
   }
 
   // Read a field and say what is wrong with it, or move its slider there.
   function check(field) {
     const box = field.closest(".calculator-field");
-    const [range, error] = [box.querySelector('[type="range"]'), box.querySelector(".calculator-error")];
+    const [bar, error] = [box.querySelector('[type="range"]'), box.querySelector(".calculator-error")];
     let [value, message] = [NaN, ""];
     try {
       value = read(field);
@@ -211,9 +210,9 @@
     field.toggleAttribute("aria-invalid", Boolean(message));
     if (message) field.setAttribute("aria-invalid", "true");
     if (error && error.textContent !== message) error.textContent = message;
-    if (range && !message) {
-      if (document.activeElement !== range) range.value = field.dataset.log === undefined ? value : Math.log10(value);
-      range.setAttribute("aria-valuetext", show(value));
+    if (bar && !message) {
+      if (document.activeElement !== bar) bar.value = field.dataset.log === undefined ? value : Math.log10(value);
+      bar.setAttribute("aria-valuetext", show(value));
     }
     return value;
   }

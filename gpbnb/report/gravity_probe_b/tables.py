@@ -2,33 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.filters.forms import Form
-from gpbnb.filters.model import LinearModel
-from gpbnb.report.display.tables import Table, short
+from gpbnb.report.display.tables import Table
 from gpbnb.report.gravity_probe_b import threshold
 from gpbnb.report.gravity_probe_b.answers import Moved
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS
-from gpbnb.report.gravity_probe_b.model import STATES
 from gpbnb.report.gravity_probe_b.threshold import Share
-
-
-def states(model: LinearModel) -> Table:
-    """Tabulate the states of the Gravity Probe B model: transition, initial standard deviation, process noise."""
-    given = model.to_float()
-    body = tuple(
-        (name, unit, f"{given['Phi'][0, i, i]:g}", _root(given["P0"][i, i]), _root(given["Q"][0, i, i]))
-        for i, (name, unit) in enumerate(STATES)
-    )
-    header = ("state", "unit", "transition per step", "initial standard deviation", "random walk per step")
-    return Table(f"{len(body)} states", header, body)
-
-
-def _root(variance: float) -> str:
-    return short(math.sqrt(variance), 3)
 
 
 def shares(found: Sequence[Share]) -> Table:
