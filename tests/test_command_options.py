@@ -32,8 +32,8 @@ LISTED = {
         ),
         (
             ledger,
-            "exit status: 0, every selected entry has a finding; 1, some entries have no check; 2, the arguments are "
-            "invalid, or the ledger or the output file cannot be used; 3, a check raised an exception",
+            "Exit status: 0 if the findings are written, 2 if an option or the output file is wrong, 130 if it is "
+            "interrupted.",
         ),
     ],
 )

@@ -62,11 +62,11 @@ class Ledger(SphinxDirective):
                 return ledger.error_table(ledger.select_topic(rows, detail, *map(verdict, ERRORS))).html
             case "verdict":
                 chosen = verdict(detail)
-                return ledger.note_table(row for row in rows if row.finding and row.finding.verdict is chosen).html
+                return ledger.note_table(row for row in rows if row.finding.verdict is chosen).html
             case "undone":
                 chosen = verdict(detail)
                 items = (row for row in rows if row.statement.kind == "open")
-                return ledger.note_table((r for r in items if r.finding and r.finding.verdict is chosen), True).html
+                return ledger.note_table((r for r in items if r.finding.verdict is chosen), True).html
             case "squares":
                 return ledger.squares(rows).html
             case "root-squares":

@@ -10,19 +10,14 @@ import gpbnb
 FORMATS = ("csv", "markdown", "json", "text")
 """How findings are written, as in :mod:`gpbnb.report.ledger.render`."""
 
-_EPILOG = (
-    "exit status: 0, every selected entry has a finding; 1, some entries have no check; 2, the "
-    "arguments are invalid, or the ledger or the output file cannot be used; 3, a check raised an "
-    "exception (the other rows are still written)"
-)
-
 
 def ledger_parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     made = argparse.ArgumentParser(
         prog="python -m gpbnb.ledger",
         description="Check every statement of the three documents and write the findings.",
-        epilog=_EPILOG,
+        epilog="Exit status: 0 if the findings are written, 2 if an option or the output file is wrong, 130 if it is "
+        "interrupted.",
     )
     made.add_argument("--format", choices=FORMATS, default="csv", help="default: csv")
     made.add_argument("--document", help="hung1984, hung1982 or savage2016; default: all")

@@ -139,11 +139,8 @@ def test_a_definition_is_given_if_it_holds():
     assert definition(OTHER).verdict is Verdict.MISPRINT
 
 
-def test_two_rows_of_a_statement_are_refused(tmp_path, monkeypatch):
-    (tmp_path / "twice").mkdir()
-    (tmp_path / "twice" / "__init__.py").touch()
-    header = ",".join(("statements", *EMPTY))
-    (tmp_path / "twice" / "topic.csv").write_text(f"{header}\n*.eq1 hung1984.II.eq1,,,,given,,,a definition,\n")
-    monkeypatch.syspath_prepend(tmp_path)
+def test_two_rows_of_a_statement_are_refused(monkeypatch):
+    rows = [{"statements": key, **EMPTY} for key in ("*.eq1", "hung1984.II.eq1")]
+    monkeypatch.setattr("gpbnb.report.ledger.judge.rows_of", lambda name: iter(rows))
     with pytest.raises(ValueError, match=r"two rows of 'hung1984\.II\.eq1' in topic\.csv; needed one"):
-        read_rows("twice.topic", {})
+        read_rows("some.topic", {})

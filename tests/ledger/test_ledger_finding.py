@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 
 ALLOWED = {
     ("verified", True),
@@ -77,11 +77,6 @@ def test_compare(otherwise):
 
 def test_compare_calls_a_disagreement_wrong_unless_told():
     assert compare(False, "4").verdict is Verdict.WRONG
-
-
-def test_answer():
-    assert answer(True, "4", "here") == Finding("4", True, Verdict.ANSWERED, "here")
-    assert answer(False, "4", "here") == Finding("4", False, Verdict.OPEN, "here")
 
 
 def test_only_a_disagreement_has_a_root_error():

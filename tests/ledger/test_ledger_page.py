@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from html import escape
 from pathlib import Path
 
@@ -10,10 +11,11 @@ from markup import Elements
 
 from gpbnb.report import ledger
 from gpbnb.report.ledger import Row, load_statements, page
+from gpbnb.report.ledger.checking import TOPIC_OF
 from gpbnb.report.ledger.corrections import load_corrections
-from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, compare
 from gpbnb.report.ledger.html import typeset
-from gpbnb.report.ledger.statements import DOCUMENTS, Statement
+from gpbnb.report.ledger.statements import DOCUMENTS
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 FINDINGS = (
@@ -21,7 +23,7 @@ FINDINGS = (
     compare(False, r"$a<b$ & <c>", Verdict.WRONG, "see the chapter *Rounding bounds*; *not* x*y*z, x*y* z"),
     compare(False, "one", Verdict.MISPRINT),
     Finding("", None, Verdict.UNVERIFIABLE, "no data"),
-    answer(True, "$|x|$", "here"),
+    Finding("$|x|$", True, Verdict.ANSWERED, "here"),
 )
 STATEMENTS = load_statements()
 # It has a correction and is legible.
@@ -56,13 +58,12 @@ def test_a_page_of_the_ledger_is_a_page_of_the_book(each):
 
 
 def test_rows_carry_what_the_filters_need():
-    owner = ledger.topics()
     rows = {attrs["id"]: attrs for attrs in Elements(EVERY_PAGE).all("tr") if "id" in attrs}
     for row in ROWS:
         attrs = rows[row.statement.id]
         assert attrs["data-kind"] == row.statement.kind
         assert attrs["data-verdict"] == row.outcome
-        assert attrs["data-chapter"] == owner.get(row.statement.id, "")
+        assert attrs["data-chapter"] == TOPIC_OF[row.statement.id]
 
 
 def test_all_formulas_are_marked_and_no_dollar_is_left():
@@ -79,28 +80,20 @@ def test_all_formulas_are_marked_and_no_dollar_is_left():
 
 
 def test_text_is_escaped_and_a_chapter_named_in_a_note_is_linked():
-    statement = Statement("hung1984.II.x", "hung1984", "II", "2", "$a<b$ & so", "claim", "$a<b$ & so on")
+    statement = replace(LEGIBLE, item="$a<b$ & so", text="$a<b$ & so on", form="")
     html = ledger.ledger_page([Row(statement, FINDINGS[1])], ledger.PAGES[0]).html
     assert r"\(a&lt;b\)</span> &amp; so on" in html
     assert '<a href="rounding.html">Rounding bounds</a>; <em>not</em> x*y*z, x*y* z' in html
-    assert re.findall(r'<p class="(\w+)">', html) == ["printed", "recomputed", "note"]
-
-
-def test_a_row_without_a_check_is_shown_as_such():
-    unchecked = Row(Statement("savage2016.x", "savage2016", "-", "-", "x", "claim", "a"), None)
-    html = ledger.ledger_page([unchecked], ledger.PAGES[-1]).html
-    assert 'data-verdict="no check" data-chapter=""' in html
-    assert Elements(html).cells[-2:] == ["no check", "a"]
+    assert re.findall(r'<p class="(\w+)">', html) == ["printed", "corrected", "recomputed", "note"]
 
 
 def test_the_options_of_each_filter_count_its_rows():
-    owner = ledger.topics()
     for each in ledger.PAGES:
         inside = [row for row in ROWS if each.holds(row.statement)]
         values = {
             "verdict": [row.outcome for row in inside],
             "kind": [row.statement.kind for row in inside],
-            "chapter": [owner[row.statement.id] for row in inside if row.statement.id in owner],
+            "chapter": [TOPIC_OF[row.statement.id] for row in inside],
         }
         html = ledger.ledger_page(ROWS, each).html
         for name, expected in values.items():
@@ -125,7 +118,7 @@ def test_the_error_table_lists_disagreements_with_the_most_serious_first():
     assert found == sorted(found, key=["wrong", "misprint"].index)
     links = [a["href"] for a in Elements(table.html).all("a") if a["href"].startswith("ledger")]
     by_address = {page.address(row.statement): row for row in ROWS}
-    disagreeing = [row for row in ROWS if row.finding and row.finding.verdict in (Verdict.WRONG, Verdict.MISPRINT)]
+    disagreeing = [row for row in ROWS if row.finding.verdict in (Verdict.WRONG, Verdict.MISPRINT)]
     assert len(disagreeing) > 250
     assert sorted(by_address[link].statement.id for link in links) == sorted(row.statement.id for row in disagreeing)
 
@@ -355,9 +348,8 @@ def test_counts_by_something_else_are_refused():
 
 
 def test_select_topic():
-    owner = ledger.topics()
     found = ledger.select_topic(ROWS, "rounding")
-    assert [row.statement.id for row in found] == [s.id for s in STATEMENTS if owner.get(s.id) == "rounding"]
+    assert [row.statement.id for row in found] == [s.id for s in STATEMENTS if TOPIC_OF[s.id] == "rounding"]
     wrong = ledger.select_topic(ROWS, "rounding", Verdict.WRONG, Verdict.MISPRINT)
     assert wrong == tuple(row for row in found if row.outcome in ("wrong", "misprint")) != ()
     with pytest.raises(ValueError, match="topic 'Rounding'; needed one of rounding"):
@@ -365,7 +357,7 @@ def test_select_topic():
 
 
 def test_every_topic_has_a_chapter_of_its_title():
-    assert set(ledger.topics().values()) <= set(ledger.CHAPTERS)
+    assert set(TOPIC_OF.values()) <= set(ledger.CHAPTERS)
     for topic, title in ledger.CHAPTERS.items():
         cells = json.loads((BOOK / f"{topic}.ipynb").read_text(encoding="utf-8"))["cells"]
         assert "".join(cells[0]["source"]).splitlines()[0] == f"# {title}"

@@ -12,7 +12,7 @@ from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 from gpbnb.report.ledger import Row, load_statements, table
-from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.render import to_csv, to_json, to_markdown, to_text
 from gpbnb.report.ledger.statements import Statement
 
@@ -21,9 +21,9 @@ FINDINGS = {
     "misprint": compare(False, r"$(n+m-1)\beta$", Verdict.MISPRINT, 'one "sign", \nas |(20)| of 1982'),
     "verified": compare(True, "yes"),
     "unverifiable": Finding("", None, Verdict.UNVERIFIABLE, "no data"),
-    "answered": answer(True, "done", "here"),
+    "answered": Finding("done", True, Verdict.ANSWERED, "here"),
 }
-ROWS = (*(Row(ENTRY, finding) for finding in FINDINGS.values()), Row(ENTRY, None), Row(ENTRY, None, ValueError("x")))
+ROWS = tuple(Row(ENTRY, finding) for finding in FINDINGS.values())
 EVERYTHING = tuple(Row(entry, FINDINGS["misprint"]) for entry in load_statements())
 
 
@@ -36,16 +36,16 @@ def test_csv_is_rfc_4180_with_the_columns_of_the_contract():
         '"one ""sign"", \nas |(20)| of 1982"'
     )
     records = list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
-    assert [record["agrees"] for record in records] == ["false", "true", "", "true", "", ""]
-    assert [record["verdict"] for record in records] == [*FINDINGS, "", ""]
-    assert [record["note"] for record in records] == [*(f.note for f in FINDINGS.values()), "", ""]
+    assert [record["agrees"] for record in records] == ["false", "true", "", "true"]
+    assert [record["verdict"] for record in records] == [*FINDINGS]
+    assert [record["note"] for record in records] == [f.note for f in FINDINGS.values()]
     assert {record["printed"] for record in records} == {ENTRY.printed}
 
 
 def test_json_says_the_same():
     records = json.loads(to_json(ROWS))
-    assert [record["agrees"] for record in records] == [False, True, None, True, None, None]
-    assert [record["verdict"] for record in records] == [*FINDINGS, None, None]
+    assert [record["agrees"] for record in records] == [False, True, None, True]
+    assert [record["verdict"] for record in records] == [*FINDINGS]
     assert records[0] == {
         "id": ENTRY.id,
         "document": "hung1984",
@@ -66,8 +66,6 @@ def test_text_is_a_line_an_entry():
         "verified      hung1984.II.eq20  yes",
         "unverifiable  hung1984.II.eq20  no data",
         "answered      hung1984.II.eq20  done  here",
-        "no check      hung1984.II.eq20",
-        "check failed  hung1984.II.eq20",
     ]
 
 
@@ -101,8 +99,7 @@ def test_a_table_renders_with_its_math_and_prose_unharmed():
         ([r"(n+m-1)\beta"], ""),
         ([], 'one "sign", as |(20)| of 1982'),
     ]
-    assert [row[1][1] for row in body] == [*FINDINGS, "no check", "check failed"]
-    assert body[4][1:] == [([], "no check"), printed, ([], ""), ([], "")]
+    assert [row[1][1] for row in body] == [*FINDINGS]
 
 
 @pytest.mark.parametrize(
@@ -118,7 +115,7 @@ def test_a_table_renders_with_its_math_and_prose_unharmed():
 )
 def test_bars_within_math(math, safe):
     entry = replace(ENTRY, text=f"${math}$")
-    _, body = rendered(table([Row(entry, None)]).markdown())
+    _, body = rendered(table([Row(entry, FINDINGS["verified"])]).markdown())
     assert [found.strip() for found in body[2][0]] == [safe]
 
 
@@ -127,7 +124,7 @@ def test_bars_within_math(math, safe):
 )
 def test_prose_is_not_markup(prose):
     entry = replace(ENTRY, item=prose, text=f"{prose} $x$ {prose}")
-    _, body = rendered(table([Row(entry, None)]).markdown())
+    _, body = rendered(table([Row(entry, FINDINGS["verified"])]).markdown())
     assert body[0] == ([], f"hung1984, II.6: {prose}")
     assert body[2] == (["x"], f"{prose}  {prose}")
 
@@ -151,7 +148,7 @@ def test_rows_may_be_an_iterator():
 
 
 def test_representations_are_short_and_stable():
-    title = "Ledger of 6 statements: 1 verified, 1 misprint, 1 unverifiable, 1 answered, 1 check failed, 1 no check"
+    title = "Ledger of 4 statements: 1 verified, 1 misprint, 1 unverifiable, 1 answered"
     assert repr(table(ROWS)) == f"<{title}>"
     assert repr(table(())) == "<Ledger of 0 statements: none>"
     assert table(ROWS)._repr_markdown_() == table(ROWS).page()

@@ -23,7 +23,6 @@ from gpbnb.report.ledger.page import (
     note_table,
     root_table,
     select_topic,
-    topics,
 )
 from gpbnb.report.ledger.render import table
 from gpbnb.report.ledger.roots import by_root, load_roots
@@ -59,5 +58,4 @@ __all__ = [
     "select_topic",
     "squares",
     "table",
-    "topics",
 ]

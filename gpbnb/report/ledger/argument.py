@@ -11,9 +11,8 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from gpbnb.report.display import style
 from gpbnb.report.display.vector import element
-from gpbnb.report.ledger.checking import Row
+from gpbnb.report.ledger.checking import TOPIC_OF, Row
 from gpbnb.report.ledger.html import Html
-from gpbnb.report.ledger.page import topics
 from gpbnb.report.ledger.roots import by_root
 
 PLACES = {
@@ -61,10 +60,9 @@ class Stage(NamedTuple):
 def stages(rows: Iterable[Row]) -> dict[str, Stage]:
     """Count the statements of each part, by topic."""
     rows = list(rows)
-    topic_of = topics()
     found = {}
     for topic in PLACES:
-        inside = [row for row in rows if topic_of.get(row.statement.id) == topic]
+        inside = [row for row in rows if TOPIC_OF[row.statement.id] == topic]
         documents = tuple(sorted({row.statement.document for row in inside}, key=lambda name: name[-4:]))
         found[topic] = Stage(documents, len(inside), sum(row.outcome == "wrong" for row in inside))
     return found
@@ -73,11 +71,10 @@ def stages(rows: Iterable[Row]) -> dict[str, Stage]:
 def inherited(rows: Iterable[Row]) -> dict[tuple[str, str], int]:
     """Count the wrong statements of a part whose root error was made in an earlier part: (later, earlier) → number."""
     rows = list(rows)
-    topic_of = topics()
     order = [*PLACES]
     found: Counter[tuple[str, str]] = Counter()
     for spoiled in by_root(rows).values():
-        parts = [topic_of[row.statement.id] for row in spoiled if row.outcome == "wrong"]
+        parts = [TOPIC_OF[row.statement.id] for row in spoiled if row.outcome == "wrong"]
         first = min(parts, key=order.index, default="")
         found.update((part, first) for part in parts if part != first)
     return dict(found)

@@ -2,67 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.finding import Finding, Verdict
-from gpbnb.report.ledger.judge import Checks
 from gpbnb.report.ledger.statements import Statement
 
-MISSING = "missing"
-FAILED = "failed"
+TOPIC_OF = {key: topic for topic, checks in TOPICS.items() for key in checks}
+"""The topic that checks each statement, by its id."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """An entry and the finding of its check; no finding if there is no check or the check raised `error`."""
+    """A statement and the finding of its check."""
 
     statement: Statement
-    finding: Finding | MaybeNone
-    error: Exception | None = None
+    finding: Finding
 
     @property
     def outcome(self) -> str:
-        """The verdict's value, ``missing`` without a check, or ``failed`` if the check raised an error."""
-        if self.finding is not None:
-            return self.finding.verdict.value
-        return MISSING if self.error is None else FAILED
+        """The verdict's value."""
+        return self.finding.verdict.value
 
 
 def examine(
-    statements: Iterable[Statement],
-    topics: Mapping[str, Checks] = TOPICS,
-    progress: Callable[[Sequence[Statement]], Iterable[Statement]] = iter,
+    statements: Iterable[Statement], progress: Callable[[Sequence[Statement]], Iterable[Statement]] = iter
 ) -> tuple[Row, ...]:
-    """Run the checks of `statements`; if a check raises, its row records the error and the other checks still run.
-
-    Parameters
-    ----------
-    statements : the statements to check.
-    topics : the checks of each topic.
-    progress : iterator that passes the statements on one by one, and may show progress.
-
-    Returns
-    -------
-    rows : in the order of `statements`.
-    """
+    """Run the checks of `statements`, which `progress` passes on one by one; an error names its statement."""
     rows: list[Row] = []
     for statement in progress(tuple(statements)):
-        checks = next((checks for checks in topics.values() if statement.id in checks), None)
         try:
-            rows.append(Row(statement, checks.run(statement) if checks else None))
+            rows.append(Row(statement, TOPICS[TOPIC_OF[statement.id]].run(statement)))
         except Exception as error:
-            rows.append(Row(statement, None, error))
+            error.add_note(f"in the check of {statement.id}")
+            raise
     return tuple(rows)
 
 
 def counts(rows: Iterable[Row]) -> dict[str, int]:
-    """Count the outcomes that occur, in the order of `Verdict`, then ``failed`` and ``missing``."""
+    """Count the outcomes that occur, in the order of `Verdict`."""
     outcomes = [row.outcome for row in rows]
-    order = [*(verdict.value for verdict in Verdict), FAILED, MISSING]
-    return {outcome: outcomes.count(outcome) for outcome in order if outcome in outcomes}
+    return {each.value: outcomes.count(each.value) for each in Verdict if each.value in outcomes}
 
 
 def in_reading_order(rows: Iterable[Row]) -> tuple[Row, ...]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.resources import files
 
-from gpbnb.report.ledger.statements import Statement, statement
+from gpbnb.report.ledger.statements import Statement, rows_of, statement
 
 
 @dataclass(frozen=True)
@@ -35,8 +33,7 @@ class Correction:
 @cache
 def load_corrections() -> dict[str, Correction]:
     """Read the corrections: statement id → correction."""
-    text = (files(__package__) / "corrections.csv").read_text(encoding="utf-8")
-    return {row["id"]: Correction(**row) for row in csv.DictReader(text.splitlines(), strict=True)}
+    return {row["id"]: Correction(**row) for row in rows_of("corrections.csv")}
 
 
 def intended(key: str) -> Statement:

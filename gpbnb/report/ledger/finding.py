@@ -1,7 +1,6 @@
 """The result of checking one printed statement.
 
-The verdict follows from whether the recomputation agrees with the printed statement, through :func:`compare` or, for an
-item that the documents leave undone, :func:`answer`.
+The verdict follows from whether the recomputation agrees with the printed statement, through :func:`compare`.
 """
 
 from __future__ import annotations
@@ -107,8 +106,3 @@ def compare(
     if agrees:
         return Finding(recomputed, True, Verdict.VERIFIED, note)
     return Finding(recomputed, False, otherwise, note if otherwise_note is None else otherwise_note, root)
-
-
-def answer(holds: bool, recomputed: str, note: str) -> Finding:
-    """Return the finding on an item that the documents leave undone: answered if our answer holds, otherwise open."""
-    return Finding(recomputed, holds, Verdict.ANSWERED if holds else Verdict.OPEN, note)

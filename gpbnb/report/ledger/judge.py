@@ -17,14 +17,12 @@ The functions of the topic give the names of these expressions their values, as 
 
 from __future__ import annotations
 
-import csv
 import re
 import string
 from collections import ChainMap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -35,12 +33,12 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display.tables import scientific
 from gpbnb.report.ledger.corrections import intended
 from gpbnb.report.ledger.dotted import DottedMatrix
-from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, compare
 from gpbnb.report.ledger.formula import OPERATORS, Link, Number, Part, Relation, Undefined, Words
 from gpbnb.report.ledger.html import chapter
 from gpbnb.report.ledger.largest import allows
 from gpbnb.report.ledger.legibility import charged
-from gpbnb.report.ledger.statements import Statement
+from gpbnb.report.ledger.statements import Statement, rows_of
 
 Names = Mapping[str, Any]
 SECOND_ORDER = Fraction(1, 10**60)
@@ -305,7 +303,7 @@ class CheckRow:
         if verdict in DISAGREEMENTS:
             return compare(bool(agrees), recomputed, verdict, note, otherwise or note, self.root)
         if verdict is Verdict.ANSWERED:
-            return answer(bool(agrees), recomputed, note)
+            return Finding(recomputed, bool(agrees), verdict if agrees else Verdict.OPEN, note)
         if agrees is False:
             return compare(False, recomputed, Verdict.MISPRINT, otherwise_note=otherwise)
         return Finding(recomputed if agrees is None else "", None, verdict, note)
@@ -328,9 +326,8 @@ def read(topic: str, *namespaces: Mapping[str, Any]) -> Checks:
     """Return the checks of a topic, named by its module, from the file of its name; functions come from namespaces."""
     checks = Checks()
     functions: Mapping[str, Any] = ChainMap(*namespaces)  # type: ignore[arg-type]
-    package, _, name = topic.rpartition(".")
-    text = (files(package) / f"{name}.csv").read_text(encoding="utf-8")
-    for row in csv.DictReader(text.splitlines(), strict=True):
+    name = topic.rpartition(".")[2]
+    for row in rows_of(f"checks/{name}.csv"):
         ids = [key for each in row.pop("statements").split() for key in _ids(each)]
         check = CheckRow(functions, **row)
         for key in ids:

@@ -14,12 +14,11 @@ The rule, for a statement that disagrees with its recomputation:
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.resources import files
 
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict
+from gpbnb.report.ledger.statements import rows_of
 
 
 @dataclass(frozen=True)
@@ -45,9 +44,7 @@ class Damage:
 @cache
 def load_legibility() -> dict[str, Damage]:
     """Read ``legibility.csv``: statement id → damage, for the statements whose scan is damaged."""
-    text = (files(__package__) / "legibility.csv").read_text(encoding="utf-8")
-    damages = [Damage(**row) for row in csv.DictReader(text.splitlines(), strict=True)]
-    return {damage.id: damage for damage in damages}
+    return {row["id"]: Damage(**row) for row in rows_of("legibility.csv")}
 
 
 def charged(key: str, finding: Finding) -> Finding:

@@ -9,7 +9,7 @@ from html import escape
 from typing import NamedTuple
 
 from gpbnb.report.display.tables import MOST_ROWS, Table
-from gpbnb.report.ledger.checking import Row, counts, in_reading_order
+from gpbnb.report.ledger.checking import TOPIC_OF, Row, counts, in_reading_order
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict
@@ -17,7 +17,7 @@ from gpbnb.report.ledger.html import CHAPTERS, Html, badge, chapter_link, typese
 from gpbnb.report.ledger.legibility import load_legibility
 from gpbnb.report.ledger.render import describe, outcome_name, section_name
 from gpbnb.report.ledger.roots import by_root, load_roots
-from gpbnb.report.ledger.statements import Statement
+from gpbnb.report.ledger.statements import Statement, rows_of
 
 
 @dataclass(frozen=True)
@@ -43,100 +43,19 @@ class LedgerPage:
         return statement.document == self.document and re.fullmatch(self.sections, place) is not None
 
 
-PAGES = (
-    LedgerPage(
-        "ledger-1984-1",
-        "Ledger: report of 1984, rounding and inversion in general",
-        "hung1984",
-        r"I|II\.([1-9]|9\..*|10)",
-    ),
-    LedgerPage("ledger-1984-2", "Ledger: report of 1984, inversion by elimination", "hung1984", r"II\.11.*"),
-    LedgerPage("ledger-1984-3", "Ledger: report of 1984, Kalman filter", "hung1984", r"II\.1[234]"),
-    LedgerPage("ledger-1984-4", "Ledger: report of 1984, roll and deroll", "hung1984", r"III.*"),
-    LedgerPage("ledger-1982-1", "Ledger: report of 1982, error budget", "hung1982", r"I|II"),
-    LedgerPage(
-        "ledger-1982-2",
-        "Ledger: report of 1982, rounding and inversion in general",
-        "hung1982",
-        r"III\.([1-9]|9\..*|10|11)",
-    ),
-    LedgerPage("ledger-1982-3", "Ledger: report of 1982, inversion by elimination", "hung1982", r"III\.11\..*"),
-    LedgerPage("ledger-1982-4", "Ledger: report of 1982, Kalman filter", "hung1982", r"III\.1[23]"),
-    LedgerPage("ledger-1982-5", "Ledger: report of 1982, measurement geometry", "hung1982", r"IV"),
-    LedgerPage("ledger-2016", "Ledger: note of 2016, digital integration", "savage2016", r".*"),
-)
+PAGES = tuple(LedgerPage(**each) for each in rows_of("pages.csv"))
 """The pages of the complete ledger; each statement is on exactly one of them."""
 
 
 class Claim(NamedTuple):
     """A principal claim in words, and what follows from its verdict for someone who relies on it."""
 
+    id: str
     text: str
     consequence: str
 
 
-CLAIMS = {
-    "hung1984.II.eq8": Claim(
-        "Rounding changes a number by at most half a unit of its last digit",
-        "You can rely on this unit roundoff for every rounded operation.",
-    ),
-    "hung1984.II.eq18": Claim(
-        "The rounding error of a sum is bounded by its terms, each times the number of additions it passes through",
-        "You can rely on this bound to first order. With few digits and many terms, use a strict bound.",
-    ),
-    "hung1984.II.eq26": Claim(
-        "The rounding error of an inner product is bounded by its products, counted in the same way",
-        "You can rely on this bound to first order. With few digits, use a strict bound.",
-    ),
-    "hung1984.II.eq31": Claim(
-        "The rounding error of a product of matrices is a few unit roundoffs of the product",
-        "Where the terms of an entry cancel, the formula promises most of its digits, but all of them may be wrong.",
-    ),
-    "hung1984.II.s10.practicality-of-44": Claim(
-        "Bounding the error of an inverse by its residual is impractical",
-        "The report abandons the sharpest bound that we tried. This bound costs one product with twice the digits.",
-    ),
-    "hung1984.II.eq91": Claim(
-        "The errors of elimination and back substitution may be added",
-        "The error can exceed the resulting bound, so a matrix that passes may have a worse inverse than allowed.",
-    ),
-    "hung1984.II.s11-4.table-1-proposed-3-places": Claim(
-        "Table 1 bounds the inverses of some matrices",
-        "You cannot test your own program with this table.",
-    ),
-    "hung1984.II.eq105": Claim(
-        "One update changes the covariance by a relative rounding error of at most a few unit roundoffs",
-        "A covariance may have lost every digit while the bound promises nearly all of them.",
-    ),
-    "hung1984.II.eq125": Claim(
-        "After k steps, the estimate of a Kalman filter is off by at most the bound (125)",
-        "Do not choose a wordlength with this bound: one step may violate it, and after a year it is far too large.",
-    ),
-    "hung1984.II.s12.example-9-digits": Claim(
-        "A year of Gravity Probe B needs 9 digits, by the first term of (125)",
-        "Nine digits keep the error far below the drift, the report's criterion, but (125) does not bound the error.",
-    ),
-    "hung1984.II.s12.example-17-digits": Claim(
-        "A year of Gravity Probe B needs 17 digits, by the second term of (125)",
-        "This number rules out IEEE double precision, which in fact is ample.",
-    ),
-    "hung1982.IV.eq8": Claim(
-        "This equation derolls the first drift",
-        "Programmed as printed, this equation measures a drift of zero. Changing two signs corrects it.",
-    ),
-    "hung1982.IV.eq9": Claim(
-        "This equation derolls the second drift",
-        "Programmed as printed, this equation measures a drift of zero. Changing two signs corrects it.",
-    ),
-    "savage2016.main.eq35": Claim(
-        "A trapezoidal integrator of a noisy signal has this random walk",
-        "You can choose a sampling rate with this formula.",
-    ),
-    "savage2016.main.eq39": Claim(
-        "For fast sampling, the random walk has this simpler form",
-        "You can rely on this formula if sampling is far faster than the bandwidth. The abstract omits this condition.",
-    ),
-}
+CLAIMS = {each["id"]: Claim(**each) for each in rows_of("claims.csv")}
 """The principal claims of the documents, by statement id."""
 
 _REPLICATION = {
@@ -152,11 +71,6 @@ _REPLICATION = {
 
 _SHOWN = {Verdict.VERIFIED.value: 1, Verdict.GIVEN.value: 1, Verdict.MISPRINT.value: 2}
 """How many texts of its evidence a verdict shows; others are collapsed, as most readers look for other verdicts."""
-
-
-def topics() -> dict[str, str]:
-    """Name the topic that checks each statement, as in ``{"hung1984.II.eq20": "rounding"}``."""
-    return {key: topic for topic, checks in TOPICS.items() for key in checks}
 
 
 def address(statement: Statement) -> str:
@@ -175,9 +89,7 @@ def select_topic(rows: Iterable[Row], topic: str, *verdicts: Verdict) -> tuple[R
     if topic not in TOPICS:
         raise ValueError(f"got topic {topic!r}; needed one of {', '.join(TOPICS)}")
     return tuple(
-        row
-        for row in rows
-        if row.statement.id in TOPICS[topic] and (not verdicts or (row.finding and row.finding.verdict in verdicts))
+        row for row in rows if row.statement.id in TOPICS[topic] and (not verdicts or row.finding.verdict in verdicts)
     )
 
 
@@ -194,10 +106,9 @@ def count_table(rows: Iterable[Row], by: str) -> Table:
     ValueError : `by` has another value.
     """
     rows = in_reading_order(rows)
-    owner = topics()
     groups: dict[str, Callable[[Row], str]] = {
         "document": lambda row: row.statement.document,
-        "chapter": lambda row: CHAPTERS.get(owner.get(row.statement.id, ""), "-"),
+        "chapter": lambda row: CHAPTERS[TOPIC_OF[row.statement.id]],
         "kind": lambda row: row.statement.kind,
     }
     if by not in groups:
@@ -221,11 +132,10 @@ def ledger_page(rows: Iterable[Row], page: LedgerPage) -> Html:
     The form is hidden until the page's script, ``ledger.js``, shows it and responds to it.
     """
     rows = in_reading_order(row for row in rows if page.holds(row.statement))
-    owner = topics()
-    lines = [_entry(row, owner) for row in rows]
+    lines = [_entry(row) for row in rows]
     caption = f"<caption>{escape(page.document)}: {len(rows)} statements</caption>\n"
     table = _table(("Statement", "Verdict", "Evidence"), lines, caption)
-    html = f'<div class="ledger">\n{_form(rows, owner)}\n{table}</div>'
+    html = f'<div class="ledger">\n{_form(rows)}\n{table}</div>'
     return Html(f"Ledger of {len(rows)} statements: {describe(counts(rows)) or 'none'}", html)
 
 
@@ -234,10 +144,10 @@ def error_table(rows: Iterable[Row]) -> Html:
 
     Statements with the same root error share a row, in which their notes are collapsed; so do those with the same note.
     """
-    found = [row for row in in_reading_order(rows) if row.finding and row.finding.verdict in DISAGREEMENTS]
+    found = [row for row in in_reading_order(rows) if row.finding.verdict in DISAGREEMENTS]
     groups: dict[str, list[Row]] = {}
     for row in found:
-        groups.setdefault((row.finding and (row.finding.root or row.finding.note)) or row.statement.id, []).append(row)
+        groups.setdefault(row.finding.root or row.finding.note or row.statement.id, []).append(row)
     ordered = sorted(groups.values(), key=lambda group: (_seriousness(group[0]), -len(group)))
     header = ("Error", "Verdict", "Statements affected")
     table = _wrapped(header, [_error(group) for group in ordered], "ledger-errors")
@@ -254,9 +164,8 @@ def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
         answer of this book.
     """
     rows = in_reading_order(rows)
-    owner = topics()
     lines = [
-        f'<tr><th scope="row">{_link(row)}{_chapter(row, owner)}</th><td>{badge(outcome_name(row.outcome))}</td>'
+        f'<tr><th scope="row">{_link(row)}{_chapter(row)}</th><td>{badge(outcome_name(row.outcome))}</td>'
         f"{_evidence(row, note_first=not left_undone)}</tr>"
         for row in rows
     ]
@@ -285,20 +194,19 @@ def claim_outcomes(rows: Iterable[Row]) -> dict[str, str]:
     """Return the outcome of each principal claim, such as "refuted", by statement id."""
     by_id = {row.statement.id: row for row in rows}
     found = {key: by_id[key] for key in CLAIMS}
-    return {key: _REPLICATION[row.finding.verdict] if row.finding else row.outcome for key, row in found.items()}
+    return {key: _REPLICATION[row.finding.verdict] for key, row in found.items()}
 
 
 def claim_table(rows: Iterable[Row]) -> Html:
     """Tabulate the principal claims of the documents in words, their outcomes, and what follows from these."""
     by_id = {row.statement.id: row for row in rows}
-    owner = topics()
     lines = []
     for key, outcome in claim_outcomes(by_id.values()).items():
         row, claim = by_id[key], CLAIMS[key]
         printed = f"<details><summary>As printed</summary><p>{typeset(row.statement.printed)}</p></details>"
         lines.append(
             f'<tr><th scope="row">{escape(claim.text)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
-            f"<td><p>{escape(claim.consequence)} {chapter_link(owner[key])}</p>{printed}</td></tr>"
+            f"<td><p>{escape(claim.consequence)} {chapter_link(TOPIC_OF[key])}</p>{printed}</td></tr>"
         )
     return Html(f"{len(lines)} claims", _wrapped(("Claim", "Outcome", "What follows"), lines, "ledger-claims"))
 
@@ -311,15 +219,15 @@ def _link(row: Row) -> str:
 
 
 def _seriousness(row: Row) -> int:
-    return DISAGREEMENTS.index(row.finding.verdict) if row.finding else len(DISAGREEMENTS)
+    return DISAGREEMENTS.index(row.finding.verdict)
 
 
 def _error(group: Sequence[Row]) -> str:
     """One error: what is wrong, what is right, the verdicts, and links to the statements of each document."""
-    notes = [typeset(row.finding.note or row.finding.recomputed) for row in group if row.finding]
+    notes = [typeset(row.finding.note or row.finding.recomputed) for row in group]
     finding = group[0].finding
-    text = _root_link(finding) if finding and finding.root else notes[0]
-    if finding and finding.root:
+    text = _root_link(finding) if finding.root else notes[0]
+    if finding.root:
         listed = "".join(
             f"<li>{_link(row)}: {note}{_paragraphs(_correction(row))}</li>"
             for row, note in zip(group, notes, strict=True)
@@ -339,28 +247,25 @@ def _error(group: Sequence[Row]) -> str:
     return f'<tr><th scope="row">{text}</th><td>{badges}</td><td>{affected}</td></tr>'
 
 
-def _entry(row: Row, owner: dict[str, str]) -> str:
+def _entry(row: Row) -> str:
     statement = row.statement
     section = section_name(statement.chapter, statement.section)
     outcome = escape(outcome_name(row.outcome))
     return (
         f'<tr id="{escape(statement.id)}" data-kind="{statement.kind}" data-verdict="{outcome}" '
-        f'data-chapter="{owner.get(statement.id, "")}"><th scope="row"><a href="#{escape(statement.id)}">'
-        f"{typeset(statement.item)}</a><br>{escape(section)}, {statement.kind}{_chapter(row, owner)}</th>"
+        f'data-chapter="{TOPIC_OF[statement.id]}"><th scope="row"><a href="#{escape(statement.id)}">'
+        f"{typeset(statement.item)}</a><br>{escape(section)}, {statement.kind}{_chapter(row)}</th>"
         f"<td>{badge(outcome_name(row.outcome))}</td>"
         f"{_evidence(row)}</tr>"
     )
 
 
-def _chapter(row: Row, owner: dict[str, str]) -> str:
-    topic = owner.get(row.statement.id, "")
-    return f"<br>{chapter_link(topic)}" if topic in CHAPTERS else ""
+def _chapter(row: Row) -> str:
+    return f"<br>{chapter_link(TOPIC_OF[row.statement.id])}"
 
 
 def _evidence(row: Row, note_first: bool = False) -> str:
-    found, note, root = "", "", ""
-    if row.finding:
-        found, note, root = typeset(row.finding.recomputed), typeset(row.finding.note), _root(row.finding)
+    found, note, root = typeset(row.finding.recomputed), typeset(row.finding.note), _root(row.finding)
     scan = _scan(row.statement)
     named = [
         ("printed", typeset(row.statement.printed)),
@@ -370,7 +275,7 @@ def _evidence(row: Row, note_first: bool = False) -> str:
         ("note", note),
     ]
     shown = _SHOWN.get(row.outcome, len(named))
-    if scan and row.finding and row.finding.verdict in DISAGREEMENTS:
+    if scan and row.finding.verdict in DISAGREEMENTS:
         shown += 1
     if note_first and note:
         named.insert(0, named.pop())
@@ -389,7 +294,7 @@ def _scan(statement: Statement) -> list[tuple[str, str]]:
 def _correction(row: Row) -> list[tuple[str, str]]:
     """What a row that disagrees should say, or why no text can correct it, as the class and text of a paragraph."""
     correction = load_corrections().get(row.statement.id)
-    if correction is None or row.finding is None or row.finding.verdict not in DISAGREEMENTS:
+    if correction is None or row.finding.verdict not in DISAGREEMENTS:
         return []
     corrected = correction.applied(row.statement)
     return [("corrected", typeset(corrected.printed)) if corrected else ("uncorrected", typeset(correction.reason))]
@@ -426,7 +331,7 @@ def _table(header: Sequence[str], lines: Sequence[str], caption: str = "", class
     )
 
 
-def _form(rows: Sequence[Row], owner: dict[str, str]) -> str:
+def _form(rows: Sequence[Row]) -> str:
     def options(values: Iterable[str], name: Callable[[str], str] = str) -> str:
         values = [value for value in values if value]
         every = "".join(
@@ -440,7 +345,7 @@ def _form(rows: Sequence[Row], owner: dict[str, str]) -> str:
         "kind": ("Kind", options(sorted(row.statement.kind for row in rows))),
         "chapter": (
             "Chapter of this book",
-            options((owner.get(r.statement.id, "") for r in rows), lambda t: CHAPTERS[t]),
+            options((TOPIC_OF[r.statement.id] for r in rows), lambda t: CHAPTERS[t]),
         ),
     }
     labels = "".join(

@@ -8,13 +8,13 @@ import json
 from collections.abc import Iterable
 
 from gpbnb.report.display.tables import Table, one_line
-from gpbnb.report.ledger.checking import FAILED, MISSING, Row, counts, in_reading_order
+from gpbnb.report.ledger.checking import Row, counts, in_reading_order
 from gpbnb.report.ledger.finding import Verdict
 from gpbnb.report.ledger.statements import Statement
 
 COLUMNS = ("id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note")
 _AGREES = {True: "true", False: "false", None: ""}
-OUTCOMES = {MISSING: "no check", FAILED: "check failed", Verdict.OCR.value: "scan error"}
+OUTCOMES = {Verdict.OCR.value: "scan error"}
 """Outcomes that readers see under another name."""
 
 
@@ -24,12 +24,12 @@ def to_csv(rows: Iterable[Row]) -> str:
     writer = csv.writer(out, lineterminator="\r\n")
     writer.writerow(COLUMNS)
     for record in map(_record, rows):
-        writer.writerow([*record[:5], _AGREES[record[5]], record[6] or "", record[7]])
+        writer.writerow([*record[:5], _AGREES[record[5]], *record[6:]])
     return out.getvalue()
 
 
 def to_json(rows: Iterable[Row]) -> str:
-    """Write `rows` as a JSON array of objects with the keys `COLUMNS`; null if there is no finding."""
+    """Write `rows` as a JSON array of objects with the keys `COLUMNS`."""
     records = [dict(zip(COLUMNS, _record(row), strict=True)) for row in rows]
     return json.dumps(records, ensure_ascii=False, indent=1) + "\n"
 
@@ -38,8 +38,7 @@ def to_text(rows: Iterable[Row]) -> str:
     """Write `rows`, one per line: outcome, id, recomputed result, note."""
     lines = []
     for row in rows:
-        found = (row.finding.recomputed, row.finding.note) if row.finding else ()
-        cells = (row.statement.id, *filter(None, map(one_line, found)))
+        cells = (row.statement.id, *filter(None, map(one_line, (row.finding.recomputed, row.finding.note))))
         lines.append(f"{outcome_name(row.outcome):<12}  {'  '.join(cells)}\n")
     return "".join(lines)
 
@@ -49,11 +48,9 @@ def to_markdown(rows: Iterable[Row]) -> str:
     return table(rows).markdown() + "\n"
 
 
-def _record(row: Row) -> tuple[str, str, str, str, str, bool | None, str | None, str]:
+def _record(row: Row) -> tuple[str, str, str, str, str, bool | None, str, str]:
     entry, finding = row.statement, row.finding
     head = (entry.id, entry.document, entry.kind, entry.printed)
-    if finding is None:
-        return (*head, "", None, None, "")
     return (*head, finding.recomputed, finding.agrees, finding.verdict.value, finding.note)
 
 
@@ -65,8 +62,8 @@ def table(rows: Iterable[Row]) -> Table:
             _place(row.statement),
             outcome_name(row.outcome),
             row.statement.printed,
-            row.finding.recomputed if row.finding else "",
-            row.finding.note if row.finding else "",
+            row.finding.recomputed,
+            row.finding.note,
         )
         for row in rows
     )
@@ -74,12 +71,12 @@ def table(rows: Iterable[Row]) -> Table:
 
 
 def describe(counted: dict[str, int]) -> str:
-    """Write `counted` in words, as in ``3 verified, 1 no check``."""
+    """Write `counted` in words, as in ``3 verified, 1 wrong``."""
     return ", ".join(f"{number} {OUTCOMES.get(outcome, outcome)}" for outcome, number in counted.items())
 
 
 def outcome_name(outcome: str) -> str:
-    """Write an outcome in words: a verdict, ``no check`` or ``check failed``."""
+    """Write an outcome in words."""
     return OUTCOMES.get(outcome, outcome)
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 from gpbnb.report.ledger.checking import Row
+from gpbnb.report.ledger.statements import rows_of
 
 
 @dataclass(frozen=True)
@@ -30,14 +29,13 @@ class Root:
 @cache
 def load_roots() -> dict[str, Root]:
     """Read ``roots.csv``: root id → root, in the order of the file."""
-    text = (files(__package__) / "roots.csv").read_text(encoding="utf-8")
-    return {row["id"]: Root(row["id"], row["title"], row["explanation"]) for row in csv.DictReader(text.splitlines())}
+    return {row["id"]: Root(**row) for row in rows_of("roots.csv")}
 
 
 def by_root(rows: Iterable[Row]) -> dict[str, tuple[Row, ...]]:
     """Group the rows that disagree by their root error; root id → rows, in the order of ``roots.csv``."""
     found: dict[str, list[Row]] = {root: [] for root in load_roots()}
     for row in rows:
-        if row.finding is not None and row.finding.root:
+        if row.finding.root:
             found[row.finding.root].append(row)
     return {root: tuple(inside) for root, inside in found.items() if inside}

@@ -92,11 +92,15 @@ class Statement:
 _PLACE = re.compile(r"\{\{(\d+)\}\}")
 
 
+def rows_of(name: str) -> csv.DictReader[str]:
+    """Read a table of the ledger, such as ``statements.csv``."""
+    return csv.DictReader((files(__package__) / name).read_text(encoding="utf-8").splitlines(), strict=True)
+
+
 @cache
 def load_statements() -> tuple[Statement, ...]:
     """Read all statements, in the order of the file."""
-    text = (files(__package__) / "statements.csv").read_text(encoding="utf-8")
-    return tuple(Statement(**row) for row in csv.DictReader(text.splitlines(), strict=True))
+    return tuple(Statement(**row) for row in rows_of("statements.csv"))
 
 
 @cache

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gpbnb.report.ledger.checking import Row, examine
 from gpbnb.report.ledger.finding import Finding, Verdict
-from gpbnb.report.ledger.statements import load_statements, select
+from gpbnb.report.ledger.statements import load_statements, rows_of, select
 
 FILE = Path(__file__).with_name("findings.csv")
 COLUMNS = ("id", "recomputed", "agrees", "verdict", "note", "root")
@@ -23,13 +23,10 @@ _AGREES = {"true": True, "false": False, "": None}
 @cache
 def load_findings() -> dict[str, Finding]:
     """Read ``findings.csv``: statement id → finding."""
-    with FILE.open(encoding="utf-8", newline="") as file:
-        return {
-            line["id"]: Finding(
-                line["recomputed"], _AGREES[line["agrees"]], Verdict(line["verdict"]), line["note"], line["root"]
-            )
-            for line in csv.DictReader(file)
-        }
+    return {
+        row["id"]: Finding(row["recomputed"], _AGREES[row["agrees"]], Verdict(row["verdict"]), row["note"], row["root"])
+        for row in rows_of("findings.csv")
+    }
 
 
 def rows(
@@ -43,24 +40,21 @@ def rows(
 
     Returns
     -------
-    rows : one row for each statement, in the order of the inventory; the finding is None if none is stored.
+    rows : one row for each statement, in the order of the inventory.
     """
     found = load_findings()
-    return tuple(Row(each, found.get(each.id)) for each in select(load_statements(), document, chapter, sections))
+    return tuple(Row(each, found[each.id]) for each in select(load_statements(), document, chapter, sections))
 
 
 def to_table(rows: Iterable[Row]) -> str:
     """Write rows as ``findings.csv`` stores them."""
-    rows = tuple(rows)
-    if errors := [row.error for row in rows if row.error is not None]:
-        raise ExceptionGroup("checks failed", errors)
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)
     for row in rows:
-        if (found := row.finding) is not None:
-            agrees = next(text for text, value in _AGREES.items() if value is found.agrees)
-            writer.writerow((row.statement.id, found.recomputed, agrees, found.verdict.value, found.note, found.root))
+        found = row.finding
+        agrees = next(text for text, value in _AGREES.items() if value is found.agrees)
+        writer.writerow((row.statement.id, found.recomputed, agrees, found.verdict.value, found.note, found.root))
     return out.getvalue()
 
 
