@@ -2,18 +2,6 @@
 
 from concurrent.futures import Executor, Future
 
-from distributed import LocalCluster
-
-
-def local_cluster(processes):
-    """One worker of dask on this machine; a scheduler without a dashboard still takes a port, here any that is free."""
-    return LocalCluster(
-        n_workers=1,
-        threads_per_worker=1,
-        processes=processes,
-        scheduler_kwargs={"dashboard": False, "dashboard_address": ":0"},
-    )
-
 
 class Failing(Executor):
     """Fails with given exceptions first, then works."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import re
-from enum import Enum
 from pathlib import Path
 from types import SimpleNamespace
-from xml.etree import ElementTree
 
 import pytest
 from docutils import nodes
@@ -90,19 +88,6 @@ def test_the_reference_documents_every_public_name():
     assert documented == {*HOMES, "NAMED_FORMATS"} - set(NAMED_FORMATS)
 
 
-def test_only_an_enum_hides_its_arguments():
-    colour = Enum("colour", ["RED"])
-    assert book.hide_enum_arguments(None, "class", "colour", colour, None, "(value)", None) == ("", None)
-    assert book.hide_enum_arguments(None, "class", "int", int, None, "(x)", None) is None
-    assert book.hide_enum_arguments(None, "function", "f", len, None, "(x)", None) is None
-
-
-def test_an_entry_is_labelled_with_its_key():
-    entries = [SimpleNamespace(key=key) for key in ("hung1984", "Higham2002")]
-    assert list(book.KeyLabels().format_labels(entries)) == ["hung1984", "Higham2002"]
-    assert book.ShortNames.default_label_style is book.KeyLabels
-
-
 def test_figures_have_one_numbering_through_the_book():
     env = SimpleNamespace(
         toctree_includes={"index": ["first", "last"], "first": ["below"]},
@@ -132,15 +117,6 @@ def app(folder, builder="html"):
     )
 
 
-def test_the_first_page_leads_to_the_root(tmp_path):
-    (tmp_path / "book").mkdir()
-    book.write_redirects(app(tmp_path), None)
-    text = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert 'http-equiv="refresh" content="0; url=book/index.html"' in text
-    assert '<a href="book/index.html">' in text
-    assert text.count("The title") == 2
-
-
 def test_a_page_that_moved_leads_to_its_place(tmp_path):
     (tmp_path / "book").mkdir()
     book.write_redirects(app(tmp_path), None)
@@ -153,12 +129,6 @@ def test_no_page_that_moved_is_still_there():
     there = {path.stem for path in FOLDER.parent.glob("*.*")}
     assert there.isdisjoint(book.MOVED)
     assert {target.partition(".")[0] for target in book.MOVED.values()} <= there
-
-
-def test_a_failed_build_is_left_alone(tmp_path):
-    book.write_redirects(app(tmp_path), ValueError("failed"))
-    weight.lighten(app(tmp_path), ValueError("failed"))
-    assert list(tmp_path.iterdir()) == []
 
 
 # -- search, and what is shipped ------------------------------------------------------------------------
@@ -175,16 +145,6 @@ def test_a_failed_build_is_left_alone(tmp_path):
 )
 def test_a_number_is_one_word_of_the_search(text, words):
     assert search.Numbers({}).split(text) == words
-
-
-def test_mathjax_comes_along_whole_and_no_more(tmp_path):
-    weight.copy_mathjax(tmp_path)
-    target = tmp_path / "_static" / "mathjax"
-    for part in weight.MATHJAX_PARTS:
-        assert (target / part).is_file() == part.endswith(".js"), part
-        assert (target / part).exists(), part
-    assert any((target / "output/chtml/fonts").rglob("*.woff*"))
-    assert not (target / "tex-svg.js").exists()
 
 
 def test_mathjax_loads_the_parts_that_come_along():
@@ -230,11 +190,6 @@ def test_rules_stay_that_fit_a_class_of_a_page_or_no_class():
     assert weight.applying(STYLES, {"used"}) == "".join(kept)
 
 
-def test_braces_that_do_not_match_are_refused():
-    with pytest.raises(ValueError, match="balanced"):
-        weight.applying("a { b: c", set())
-
-
 # -- the ledger's rows as labels, its formulas and links -----------------------------------------------
 
 
@@ -254,12 +209,6 @@ def test_each_entry_has_a_label():
         assert env.standard.labels[each.id.lower()][:2] == place
     assert env.standard.labels["hung1984.ii.eq20"][2] == "hung1984, II, eq (20)"
     assert env.standard.labels["savage2016.main.eq8"][2] == "savage2016, eq (8)"
-
-
-def test_without_its_page_the_ledger_has_no_labels():
-    env = environment("book/index")
-    ledger.add_labels(None, env)
-    assert env.standard.labels == env.standard.anonlabels == {}
 
 
 def tree(html):
@@ -304,32 +253,6 @@ def test_links_lead_within_where_all_pages_are_one(tmp_path):
     assert raw.astext() == raw.rawsource == mended
 
 
-def test_links_stay_where_pages_are_many(tmp_path):
-    document = tree(LINKS)
-    book.mend_links(app(tmp_path), document, "book/errata")
-    raw = html_of(document)
-    assert raw.astext() == LINKS
-
-
-@pytest.mark.parametrize(
-    ("typed", "written"),
-    [
-        ("2.6490e+08", "2.6490\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10^8"),
-        ("-1e-08", "-1\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10^−8"),
-        ("1e", "1e"),
-    ],
-)
-def test_powers_of_ten_are_written_as_such(typed, written):
-    document = new_document("page")
-    document += nodes.paragraph("", "", nodes.inline("", typed, classes=["pasted-text"]), nodes.Text(" 1e-08"))
-    book.write_powers(None, document, "book/page")
-    shown = "".join(
-        f"^{part.astext()}" if isinstance(part.parent, nodes.superscript) else part.astext()
-        for part in document.findall(nodes.Text)
-    )
-    assert shown == f"{written} 1e-08"
-
-
 def test_powers_of_ten_in_tables_too_but_not_in_code_and_formulas():
     document = new_document("page")
     document += [table(("a", "b"), ("1e-05 to 2e3, x2e3", "")), nodes.paragraph("", "1e-05")]
@@ -369,28 +292,6 @@ def test_the_description_is_made_of_whole_sentences_without_formulas():
     question = "Which of the nine misalignments change the drift in a year?"
     assert metadata.description(page_with(r"With \beta it fails.", "Too short.", f"{question} These do:")) == question
     assert metadata.description(new_document("empty")) == ""
-
-
-def test_a_work_that_a_description_names_keeps_its_year():
-    text = "This page lists every statement of Hung [1984] with its verdict"
-    assert metadata.description(page_with(f"{text} [Savage, 2016].")) == f"{text.replace('[1984]', '(1984)')}."
-
-
-@pytest.mark.parametrize("opening", ["The question.", "Question."])
-def test_a_chapter_is_described_by_its_question(opening):
-    """Its first paragraph may begin an argument that only the page explains."""
-    document = page_with("The figure shows one run in detail, with all of its errors.")
-    box = nodes.admonition()
-    box += nodes.paragraph("", f"{opening} How far can rounding move the estimate of a filter in a year?")
-    document[0] += box
-    assert metadata.description(document) == "How far can rounding move the estimate of a filter in a year?"
-
-
-def test_addresses_are_full_if_the_address_of_the_book_is_known():
-    app = SimpleNamespace(config=SimpleNamespace(html_baseurl=""))
-    assert metadata.address(app, "book/index.html") == "book/index.html"
-    app.config.html_baseurl = "https://example.org/gpbnb/"
-    assert metadata.address(app, "book/index.html") == "https://example.org/gpbnb/book/index.html"
 
 
 @pytest.fixture
@@ -443,15 +344,3 @@ def test_an_address_that_is_none_is_refused(monkeypatch, given):
     monkeypatch.setenv("BOOK_ADDRESS", given)
     with pytest.raises(ConfigError, match="needed one such as https://"):
         metadata.read_address(None, SimpleNamespace(html_baseurl=""))
-
-
-def test_the_sitemap_lists_every_page(tmp_path):
-    builder = SimpleNamespace(format="html", get_target_uri=lambda page: f"{page}.html")
-    app = SimpleNamespace(config=SimpleNamespace(html_baseurl="https://example.org"), builder=builder, outdir=tmp_path)
-    app.env = SimpleNamespace(found_docs={"book/b&c", "book/a"})
-    metadata.write_sitemap(app, None)
-    tree = ElementTree.parse(tmp_path / "sitemap.xml")
-    assert [loc.text for loc in tree.iter("{http://www.sitemaps.org/schemas/sitemap/0.9}loc")] == [
-        "https://example.org/book/a.html",
-        "https://example.org/book/b&c.html",
-    ]

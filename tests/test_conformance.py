@@ -14,15 +14,11 @@ from tests.corpus.oracle import rounds
 ROWS = [*conformance.rows()]
 SEED = 2026
 SOME = (
-    "extended 0",
-    "extended 2",
-    "extended 7",
-    "unscented 5",
-    "functions 12",
-    "functions 13",
-    "matrices 24",
-    "sums 2",
-)
+    "kalman 2", "kalman 13", "kalman 24", "fixed kalman 3", "named kalman 10", "long kalman 7",
+    "sums 2", "compensated 2", "records 7", "blocks 8", "extended 0", "extended 2", "extended 7", "unscented 5",
+    "smoother 8", "smoother 11", "systems 5", "words 9", "words 20", "functions 12", "functions 13",
+    "elementary 3", "matrices 24",
+)  # fmt: skip
 
 
 def kinds() -> dict[tuple[str, str], list[conformance.Row]]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import subprocess
-import sys
 from fractions import Fraction
 
 import numpy as np
@@ -102,28 +100,6 @@ def test_spin_axis_in_the_absolute_frame_has_the_signs_of_7():
         assert np.allclose(m.rotation(phi)[1:, 0], stands, atol=h**2)
 
 
-@settings(SEEDED)
-@given(*[arrays(np.float64, 3, elements=st.floats(-0.3, 0.3))] * 2)
-def test_theta_leads_from_gyro_over_the_absolute_to_the_intermediate_frame(phi, alpha):
-    theta = m.theta_of(phi, alpha)
-    assert np.allclose(m.rotation(theta), m.rotation(alpha) @ m.rotation(phi), atol=20 * EPS, rtol=0)
-
-
-def test_theta_is_phi_plus_alpha_to_first_order():
-    phi, alpha = np.array([1e-5, 2e-5, -3e-5]), np.array([2e-5, -1e-5, 1e-5])
-    off = np.abs(m.theta_of(phi, alpha) - phi - alpha).max()
-    assert 1e-11 < off < 2 * 3e-5 * 2e-5  # two products of a drift and a pointing angle
-
-
-def test_many_phases_at_once():
-    phase = np.linspace(0, 9, 7)
-    alpha, beta, gamma = np.full(3, 0.1), np.full(3, 0.2), np.full((7, 3), 0.3)
-    spin = m.spin_in_readout(alpha, beta, gamma, phase)
-    assert spin.shape == (7, 3)
-    one = m.spin_in_readout(alpha, beta, gamma[4], phase[4])
-    assert np.array_equal(spin[4], one)
-
-
 # -- the measurement matrix -----------------------------------------------------------------------
 
 ANGLES = {"phi": 0, "alpha": 0, "beta": 0, "gamma": 0}
@@ -195,15 +171,6 @@ def test_the_ten_states_of_the_filter():
     ]
 
 
-def test_transverse_misalignments_are_biases():
-    phase = np.linspace(0, 6, 5)
-    for flag in (True, False):
-        H = m.measurement_matrix(phase, ("gamma2", "gamma3", "beta2", "beta3", "bias_y", "bias_z"), derolled=flag)
-        g2, g3, b2, b3, y, z = np.moveaxis(H, -1, 0)
-        for transverse, bias in ((g2, z), (b2, z), (-g3, y), (-b3, y)):
-            assert np.array_equal(transverse, bias)
-
-
 def test_pointing_and_telescope_misalignment_cancel_in_the_difference():
     H = m.measurement_matrix(np.linspace(0, 6, 5), ("alpha2", "alpha3", "beta2", "beta3"), signal="difference")
     assert np.all(H == 0)
@@ -221,35 +188,3 @@ def test_rows_of_fractions_are_exact_and_those_of_floats_the_matrix(signal, dero
     near = {"nominal_theta": np.array(theta, float), "nominal_alpha": np.array(alpha, float)}
     floats = m.measurement_matrix(math.atan2(S, C), m.STATES, **near, **options)
     assert np.allclose(exact.astype(float), floats, atol=10 * EPS, rtol=0)
-
-
-def test_rows_of_one_ring_and_the_telescope_along_its_normal():
-    """What (1) and (2) give along z in the rolling frame, with the signal of the scale factor; all exact."""
-    C, S = np.array([[Fraction(3, 5), Fraction(4, 5)], [Fraction(8, 17), Fraction(-15, 17)]], dtype=object).T
-    known = np.array([[0, Fraction(5), Fraction(2)], [0, Fraction(-1), Fraction(3)]], dtype=object)
-    states = ("phi2", "phi3", "phi2_rate", "phi3_rate", "alpha2", "alpha3", "beta2", "gamma2", "bias_z", "scale")
-    gyro = m.measurement_rows(C, S, states, derolled=False, nominal_theta=known)[:, 1]
-    star = m.measurement_rows(C, S, states, derolled=False, signal="telescope")[:, 1]
-    for k, (c, s) in enumerate(zip(C, S, strict=True)):
-        assert gyro[k].tolist() == [c, s, 0, 0, c, s, 1, 1, 1, c * known[k, 1] + s * known[k, 2]]
-        assert star[k].tolist() == [0, 0, 0, 0, c, s, 1, 0, 0, 0]
-
-
-def test_nominal_angles_may_change_with_the_phase():
-    phase, theta = np.linspace(0, 6, 4), np.arange(12.0).reshape(4, 3)
-    H = m.measurement_matrix(phase, ("scale",), nominal_theta=theta)
-    assert np.array_equal(H[..., 0], np.stack([-theta[:, 2], theta[:, 1]], axis=-1))
-
-
-def test_units():
-    assert pytest.approx(math.pi / 180) == 3600 * m.ARCSEC
-    assert pytest.approx(m.ARCSEC) == 1000 * m.MAS
-
-
-# -- bad input ------------------------------------------------------------------------------------
-
-
-def test_importing_is_light():
-    code = "import sys, gpbnb.report.measurement; print(*{'sympy', 'matplotlib', 'scipy', 'numba'} & set(sys.modules))"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout.split() == []

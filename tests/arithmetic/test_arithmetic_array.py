@@ -91,15 +91,6 @@ class TestConversion:
         assert f"{x[0, 0]:.3f}" == "1.500"
         assert f"{x[0, 0]}" == "1.5"
 
-    def test_from_another_format(self) -> None:
-        x = FloatFormat(10, 6).array([["1.23455", "-1e1000000000"]])
-        assert str(D4.array(x)) == "[[         1.235 -1e+1000000000]]"
-        assert D4.array(D4.array(x)) is not x
-        assert str(FloatFormat(10, 3, CHOP).array(x[:, :1])) == "[[1.23]]"
-        assert B8.array(x[0, 0]).to_fractions() == Fraction(158, 128)
-        assert D4.array(B8.array([0.1])).to_fractions().tolist() == [Fraction("0.1001")]
-        assert np.all(D4.array([D4.array([1, 2]), [3, B8.array(4)]]) == D4.array([[1, 2], [3, 4]]))
-
     @pytest.mark.parametrize(
         "values",
         [[1, 2], (1, 2), range(1, 3), np.array([1, 2]), np.array([1.0, 2.0]), np.array(["1", "2"]), ["1", Decimal(2)],
@@ -125,15 +116,6 @@ class TestText:
             "                                                                    [  '1000',   '1e-7']])",
         ]
         assert str(x).splitlines() == ["[[ 3.235 -1.234]", " [  1000   1e-7]]"]
-
-    @pytest.mark.parametrize("fmt", [D4, B8, FloatFormat(3, 5, CHOP), FloatFormat(16, 1, CHOP)])
-    @pytest.mark.parametrize("shape", [(), (1,), (0,), (2, 3), (0, 3), (3, 0), (2, 1, 2), (40,)])
-    def test_repr_makes_the_array_again(self, fmt: FloatFormat, shape: tuple[int, ...]) -> None:
-        x = fmt.array(np.random.default_rng(7).normal(size=shape) * 10.0 ** np.random.default_rng(8).integers(-9, 9))
-        again = eval(repr(x))
-        assert again.format == fmt
-        assert again.shape == shape
-        assert np.all(again == x)
 
     def test_notation(self) -> None:
         values = ["0", "1", "1e15", "1e16", "1.2e16", "1e-4", "1.2e-5", "-0.05", "120"]
@@ -178,19 +160,6 @@ class TestArithmetic:
         for comparison in (operator.eq, operator.ne, operator.lt, operator.le, operator.gt, operator.ge):
             assert np.array_equal(comparison(self.X, other), comparison(self.X, y))
             assert np.array_equal(comparison(other, self.X), comparison(y, self.X))
-
-    def test_broadcasting_against_loops(self) -> None:
-        rng = np.random.default_rng(11)
-        for a_shape, b_shape in [((3,), ()), ((2, 1), (3,)), ((2, 1, 3), (4, 1)), ((1,), (0,)), ((), ())]:
-            x, y = B8.array(rng.normal(size=a_shape)), B8.array(rng.normal(size=b_shape))
-            for operation in OPERATIONS.values():
-                found = operation(x, y)
-                assert found.shape == np.broadcast_shapes(a_shape, b_shape)
-                a = np.broadcast_to(x.to_fractions(), found.shape)
-                b = np.broadcast_to(y.to_fractions(), found.shape)
-                for index in np.ndindex(found.shape):
-                    exact = operation(Fraction(a[index]), Fraction(b[index]))
-                    assert found[index].to_fractions() == oracles.rounded(exact, 2, 8, True)
 
     def test_signs(self) -> None:
         x = D4.array(["1.5", "-2", "0"])
@@ -279,17 +248,6 @@ class TestArithmetic:
         assert D4.array(np.zeros((3, 0))).sum(0).shape == (0,)
         assert D4.array(5).sum() == 5
 
-    def test_python_sum_and_in(self) -> None:
-        assert sum(D4.array([1, 2, 3])) == 6
-        assert "1.5" in self.X
-        assert 7 not in self.X
-
-    def test_iteration(self) -> None:
-        rows = list(self.X)
-        assert [row.shape for row in rows] == [(3,), (3,)]
-        assert np.all(np.stack(rows) == self.X)
-        assert len(self.X) == 2
-
     def test_truth_and_float(self) -> None:
         assert D4.array(1)
         assert not D4.array(0)
@@ -337,18 +295,6 @@ class TestArithmetic:
 
 
 class TestMatmul:
-    @pytest.mark.parametrize("fmt", [D4, B8, FloatFormat(3, 4, CHOP)])
-    def test_against_loops(self, fmt: FloatFormat) -> None:
-        rng = np.random.default_rng(5)
-        arithmetic = oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST)
-        for m, n, p in [(1, 1, 1), (2, 3, 4), (3, 5, 1), (1, 6, 2), (4, 4, 4)]:
-            a, b = fmt.array(rng.normal(size=(m, n))), fmt.array(rng.normal(size=(n, p)))
-            expected = arithmetic.matmul(a.to_fractions().tolist(), b.to_fractions().tolist())
-            assert (a @ b).to_fractions().tolist() == expected
-            assert (a @ b[:, 0]).to_fractions().tolist() == [row[0] for row in expected]
-            assert (a[0] @ b).to_fractions().tolist() == expected[0]
-            assert (a[0] @ b[:, 0]).to_fractions() == expected[0][0]
-
     def test_stacks(self) -> None:
         rng = np.random.default_rng(6)
         for a_shape, b_shape in [

@@ -99,61 +99,6 @@ def test_the_order_of_operations_shows() -> None:
     assert sum(x != y for x, y in zip(forward, backward, strict=True)) >= 3
 
 
-class TestIdentities:
-    @each_pivoting
-    @pytest.mark.parametrize("fmt", [FloatFormat(2, 200), FloatFormat(3, 150, CHOP)], ids=["base2", "base3"])
-    def test_lower_times_upper_without_rounding(self, fmt: FloatFormat, pivot: bool) -> None:
-        # Factors of few digits whose product, and whose elimination, needs no rounding in this format.
-        rng = np.random.default_rng(17)
-        for n in (1, 2, 3, 4, 6):
-            lower = np.tril(rng.integers(-4, 5, size=(n, n)), -1) + np.eye(n, dtype=int)
-            upper = np.triu(rng.integers(1, 9, size=(n, n)))
-            if pivot:  # multipliers exact and no larger than one: powers of the base
-                lower = np.tril(fmt.base ** -rng.integers(1, 4, size=(n, n)).astype(float), -1) + np.eye(n)
-                lower = fmt.array([[Fraction(1, fmt.base ** round(-np.log(v) / np.log(fmt.base))) if v else 0
-                                    for v in row] for row in lower])  # fmt: skip
-            a = fmt.array(lower) @ fmt.array(upper)
-            shuffled = a[rng.permutation(n)] if pivot else a
-            found = linalg.lu(shuffled, pivot)
-            assert np.array_equal(found.lower @ found.upper, shuffled[found.permutation])
-            assert np.array_equal(found.upper, np.triu(found.upper))
-            assert np.array_equal(found.lower, np.tril(found.lower))
-            assert np.all(np.diagonal(found.lower) == 1)
-            if not pivot:
-                assert np.array_equal(found.lower, fmt.array(lower))
-                assert np.array_equal(found.upper, upper)
-
-    def test_backward_error_of_lu(self) -> None:
-        # |LU - A| <= gamma_n |L||U|, gamma_n = n u / (1 - n u): Higham 2002, theorem 9.3.
-        fmt = FloatFormat(10, 5)
-        rng = np.random.default_rng(23)
-        for n in (2, 4, 7):
-            a = fmt.array(rng.normal(size=(n, n)))
-            found = linalg.lu(a, pivot=True)
-            lower, upper = found.lower.to_fractions(), found.upper.to_fractions()
-            error = abs(lower @ upper - a[found.permutation].to_fractions())
-            gamma = n * fmt.unit_roundoff / (1 - n * fmt.unit_roundoff)
-            assert np.all(error <= gamma * (abs(lower) @ abs(upper)))
-            assert np.any(error > 0)
-
-    @pytest.mark.parametrize("order", [[0], [1, 0], [2, 0, 1], [3, 1, 0, 2]])
-    def test_inverse_of_a_permutation_is_its_transpose(self, order: list[int]) -> None:
-        for fmt in FORMATS:
-            p = fmt.array(np.eye(len(order), dtype=int)[order])
-            assert np.array_equal(linalg.inv(p, pivot=True), p.T)
-            assert linalg.lu(p, pivot=True).permutation.tolist() == np.argsort(order).tolist()
-
-    def test_inverse_of_a_diagonal(self) -> None:
-        d = FORMATS[-1].array(np.diag([2, -4, 5]))
-        assert np.array_equal(linalg.inv(d), np.diag(1 / np.diag(d)))
-
-    def test_inverse_solves_for_each_column(self) -> None:
-        fmt = FloatFormat(10, 4)
-        a = fmt.array([["3.235", "-1.234", "3.256"], ["1.023", "-5.235", "0.921"], ["1.336", "2.120", "-8.235"]])
-        columns = [linalg.solve(a, fmt.array([int(i == j) for i in range(3)])) for j in range(3)]
-        assert np.array_equal(linalg.inv(a), np.stack(columns, axis=1))
-
-
 class TestPivoting:
     FMT = FloatFormat(10, 4)
 
@@ -236,16 +181,6 @@ def test_operands_do_not_change() -> None:
     found = linalg.lu(a, pivot=True)
     found.permutation[:] = 0
     assert (repr(a), repr(b)) == before
-
-
-def test_sums_kept_in_wider_fixed_point_are_rounded_once() -> None:
-    """As in the accumulator of a signal processor, whose digits hold products and their sums exactly."""
-    fmt, wide = FixedFormat(3, 12), FixedFormat(7, 24)
-    rng = np.random.default_rng(12)
-    a, b = (fmt.array(rng.uniform(-0.7, 0.7, shape)) for shape in ((4, 30), (30, 3)))
-    expected = np.vectorize(fmt.round, otypes=[object])(a.to_fractions() @ b.to_fractions())
-    assert np.array_equal(linalg.matmul(a, b, sums=wide).to_fractions(), expected)
-    assert not np.array_equal(linalg.matmul(a, b).to_fractions(), expected)
 
 
 @pytest.mark.parametrize("fmt", [FloatFormat(10, 2), FloatFormat(2, 4, "even")], ids=str)

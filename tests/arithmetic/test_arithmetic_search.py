@@ -8,7 +8,6 @@ from fractions import Fraction
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import Outcome, Search, smallest_precision
 
 
@@ -71,19 +70,6 @@ def test_above_an_answer_that_is_refuted_every_precision_is_tried(missed, answer
     assert found.fmt == (None if answer is None else FloatFormat(10, answer))
     assert found.irregular == tuple(irregular)
     assert not found.undecided
-
-
-def test_the_neighbours_of_the_answer_are_tried():
-    calls: list[int] = []
-    assert smallest_precision(among(range(11, 99), calls), largest=53).precision == 11
-    assert {10, 11, 12} <= set(calls)
-
-
-def test_the_format_is_passed_on_and_returned():
-    seen = []
-    found = smallest_precision(lambda fmt: seen.append(fmt) or True, 10, Rounding.CHOP, largest=4)
-    assert found == FloatFormat(10, 1, Rounding.CHOP)
-    assert {(f.base, f.rounding) for f in seen} == {(10, Rounding.CHOP)}
 
 
 @pytest.mark.parametrize("base", [2, 3, 10, 16])

@@ -9,9 +9,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, Rounding, required_precision
+from gpbnb import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.bounds import adversary
 from gpbnb.bounds.adversary import attack, ceiling, random_errors
 from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
@@ -26,7 +25,6 @@ from gpbnb.filters.opening import as_packed
 from gpbnb.filters.program import innovation_program, loop_program, sequential_program
 from gpbnb.filters.run import Run
 from gpbnb.filters.system import biquad, controller, state_space
-from gpbnb.report.guarantees import derivation
 from gpbnb.report.guarantees.published import fixif_longitudinal, nile_local_level
 from gpbnb.report.kalman.exact_step import exact_step
 from tests.plain_program import steps_in_python
@@ -78,21 +76,6 @@ def test_the_program_gives_the_digits_of_the_filter(form: Form, fmt: FloatFormat
     program = given.program
     advance(run.tag, program.operations, program.outputs, given.packed, given.first, as_packed(fmt, z), x, X)
     assert np.array_equal(run.exactly(X), run.checkpoints().x)
-
-
-def test_the_compiled_program_is_the_obvious_one() -> None:
-    fmt, rng = FloatFormat(10, 5), np.random.default_rng(2)
-    filter_ = state_space(exact(rng.uniform(-0.5, 0.5, (3, 3))), exact(rng.uniform(-1, 1, (3, 2))))
-    given, z = filter_schedule(filter_, fmt), fmt.array(rng.uniform(-9, 9, (20, 2)))
-    stored = [fmt.round(c) for c in filter_.coefficients]
-    x = [Fraction(0)] * 3
-    packed = as_packed(fmt, x)
-    X = np.zeros((20, *packed.shape), packed.dtype)
-    program = given.program
-    advance(fmt.backend.tag, program.operations, program.outputs, given.packed, 0, as_packed(fmt, z), packed, X)
-    for k in range(20):
-        x = steps_in_python(program, fmt.round, stored, x, list(z.to_fractions()[k]))
-        assert [Fraction(int(m)) * Fraction(10) ** int(e) for m, e in X[k]] == x
 
 
 @pytest.mark.parametrize(
@@ -308,20 +291,6 @@ def test_limits_that_are_none_are_refused(given: dict[str, float]) -> None:
         limits(**given)
 
 
-def test_the_smallest_precision_by_guarantee_and_by_probable_error() -> None:
-    """Each answer holds, one bit fewer does not, and a worst case asks for more than noise."""
-    within, answers = limits(state=[1000, 30], innovation=8), {}
-    for basis in ("guarantee", "probable"):
-        found = required_precision(tracker(), 1, 0.01, basis=basis, within=within)
-        tried = dict(found.tried)
-        answers[basis] = found.digits
-        assert tried[found.digits] <= 1 < tried[found.digits - 1]
-    assert answers["probable"] < answers["guarantee"]
-    # Four bits more divide both by sixteen: the error of the gain and the binades change little.
-    finer = guarantee(tracker(), FloatFormat(2, answers["guarantee"] + 4), within)
-    assert 0.01 / 64 < finer.bound.max() < 0.01 / 8
-
-
 def test_the_probable_error_is_that_of_independent_roundings() -> None:
     """Against a simulation of the same noise: to four standard errors, with noise correlated over 20 steps."""
     found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1000, 30], innovation=8))
@@ -334,19 +303,6 @@ def test_the_probable_error_is_that_of_independent_roundings() -> None:
     assert np.allclose(np.sqrt(total), probable_error(found), rtol=4 * np.sqrt(2 * 20 / (200 * steps)))
 
 
-def test_the_probable_error_of_a_periodic_model_is_the_largest_of_its_steps() -> None:
-    found = guarantee(rolling(), FloatFormat(2, 24), limits(state=100, innovation=10))
-    F, effects, errors = separate_roundings(found)
-    G = effects * errors[:, None, :] / math.sqrt(3)
-    covariance, steps = np.zeros((2, 2)), []
-    for k in range(40 * len(F)):
-        covariance = F[k % len(F)] @ covariance @ F[k % len(F)].T + G[k % len(F)] @ G[k % len(F)].T
-        steps.append(np.diagonal(covariance))
-    scatter = np.sqrt(steps[-len(F) :])
-    assert (np.ptp(scatter, axis=0) > 0.01 * scatter.max()).any()
-    assert np.allclose(probable_error(found), scatter.max(axis=0), rtol=1e-9, atol=0)
-
-
 def test_the_probable_error_is_the_scatter_of_an_emulated_run() -> None:
     """Near the limits, where roundings are as large as assumed; measured: 0.99 and 1.04 of it.
 
@@ -356,12 +312,6 @@ def test_the_probable_error_is_the_scatter_of_an_emulated_run() -> None:
     scatter = random_errors(found, 20_000, [750, 0])[10_000:].std(axis=0)
     assert (0.9 * probable_error(found) < scatter).all()
     assert (scatter < 1.1 * probable_error(found)).all()
-
-
-@pytest.mark.parametrize("name", ["recursion", "telescope", "induction", "ellipsoid"])
-def test_the_algebra(name: str) -> None:
-    for step in getattr(derivation, name)().steps:
-        assert step.holds, step.name
 
 
 def test_the_ceiling_of_a_run_lies_between_its_error_and_the_guarantee():
@@ -389,41 +339,6 @@ def test_the_ceiling_adds_up_roundings_by_the_size_of_their_results():
         total = 0.5625 * total + sum(half[math.frexp(each)[1]] for each in sizes)
         x = sum(products)
     assert ceiling(found, z, 0) == pytest.approx(total, rel=1e-12)
-
-
-def test_the_ceiling_includes_the_errors_of_gain_and_closed_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without roundings, it is the distance of the filter with stored coefficients from the exact one."""
-    model = LinearModel([[1]], [[1]], [["0.3"]], [[1]], [0], [[1]])
-    found = guarantee(model, FloatFormat(2, 7), limits(state=100, innovation=10), form=Form.HUNG)
-    monkeypatch.setattr(adversary, "largest_errors", lambda _, sizes: 0 * sizes)
-    given, z = found.schedule, np.array([[5.0], [-3.0], [7.0], [9.0]])
-    parts = linear_steps(given, np.arange(given.steps))
-    assert parts.loop[:4].any()
-    assert parts.gain[:4].any()
-    x = stored = 0.0
-    for k, value in enumerate(z[:, 0]):
-        at = k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
-        K = given.exact[at, 0, 0, 0]
-        wrong = K + parts.gain[at, 0, 0]
-        stored = (1 - wrong + parts.loop[at, 0, 0]) * stored + wrong * value
-        x = (1 - K) * x + K * value
-    # The ceiling is of first order in the coefficient errors, which are at most 2**-7.
-    assert ceiling(found, z, 0) == pytest.approx(abs(stored - x), rel=2**-7)
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        ([[1, 0]], [[1]]),
-        ([[1, 0]], [[1]], [[1]], [[0]]),
-        ([[1]], [[1]], [[1, 2]], [[0]]),
-        ([[1]], [[1]], [[1]], [[0, 0]]),
-        ([[1]], [[1]], [[1]], [[0], [0]]),
-    ],
-)
-def test_a_state_space_filter_with_shapes_that_do_not_fit_is_refused(given) -> None:
-    with pytest.raises(ValueError, match=r"got A of shape .* needed \(n, n\) and \(n, m\), C \(p, n\), D \(p, m\)"):
-        state_space(*given)
 
 
 def test_outputs_and_delays_have_a_guarantee():

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, required_precision
-from gpbnb.bounds.adversary import attack
 from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_guess, from_schedule, guarantee, limits
 from gpbnb.bounds.guess import FilterLimits
@@ -21,7 +20,6 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.filters.system import state_space
 from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
-from gpbnb.report.guarantees.random_filters import draw
 
 FORMAT = FloatFormat(2, 11)
 Asked = Callable[[LinearModel, Any, FloatFormat], Any]
@@ -133,13 +131,6 @@ def test_limits_that_were_not_checked_are(asked: Asked) -> None:
         asked(two_states(), (np.ones(2), np.ones(1), np.ones(1)), FORMAT)
 
 
-def test_limits_of_a_system_have_one_entry_for_each_input() -> None:
-    system = LinearSystem([["0.5"]], [["0.5", "0.25"]])
-    with pytest.raises(ValueError, match="needed one, or 2: this filter has 1 state and 2"):
-        required_precision(system, 10, 0.1, basis="guarantee", within=limits(measurement=[3, 3, 3]))
-    assert required_precision(system, 10, 0.1, basis="guarantee", within=limits(measurement=3)).format
-
-
 @pytest.mark.parametrize("basis", ["bound", "guarantee"])
 @pytest.mark.parametrize("A", [[["0.5", "0"], ["0.1", "1"]], [["0.96", "0.28"], ["-0.28", "0.96"]]])
 def test_errors_that_never_decay_have_a_bound_for_the_steps_asked_for(A: Any, basis: Any) -> None:
@@ -185,13 +176,6 @@ def test_a_filter_that_measures_nothing(rounding: Rounding, x0: list[Any]) -> No
                 assert (found.bound < 1e-9).all() == (x0 == [0, 0])  # the checker rounds outwards
 
 
-def test_a_filter_that_measures_nothing_is_attacked_in_vain() -> None:
-    found = guarantee(scalar(H=[[0]]), FORMAT, limits(measurement=10))
-    outcome = attack(found, 20, 5)
-    assert outcome.admissible
-    assert (outcome.errors.tolist(), outcome.ratio) == ([0.0], 0.0)
-
-
 def test_limits_of_zero_allow_no_error() -> None:
     assert (guarantee(two_states(), FORMAT, limits(measurement=0)).bound < 1e-9).all()
 
@@ -224,20 +208,6 @@ def test_a_model_of_some_steps_has_a_bound_for_these() -> None:
     errors = np.abs((run.states(z) - reference_states(falling.rounded(FORMAT), z.to_fractions())).sum(axis=2))
     assert (errors <= found.bound).all()
     assert errors.max() > 0.02 * found.bound.max()
-
-
-def test_blocks_end_with_the_model() -> None:
-    with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
-        next(bounds_in_blocks(scalar(steps=5), FORMAT, [limits(state=10, innovation=20)], [[1]], 6))
-    done = [
-        count for count, _ in bounds_in_blocks(scalar(steps=5), FORMAT, [limits(state=10, innovation=20)], [[1]], 5)
-    ]
-    assert done == [1, 2, 3, 4, 5]
-
-
-def test_outputs_that_depend_on_nothing() -> None:
-    schedule_of = filter_schedule(state_space([["1/2"]], [[0]], [[0]], [[0]]), FORMAT)
-    assert (from_schedule(schedule_of, limits(measurement=1)).bound < 1e-9).all()
 
 
 # -- inputs of a linear system as a format stores them ----------------------------------------------------------------
@@ -339,10 +309,3 @@ def test_a_filter_too_slow_for_a_proof_is_refused_before_it_is_tried() -> None:
     assert "needed at most 7 steps; take more process noise" in slow.why
     unsettled = from_guess(replace(given, settled=False), within, 50, 1e3)
     assert f"each of {given.steps} steps; needed at most 7" in unsettled.why
-
-
-def test_an_inverse_beyond_the_range_is_named() -> None:
-    """In base 10, the compiled loops also stop at a subnormal number."""
-    given = draw(166)
-    with pytest.raises(OverflowError, match="in the inverse of R; needed numbers within the range of 5 decimal digits"):
-        guarantee(given.model, given.fmt, given.within, given.form)

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_terms import same
 from flint import ctx
 from plain_structures import floating
 from scipy import signal
@@ -68,11 +67,11 @@ def test_the_rest_of_a_geometric_sum_is_exact() -> None:
         rest = sums.rest()
         assert rest is not None
         for (found,), exactly in zip(rest, (left, 2 * left), strict=True):
-            same(float(found.mid()), exactly, 1e-15)
+            assert float(found.mid()) == pytest.approx(float(exactly), rel=1e-15, abs=0)
         sums.add(sums.length)  # the next block begins where the first has ended
         assert sums.count == 2 * sums.length
-        same(float(sums._sums[0][0]), 3 * (1 - r**sums.count) / (1 - r), 1e-15)
-        same(float(sums._sums[1][0]), 5 + 6 * (1 - r**sums.count) / (1 - r), 1e-15)
+        expected = [3 * (1 - r**sums.count) / (1 - r), 5 + 6 * (1 - r**sums.count) / (1 - r)]
+        assert [float(each[0]) for each in sums._sums] == pytest.approx(list(map(float, expected)), rel=1e-15, abs=0)
     finally:
         ctx.prec = before
 

@@ -11,18 +11,16 @@ import pytest
 from gpbnb import required_precision
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
+from gpbnb.arithmetic.named import BINARY16
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.adversary import attack
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.bounds.guess import ROUNDING
 from gpbnb.bounds.units import units
-from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.filters.system import LinearSystem
-from gpbnb.wordlength.records import survey_records
 from tests.surveying import survey
 
 HALF = {"range": (-14, 15), "rounding": "even"}
@@ -79,36 +77,6 @@ def test_a_run_names_what_overflows(form, given, reason):
     assert run.reason == f"overflow in {reason}"
 
 
-def test_the_ud_form_needs_range_for_products_of_variances():
-    """The variance of the innovation, 6.1, fits below 8, but not its product with that of a state, as UD forms it."""
-    model = LinearModel([[1, "0.5"], [0, 1]], [[1, 0]], [["0.1", 0], [0, "0.1"]], [[1]], [0, 0], [[4, 0], [0, 4]])
-    z = np.ones((20, 1))
-    found = emulate(model, z, FixedFormat(3, 12), "UD")
-    assert found.stopped == 1
-    assert "; the UD form multiplies variances by each other, so scale the states or use more integer " in found.reason
-    assert emulate(model, z, FixedFormat(3, 12), "innovation").stopped is None
-    assert emulate(model, z, FixedFormat(5, 10), "UD").stopped is None
-
-
-def test_more_range_gives_an_answer():
-    assert required_precision(uncertain("1e5"), 20, 0.01, rounding="even", range=(-126, 127)).digits < 53
-
-
-def test_many_records_in_named_formats():
-    found = survey_records(uncertain("4e4", 2), 2, 0.01, [BINARY16, BFLOAT16, BINARY32], steps=20)
-    assert np.isinf(found.ratios[:, 0]).all()
-    assert {reasons[0] for reasons in found.reasons} == {
-        "the run is refused: overflow in the innovation covariance at step 1"
-    }
-    assert [reasons[2] for reasons in found.reasons] == ["", ""]
-    assert found.enough() == (BINARY32,)
-
-
-def test_a_history_says_why_it_ended():
-    found = emulate(uncertain("4e4", 2), np.ones((5, 1)), BINARY16)
-    assert (found.stopped, found.reason) == (1, "overflow in the innovation covariance at step 1")
-
-
 def test_a_linear_system_and_a_function_have_ranges():
     smoother, ten = LinearSystem([["0.9"]], [["0.1"]]), np.full((50, 1), 10.0)
     assert required_precision(smoother, ten, 0.01, **HALF).digits < 20
@@ -125,21 +93,7 @@ def test_a_linear_system_and_a_function_have_ranges():
     assert "the function stops: multiplication at [0]" in found.why
 
 
-@pytest.mark.parametrize("given", [{"range": (5, 1)}, {"range": (None, 1)}])
-def test_half_a_range_is_refused(given):
-    with pytest.raises(ValueError, match="needed"):
-        required_precision(WALK, 5, 0.1, **given)
-
-
 # -- guarantees -------------------------------------------------------------------------------------------
-
-
-def test_a_guarantee_within_the_range_is_that_without_limits():
-    assert guarantee(WALK, BINARY32, WITHIN).bound == guarantee(WALK, FloatFormat(2, 24, EVEN), WITHIN).bound
-    assert (
-        guarantee(WALK, FloatFormat(2, 24, EVEN), WITHIN).bound
-        < guarantee(WALK, FloatFormat(2, 24, Rounding.CHOP), WITHIN).bound / 1.9
-    )
 
 
 def test_a_number_beyond_the_range_has_no_guarantee():
@@ -234,21 +188,3 @@ def in_units(exponent):
 def test_units_far_from_one_change_nothing(form, basis):
     answers = {required_precision(in_units(e), 30, 0.01 * 2.0**e, form=form, basis=basis).tried for e in (0, 210, -210)}
     assert len(answers) == 1
-
-
-@pytest.mark.parametrize("exponent", [230, -230])
-def test_units_too_far_from_one_are_refused(exponent):
-    """Compiled loops of a format with any exponent have the exponents of float64."""
-    with pytest.raises(OverflowError, match=r"got Q with an entry near 2.*; needed 2.*; scale the model"):
-        required_precision(in_units(exponent), 30, 0.01)
-    with pytest.raises(OverflowError, match="scale the model"):
-        survey(in_units(exponent), np.ones((3, 1)), 0.01, [24])
-    wide = required_precision(in_units(exponent), 30, 0.01 * 2.0**exponent, range=(-1000, 1000))
-    assert wide.tried
-
-
-def test_a_range_too_long_to_compute_with_is_refused():
-    for range_ in ({"emin": -(10**12), "emax": 5}, {"emin": -5, "emax": 10**12}):
-        with pytest.raises(ValueError, match="needed exponents of at most 1048576"):
-            FloatFormat(2, 8, **range_)
-    assert FloatFormat(2, 113, emin=-16382, emax=16383).limits is not None

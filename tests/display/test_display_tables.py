@@ -10,10 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, IBM_HEX32, arithmetic, digits
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display.tables import MOST_ROWS, Table, scientific, short
 
 
@@ -56,16 +52,6 @@ def test_no_cell_can_break_the_table():
     assert [len(cells(line)) for line in table.markdown().splitlines()] == [len(texts)] * 3
 
 
-def test_an_empty_table_has_its_header():
-    assert Table("none", ("a",), ()).markdown().splitlines() == ["| a |", "| --- |"]
-
-
-def test_digits_names_base_and_precision():
-    named = {(2, 1): "1 bit", (2, 24): "24 bits", (10, 1): "1 decimal digit", (10, 4): "4 decimal digits"}
-    named |= {(16, 6): "6 base-16 digits", (3, 1): "1 base-3 digit"}
-    assert {key: digits(FloatFormat(*key)) for key in named} == named
-
-
 @pytest.mark.parametrize(
     ("value", "figures", "text"),
     [(82, 2, r"$8.2\times10^{1}$"), (Fraction(1, 3), 3, r"$3.33\times10^{-1}$"), (1, 2, "$1.0$")],
@@ -89,17 +75,6 @@ def test_scientific_numbers(value, figures, text):
 )
 def test_short_numbers(value, figures, text):
     assert short(value, figures) == text
-
-
-def test_an_arithmetic_is_named_by_its_digits_and_by_chopping():
-    assert arithmetic(FloatFormat(2, 24)) == "24 bits"
-    assert arithmetic(FloatFormat(10, 4, Rounding.CHOP)) == "4 decimal digits, chopped"
-    assert arithmetic(BINARY32) == "24 bits, ties to even, exponents -126 to 127"
-    assert arithmetic(IBM_HEX32) == "6 base-16 digits, chopped, exponents -65 to 62, no subnormal numbers"
-    assert arithmetic(FixedFormat(0, 15)) == "fixed point of 16 bits, 15 of them fraction"
-    saturated = FixedFormat(2, 13, Rounding.DOWN, "saturate")
-    assert arithmetic(saturated) == "fixed point of 16 bits, 13 of them fraction, rounded down, saturated"
-    assert len({arithmetic(FloatFormat(2, 8, mode)) for mode in Rounding}) == len(Rounding)
 
 
 def column(*given, header="h", quoted=()):
@@ -145,11 +120,6 @@ def test_a_page_aligns_the_numbers_of_a_column_in_one_notation(given, shown):
     assert found == shown
 
 
-def test_numbers_quoted_from_a_document_stay_as_printed():
-    given = (".3775e-8", "9", "$1.2949\\times10^{16}$")
-    assert column(*given, header="printed", quoted=("printed",)) == list(given)
-
-
 def test_a_column_that_is_the_same_in_each_row_stands_below_the_table():
     body = (("a", "100", "1", "-2"), ("b", "100", "2", "-2"))
     table = Table("t", ("name", "trials", "found", "$x_1$"), body)
@@ -159,16 +129,6 @@ def test_a_column_that_is_the_same_in_each_row_stands_below_the_table():
     assert table.markdown().count("100") == 2
     assert "In each row" not in Table("t", ("name", "trials"), (("a", "100"), ("b", "100"))).page()
     assert "In each row" not in Table("t", table.header, body[:1]).page()
-
-
-def test_a_table_of_more_than_twelve_rows_is_folded():
-    rows = tuple((f"row {k}", str(k)) for k in range(13))
-    text = Table("counts & sizes", ("name", "k"), rows).page()
-    assert text.startswith(
-        '<details class="long-table"><summary>counts &amp; sizes, 13 rows</summary>\n\n| name | k |\n'
-    )
-    assert text.endswith(" |\n\n</details>")
-    assert "<details" not in Table("counts", ("name", "k"), rows[:12]).page()
 
 
 def test_every_table_of_the_book_is_one_of_this_class():

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
-from plain_blocks import Filter, Rounds
 
-from gpbnb import BINARY32, BINARY64, FixedFormat, FloatFormat, Form, LinearModel
+from gpbnb import BINARY32, FixedFormat, FloatFormat, Form, LinearModel
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.run import Run, Sums
-from tests.plain_structures import floating
 
 GIVEN = {
     "Phi": [["1", "0.1", "0"], ["0", "0.9", "0.3"], ["0", "0", "0.7"]],
@@ -23,43 +19,9 @@ GIVEN = {
     "P0": [["1", "0.1", "0"], ["0.1", "2", "0"], ["0", "0", "0.5"]],
 }
 MODEL = LinearModel(*GIVEN.values())
-FRACTIONS = {
-    key: [Fraction(a) for a in rows] if key == "x0" else [[Fraction(a) for a in row] for row in rows]
-    for key, rows in GIVEN.items()
-}
 Z = np.random.default_rng(8).normal(size=(12, 2))
 Z[3] = Z[5, 0] = Z[8:10] = np.nan
 """Measurements, of which some are missing: rows of K H are then zero, and rows of I - K H the identity's."""
-
-
-@pytest.mark.parametrize("form", list(Form), ids=str)
-@pytest.mark.parametrize(
-    ("base", "digits", "sums", "rounding"),
-    [
-        (2, {"state": 11, "gain": 7, "covariance": 24, "innovation": 9}, None, "nearest"),
-        (2, {"state": 24, "gain": 30, "covariance": 9, "innovation": 53}, None, "nearest"),
-        (2, {"state": 8, "gain": 12, "covariance": 16, "innovation": 10}, 20, "even"),
-        (10, {"state": 4, "gain": 3, "covariance": 9, "innovation": 5}, None, "chop"),
-        (10, {"state": 8, "gain": 7, "covariance": 4, "innovation": 6}, None, "nearest"),
-        (10, {"state": 12, "gain": 7, "covariance": 10, "innovation": 11}, None, "even"),
-        (16, {"state": 6, "gain": 5, "covariance": 3, "innovation": 13}, None, "chop"),
-    ],
-)
-def test_each_block_computes_in_its_own_format_as_plain_loops_do(form, base, digits, sums, rounding):
-    formats = {name: FloatFormat(base, each, rounding) for name, each in digits.items()}
-    blocks = BlockFormats(**formats, sums=None if sums is None else FloatFormat(base, sums, rounding))
-    rounds = {name: floating(base, each, rounding) for name, each in digits.items()}
-    within = None if sums is None else floating(base, sums, rounding)
-    slow = Filter(
-        FRACTIONS,
-        form,
-        floating(base, max(digits.values()), rounding),
-        {name: Rounds(r, r if within is None else within) for name, r in rounds.items()},
-    )
-    x, K, P = taken(blocks, form)
-    for k, z in enumerate(Z):
-        slow.step(z)
-        assert (x[k].tolist(), P[k].tolist(), K[k].tolist()) == (slow.x, slow.P, slow.K)
 
 
 def taken(blocks, form):
@@ -68,18 +30,6 @@ def taken(blocks, form):
     run = Run(model, blocks, form, range(1, len(Z) + 1))
     run.take(z)
     return run.exactly(run.X), run.exactly(run.G), run.exactly(run.C)
-
-
-def test_a_covariance_in_binary64_beside_binary32_is_that_of_plain_loops():
-    single, double = floating(2, 24, "even", -126), floating(2, 53, "even", -1022)
-    rounds = dict.fromkeys(BLOCKS, Rounds(single, single)) | {"covariance": Rounds(double, double)}
-    slow = Filter(FRACTIONS, Form.UD, double, rounds)
-    blocks = BlockFormats.uniform(BINARY32).with_block("covariance", BINARY64)
-    assert blocks.model == FloatFormat(2, 53, "even")
-    x, _, U = taken(blocks, Form.UD)
-    for k, z in enumerate(Z):
-        slow.step(z)
-        assert (x[k].tolist(), U[k].tolist()) == (slow.x, slow.P)
 
 
 @pytest.mark.parametrize("form", list(Form), ids=str)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, Sums
-from tests.array_filter import estimates
 
 STEPS = 40
 
@@ -38,23 +36,6 @@ def model(**changes: Any) -> LinearModel:
 
 
 MEASURED = np.random.default_rng(3).normal(size=(STEPS, 1)) + 2
-
-
-@pytest.mark.parametrize("compensated", [False, True])
-@pytest.mark.parametrize(
-    ("fmt", "sums"),
-    [
-        (named.BFLOAT16, named.BINARY32),
-        (named.BFLOAT16, None),
-        (FixedFormat(3, 12, Rounding.EVEN), named.BINARY32),
-    ],
-    ids=str,
-)
-def test_a_run_is_what_arrays_compute(fmt: Any, sums: Any, compensated: bool) -> None:
-    run = Run(model(), fmt, Form.INNOVATION, range(1, STEPS + 1), Sums(fmt=sums), compensated=compensated)
-    run.take(MEASURED)
-    times = partial(linalg.matmul, sums=sums)
-    assert np.array_equal(run.checkpoints().x, estimates(model(), MEASURED, fmt, times, compensated))
 
 
 def test_sums_in_a_wider_format_change_digits() -> None:

@@ -6,26 +6,20 @@ import math
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from fractions import Fraction
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from small_filter import FORMATS, FORMATS_OF_ALL_FORMS, STEPS, exact_steps, measurements, model, run
 
-from gpbnb import BFLOAT16, FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters.emulation import compare_runs, emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.run import Run, log_spaced, reference
+from gpbnb.filters.run import Run, reference
 from gpbnb.filters.simulation import BLOCK, Simulation
-
-NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 
 # -- the reference --------------------------------------------------------------------------------
 
@@ -57,14 +51,6 @@ def test_all_forms_are_one_filter(form):
     assert history.stopped is None
 
 
-def test_errors_fall_with_the_digits_in_every_form():
-    given, z = model(), measurements(40)
-    for form in Form:
-        errors = [emulate(given, z, FloatFormat(2, t), form, (40,)).covariance_norm[0] for t in (12, 24, 36, 48)]
-        for coarse, fine in pairwise(errors):
-            assert 2**7 < coarse / fine < 2**17  # 2**12, and what chance may do
-
-
 def test_a_reference_of_the_model_as_given_adds_the_errors_of_storing_it():
     given, z, fmt = model(), measurements(), FloatFormat(10, 4)
     alone = emulate(given, z, fmt, Form.INNOVATION, (STEPS,))
@@ -93,29 +79,6 @@ def test_a_run_in_pieces_is_the_run_in_one(fmt, form):
     assert parts.steps == whole.steps == 20
     for name in ("x", "P", "X", "G", "C", "notes"):
         assert np.array_equal(getattr(parts, name), getattr(whole, name))
-
-
-def test_the_norms_of_a_history():
-    history = emulate(model(), measurements(), FloatFormat(10, 4), Form.HUNG, (2, 5))
-    rounded = Run(model(), FloatFormat(10, 4), Form.HUNG, (2, 5))
-    rounded.take(measurements())
-    assert history.estimate == pytest.approx(rounded.checkpoints().to_float("x"), rel=1e-14)
-    assert history.steps.tolist() == [2, 5]
-    assert repr(history).startswith("Hung (1984) in 4 decimal digits")
-    assert " 5 steps: largest error of each state " in repr(history)
-    for at in range(2):
-        true = history.reference
-        assert history.state_norm[at] == np.abs(history.state[at]).max()
-        for norm, error, size in (
-            (history.gain_norm, history.gain, true.K),
-            (history.covariance_norm, history.covariance, true.P),
-        ):
-            columns = np.abs(error[at]).sum(axis=0).max() / np.abs(size[at].astype(float)).sum(axis=0).max()
-            assert norm[at] == pytest.approx(columns, rel=1e-15)
-        computed = true.P[at].astype(float) + history.covariance[at]
-        scale = np.diag(1 / np.sqrt(np.diag(true.P[at].astype(float))))
-        values = np.linalg.eigvalsh(scale @ (computed + computed.T) @ scale / 2)
-        assert history.least_eigenvalue[at] == pytest.approx(values[0], rel=1e-9)
 
 
 def scalar(r, p=1, h=1, q=0):
@@ -218,32 +181,7 @@ def test_what_a_run_refuses():
     assert float(reference(huge, np.ones((3, 1)), (3,)).x[0, 0]) == 1
 
 
-def test_checkpoint_steps():
-    assert log_spaced(1) == (1,)
-    assert log_spaced(1000, 3) == (1, 2, 5, 10, 22, 46, 100, 215, 464, 1000)
-    assert log_spaced(20, 1) == (1, 10, 20)
-    with pytest.raises(ValueError, match="got 0 steps"):
-        log_spaced(0)
-    with pytest.raises(ValueError, match="0 per decade"):
-        log_spaced(5, 0)
-
-
-def test_the_names_of_the_forms():
-    assert [str(form) for form in Form] == ["Hung (1984)", "Hung (1984), second gain", "innovation", "Joseph", "UD"]
-
-
 # -- simulated measurements -----------------------------------------------------------------------
-
-
-def test_measurements_are_the_same_in_blocks_and_at_once():
-    source = Simulation(model(), (1.0, 2.0, 3.0), seed=3, resolution=0.25)
-    z = source.measurements(BLOCK + 10)
-    first, truth = source.block(0, np.array([1.0, 2.0, 3.0]))
-    second, _ = source.block(1, truth, 10)
-    assert np.array_equal(z, np.concatenate([first, second]))
-    assert np.array_equal(z * 4, np.rint(z * 4))
-    assert source.measurements(0).shape == (0, 2)
-    assert not np.array_equal(z, Simulation(model(), (1.0, 2.0, 3.0), seed=4, resolution=0.25).measurements(BLOCK + 10))
 
 
 def test_a_cycle_and_the_noise_go_on_from_block_to_block():
@@ -341,38 +279,11 @@ def test_the_bound_of_the_reference_holds():
             assert (bound < 1e-22).all()
 
 
-def test_ratios_tell_a_violation():
-    found = emulate_with_bound(model(), measurements(), FloatFormat(2, 24), Form.HUNG, (1, 6))
-    for name, column in (("state", 0), ("gain", 1), ("covariance", 2)):
-        small = {each: getattr(found, each) * (1e-9 if each == name else 1) for each in ("state", "gain", "covariance")}
-        ratios = type(found)(found.history, **small).ratios()
-        assert ratios.shape == (2, 3)
-        assert (ratios[:, column] > 1).all()
-        assert (np.delete(ratios, column, axis=1) <= 1).all()
-
-
 def test_the_bound_ends_where_the_gain_is_not_known():
     found = emulate_with_bound(scalar("1e-6"), np.ones((3, 1)), FloatFormat(10, 4), Form.HUNG, (1, 2, 3))
     assert np.isfinite(found.state[:2]).all()
     assert np.isinf(found.state[2]).all()
     assert found.ratios().max() <= 1
-
-
-def test_forms_are_given_by_name():
-    given, z = model(), measurements()
-    named, member = run(FloatFormat(2, 24), "joseph", given, z), run(FloatFormat(2, 24), Form.JOSEPH, given, z)
-    assert named.form is Form.JOSEPH
-    assert np.array_equal(named.x, member.x)
-    with pytest.raises(ValueError, match="Potter form; needed one with compiled loops: Hung"):
-        run(FloatFormat(2, 24), "potter", given, z)
-
-
-def test_a_bound_needs_a_format_that_tells_of_an_overflow():
-    """What saturates is wrong by more than any rounding, which the bound does not see."""
-    with pytest.raises(ValueError, match=r"got a bound along with a run in .*; needed overflow 'raise'"):
-        Run(model(), FixedFormat(3, 12, overflow="saturate"), Form.INNOVATION, [1], bounded=True)
-    with pytest.raises(ValueError, match="needed overflow 'raise'"):
-        Run(model(), replace(BFLOAT16, overflow="saturate"), Form.INNOVATION, [1], bounded=True)
 
 
 COUNTED = """
@@ -407,15 +318,3 @@ def test_a_step_releases_exactly_the_arrays_that_it_makes():
         check=True,
     )
     assert found.stdout.split() == ["True", "0", "0"] * 4
-
-
-@pytest.mark.parametrize("digits", [5, 17])
-@pytest.mark.parametrize("power", [0, 25, 44, -30, -150])
-def test_estimates_of_many_records_in_base_10_are_the_nearest_floats(digits, power):
-    fmt, scale = FloatFormat(10, digits), Fraction(10) ** power
-    one = LinearModel([["0.9"]], [[1]], [[scale**2 / 10]], [[scale**2]], [scale], [[scale**2]])
-    z = np.array([0.7, 2.1, 1.3, 0.2]) * float(scale)
-    found = Run(one, fmt, Form.INNOVATION, (), records=2).carry(np.stack([z, -z], axis=1)[:, None, :], 1)
-    single = Run(one, fmt, Form.INNOVATION, range(1, 5))
-    single.take(fmt.array(z.reshape(-1, 1)))
-    assert found[:, 0, 0].tolist() == [float(each) for each in single.exactly(single.X).ravel()]

@@ -1,6 +1,5 @@
 """Known inputs, offsets, matrices as functions of the step, and the forms written with array operations."""
 
-import itertools
 from dataclasses import replace
 from fractions import Fraction
 
@@ -58,50 +57,6 @@ def test_the_reference_with_inputs_is_the_exact_filter(seed):
     assert np.abs((found - true).astype(float)).max() < 2.0**-85 * np.abs(true.astype(float)).max()
 
 
-# UD and the second gain take long to compile. Their loops are the same for all formats, so two formats are enough.
-@pytest.mark.parametrize(
-    ("fmt", "form"),
-    [
-        *itertools.product((FloatFormat(2, 24), FloatFormat(10, 7)), (*Form, ArrayForm.COMPENSATED)),
-        *((FloatFormat(16, 6, Rounding.CHOP), form) for form in (Form.HUNG, Form.JOSEPH, ArrayForm.COMPENSATED)),
-    ],
-    ids=str,
-)
-def test_arrays_give_the_digits_of_the_compiled_loops(fmt, form):
-    model = drawn(4, inputs=False)
-    z = fmt.array(simulated_measurements(model, 12, 1))
-    steps = (1, 2, 3, 7, 12)
-    slow = ArrayRun(model, fmt, form, steps)
-    compensated = form is ArrayForm.COMPENSATED
-    fast = Run(model, fmt, Form.INNOVATION if compensated else form, steps, compensated=compensated)
-    for run in (slow, fast):
-        run.take(z)
-    for a, b in zip(_parts(slow), _parts(fast), strict=True):
-        assert np.array_equal(a, b)
-    assert slow.indefinite == fast.indefinite
-
-
-def _parts(run):
-    found = run.checkpoints()
-    return found.x, found.K, found.P
-
-
-@pytest.mark.parametrize("form", FORMS, ids=str)
-def test_every_form_agrees_with_the_reference_in_many_digits(form):
-    model = drawn(5, inputs=form not in (Form.HUNG, Form.HUNG_SECOND_GAIN))
-    z = simulated_measurements(model, STEPS)
-    fmt = FloatFormat(2, 53)
-    steps = (1, 2, 5, STEPS)
-    run = ArrayRun(model, fmt, form, steps)
-    run.take(z)
-    history = compare_runs(run, reference(model, z, steps))
-    # well conditioned: a few hundred roundings of 2**-53
-    for error in (history.state, history.gain, history.covariance):
-        assert np.abs(error).max() < 2.0**-44
-    assert np.abs(history.state).max() > 0
-    assert run.indefinite is None
-
-
 @pytest.mark.parametrize("form", [form for form in FORMS if form not in (Form.HUNG, Form.HUNG_SECOND_GAIN)], ids=str)
 def test_the_bound_holds_with_inputs_and_is_not_vacuous(form):
     model, fmt = drawn(6), FloatFormat(2, 20)
@@ -156,25 +111,6 @@ def test_answers_with_inputs(basis):
     answer = required_precision(cart, 60, [1e-3, 1e-2], basis=basis)
     assert answer.format is not None
     assert answer.ratio <= 1 < dict(answer.tried)[answer.digits - 1]
-
-
-@pytest.mark.parametrize("basis", ["emulation", "bound"])
-def test_answers_with_inputs_do_not_depend_on_units(basis):
-    u = np.sin(np.arange(20) / 7).reshape(-1, 1)
-    cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=u, b=["0.001", 0], d=["0.5"])
-    scale = Fraction(2) ** -40
-    small = replace(
-        cart,
-        B=cart.B * scale,
-        b=cart.b * scale,
-        d=cart.d * scale,
-        **{letter: getattr(cart, letter) * scale**2 for letter in ("Q", "R", "P0")},
-    )
-    answers = [
-        required_precision(cart, 20, 1e-3, basis=basis),
-        required_precision(small, 20, 1e-3 * float(scale), basis=basis),
-    ]
-    assert answers[0].tried == answers[1].tried
 
 
 def test_an_offset_of_the_states_is_an_input_of_one():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import cache
 
 import numpy as np
 import pytest
@@ -22,94 +21,12 @@ from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, opened, simulated, true_states
-from gpbnb.filters.run import Run
 from gpbnb.wordlength.records import survey_records
 from tests.plain_nonlinear import (
     MOTIONS,
-    STEPS,
-    UNSCENTED,
-    PlainFilter,
-    PlainUnscented,
     case,
-    plain_estimates,
-    rounding,
 )
 from tests.surveying import survey
-
-
-@pytest.mark.parametrize(
-    ("n", "base", "digits", "form"),
-    [
-        (2, 2, 11, Form.INNOVATION),
-        (2, 2, 24, Form.UD),
-        (2, 10, 7, Form.JOSEPH),
-        (3, 2, 11, Form.UD),
-        (3, 2, 24, Form.JOSEPH),
-        (3, 10, 7, Form.INNOVATION),
-        (4, 2, 11, Form.JOSEPH),
-        (4, 2, 24, Form.INNOVATION),
-        (4, 10, 7, Form.UD),
-    ],
-)
-def test_every_digit_is_that_of_plain_loops(n, base, digits, form):
-    model, z, sight, given, u = case(MOTIONS[n], seed=n)
-    run = NonlinearRun(model, FloatFormat(base, digits), form, range(1, STEPS + 1))
-    run.take(z)
-    assert run.stopped is None, run.reason
-    plain = PlainFilter(MOTIONS[n], sight, given, form, rounding(base, digits))
-    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
-    assert run.P.to_fractions().tolist() == plain.P
-
-
-def words(bits):
-    """Round a fraction to the nearest multiple of 2**-bits, ties away from zero."""
-    return lambda x: (1 if x > 0 else -1) * ((2 * abs(Fraction(x)) * 2**bits + 1) // 2) / Fraction(2**bits)
-
-
-@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD])
-def test_every_digit_in_fixed_point_is_that_of_plain_loops(form):
-    model, z, sight, given, u = case(MOTIONS[3], seed=3)
-    run = NonlinearRun(model, FixedFormat(8, 22), form, range(1, STEPS + 1))
-    run.take(z)
-    assert run.stopped is None, run.reason
-    plain = PlainFilter(MOTIONS[3], sight, given, form, words(22))
-    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
-    assert run.P.to_fractions().tolist() == plain.P
-
-
-@cache
-def in_120_bits(stored=None):
-    """The first 20 estimates of plain loops in 120 bits, from measurements as they are or as a format stores them."""
-    _, z, sight, given, u = case(MOTIONS[3], seed=3)
-    true = PlainFilter(MOTIONS[3], sight, given, Form.INNOVATION, rounding(2, 120))
-    seen = z[:20] if stored is None else as_stored(z[:20], stored)
-    return list(plain_estimates(true, seen, u[:20]))
-
-
-def as_stored(z, r):
-    return np.array([[r(Fraction(each)) for each in row] for row in z.tolist()], dtype=object)
-
-
-def largest_error(form, r):
-    """The largest error of any state in the first steps of plain loops, against loops in 120 bits."""
-    _, z, sight, given, u = case(MOTIONS[3], seed=3)
-    run = PlainFilter(MOTIONS[3], sight, given, form, r)
-    both = zip(plain_estimates(run, z[:20], u[:20]), in_120_bits(), strict=True)
-    return max(float(abs(a - b)) for x, exact in both for a, b in zip(x, exact, strict=True))
-
-
-@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD])
-def test_fraction_bits_are_those_of_plain_loops(form):
-    model, z, *_ = case(MOTIONS[3], seed=3)
-    found = required_precision(model, z[:20], 0.01, kind="fixed", like=FixedFormat(8, 1), form=str(form))
-    bits = found.digits
-    assert found.format == FixedFormat(8, bits)
-    ratios = dict(found.tried)
-    for each in (bits - 1, bits, bits + 1):  # the reference has twice 53 bits or more
-        assert ratios[each] == pytest.approx(largest_error(form, words(each)) / 0.01, rel=1e-9)
-    assert ratios[bits] <= 1 < ratios[bits - 1]
-    assert ratios[bits + 1] <= 1
-    assert str(found).startswith(f"{bits} fraction bits in a word of {9 + bits} bits: ")
 
 
 @pytest.mark.parametrize("form", ["innovation", "Joseph"])
@@ -138,25 +55,6 @@ def test_fraction_bits_name_the_overflow_of_a_nonlinear_filter():
     assert "59 fraction bits fail: overflow: measurements: entry" in str(found)
 
 
-@pytest.mark.parametrize(
-    ("fmt", "r"), [(FloatFormat(2, 20), rounding(2, 20)), (FixedFormat(8, 22), words(22))], ids=["20 bits", "fixed"]
-)
-@pytest.mark.parametrize("form", [Form.JOSEPH, Form.UD])
-def test_emulate_compares_with_the_filter_in_many_digits(form, fmt, r):
-    model, z, sight, given, u = case(MOTIONS[3], seed=3)
-    z, u, steps = z[:20], u[:20], (1, 7, 20)
-    found = emulate(model, z, fmt, form, steps)
-    computed = list(plain_estimates(PlainFilter(MOTIONS[3], sight, given, form, r), z, u))
-    exact = in_120_bits(r)
-    errors = [[float(a - b) for a, b in zip(computed[k - 1], exact[k - 1], strict=True)] for k in steps]
-    assert found.steps.tolist() == list(steps)
-    # The references differ by far less than float64 shows.
-    assert found.state == pytest.approx(np.array(errors), rel=1e-12, abs=0)
-    assert 1e-7 < found.state_norm.max() < 1e-2
-    assert found.stopped is None
-    assert max(found.gain_norm.max(), found.covariance_norm.max()) < 1e-2
-
-
 def test_emulate_refuses_what_a_nonlinear_filter_does_not_have():
     model, z, *_ = case(MOTIONS[2], seed=3)
     with pytest.raises(ValueError, match="got sums or compensated estimates for a nonlinear model; needed neither"):
@@ -169,39 +67,6 @@ def test_emulate_refuses_what_a_nonlinear_filter_does_not_have():
     assert stopped.stopped == 1
     assert stopped.reason == "overflow at step 1"
     assert len(stopped.steps) == 0
-
-
-@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD])
-def test_blocks_round_in_formats_of_their_own(form):
-    model, z, sight, given, u = case(MOTIONS[3], seed=9)
-    digits = {"state": 20, "gain": 12, "covariance": 17, "innovation": 14}
-    formats = BlockFormats(**{name: FloatFormat(2, count) for name, count in digits.items()})
-    run = NonlinearRun(model, formats, form, range(1, STEPS + 1))
-    run.take(z)
-    blocks = {name: rounding(2, count) for name, count in digits.items()}
-    plain = PlainFilter(MOTIONS[3], sight, given, form, rounding(2, 20), blocks)
-    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
-    assert run.P.to_fractions().tolist() == plain.P
-
-
-@pytest.mark.parametrize("form", [Form.INNOVATION, Form.UD])
-def test_an_iterated_update_takes_functions_at_the_last_estimate(form):
-    model, z, sight, given, u = case(MOTIONS[2], seed=4, iterations=3)
-    run = NonlinearRun(model, FloatFormat(2, 18), form, range(1, STEPS + 1))
-    run.take(z)
-    plain = PlainFilter(MOTIONS[2], sight, given, form, rounding(2, 18), iterations=3)
-    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
-
-
-@pytest.mark.parametrize(("n", "base", "digits"), [(2, 2, 24), (3, 10, 7), (4, 2, 14)])
-def test_the_unscented_filter_has_the_digits_of_plain_loops(n, base, digits):
-    model, z, sight, given, u = case(MOTIONS[n], seed=n, **UNSCENTED)
-    run = NonlinearRun(model, FloatFormat(base, digits), Form.INNOVATION, range(1, STEPS + 1))
-    run.take(z)
-    assert run.stopped is None, run.reason
-    plain = PlainUnscented(MOTIONS[n], sight, given, Form.INNOVATION, rounding(base, digits))
-    assert run.checkpoints().x.tolist() == list(plain_estimates(plain, z, u))
-    assert run.P.to_fractions().tolist() == plain.P
 
 
 # -- linear functions -------------------------------------------------------------------------------------------------
@@ -232,13 +97,6 @@ def test_linear_functions_have_the_digits_of_the_linear_filter(form, fmt):
     assert np.array_equal(run.states(RECORD), expected.states(RECORD))
     assert np.array_equal(run.checkpoints().P, expected.checkpoints().P)
     assert np.array_equal(run.checkpoints().K, expected.checkpoints().K)
-
-
-def test_linear_functions_in_blocks_have_the_digits_of_the_compiled_loops():
-    formats = BlockFormats(*(FloatFormat(2, t) for t in (15, 11, 13, 12)))
-    for form in (Form.INNOVATION, Form.JOSEPH):
-        states = NonlinearRun(by_functions(), formats, form).states(RECORD)
-        assert np.array_equal(states, Run(linear(), formats, form, ()).states(RECORD))
 
 
 def test_factored_forms_subtract_the_predicted_measurement_as_a_sum():

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import re
-from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, BINARY64, FixedFormat, FloatFormat, NonlinearSystem, required_precision
-from tests.plain_nonlinear import drawn
-from tests.plain_program import steps_in_python
-from tests.plain_structures import fixed, floating, limited
+from gpbnb import BINARY32, BINARY64, FixedFormat, NonlinearSystem, required_precision
 from tests.step_functions import SYSTEMS, Native, clipped_controller
 
 needs = pytest.mark.parametrize
@@ -33,42 +29,6 @@ def test_runs_have_the_digits_of_the_processor(system, fmt):
         assert x.dtype == y.dtype == native.dtype
         assert found[k].tolist() == [*x.tolist(), *y.tolist()]
     assert np.ptp(found, axis=0).min() > 0.001
-
-
-PLAIN = [
-    (FloatFormat(2, 12), floating(2, 12, "nearest")),
-    (FloatFormat(10, 5, "even"), floating(10, 5, "even")),
-    (FixedFormat(10, 14, "odd", "saturate"), lambda x: limited(14, 10, "saturate")(fixed(14, "odd")(x))),
-    (FixedFormat(8, 9, "up", "wrap"), lambda x: limited(9, 8, "wrap")(fixed(9, "up")(x))),
-]
-
-
-@needs("fmt", PLAIN, ids=lambda each: str(each[0]))
-@needs("system", SYSTEMS, ids=lambda each: each.name)
-def test_the_program_has_the_digits_of_the_step(system, fmt):
-    fmt, r = fmt
-    u = inputs(system, 40)
-    program, (coefficients,) = system.program(fmt)
-    found = np.asarray(system.states(fmt, u).to_fractions())
-    x = [*map(r, system.x0), *[Fraction(0)] * program.p]
-    for k, row in enumerate(u):
-        x = steps_in_python(program, r, coefficients, x, [r(Fraction(each)) for each in row])
-        assert x == found[k].tolist()
-
-
-@needs("seed", range(40))
-def test_programs_of_random_steps(seed):
-    (system, plain), u = drawn(seed), inputs(SYSTEMS[3], 6, 1.0)
-    fmt, r = PLAIN[seed % len(PLAIN)]
-    program, (coefficients,) = system.program(fmt)
-    found = np.asarray(system.states(fmt, u).to_fractions())
-    x = [*map(r, system.x0), *[Fraction(0)] * program.p]
-    state = x[: system.n]
-    for k, row in enumerate(u):
-        given = [r(Fraction(each)) for each in row]
-        x = steps_in_python(program, r, coefficients, x, given)
-        state, outputs = plain(r, state, given)
-        assert x == found[k].tolist() == [*state, *outputs]
 
 
 def test_a_limit_is_one_operation():

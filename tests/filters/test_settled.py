@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,7 @@ from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import product, product_by_sparse
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, zero
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
-from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32, BINARY64
+from gpbnb.arithmetic.named import BINARY32, BINARY64
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
@@ -88,52 +86,6 @@ def test_a_run_may_be_cut_anywhere():
         cut.take(z[begin:end])
     for one, other in ((whole.x, cut.x), (whole.P, cut.P), (whole.C, cut.C), (whole.G, cut.G), (whole.X, cut.X)):
         assert np.array_equal(one, other)
-
-
-@pytest.mark.parametrize(
-    "fmt",
-    [
-        BINARY16,
-        BFLOAT16,
-        BINARY32,
-        BINARY64,
-        FloatFormat(2, 24),
-        FloatFormat(2, 24, "chop"),
-        FloatFormat(2, 53),
-        FloatFormat(16, 6),
-        FloatFormat(2, 24, "even", emin=-30, emax=10, subnormal=False),
-    ],
-)
-@pytest.mark.parametrize("scale", [1.0, 2.0**-20, 2.0**6])
-def test_wide_steps_have_the_digits_of_arrays(fmt, scale):
-    given, z = model(9, 3), measurements(2)
-    given = LinearModel(
-        Phi=given.Phi, H=given.H, Q=given.Q * Fraction(scale), R=given.R, x0=given.x0, P0=given.P0 * Fraction(scale)
-    )
-    run = Run(given, fmt, Form.INNOVATION, ())
-    run.take(fmt.array(z))
-    matrices = given.Phi[0], given.H[0], given.Q[0], given.R[0], given.P0
-    Phi, H, Q, R, P = (fmt.array(each).on_exact_backend() for each in matrices)
-    one = fmt.array(np.eye(9)).on_exact_backend()
-    for _ in range(2):
-        V = Phi @ P @ Phi.T + Q
-        PHt = V @ H.T
-        S = H @ PHt + R
-        K = PHt @ inverse(fmt, S)
-        P = (one - K @ H) @ V
-    assert np.array_equal(run.exactly(run.P), P.to_fractions())
-
-
-def inverse(fmt, S):
-    """Of two rows, by elimination, as the filter does it."""
-    (a, b), (c, d) = S
-    f = c / a
-    u = d - f * b
-    one, nothing = fmt.array(1).on_exact_backend(), fmt.array(0).on_exact_backend()
-    rows = [[one, nothing], [nothing - f * one, one - f * nothing]]
-    second = [each / u for each in rows[1]]
-    first = [(rows[0][j] - b * second[j]) / a for j in range(2)]
-    return np.stack([np.stack(first), np.stack(second)])
 
 
 @compiled

@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from plain_smoothing import Plain
 from small_filter import measurements, model
 
 from gpbnb import FixedFormat, FixedIntervalSmoother, FloatFormat, LinearModel, required_precision
@@ -19,7 +18,6 @@ from gpbnb.filters.kalman_step import StepModel
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.smoothing import smooth_covariances
 
-FORMATS = [(2, 9, True), (2, 24, False), (2, 70, True), (10, 6, True), (16, 5, False), (3, 9, True)]
 FORMS = ("innovation", "Joseph", "square root")
 
 
@@ -33,26 +31,6 @@ def cyclic():
 def scalar():
     """One state and one measurement."""
     return LinearModel([["0.9"]], [["1.1"]], [["0.3"]], [["0.7"]], ["0.4"], [["2.3"]])
-
-
-CASES = {"cycles": (cyclic(), measurements()), "scalar": (scalar(), measurements(5, 1))}
-
-
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("parts", FORMATS, ids=str)
-def test_digits_are_those_of_plain_loops(parts, name, form):
-    base, precision, nearest = parts
-    given, z = CASES[name]
-    fmt = FloatFormat(base, precision, "nearest" if nearest else "chop")
-    plain, found = Plain(*parts), FixedIntervalSmoother(given, z, form).run(fmt)
-    expected = (
-        plain.by_roots(given, exact(z))
-        if form == "square root"
-        else plain.by_covariances(given, exact(z), form == "Joseph")
-    )
-    assert found.x.to_fractions().tolist() == [[row[0] for row in x] for x, _ in expected]
-    assert found.P.to_fractions().tolist() == [P for _, P in expected]
 
 
 def least_squares(given, z, present):

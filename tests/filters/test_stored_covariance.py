@@ -10,7 +10,6 @@ import pytest
 
 from gpbnb import required_precision
 from gpbnb.arithmetic.definiteness import is_definite
-from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
@@ -19,12 +18,10 @@ from gpbnb.filters import bounded_steps
 from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.array_steps import predict_root, predict_ud
-from gpbnb.filters.covariance import Repair, raised_until
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.factors import covariance_of_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.opening import double_doubles_of
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import simulated_measurements
 
@@ -77,12 +74,6 @@ def test_the_variances_are_raised_no_more_than_necessary():
     assert "Q, stored in 24 bits" in str(repair)
 
 
-def test_a_definite_model_is_stored_as_it_is():
-    model = LinearModel([[1]], [[1]], [["0.01"]], [["0.3"]], [0], [[1]])
-    for fmt in FORMATS:
-        assert model.definite_in(fmt) is model
-
-
 def test_noise_of_measurements_is_stored_definite():
     R = [[1, "0.9999"], ["0.9999", 1]]
     model = LinearModel(np.eye(2, dtype=int), np.eye(2, dtype=int), np.eye(2, dtype=int), R, [0, 0], np.eye(2))
@@ -101,16 +92,6 @@ def test_without_repair_an_indefinite_covariance_is_refused():
         model.rounded(fmt)
     with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
         Run(model, fmt, Form.UD, ())
-
-
-def test_a_variance_that_becomes_zero_cannot_be_raised():
-    """In fixed point a small variance is rounded to zero while a covariance is not."""
-    fmt = FixedFormat(2, 8)
-    Q = [["0.001", "0.03"], ["0.03", 1]]
-    model = LinearModel(np.eye(2, dtype=int), [[1, 0]], Q, [[1]], [0, 0], np.eye(2))
-    assert model.definite_in(fmt) is model
-    with pytest.raises(ValueError, match="needed a positive semidefinite matrix"):
-        model.rounded(fmt)
 
 
 def test_emulation_and_bound_of_a_raised_covariance_agree():
@@ -162,24 +143,6 @@ def test_each_covariance_is_raised_by_itself(letter):
         assert np.abs(off / np.multiply.outer(sizes, sizes)).max() <= 2 * run.repairs[0].shift + 24 * 2.0**-24
 
 
-def test_the_search_for_the_least_change():
-    found = raised_until(exact([[1, 2], [2, 1]]), is_definite, 0.125, 4)
-    assert found is not None
-    assert found[1] == 1.0
-    assert found[0].tolist() == [[2, 2], [2, 2]]
-    assert raised_until(exact([[1, 2], [2, 1]]), is_definite, 0.125, 0.5) is None
-    assert str(Repair("P0", 0, 0.0, 0.25)) == (
-        "P0 was made semidefinite (its variances were raised by 0.2 of themselves)"
-    )
-
-
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 53), FloatFormat(2, 80), FloatFormat(10, 18)], ids=str)
-def test_bounds_start_from_all_digits_of_an_array(fmt):
-    a = fmt.array([["1/3", "-2/7"], ["1e5", "1/1234567"]])
-    for found, true in zip(double_doubles_of(a).reshape(-1, 2), a.to_fractions().ravel(), strict=True):
-        assert abs(sum(map(Fraction, found.tolist())) / true - 1) < Fraction(1, 2**100)
-
-
 def test_a_predicted_root_with_a_zero_on_the_diagonal_is_not_definite():
     fmt = FloatFormat(2, 24)
     S, zero = fmt.array([[2, 1], [0, 0]]), fmt.array([[0, 0], [0, 0]])
@@ -211,15 +174,6 @@ def test_a_predicted_variance_of_zero_is_reported_whichever_it_is(zero):
     assert found.to_float().tolist() == Phi.tolist()
     assert not definite
     assert predict_ud(fmt.array(np.eye(2)), fmt.array(np.eye(2)), fmt.array(nothing))[1]
-
-
-@pytest.mark.parametrize("zero", [0, 1])
-def test_a_run_in_factors_reports_it_although_the_measurement_is_taken_as_usual(zero):
-    fmt, Phi = FloatFormat(2, 24), np.eye(2, dtype=int)
-    Phi[zero, zero] = 0
-    run = Run(LinearModel(Phi, [[1, 1]], [[0, 0], [0, 0]], [[1]], [0, 0], np.eye(2, dtype=int)), fmt, Form.UD, (1, 2))
-    run.take(fmt.array(np.ones((2, 1))))
-    assert (run.indefinite, run.stopped) == (1, None)
 
 
 @pytest.mark.parametrize("form", [Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON])

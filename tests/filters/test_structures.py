@@ -12,8 +12,8 @@ from scipy import linalg, signal
 
 from gpbnb import BINARY16, FixedFormat, FloatFormat, LinearSystem, required_precision
 from gpbnb.arithmetic.rational import exact
-from gpbnb.filters.sections import _filtered, factored
-from gpbnb.filters.structures import STRUCTURES, balanced, companion, reflections, steady_covariance
+from gpbnb.filters.sections import _filtered
+from gpbnb.filters.structures import STRUCTURES, companion, reflections, steady_covariance
 from gpbnb.wordlength.strategies import BoundedSystem
 
 FORMATS = [
@@ -45,26 +45,6 @@ def random_filter(rng, order):
     return b, a * rng.choice([1.0, 2.0, -0.5])
 
 
-def numbers(found, fmt):
-    """The outputs as fractions; sums of two float64 are only near a decimal number."""
-    sums = (exact(found[:, 0, 0]) + exact(found[:, 0, 1])).tolist()
-    return list(map(plain.floating(10, fmt.precision, "nearest"), sums)) if fmt.base == 10 else sums
-
-
-def slowly(structure, b, a, u, f):
-    """Outputs of a structure by a loop that shares no code with the package, from its exact design coefficients."""
-    top = [Fraction(x) / Fraction(a[0]) for x in b]
-    bottom = [Fraction(x) / Fraction(a[0]) for x in a[1:]]
-    if structure in plain.FORMS:
-        return plain.FORMS[structure](top, bottom, u, f)
-    if structure.startswith("cascade"):
-        return plain.cascade(factored(top, bottom), structure.removeprefix("cascade of "), u, f)
-    if structure == "lattice":
-        return plain.lattice(*reflections([*top, *[Fraction(0)] * (len(a) - len(b))], [Fraction(1), *bottom]), u, f)
-    matrices = companion(top, bottom)
-    return plain.state_space(*(balanced(matrices) if structure.startswith("balanced") else matrices), u, f)
-
-
 @pytest.mark.parametrize("structure", STRUCTURES)
 def test_no_run_is_beyond_its_bound(structure):
     """Inputs of full size, among them the signs of the reversed response, which drive an output to its peak."""
@@ -82,19 +62,6 @@ def test_no_run_is_beyond_its_bound(structure):
             shares.append(np.abs((found - true).sum(axis=-1)).max() / bound)
     assert len(shares) >= 12
     assert 1 / 20 < max(shares) <= 1
-
-
-@pytest.mark.parametrize("structure", STRUCTURES)
-@pytest.mark.parametrize("order", range(1, 9))
-def test_each_digit_is_that_of_a_plain_loop(structure, order):
-    rng = np.random.default_rng([order, STRUCTURES.index(structure)])
-    for fmt, r in FORMATS:
-        b, a = random_filter(rng, order)
-        system = LinearSystem.from_coefficients(b, a, structure)
-        u = rng.uniform(-1, 1, (12, 1))
-        found = system.outputs(u, fmt)
-        expected = slowly(structure, b, a, [Fraction(x) for x in u[:, 0]], plain.uniform(r))
-        assert numbers(found, fmt) == expected, (fmt, b, a)
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
@@ -143,52 +110,6 @@ def test_reflections_of_a_filter_of_second_order():
     assert v[2] == 3
     assert v[1] == 2 - 3 * Fraction(1, 2)
     assert v[0] == 1 - 3 * Fraction(1, 4) - v[1] * Fraction(2, 5)
-
-
-CONTROLLERS = [
-    {},
-    {"Kd": "0.7"},
-    {"limits": ("-0.8", "0.9")},
-    {"Kd": "0.3", "limits": ("-1.1", "0.4"), "back": "0.6", "leak": "0.99"},
-    {"integral_limits": ("-0.25", "0.3"), "Kd": "-0.2"},
-    {"integral_limits": ("-0.5", "0.5"), "limits": ("-1", "1"), "back": "0.3", "Kd": "1.3", "leak": "0.9"},
-]
-
-
-def controller_of(given):
-    """The controller with these settings, and all its settings as fractions."""
-    system = LinearSystem.pid(
-        "0.8", "0.1", given.get("Kd"), given.get("leak", 1), given.get("limits"), given.get("integral_limits"),
-        given.get("back"),
-    )  # fmt: skip
-    full = {"Kp": "0.8", "Ki": "0.1", "leak": 1} | given
-    settings = {name: full.get(name) for name in ("Kp", "Ki", "Kd", "leak", "limits", "integral_limits", "back")}
-    return system, {
-        name: tuple(map(Fraction, each)) if isinstance(each, tuple) else None if each is None else Fraction(each)
-        for name, each in settings.items()
-    }
-
-
-@pytest.mark.parametrize("given", CONTROLLERS, ids=str)
-def test_each_digit_of_a_controller_is_that_of_a_plain_loop(given):
-    system, settings = controller_of(given)
-    rng = np.random.default_rng(5)
-    limited = 0
-    for fmt, r in FORMATS:
-        e = rng.uniform(-1.5, 1.5, (40, 1)) + 0.5 * np.sign(np.sin(np.arange(40) / 6))[:, None]
-        expected = plain.pid(settings, [Fraction(x) for x in e[:, 0]], plain.uniform(r))
-        assert numbers(system.outputs(e, fmt), fmt) == expected, fmt
-        limited += expected.count(expected[-1]) > 1
-        exactly = plain.pid(settings, [Fraction(x) for x in e[:, 0]], plain.uniform(lambda x: x))
-        assert system.outputs(e)[:, 0, 0] == pytest.approx([float(each) for each in exactly], rel=1e-14, abs=1e-15)
-
-
-def test_a_smoother_is_that_of_a_plain_loop():
-    rng = np.random.default_rng(2)
-    for fmt, r in FORMATS:
-        u = rng.uniform(-3, 3, (40, 1))
-        expected = plain.smoother(Fraction("0.3"), [Fraction(x) for x in u[:, 0]], plain.uniform(r))
-        assert numbers(LinearSystem.smoother("0.3").outputs(u, fmt), fmt) == expected, fmt
 
 
 @pytest.mark.parametrize("basis", ["emulation", "bound"])

@@ -2,99 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
 
 import numpy as np
 import plain_structures as plain
 import pytest
-from test_structures import CONTROLLERS, controller_of, random_filter, slowly
+from test_structures import random_filter
 
 from gpbnb import FixedFormat, LinearSystem
 from gpbnb.bounds.words import WordGuarantee
-from gpbnb.filters import words as words_module
 from gpbnb.filters.structures import STRUCTURES
-from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_words
+from gpbnb.filters.words import WordFormats, integers_of, run_words
 
 MODES = ["nearest", "even", "chop", "up", "down", "odd"]
-
-
-def random_words(rng):
-    """Formats of words, and the arithmetic of a plain loop in them."""
-    data = (
-        int(rng.integers(3, 8)),
-        int(rng.integers(0, 14)),
-        str(rng.choice(MODES)),
-        str(rng.choice(["saturate", "wrap"])),
-    )
-    of_coefficients = (int(rng.integers(4, 16)), str(rng.choice(MODES)))
-    sums = None
-    if rng.random() < 0.7:
-        room = int(rng.integers(-2, 3)) + data[0]
-        sums = (room, data[1] + int(rng.integers(0, 14)), str(rng.choice(MODES)), str(rng.choice(["saturate", "wrap"])))
-        if rng.random() < 0.2:  # an accumulator of 64 bits
-            sums = (63 - data[1] - of_coefficients[0], data[1] + of_coefficients[0], *sums[2:])
-    found = WordFormats(
-        FixedFormat(*data),
-        FixedFormat(8, *of_coefficients),
-        None if sums is None else FixedFormat(*sums),
-    )
-    return found, plain.words(plain.fixed(*of_coefficients), data, sums)
-
-
-@pytest.mark.parametrize("structure", STRUCTURES)
-def test_each_integer_is_that_of_a_plain_loop(structure):
-    rng = np.random.default_rng(STRUCTURES.index(structure))
-    compiled = 0
-    for _ in range(30):
-        words, arithmetic = random_words(rng)
-        b, a = random_filter(rng, int(rng.integers(1, 6)))
-        system = LinearSystem.from_coefficients(b, a, structure)
-        u = rng.uniform(-4, 4, (30, 1))
-        found = run_words(system, u, words)
-        expected = slowly(structure, b, a, [Fraction(x) for x in u[:, 0]], arithmetic)
-        assert [int(y) * found.unit for y in found.states[:, -1]] == expected, (words, b, a)
-        pairs = found.outputs(1)[:, 0]
-        assert [Fraction(x) + Fraction(y) for x, y in pairs.tolist()] == expected
-        compiled += integer_program(system.as_filter(), words).is_short
-    assert compiled > 20
-
-
-@pytest.mark.parametrize("given", CONTROLLERS, ids=str)
-def test_each_integer_of_a_controller_is_that_of_a_plain_loop(given):
-    system, settings = controller_of(given)
-    rng = np.random.default_rng(8)
-    for _ in range(15):
-        words, arithmetic = random_words(rng)
-        e = rng.uniform(-1.5, 1.5, (40, 1))
-        found = run_words(system, e, words)
-        expected = plain.pid(settings, [Fraction(x) for x in e[:, 0]], arithmetic)
-        assert [int(y) * found.unit for y in found.states[:, -1]] == expected, words
-
-
-def test_long_words_run_on_integers_of_python(monkeypatch):
-    """Data of 50 bits; and the compiled loops give what Python's integers give, with overflow in sums of 64 bits."""
-    rng = np.random.default_rng(3)
-    b, a = random_filter(rng, 4)
-    system = LinearSystem.from_coefficients(b, a)
-    u = rng.uniform(-3, 3, (20, 1))
-    long = WordFormats(FixedFormat(9, 45), FixedFormat(4, 30), FixedFormat(14, 75))
-    assert not integer_program(system.as_filter(), long).is_short
-    data, sums = (9, 45, "nearest", "raise"), (14, 75, "nearest", "raise")
-    arithmetic = plain.words(plain.fixed(30, "nearest"), data, sums)
-    found = run_words(system, u, long)
-    expected = slowly("direct form II transposed", b, a, [Fraction(x) for x in u[:, 0]], arithmetic)
-    assert [int(y) * found.unit for y in found.states[:, -1]] == expected
-    for overflow in ("saturate", "wrap"):
-        words = WordFormats(
-            FixedFormat(1, 30, overflow=overflow), FixedFormat(2, 28), FixedFormat(5, 58, overflow=overflow)
-        )
-        made = integer_program(system.as_filter(), words)
-        assert made.is_short
-        assert made.words.accumulator.precision == 63
-        inputs, start = integers_of(u * 40, words.data), np.zeros(system.n + 1, np.int64)
-        by_loops = words_module.run_integers(made, inputs, start)
-        assert (by_loops == words_module.run_integers(made, inputs.astype(object), start)).all()
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -147,23 +67,6 @@ def test_a_coefficient_beyond_its_range_is_named():
         OverflowError, match=r"got a1 = -1\.9, beyond the range of fixed point of 16 bits, 15 of them fraction"
     ):
         run_words(system, np.zeros((3, 1)), WordFormats(FixedFormat(4, 15), FixedFormat(0, 15)))
-
-
-def test_shifted_numbers_are_rounded_in_every_mode():
-    rounded = {
-        "down": math.floor,
-        "up": math.ceil,
-        "chop": int,
-        "even": round,
-        "nearest": lambda x: math.floor(abs(x) + Fraction(1, 2)) * (-1 if x < 0 else 1),
-        "odd": lambda x: math.floor(x) if math.floor(x) % 2 else math.ceil(x),
-    }
-    for code, mode in enumerate(MODES):
-        for n in range(-40, 41):
-            assert words_module._shifted.py_func(n, -2, code) == 4 * n
-            for shift in range(4):
-                expected = rounded[mode](Fraction(n, 2**shift))
-                assert words_module._shifted.py_func(n, shift, code) == expected, (mode, n, shift)
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)

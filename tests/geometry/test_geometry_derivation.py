@@ -104,18 +104,6 @@ def test_each_mean_is_of_what_its_name_says(derivation, name, integrand):
     assert steps.equal(integral.function, steps.written(integrand, step))
 
 
-def test_number_of_steps():
-    assert steps.lengths(DERIVATIONS) == {
-        "turns": 4,
-        "deroll": 6,
-        "printed_deroll": 6,
-        "first_order_effects": 6,
-        "second_order_effects": 2,
-        "one_ring": 2,
-        "precessions": 5,
-    }
-
-
 @pytest.mark.parametrize("sequence", derivation.SEQUENCES)
 def test_the_symbolic_rotation_is_the_numeric_one(sequence):
     """Rodrigues' formula here, elementary matrices in gpbnb.report.measurement."""
@@ -132,15 +120,6 @@ def test_all_orders_agree_to_first_and_not_to_second_order():
         for s in derivation.SEQUENCES
     }
     assert len(seconds) == 6
-
-
-def test_printed_matrices_are_those_of_the_package():
-    values = dict(zip(derivation.ALPHA, (0.5, 0.25, 0.125), strict=True))
-    printed = np.array(derivation.printed_small(derivation.ALPHA).subs(values).tolist(), dtype=float)
-    assert np.array_equal(printed, m.small_rotation([0.5, 0.25, 0.125]))
-    roll = sp.Matrix([[1, 0, 0], [0, derivation.C, derivation.S], [0, -derivation.S, derivation.C]])
-    assert np.allclose(np.array(roll.subs(derivation.P, 0.4).tolist(), dtype=float), m.roll(0.4), atol=1e-16)
-    assert roll == derivation.turn(1, derivation.P)
 
 
 def test_the_fewest_signs_are_two_and_only_one_pair_does():
@@ -165,13 +144,6 @@ def test_printed_estimates_are_those_of_theory():
     third, second = (float(e.subs(values)) for e in derivation.printed_estimates(y, z))
     readings = [float(y.subs(values)), float(z.subs(values))]
     assert np.allclose(theory.printed_deroll(readings, 0.9), [-third, second], atol=1e-15)
-
-
-def test_errors_to_third_order_begin_with_those_to_second():
-    small = (*derivation.ALPHA, *derivation.BETA, *derivation.GAMMA, *derivation.PHI)
-    for second, third in zip(derivation.drift_errors(2), derivation.drift_errors(3), strict=True):
-        assert sp.expand(derivation.up_to(2, third, small) - second) == 0
-        assert sp.expand(third - second) != 0
 
 
 def test_a_star_off_the_plane_has_drifts_that_are_not_perpendicular():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gpbnb.report.geometry import experiment, theory
 from gpbnb.report.geometry.theory import Misalignments
-from gpbnb.report.measurement import ARCSEC, MAS, deroll, rotation, spin_in_readout, star_in_telescope, theta_of
+from gpbnb.report.measurement import ARCSEC, MAS
 
 SEEDED = settings(derandomize=True, deadline=None, database=None)
 
@@ -23,23 +23,6 @@ def third_order(case):
     """Bound of what the analysis leaves out: at most 30 third-order products with coefficients up to one (sympy)."""
     largest = max(abs(v) for name, value in vars(case).items() for v in value)
     return 30 * largest**3
-
-
-def test_the_difference_is_that_of_the_chains_with_theta():
-    rng = np.random.default_rng(8)
-    alpha, beta, gamma = rng.uniform(-0.2, 0.2, (3, 3))
-    case = Misalignments(tuple(alpha), tuple(beta), tuple(gamma), drift=(0.1, -0.2))
-    phase = np.linspace(0, 6, 7)
-    theta = theta_of([0, 0.1, -0.2], alpha)
-    gap = spin_in_readout(theta, beta, gamma, phase) - star_in_telescope(alpha, beta, phase)
-    y, z = deroll(gap[:, 1:], phase).T
-    # a dozen rotations of unit vectors
-    assert np.allclose(experiment.difference(case, np.ones(7), phase), np.stack([z, -y], axis=-1), atol=1e-14, rtol=0)
-
-
-def test_the_spin_axis_is_the_first_column_of_the_matrix_of_phi():
-    case = Misalignments(drift=(0.3, 0.5))
-    assert np.allclose(experiment.spin_axis(case, 1.0), rotation([0, 0.3, 0.5])[:, 0], atol=1e-16)
 
 
 def ramp_leak(rate):
@@ -106,25 +89,6 @@ def test_parts_of_a_roll_are_those_of_the_analysis(values, samples):
     assert found["telescope"].turning == pytest.approx(np.hypot(*beta[1:]), abs=left)
     assert found["gyro"].turning == pytest.approx(np.hypot(*np.add(beta, gamma)[1:]), abs=4e-8)
     assert found["difference"].turning == pytest.approx(np.hypot(*theory.standing(beta, gamma)), abs=left)
-
-
-def test_the_year_is_the_same_in_chunks(monkeypatch):
-    case = CASES["gamma1 and alpha_rate2"]
-    whole = experiment.year(case, PERIOD, STEP)
-    monkeypatch.setattr(experiment, "CHUNK", 100)
-    parts = experiment.year(case, PERIOD, STEP)
-    assert np.array_equal(whole.phi, parts.phi)
-    assert np.array_equal(whole.drift, parts.drift)
-    assert np.allclose(whole.sample_drift, parts.sample_drift, rtol=1e-12, atol=0)
-
-
-def test_years_run_each_case_both_ways():
-    some = {name: CASES[name] for name in ("no angle", "gamma1")}
-    found = experiment.years(some, STEP, PERIOD)
-    assert list(found) == list(some)
-    for name, (still, rolled) in found.items():
-        assert (still.roll_period, rolled.roll_period) == (None, PERIOD)
-        assert still.case == rolled.case == some[name]
 
 
 @pytest.mark.parametrize("name", theory.SINGLE)

@@ -92,40 +92,12 @@ def test_leaks_are_the_sums_written_out(samples, rolls):
     assert theory.line_fit_leak(1, rolls, samples) == pytest.approx(slope, rel=2 / len(k) ** 2)
 
 
-def test_leaks_of_many_samples():
-    assert theory.line_fit_leak(1, 100) == pytest.approx(theory.line_fit_leak(1, 100, 10**5), rel=1e-9)
-    assert theory.line_fit_leak(-1, 100) == theory.line_fit_leak(1, 100) == 6 / (100 * math.pi)
-
-
-def test_reach_is_where_the_loss_is_the_limit():
-    for name in theory.SINGLE:
-        size = theory.reach(name, MAS)
-        assert theory.small_angle_loss(name, size) == pytest.approx(MAS, rel=1e-9, abs=0)
-    assert theory.twist_limit(MAS) / ARCSEC == pytest.approx(206264.806 / 6600, rel=1e-6)
-
-
 def test_aberration():
     """The constant of aberration is 20.4955 arcseconds; the Earth's orbit is not quite a circle."""
     year, orbit = theory.aberration(640e3)
     assert year == pytest.approx(20.4955 * ARCSEC, rel=2e-4)
     period = 2 * math.pi * (theory.RADIUS + 640e3) / (orbit * theory.LIGHT)
     assert period == pytest.approx(97.5 * 60, rel=1e-2)
-
-
-def test_precession_rates_are_of_the_size_that_is_used():
-    geodetic, motional = theory.precession_rates(640e3)
-    assert geodetic == pytest.approx(theory.GEODETIC, rel=0.01)
-    assert motional == pytest.approx(theory.MOTIONAL, rel=0.05)
-    higher = theory.precession_rates(2000e3)
-    ratio = (theory.RADIUS + 640e3) / (theory.RADIUS + 2000e3)
-    assert np.divide(higher, (geodetic, motional)) == pytest.approx([ratio**2.5, ratio**3])
-
-
-def test_cases():
-    case = Misalignments().with_angle("gamma_rate2", 3e-5).with_angle("beta3", 1e-5)
-    assert case.gamma_rate == (0, 3e-5, 0)
-    assert case.at("gamma", [0, 0.5]).tolist() == [[0, 0, 0], [0, 1.5e-5, 0]]
-    assert case.at("beta", [0, 0.5]).tolist() == [0, 0, 1e-5]
 
 
 def test_what_stands_is_turned_by_the_phase_that_is_zero_by_default():

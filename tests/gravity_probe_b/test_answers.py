@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.forms import Form
 from gpbnb.report.gravity_probe_b import answers, year
 from gpbnb.report.kalman import report_bounds
 
@@ -36,15 +33,6 @@ def test_what_counts_is_the_year_and_not_its_end_alone():
     (nine,) = (run for run in answers.find_answers().runs if (run.case.base, run.case.precision) == (10, 9))
     assert max(np.abs(nine.drift[-1]).max(), np.abs(nine.rate[-1]).max()) < 1 < answers.largest(nine)
     assert answers.largest(nine) == np.abs(np.hstack([nine.drift, nine.rate])).max()
-
-
-@pytest.mark.parametrize("digits", [1, 9, 17])
-def test_digits_are_those_of_the_format_and_chopping_costs_as_much_as_a_factor_of_two(digits):
-    assert answers.decimal_digits(FloatFormat(10, digits)) == pytest.approx(digits, abs=1e-12)
-    chopped = answers.decimal_digits(FloatFormat(10, digits, Rounding.CHOP))
-    assert digits - chopped == pytest.approx(math.log10(2), abs=1e-12)
-    # half a unit of the last of 53 bits is 2**-53, and 0.5 * 10**(1 - t) is that for t = 1 + 52 log10(2)
-    assert answers.decimal_digits(FloatFormat(2, 53)) == pytest.approx(1 + 52 * math.log10(2), abs=1e-12)
 
 
 @pytest.mark.parametrize("size", [5.0, -5.0])
@@ -80,21 +68,3 @@ def test_the_tolerance_itself_is_met_and_what_is_just_below_is_not(rounding):
     assert error > 0
     assert answers._good(next(run for run in enough if answers.largest(run) == error), rounding, error) is not None
     assert answers._good(next(run for run in enough if answers.largest(run) == error), rounding, 0.999 * error) is None
-
-
-def test_only_the_usual_model_counts():
-    assert {run.case.model for run in answers.find_answers().runs} == {year.MODELS[0]}
-
-
-def test_the_fewest_bits_are_those_within_the_tolerance():
-    found = answers.find_answers()
-    usual = {
-        run.case.precision: answers.largest(run)
-        for run in found.runs
-        if (run.case.base, run.case.form, run.case.rounding) == (2, Form.HUNG, Rounding.NEAREST)
-    }
-    within = {precision for precision, error in usual.items() if error <= 1}
-    assert found.bits == min(within) == 32
-    assert found.error == usual[32]
-    with pytest.raises(ValueError, match="needed one that a run in bits meets"):
-        answers._fewest_bits(found.runs, 1e-20)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tabulated import by_header
 
 from gpbnb import FloatFormat
 from gpbnb.arithmetic.rational import exact
@@ -82,29 +81,6 @@ def test_stored_bounds_of_gravity_probe_b() -> None:
     assert (last["deviation"][narrower] < last["absolute"][narrower] / 3).all()
 
 
-def test_the_table_has_the_last_row_of_each_choice_of_states(monkeypatch: pytest.MonkeyPatch) -> None:
-    bounds = (0.125, 0.25, 0.0625, 0.375, 9.0, 9.0, 9.0, 9.0, 9.0, 9.0)
-    rows = [
-        horizon.HorizonRow(50, 8640 * days, states, bounds, ())
-        for states in ("absolute", "deviation")
-        for days in (3, 9000)
-    ]
-    monkeypatch.setattr(horizon, "load", lambda: tuple(rows))
-    table = horizon.table()
-    assert table.title == "Gravity Probe B in binary64"
-    assert [row["states"] for row in by_header(table)] == ["drift itself", "deviations from the predicted drift"]
-    assert by_header(table)[0] == {
-        "states": "drift itself",
-        "days": "9000",
-        "drift φ2, mas": "0.12",
-        "drift φ3, mas": "0.25",
-        "drift rate 2, mas/yr": "0.062",
-        "drift rate 3, mas/yr": "0.38",
-        "bits": "49",
-    }
-    assert horizon.bits(rows[0], tolerance=0.125) == 52
-
-
 def test_the_first_cycle_of_gravity_probe_b_again() -> None:
     first = {row.states: row for row in horizon.load()[:2]}
     assert {row.steps for row in first.values()} == {2340}
@@ -127,52 +103,3 @@ def test_a_saved_run_continues_with_the_same_bounds(tmp_path: Path, monkeypatch:
     for (_, (again,)), (_, (once,)) in zip(rest, whole[2:], strict=True):
         assert (again.worst == once.worst).all()
         assert (again.last == once.last).all()
-
-
-def test_the_rows_are_those_of_absolute_states_and_then_of_deviations(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    absolute, deviation = (horizon.HorizonBounds(size * np.ones(10), np.ones(10), np.ones((10, 4))) for size in (5, 2))
-    asked = []
-
-    def bounds(precision: int, steps: int, saved: Path | None) -> list[object]:
-        asked.append((precision, steps, saved and saved.name))
-        return [(steps, [absolute, deviation])]
-
-    monkeypatch.setattr(horizon, "gravity_probe_b_bounds", bounds)
-    file = horizon.SWEEP.recompute(tmp_path)
-    assert [row[:4] for row in horizon.SWEEP.load(file).rows] == [
-        ("53", str(YEAR), "absolute", "5"),
-        ("53", str(YEAR), "deviation", "2"),
-    ]
-    assert capsys.readouterr().err.count(f"{YEAR}/{YEAR}") == 1
-    horizon.year_of_bounds(24, None, 3)
-    assert asked == [(53, YEAR, "state_53.pickle"), (24, 3, None)]
-    assert capsys.readouterr().err == ""
-
-
-def test_a_stored_row_comes_out_again() -> None:
-    rows = horizon.first_cycle(53, np.random.default_rng(0))
-    assert rows == list(horizon.SWEEP.load().rows[:2])
-
-
-def test_there_are_rows_for_each_hundredth_of_a_year_and_the_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A run that goes on keeps the lines before the saved state, and waits for the next hundredth after the last."""
-    part, none = YEAR // 100, horizon.HorizonBounds(np.ones(10), np.ones(10), np.ones((10, 4)))
-    steps = [1, part, part + 1, 2 * part, 2 * part + 1, 3 * part]
-
-    def bounds(precision: int, last: int, saved: Path) -> list[object]:
-        saved.touch()
-        return [(done, [none, none]) for done in steps if begin <= done <= last]
-
-    monkeypatch.setattr(horizon, "gravity_probe_b_bounds", bounds)
-
-    def found(last: int) -> list[int]:
-        return [int(row[1]) for row in horizon.year_of_bounds(24, tmp_path, last)]
-
-    begin = 0
-    assert found(part + 1) == [1, 1, part + 1, part + 1]
-    begin = part + 1  # the state was saved before the last line
-    assert found(3 * part) == [1, 1, part + 1, part + 1, 2 * part + 1, 2 * part + 1, 3 * part, 3 * part]

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from fractions import Fraction
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,21 +10,18 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kernels.records import pairs_as_floats, update_largest
+from gpbnb.filters.kernels.records import update_largest
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.gravity_probe_b import threshold
-from gpbnb.report.gravity_probe_b.lockstep import REFERENCE, error_rows, run_lockstep
+from gpbnb.report.gravity_probe_b.lockstep import REFERENCE, error_rows
 from gpbnb.report.gravity_probe_b.threshold import (
     FORMS,
-    SIMPLE_CELLS,
-    STATES,
     SimpleYear,
     YearCell,
     compute,
     lockstep,
     rows,
-    sample,
 )
 from gpbnb.report.gravity_probe_b.year import MODELS, model
 from gpbnb.report.gravity_probe_b.year import simulation as year_simulation
@@ -80,19 +74,6 @@ def test_a_filter_that_stops_leaves_no_numbers():
     largest = np.zeros((2, 2))
     update_largest(after, np.zeros_like(after), largest)
     assert np.isinf(largest).all()
-
-
-def test_measurement_matrices_may_be_replaced(measured):
-    told = model(MODELS[0], 2)
-    H = told.to_float()["H"]
-    many, other = (Run(told, FloatFormat(2, 30), Form.INNOVATION, (), records=COUNT) for _ in range(2))
-    expected = many.carry(measured, 4)
-    assert (len(H) > STEPS) is True
-    other.use_measurement_matrices(H[:STEPS])
-    assert (other.carry(measured, 4) == expected).all()
-    changed = Run(told, FloatFormat(2, 30), Form.INNOVATION, (), records=COUNT)
-    changed.use_measurement_matrices(np.zeros_like(H[:1]))  # nothing is measured
-    assert (changed.carry(measured, 4) == 0).all()
 
 
 # -- the sweep ------------------------------------------------------------------------------------
@@ -150,33 +131,6 @@ def test_an_interrupted_cell_goes_on(tmp_path):
     assert other.block == 0
 
 
-def test_measurements_reference_and_formats_are_timed_apart(monkeypatch):
-    """A clock goes on by 1, 10, 100, 1000 and 10000 seconds during the parts of a block, which has three formats."""
-    readings = iter([0, 1, 11, 111, 1111, 11111])
-    clock = SimpleNamespace(process_time=lambda: next(readings))
-    monkeypatch.setattr("gpbnb.report.gravity_probe_b.lockstep.time", clock)  # not that of pytest and coverage.py
-    whole = lockstep(dataclasses.replace(SMALL, precisions=(20, 22, 24)), 100)
-    whole.advance()
-    assert whole.seconds.tolist() == [1, 10, 100, 1000, 10000]
-
-
-@pytest.mark.parametrize(("blocks", "saved"), [(1, [1, 2, 3]), (2, [2]), (3, [3]), (4, [])])
-def test_a_cell_is_saved_after_every_so_many_blocks(blocks, saved, tmp_path, monkeypatch):
-    whole, seen = lockstep(SMALL, 10_000), []  # three blocks
-    monkeypatch.setattr(whole, "advance", lambda: setattr(whole, "block", whole.block + 1))
-    monkeypatch.setattr(whole, "save", lambda file: seen.append(whole.block))
-    run_lockstep(whole, tmp_path, blocks)
-    assert seen == saved
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_sample_is_one_record_computed_alone(monkeypatch):
-    lines = rows(SMALL, compute(SMALL, steps=300))
-    monkeypatch.setattr(threshold, "compute", lambda cell: compute(cell, steps=300))
-    found = {sample(SMALL, np.random.default_rng(seed))[0] for seed in range(20)}
-    assert found == set(lines)
-
-
 def test_rows_have_the_larger_error_of_both_drifts_and_of_both_rates():
     """Of two formats and two records; `end` has signs, and a filter that stopped has no numbers."""
     largest = [[[1, 20], [10, 2], [3, 40], [30, 4]], [[math.nan, 1], [5, 1], [6, 1], [7, 1]]]
@@ -187,37 +141,3 @@ def test_rows_have_the_larger_error_of_both_drifts_and_of_both_rates():
         ("b", "53", "7", "inf", "7", "inf", "4"),
         ("b", "53", "8", "1", "1", "0", "0"),
     ]
-
-
-def test_the_cells_are_distinct_and_cover_the_threshold():
-    records = [
-        (*head, str(cell.first + i)) for cell in SIMPLE_CELLS for head in cell.heads() for i in range(cell.count)
-    ]
-    assert sorted(records) == sorted(row[: threshold.SWEEP.key] for row in threshold.SWEEP.load().rows)
-    heads = [(*head, cell.first) for cell in SIMPLE_CELLS for head in cell.heads()]
-    assert len(set(heads)) == len(heads)
-    nearest = {
-        (states, base): {
-            t for cell in SIMPLE_CELLS if (cell.states, cell.base) == (states, base) for t in cell.precisions
-        }
-        for states in STATES
-        for base in (2, 10)
-    }
-    assert nearest["absolute", 2] >= set(range(28, 37))
-    assert nearest["deviation", 2] >= set(range(22, 31))
-    assert nearest["absolute", 10] & nearest["deviation", 10] >= {8, 9, 10, 11}
-    assert {cell.rounding for cell in SIMPLE_CELLS} == {"nearest", "chop"}
-    near = [cell for cell in SIMPLE_CELLS if cell.base == 2 and cell.rounding == "nearest"]
-    assert all(cell.count >= 100 for cell in near)
-    assert all(cell.count >= 30 for cell in SIMPLE_CELLS)
-    assert dataclasses.replace(SMALL, first=5).key[-1] == "5"
-
-
-def test_pairs_become_the_nearest_floats_where_one_rounding_gives_them() -> None:
-    """Powers up to 10**22 are exact; beyond them, more than one rounding would be necessary."""
-    exponents = [-40, -24, -23, -22, -21, -1, 0, 1, 21, 22, 23, 24, 40]
-    pairs = np.array([[123456789, e] for e in exponents]).reshape(-1, 1, 1, 2)
-    out = np.empty((len(exponents), 1, 1))
-    pairs_as_floats.py_func(pairs, out)
-    for found, e in zip(out.ravel(), exponents, strict=True):
-        assert found == float(123456789 * Fraction(10) ** e) if abs(e) <= 22 else np.isnan(found), e

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import BLOCK
-from gpbnb.report.gravity_probe_b import mission, threshold
+from gpbnb.report.gravity_probe_b import mission
 from gpbnb.report.gravity_probe_b.lockstep import Lockstep
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS, STATES, Mission
 
@@ -105,27 +104,6 @@ def test_the_telescope_measures_pointing_and_the_gyro_the_drift_as_well():
             assert H[:, row, at] == pytest.approx(columns.get(at, 0 * one), abs=2.0**-13), (row, states[at])
 
 
-@pytest.mark.parametrize("base", [2, 10])
-def test_matrices_are_held_exactly_by_every_format_of_the_sweep(base):
-    H = Mission().matrices(300, base)
-    fmt = FloatFormat(2, 20) if base == 2 else FloatFormat(10, 7)
-    given = [Fraction(round(h * 10**4), 10**4) if base == 10 else Fraction(h) for h in H[::400].ravel()]
-    assert [fmt.round(each) for each in given] == given
-    model = Mission().model(base)
-    for entry in (*model.Phi.ravel(), *model.Q.ravel(), *model.R.ravel(), *model.P0.ravel()):
-        assert fmt.round(entry) == entry
-
-
-def test_decimals_are_the_same_on_the_fast_way():
-    mission, fmt = Mission(), FloatFormat(10, 8)
-    fast, slow = (Run(mission.model(10), fmt, Form.INNOVATION, ()) for _ in range(2))
-    H = mission.matrices(0, 10)[:50]
-    fast.use_measurement_matrices(H, 4)
-    slow.use_measurement_matrices(np.rint(H * 1e4) / 1e4)
-    assert (fast.matrices.H == slow.matrices.H).all()
-    assert (fast.matrices.HT == slow.matrices.HT).all()
-
-
 def test_while_the_star_is_hidden_no_estimate_learns():
     mission = replace(Mission(), flicker=False)
     run = Run(mission.model(2), FloatFormat(2, 30), Form.INNOVATION, ())
@@ -151,46 +129,6 @@ def test_the_filter_finds_scale_and_roll_phase_by_the_aberration():
         # Four records: a difference of five standard deviations is a fault.
         assert np.abs(reference.x[at] - lockstep.truth[:, at]).max() < 5 * deviation[at]
     assert lockstep.largest.max() < 0.1
-
-
-def test_the_sweep_changes_one_choice_at_a_time():
-    usual = mission.SETTINGS["mission"]
-    fields = list(vars(usual))
-    for name, setting in mission.SETTINGS.items():
-        changed = [field for field in fields if getattr(setting, field) != getattr(usual, field)]
-        assert len(changed) == (name != "mission")
-    assert mission.SETTINGS["steps and roll as flown"].steps == 15_768_000
-    cell = threshold.MISSION_CELLS[0]
-    assert cell.year.deviations
-    found = threshold.rows(cell, threshold.compute(replace(cell, count=2), steps=500))
-    assert next(row[:7] for row in found) == cell.key
-    assert len(found) == 2 * len(cell.precisions)
-
-
-def test_a_sample_is_one_record_of_one_format(monkeypatch):
-    asked = set()
-    monkeypatch.setattr(threshold, "compute", lambda cell: asked.add((cell.precisions, cell.first, cell.count)))
-    monkeypatch.setattr(threshold, "rows", lambda cell, result: [])
-    cell = replace(threshold.MISSION_CELLS[0], precisions=(20, 24), first=5, count=3)
-    for seed in range(40):
-        threshold.sample(cell, np.random.default_rng(seed))
-    assert asked == {((precision,), record, 1) for precision in (20, 24) for record in (5, 6, 7)}
-
-
-def test_every_cell_of_the_sweep_can_be_computed():
-    heads = [(*head, cell.first) for cell in threshold.MISSION_CELLS for head in cell.heads()]
-    assert len(set(heads)) == len(heads)
-    records = [
-        (*head, str(cell.first + i))
-        for cell in threshold.MISSION_CELLS
-        for head in cell.heads()
-        for i in range(cell.count)
-    ]
-    assert sorted(records) == sorted(row[: threshold.MISSION_SWEEP.key] for row in threshold.MISSION_SWEEP.load().rows)
-    for cell in threshold.MISSION_CELLS:
-        found = threshold.lockstep(replace(cell, count=1), 1)
-        assert str(found.runs[0].form) == {"hung": "Hung (1984)", "innovation": "innovation"}[cell.form]
-        assert [run.fmt.precision for run in found.runs] == list(cell.precisions)
 
 
 def test_measurements_are_whole_multiples_of_their_resolution(monkeypatch):

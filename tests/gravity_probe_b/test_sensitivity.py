@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
-from gpbnb.report.gravity_probe_b import answers, tables, year
+from gpbnb.report.gravity_probe_b import answers, year
 from gpbnb.report.gravity_probe_b.answers import Moved, median_precision, sensitivity, single_record
 from gpbnb.report.gravity_probe_b.threshold import Share
 
@@ -39,38 +38,6 @@ def test_two_kinds_that_meet_the_tolerance_are_compared_where_they_do():
     usual = [share(24, 4.0), share(25, 0.25), share(29, 0.001)]
     chopped = [share(29, 2.0, rounding=Rounding.CHOP), share(30, 0.5, rounding=Rounding.CHOP, records=2)]
     assert sensitivity([*usual, *chopped]) == (Moved("rounding, simple model", "nearest", "chop", 5, 2),)
-
-
-def test_one_choice_changes_at_a_time():
-    found = [
-        share(25, 1.0),
-        share(26, 0.25),  # nearest to the tolerance is 25, where only these states were run
-        share(33, 1.0, states="absolute", records=2),
-        share(26, 1.0, rounding=Rounding.CHOP),
-        share(25, 4.0, form="innovation"),
-        share(25, 2.0, setting="mission"),
-        share(26, 1.0, setting="mission"),
-        share(26, 0.5, setting="white noise only", records=1),
-        share(26, 9.0, setting="white noise only", states="absolute"),  # two choices at once
-    ]
-    assert sensitivity(found) == (
-        Moved("states, simple model", "deviation", "absolute", 8, 2),
-        Moved("form, simple model", "hung", "innovation", 2, 3),
-        Moved("rounding, simple model", "nearest", "chop", 2, 3),
-        Moved("model", "simple", "mission", 1, 3),
-        Moved("model", "mission", "white noise only", -1, 1),
-    )
-    table = tables.sensitivity(sensitivity(found))
-    rows = table.body
-    assert table.title == "what moves the answer"
-    assert by_header(table)[0] == {
-        "choice": "states, simple model",
-        "from": "deviations",
-        "to": "absolute angles",
-        "bits": "+8.0",
-        "records (at least)": "2",
-    }
-    assert rows[-1][3] == "−1.0"
 
 
 def test_what_is_stored_of_one_record():

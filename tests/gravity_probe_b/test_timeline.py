@@ -5,10 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import pytest
 
-from gpbnb.report.display import style
 from gpbnb.report.gravity_probe_b import timeline
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
@@ -42,27 +40,6 @@ def test_days_become_fractions_of_years():
     (data,) = [each for each in timeline.EVENTS if each.words == "data"]
     assert launch.span == pytest.approx((2004 + 110 / 366,) * 2, abs=1 / 300)  # 20 April is the 111th day of 2004
     assert data.span == pytest.approx((2004 + 240 / 366, 2005 + 225 / 365), abs=1 / 300)
-
-
-def test_the_picture_follows_the_rule_of_figures_and_shows_every_event_at_its_time():
-    figure = timeline.figure()
-    figure.canvas.draw()
-    assert style.defects(figure) == []
-    (ax,) = figure.axes
-    dots = sorted(float(line.get_ydata()[0]) for line in ax.lines if line.get_marker() == "o")
-    assert dots == sorted(each.span[0] for each in timeline.EVENTS if not each.end)
-    bars = sorted(tuple(line.get_ydata()) for line in ax.lines if line.get_linewidth() > 5)
-    assert bars == sorted(each.span for each in timeline.EVENTS if each.end)
-    top, bottom = timeline.FIRST, timeline.LAST
-    assert all(top <= time <= bottom for each in timeline.EVENTS for time in each.span)
-    for lane in timeline.LANES:
-        words = [f": {each.words}" for each in sorted(timeline.EVENTS, key=lambda each: sum(each.span))]
-        placed = sorted((text.get_position()[1], text.get_text().partition(": ")) for text in ax.texts)
-        shown = [f": {words}" for _, (_, colon, words) in placed if colon]
-        of_lane = {f": {each.words}" for each in timeline.EVENTS if each.lane == lane}
-        # From the earliest to the latest, also where words were moved apart.
-        assert [each for each in shown if each in of_lane] == [each for each in words if each in of_lane]
-    plt.close(figure)
 
 
 def test_words_and_table_name_every_event():

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -152,13 +149,6 @@ def test_the_refined_bound_is_near_the_error_at_the_end_of_the_year():
     assert max(bounds[SINGLE.reference].drift[-1]) < 1e-12 * MILLIARCSECOND
 
 
-def test_bounds_are_rounded_upwards_and_grow():
-    for each in year.bounds().values():
-        assert (each.drift > 0).all()
-        assert (each.state >= np.maximum(each.drift.max(axis=1), each.rate.max(axis=1)) * (1 - 1e-5)).all()
-        assert each.state[-1] < 1e-8
-
-
 def test_what_the_filter_knows_is_what_it_thinks():
     """The unrounded filter's errors, of the simulated truth, are of the size of its standard deviations."""
     for about in year.provenance()["references"].values():
@@ -185,19 +175,6 @@ def test_in_one_base_every_format_holds_the_model_and_the_measurements():
     z = year.simulation(MODELS[0]).measurements(BLOCK)
     assert (z == np.rint(z)).all()
     assert np.abs(z).max() < 10**4  # four decimal digits
-
-
-def test_checkpoint_steps_are_at_equal_ratios():
-    assert year.checkpoint_steps()[-1] == YEAR
-    assert year.checkpoint_steps(100) == (1, 2, 5, 10, 22, 46, 100)
-
-
-def test_cases_have_names_of_their_own():
-    names = {case.name for case in CASES} | {case.reference.name for case in CASES}
-    assert len(names) == len(CASES) + 4
-    assert SINGLE.name == "roll-600-s-2-24-nearest-hung"
-    assert SINGLE.fmt == FloatFormat(2, 24, NEAREST)
-    assert SINGLE.reference.fmt is None
 
 
 def test_the_fingerprint_tells_whatever_changes_a_run(monkeypatch):
@@ -269,12 +246,6 @@ def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeyp
     assert ResumableRun(SINGLE, parts, STEPS).run.steps == 0
 
 
-def test_progress_reaches_the_end(tmp_path, capsys):
-    for _ in range(2):  # the second time, nothing is left to do
-        run_cases([SINGLE], tmp_path, 100)
-        assert "year: 100%" in capsys.readouterr().err
-
-
 def test_rows_of_a_year_agree_in_all_but_the_last_digits_of_an_eigenvalue():
     row = ("hung", "24", "1.5", "0.001")
     assert same_errors(row, ("hung", "24", "1.5", "0.00100001"))
@@ -282,60 +253,7 @@ def test_rows_of_a_year_agree_in_all_but_the_last_digits_of_an_eigenvalue():
     assert not same_errors(row, ("hung", "24", "1.6", "0.001"))
 
 
-def test_progress_counts_the_steps_of_a_run(tmp_path):
-    shown = []
-    ResumableRun(SINGLE, tmp_path, STEPS).advance(3, SimpleNamespace(update=shown.append))
-    assert shown == [BLOCK, BLOCK, 100]
-
-
-def test_the_processor_time_of_a_run_is_that_of_its_blocks(tmp_path, monkeypatch):
-    """A clock goes on by 1, 10 and 100 seconds during the blocks, and by 1000 seconds between them."""
-    run, readings = ResumableRun(SINGLE, tmp_path, STEPS), iter([5, 6, 1006, 1016, 2016, 2116])
-    monkeypatch.setattr(year, "time", SimpleNamespace(process_time=lambda: next(readings)))
-    run.advance(3)
-    assert run.seconds == ResumableRun(SINGLE, tmp_path, STEPS).seconds == 111
-
-
-def test_what_is_recomputed_is_loaded(tmp_path, monkeypatch):
-    file = year.SWEEP.recompute(tmp_path, count=3, steps=100)
-    here = file.parent
-    assert file == here / "year.csv"
-    origin = read(file, year.COLUMNS, "").provenance
-    assert (origin["command"], origin["seed"]) == (year.SWEEP.command, "1984")
-    runs = year.load(here)
-    assert [run.case for run in runs] == list(CASES[:3])
-    assert all(run.steps.tolist() == list(year.checkpoint_steps(100)) for run in runs)
-    # As far as it goes, it is the year.
-    for run in runs:
-        whole = at_end(2, run.case.precision)
-        assert np.array_equal(run.rate, whole.rate[:7])
-        assert np.array_equal(run.gain, whole.gain[:7])
-    assert list(year.bounds(here)) == [SINGLE.reference]
-    assert np.array_equal(year.bounds(here)[SINGLE.reference].drift, year.bounds()[SINGLE.reference].drift[:7])
-    assert year.provenance(here)["steps"] == 100
-    (here / "year.csv").write_text("step\n", encoding="utf-8")
-    year.load.cache_clear()
-    with pytest.raises(ValueError, match=r"year\.csv, line 1: the line .* is missing"):
-        year.load(here)
-
-    year.load.cache_clear()
-    monkeypatch.setattr(year, "run_cases", None)
-    assert year.SWEEP.recompute(tmp_path, count=3, steps=100, store=True) == file
-    assert len(year.load(here)) == 3
-    for refused in ({"executor": ThreadPoolExecutor(1)}, {"only": ["hung"]}):
-        with pytest.raises(
-            ValueError, match="got processes or words; needed one process and all cases, or the first ones"
-        ):
-            year.SWEEP.recompute(tmp_path, **refused)
-
-
 def test_a_year_that_lost_its_variance_says_when():
     run = at_end(2, 14)
     assert run.indefinite == year.provenance()["cases"][run.case.name]["indefinite"] == 504_566
     assert at_end(2, 24).indefinite is None
-
-
-def test_a_case_is_bounded_only_where_the_others_rest_on_it(tmp_path):
-    assert ResumableRun(SINGLE.reference, tmp_path, 10).run.bounded
-    assert ResumableRun(SINGLE, tmp_path, 10).seconds == 0
-    assert not ResumableRun(SINGLE, tmp_path, 10).run.bounded

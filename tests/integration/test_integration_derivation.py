@@ -8,13 +8,12 @@ import steps
 import sympy as sp
 
 from gpbnb.report.integration import derivation, theory
-from gpbnb.report.integration.derivation import MU, OMEGA, TAU, TIME, P, T
+from gpbnb.report.integration.derivation import MU, T
 
 DERIVATIONS = steps.Derivations(
     derivation.independent,
     derivation.transient,
 )
-VALUES = {OMEGA: 3, T: sp.Rational(2, 5), P: sp.Rational(289, 100), MU: sp.Rational(6, 5)}
 
 
 #: Where what comes out is already written as it is printed.
@@ -51,31 +50,9 @@ def test_each_step_holds_and_is_named_for_what_it_derives(name):
     steps.check_each(DERIVATIONS[name], NAMES[name], ALIKE)
 
 
-def test_noise_in_numbers():
-    one = theory.discretize(1.2)
-    expected = 2.89 * np.array([[one.q11, one.q12 * 0.4], [one.q12 * 0.4, one.q22 * 0.16]], dtype=float)
-    assert np.array(derivation.noise().subs(VALUES)).astype(float) == pytest.approx(expected, rel=1e-12)
-    turned = np.array(derivation.noise("reversed").subs(VALUES)).astype(float)
-    assert turned == pytest.approx(expected, rel=1e-12)
-    printed = np.array(derivation.noise("printed").subs({**VALUES, TIME: 1})).astype(float)
-    assert printed[0, 0] == pytest.approx(expected[0, 0] * np.exp(-6), rel=1e-12)
-
-
-def test_noise_at_a_point_is_the_integral():
-    q = derivation.noise()
-    density = 2 * OMEGA * P * sp.exp(-2 * OMEGA * TAU)
-    assert sp.simplify(sp.integrate(density, (TAU, 0, T)) - q[0, 0]) == 0
-
-
 def test_the_integral_equation_as_printed_lacks_the_identity():
     assert derivation.transition_residual(identity=True) == sp.zeros(2)
     assert derivation.transition_residual(identity=False) == sp.eye(2)
-
-
-def test_expected_values():
-    x1, q1, p11 = derivation.X1, derivation.Q1, derivation.P11
-    assert derivation.expected(x1 * q1) == 0
-    assert derivation.expected(3 * x1**2) == 3 * p11
 
 
 def test_the_walk_is_that_of_the_theory():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tracemalloc
 from itertools import pairwise
 
 import numpy as np
@@ -41,17 +40,6 @@ def test_advance_is_the_recursion(process):
     assert state == pytest.approx(slow, rel=1e-12)
 
 
-def test_both_loops_are_the_same_for_the_first_order():
-    step, normal = theory.exact_step(FIRST, 2.0), rng(1).standard_normal((50, 3, 2))
-    found = []
-    for loop in (experiment._advance, experiment._advance_one):
-        x, d, state = np.empty((50, 3)), np.empty((50, 3)), np.full((3, 1), 0.5)
-        loop(step.a, step.b, state, normal, x, d)
-        found.append((x, d, state))
-    for one, other in zip(*found, strict=True):
-        assert one == pytest.approx(other, rel=1e-14, abs=1e-16)
-
-
 @pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
 def test_numbers_do_not_depend_on_the_pieces(process, monkeypatch):
     whole = experiment.simulate(process, 2.0, [10, 100], rng(3), 5)
@@ -59,30 +47,6 @@ def test_numbers_do_not_depend_on_the_pieces(process, monkeypatch):
     cut = experiment.simulate(process, 2.0, [10, 100], rng(3), 5)
     assert len(list(experiment.chunks(process, 2.0, 100, rng(3), 5))) > 10
     assert cut.errors == pytest.approx(whole.errors, rel=1e-12, abs=1e-14)
-
-
-def test_pieces_carry_the_samples_before():
-    chunks = list(experiment.chunks(FIRST, 2.0, 20, rng(4), 2))
-    assert [chunk.first for chunk in chunks] == [1]
-    assert chunks[0].x.shape == (21, 2)
-    assert chunks[0].d.shape == (20, 2)
-
-
-def test_a_piece_has_a_cycle_at_least(monkeypatch):
-    monkeypatch.setattr(experiment, "CHUNK", 24)
-    for paths in (11, 12, 13, 100):  # two numbers for each path and cycle
-        chunks = list(experiment.chunks(FIRST, 2.0, 3, rng(4), paths))
-        assert [chunk.first for chunk in chunks] == [1, 2, 3]
-        assert {chunk.d.shape for chunk in chunks} == {(1, paths)}
-
-
-def test_pieces_follow_each_other(monkeypatch):
-    monkeypatch.setattr(experiment, "CHUNK", 24)
-    chunks = list(experiment.chunks(FIRST, 2.0, 20, rng(4), 2))
-    assert len(chunks) > 2
-    for before, after in pairwise(chunks):
-        assert after.first == before.first + len(before.d)
-        assert np.array_equal(after.x[0], before.x[-1])
 
 
 @pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
@@ -114,15 +78,6 @@ def test_the_error_of_a_trapezoid_is_that_beside_a_fine_integral():
     )
 
 
-@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
-def test_simulated_errors_have_the_exact_variance(process):
-    n = [12, 24, 120]
-    run = experiment.simulate(process, 2.0, n, rng(8), 3000)
-    expected = theory.trapezoid_variance(process, 2.0, n[-1])[n]
-    assert np.abs(run.deviations(expected)).max() < 4
-    assert run.relative_standard_error == pytest.approx(math.sqrt(2 / 3000))
-
-
 def test_a_sweep_agrees_with_the_exact_variance_and_tells_39_apart():
     found = experiment.sweep([1e-3, 0.3, 10.0, 100.0], 200, 4000, rng(13))
     assert np.abs(found.deviations()).max() < 4
@@ -131,17 +86,6 @@ def test_a_sweep_agrees_with_the_exact_variance_and_tells_39_apart():
     assert away[2] < -10
     assert away[3] < -30
     assert found.standard_error == pytest.approx(math.sqrt(2 / 4000))
-
-
-def test_ten_million_samples_in_bounded_memory():
-    experiment.simulate(FIRST, 2.0, [10], rng(14))
-    tracemalloc.start()
-    run = experiment.simulate(theory.first_order(1.0, 0.1), 1.0, [5_000_000, 10_000_000], rng(14))
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 100e6  # the samples and errors of ten million cycles alone would be 160 MB
-    expected = theory.error_variance([5e6, 1e7], 0.1)
-    assert np.all(np.abs(run.errors[:, 0]) < 4 * np.sqrt(expected))
 
 
 # -- roundings ------------------------------------------------------------------------------------
@@ -194,12 +138,6 @@ def test_samples_and_products_are_rounded_too():
     _, rounding, _ = emulated(1.0, 0.5, 20.0, fmt, rng(24), 20_000)
     ratio = rounding / theory.two_errors(1.0, 1.0, 0.5, 20.0, fmt).rounding
     assert ratio == pytest.approx(1.0, abs=0.1)
-
-
-def test_decimal_digits():
-    _, rounding, _ = emulated(8.0, 64.0, 8.0, FloatFormat(10, 5), rng(19), 60)
-    expected = theory.two_errors(1.0, 8.0, 64.0, 8.0, FloatFormat(10, 5))
-    assert rounding == pytest.approx(expected.rounding, rel=4 * math.sqrt(6 / 60) / 2)
 
 
 def test_beyond_the_stall_rate_the_integral_is_lost():

@@ -38,12 +38,6 @@ def test_correlated_roundings_add_up_as_they_do():
         assert observed == pytest.approx(float(theory.correlation_factor(s)), rel=0.12)
 
 
-def test_correlation_fades_and_grows():
-    assert theory.correlation_factor(3.0) == 1
-    assert theory.correlation_factor(0.35) == pytest.approx(1.10, abs=0.01)
-    assert theory.correlation_factor(0.02) == pytest.approx(1 + 1 / (30 * 0.02**2), rel=0.01)
-
-
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8), FloatFormat(16, 8, CHOP), FloatFormat(3, 15)])
 def test_errors_fall_and_grow_with_the_rate_as_the_closed_forms_say(fmt):
     omega, duration = 100.0, 1000.0
@@ -62,27 +56,6 @@ def test_errors_fall_and_grow_with_the_rate_as_the_closed_forms_say(fmt):
     scaled = theory.two_errors(fmt.base**3, omega, slow, duration, fmt)
     assert scaled.rounding == pytest.approx(fmt.base**3 * first.rounding, rel=1e-9)
     assert scaled.total == pytest.approx(math.hypot(scaled.discretization, scaled.rounding))
-
-
-def test_the_closed_best_rate_is_the_least_of_both_variances():
-    """d/df of ωt/6f² + κt²f/ω, and of ωt/6f² + 2κ_1²t³f²/3ω, is zero."""
-    omega, t = 30.0, 500.0
-    fmt, chopped = FloatFormat(2, 24), FloatFormat(2, 24, CHOP)
-    f, g = (theory.independent_best_rate(omega, t, each) for each in (fmt, chopped))
-    assert theory.mean_square_rounding(fmt) * t**2 / omega == pytest.approx(omega * t / (3 * f**3), rel=1e-12, abs=0)
-    slope = 4 * theory.mean_chopping(chopped) ** 2 * t**3 * g / (3 * omega)
-    assert slope == pytest.approx(omega * t / (3 * g**3), rel=1e-12)
-
-
-def test_odd_bases_have_no_ties():
-    """Without them the error is proportional to the square root of the rate; with them it has a floor."""
-    ratio = {}
-    for base in (2, 3):
-        slow, fast = (theory.two_errors(1.0, 1.0, f, 1e5, FloatFormat(base, 20)) for f in (2.0, 8.0))
-        ratio[base] = fast.rounding / slow.rounding
-    assert ratio[3] == pytest.approx(2, rel=0.03)
-    # κ t² f/ω = 0.18 f beside κ_1² t² (1 + φ)/2π = 0.13, in 2**-2t: √(1.57/0.49) = 1.8 between 2 and 8 Hz.
-    assert ratio[2] == pytest.approx(1.8, rel=0.05)
 
 
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 16), FloatFormat(2, 24), FloatFormat(10, 7), FloatFormat(2, 32, CHOP)])

@@ -78,13 +78,6 @@ def test_langevin_is_the_function_of_that_name():
 # -- (35) and (39) --------------------------------------------------------------------------------
 
 
-def test_random_walk_scales_as_its_units_do():
-    base = theory.random_walk(2.0, 3.0, 7.0)
-    assert theory.random_walk(6.0, 3.0, 7.0) == pytest.approx(3 * base, rel=1e-15)
-    assert theory.random_walk(2.0, 12.0, 28.0) == pytest.approx(base / 2, rel=1e-15)
-    assert base == pytest.approx(2 * math.sqrt((1 / math.tanh(3 / 14) - 14 / 3) / 7), rel=1e-13)
-
-
 def test_the_approximation_is_the_small_limit_and_too_large():
     mu = np.geomspace(1e-3, 1e3, 50)
     ratio = theory.approximation_ratio(mu)
@@ -175,14 +168,6 @@ def test_a_resonance_can_be_sampled_at_any_rate(f_c):
         assert step.b[2, 2] == pytest.approx(math.sqrt(4 * 0.2 * 3.0**3 * 1.3**2 / 720 * f_c**-5), rel=1e-7, abs=0)
 
 
-@pytest.mark.parametrize("f_c", [0.3, 5.0, 200.0, 1e5])
-def test_the_closed_step_is_the_one_of_the_matrix_exponential(f_c):
-    closed = theory.exact_step(FIRST, f_c)
-    a, b = inputs._moments(FIRST, 1 / f_c)
-    assert closed.a == pytest.approx(a, rel=1e-13, abs=0)
-    assert closed.b == pytest.approx(b, rel=1e-12, abs=0)
-
-
 @pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
 def test_a_step_keeps_the_steady_state_and_the_autocovariance(process):
     m = len(process.drift)
@@ -222,25 +207,6 @@ def test_recursion_and_closed_form(mu):
     assert np.all(rate > 0.5)
 
 
-@pytest.mark.parametrize("mu", [0.05, 0.7, 8.0])
-def test_closed_forms_are_what_the_covariance_recursion_gives(mu):
-    process, n = theory.first_order(1.3, mu * 2.5), np.arange(41)
-    unit = (1.3 / 2.5) ** 2
-    assert theory.trapezoid_variance(process, 2.5, 40) == pytest.approx(unit * theory.error_variance(n, mu), rel=1e-11)
-
-
-def test_another_start():
-    """Against the recursion with the covariance of the input at the start set by hand."""
-    mu, start = 0.8, 0.3
-    step = theory.exact_step(theory.first_order(1.0, mu), 1.0)
-    a = np.array([[step.a[0, 0], 0.0], [step.a[1, 0], 1.0]])
-    state, expected = np.diag([start, 0.0]), [0.0]
-    for _ in range(30):
-        state = a @ state @ a.T + step.b @ step.b.T
-        expected.append(state[1, 1])
-    assert theory.error_variance(np.arange(31), mu, start) == pytest.approx(expected, rel=1e-12, abs=1e-15)
-
-
 @pytest.mark.parametrize("mu", [0.5, 5.0])
 def test_the_documents_recursion_mended_and_as_printed(mu):
     exact = theory.error_variance(np.arange(31), mu)
@@ -268,37 +234,12 @@ def test_the_random_walk_takes_over_where_it_says(mu):
 # -- other inputs and integrators -----------------------------------------------------------------
 
 
-@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
-def test_spectrum_and_autocovariance_belong_together(process):
-    for omega in (0.0, 1.0, 2.9, 10.0):
-        transform = (
-            2 * integrate.quad(lambda t, w=omega: process.autocovariance(t) * math.cos(w * t), 0, 60, limit=400)[0]
-        )
-        assert process.psd(omega) == pytest.approx(transform, abs=1e-6)
-    assert process.autocovariance(0.0) == pytest.approx(process.sigma**2)
-    assert np.array_equal(process.autocovariance([-0.5]), process.autocovariance([0.5]))
-
-
-@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
-def test_folding_is_the_sum_over_the_spectrum(process):
-    f_c, k = 2.0, np.arange(1, 400_001)
-    # What is left out falls as 1/k² or faster: below 2·S(k)·k.
-    assert process.folded(1 / f_c) == pytest.approx(2 * float(np.sum(process.psd(2 * np.pi * f_c * k))), rel=1e-5)
-
-
 def test_folding_is_right_where_it_cancels_nearly_everything():
     """Σ c p = 0: the random walk of a resonance is of fourth order in T, -T⁴ Σ Re(c p³)/360."""
     process, f_c = theory.resonant(1.0, 1.0, 0.3), 1e9
     with mpmath.workdps(50):
         third = sum(mpmath.re(c * p**3) for c, p in inputs._exact_modes(process))
     assert theory.walk_rate(process, f_c) == pytest.approx(float(-third / 360) * f_c**-4, rel=1e-12, abs=0)
-
-
-@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
-def test_the_rate_is_that_of_the_recursion(process):
-    variance = theory.trapezoid_variance(process, 2.0, 2400)
-    grown = (variance[2400] - variance[1200]) / 600
-    assert grown == pytest.approx(theory.walk_rate(process, 2.0), rel=1e-10)
 
 
 # -- what is refused ------------------------------------------------------------------------------

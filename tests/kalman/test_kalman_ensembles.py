@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -13,13 +11,9 @@ from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.report.kalman import ensembles
-from gpbnb.report.kalman.ensembles import FORMATS, KINDS, Task, TrialOutcome, random_model, summaries, tasks, trial
+from gpbnb.report.kalman.ensembles import KINDS, Task, TrialOutcome, random_model, summaries, tasks, trial
 
 SINGLE = FloatFormat(2, 24)
-
-
-def some(count=8):
-    return tuple(Task("stable", SINGLE, form, seed, 16) for seed in range(count // 2) for form in (Form.HUNG, Form.UD))
 
 
 # -- trials ---------------------------------------------------------------------------------------
@@ -61,28 +55,6 @@ def test_a_trial_compares_every_step_with_the_bounds(kind):
     assert found.printed_state == pytest.approx(worst, rel=1e-4)
 
 
-def test_models_are_of_their_kinds():
-    for seed in range(20):
-        models = {kind: random_model(np.random.default_rng([seed, 0]), kind)[0] for kind in KINDS}
-        radius = {kind: np.abs(np.linalg.eigvals(model.to_float()["Phi"][0])).max() for kind, model in models.items()}
-        assert radius["stable"] < 0.951
-        assert radius["far scales"] < 0.96
-        assert 0.979 < radius["oscillating"] < 1
-        assert radius["drifting"] == pytest.approx(1, abs=1e-3)
-        assert (models["one sign"].to_float()["Phi"] >= 0).all()
-        assert (models["one sign"].to_float()["H"] >= 0).all()
-        assert all(1 <= model.n <= 4 and 1 <= model.m <= 2 for model in models.values())
-    with pytest.raises(ValueError, match="got kind 'odd'; needed one of stable"):
-        random_model(np.random.default_rng(0), "odd")
-
-
-def test_tasks_are_every_kind_format_and_form():
-    todo = tasks(2, steps=7, first_seed=5)
-    assert len(todo) == len(set(todo)) == 2 * len(KINDS) * len(FORMATS) * len(Form)
-    assert {task.seed for task in todo} == {5, 6}
-    assert {task.steps for task in todo} == {7}
-
-
 # -- what the package brings ----------------------------------------------------------------------
 
 
@@ -118,25 +90,6 @@ def test_a_part_of_the_sweep_comes_out_as_it_is_stored(seed):
         assert [line[at] for at in largest] == [row[at] for at in largest] if few else line == row
 
 
-def test_what_is_recomputed_is_loaded(tmp_path, monkeypatch):
-    monkeypatch.setattr(ensembles, "FORMATS", (SINGLE,))
-    monkeypatch.setattr(ensembles, "KINDS", KINDS[:1])
-    file = ensembles.SWEEP.recompute(tmp_path, count=2)
-    found = ensembles.load(file)
-    assert [each.form for each in found] == [form.name.lower() for form in Form]
-    assert [each.trials for each in found] == [2] * len(Form)
-    again = summaries([trial(task) for task in tasks(2)])
-    for stored, each in zip(found, again, strict=True):
-        assert stored._replace(**dict.fromkeys(stored._fields[2:], 0)) == each._replace(
-            **dict.fromkeys(stored._fields[2:], 0)
-        )
-        assert stored[2:] == pytest.approx(each[2:], rel=1e-5)
-    file.write_text("kind\n", encoding="utf-8")
-    ensembles.load.cache_clear()
-    with pytest.raises(ValueError, match=r"ensembles\.csv, line 1"):
-        ensembles.load(file)
-
-
 def outcome(form=Form.UD, **changed):
     values = dict.fromkeys(("state", "gain", "covariance", "last", "bounded"), 0.5)
     values |= dict.fromkeys(("printed_covariance", "printed_gain", "printed_state"), 0.25)
@@ -166,10 +119,3 @@ def test_a_summary_counts():
     assert (ud.violations_125, ud.worst_125) == (0, 0.25)
     assert (usual.violations_125, usual.worst_125) == (1, 7.0)
     assert (ud.indefinite, usual.indefinite) == (1, 0)
-
-
-@pytest.mark.parametrize(
-    ("ratios", "largest"), [([math.nan], 0.0), ([math.nan, 0.5], 0.5), ([], 0.0), ([2.0, math.inf], math.inf)]
-)
-def test_an_error_of_zero_violates_no_bound_of_zero(ratios, largest):
-    assert ensembles._largest(np.array(ratios)) == largest

@@ -7,9 +7,8 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
-from gpbnb.arithmetic.formats import FloatFormat, prints_as
+from gpbnb.arithmetic.formats import prints_as
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.kalman import derivation, report_bounds
 
 # -- counts ---------------------------------------------------------------------------------------
@@ -29,21 +28,6 @@ def test_coefficients_are_those_derived(faults, k, n, m):
     second = derivation.second_coefficient(c, d, g, 1 if faults.get("free_signs") else -1)
     values = {derivation.K: k, derivation.N: n, derivation.M: m}
     assert report_bounds.coefficients(k, n, m, **faults) == (first.subs(values), second.subs(values))
-
-
-@pytest.mark.parametrize(
-    "faults", [{}, {"once": True}, {"free_signs": True}, {"carried": True}, {"once": True, "carried": True}]
-)
-def test_coefficients_are_sums_over_steps(faults):
-    k, n, m = 7, 3, 2
-    grow = 3 * n + m + 2 if faults.get("carried") else 0
-    extra = 0 if faults.get("once") else 1
-    c = [6 * n + 3 * m + 5 + extra * (n + 1) + grow * j for j in range(k)]
-    d = [4 * n + 3 * m + 4 + extra + grow * j for j in range(k)]
-    a0 = sum(c)
-    a = [sum(c[i + 1 :]) + d[i] for i in range(k)]
-    sign = 1 if faults.get("free_signs") else -1
-    assert report_bounds.coefficients(k, n, m, **faults) == (a0, sum(a0 + sign * each for each in a))
 
 
 def test_the_printed_cases():
@@ -84,14 +68,6 @@ def test_the_least_b():
 # -- the closing example --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("base", "rounding"), [(2, Rounding.NEAREST), (10, Rounding.NEAREST), (10, Rounding.CHOP)])
-@pytest.mark.parametrize("coefficient", [1, 82, 999_999, 10**9, Fraction(1, 7)])
-def test_required_precision_is_enough_and_the_least(base, rounding, coefficient):
-    t = report_bounds.precision_for_coefficient(coefficient, Fraction(1, 3), base, rounding)
-    assert coefficient * FloatFormat(base, t, rounding).unit_roundoff <= Fraction(1, 3)
-    assert t == 1 or coefficient * FloatFormat(base, t - 1, rounding).unit_roundoff > Fraction(1, 3)
-
-
 def test_the_closing_example():
     first, second = report_bounds.coefficients(*report_bounds.EXAMPLE)
     assert (first, second) == (258_595_200, 407_752_879_824_000)
@@ -106,10 +82,3 @@ def test_which_misprint_leads_to_which_printed_number():
     assert report_bounds.one_digit_misprints(k, n, m, printed["first coefficient"]) == [(7, 4, 6), (7, 3, 8)]
     for name in ("first", "second"):
         assert prints_as(1 / Fraction(printed[f"{name} coefficient"]), printed[f"{name} beta"])
-
-
-def test_the_order_of_the_equations():
-    found = report_bounds.order(second=False)
-    for equation, needs in report_bounds.dependencies(second=False).items():
-        assert all(found.index(need) < found.index(equation) for need in needs)
-    assert report_bounds.order(second=True) is None

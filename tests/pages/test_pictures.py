@@ -101,10 +101,6 @@ def type_in(page, picture, **given):
     return page.evaluate(READ, picture)
 
 
-def points(path):
-    return [tuple(map(float, each.split())) for each in path[1:].split("L")]
-
-
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize(
     ("base", "t", "x"),
@@ -152,33 +148,6 @@ def test_a_number_is_rounded_as_the_package_rounds_it(pages, base, t, x, rule):
     )
     tip = float(found["given"][1:].split()[0])
     assert tip == pytest.approx(marks[0] + float(exact - numbers[0]) * scale, abs=0.1)
-
-
-@pytest.mark.parametrize("rule", RULES)
-@pytest.mark.parametrize(("base", "t"), [("10", "1"), ("10", "2"), ("2", "4"), ("16", "2")])
-def test_the_saw_tooth_is_the_error_of_the_package(pages, base, t, rule):
-    found = type_in(pages("numberline"), "numberline", base=base, t=t, chop=rule, x="1.5")
-    fmt = FloatFormat(int(base), int(t), RULES[rule])
-    beta = float(fmt.unit_roundoff)
-    (zero,) = [y - 4 for _, y, text in found["texts"] if text == "0"]
-    (one,) = [y - 4 for x, y, text in found["texts"] if text == "1" and x == 38]
-    left, right = 44, found["width"] - 14
-    seen = []
-    for px, py in points(found["teeth"]):
-        m = int(base) ** ((px - left) / (right - left))
-        error = (zero - py) / (zero - one) * beta
-        # A tenth of a pixel across may be a step of the saw: the error near the point is compared.
-        near = np.linspace(px - 0.06, px + 0.06, 13)
-        numbers = [Fraction(int(base) ** ((p - left) / (right - left))) for p in near]
-        errors = [float(abs(fmt.round(n) - n) / n) for n in numbers if 1 <= n <= int(base)]
-        assert min(errors) - 0.01 * beta <= error <= max(errors) + 0.01 * beta, m
-        seen.append(error)
-    assert max(seen) > 0.49 * beta
-    (here,) = found["here"]
-    exact = Fraction(3, 2)
-    assert (zero - here[1]) / (zero - one) * beta == pytest.approx(
-        float(abs(fmt.round(exact) - exact) / exact), abs=0.01 * beta
-    )
 
 
 def test_dragging_moves_the_number(pages):
@@ -345,20 +314,6 @@ def test_a_wrong_number_is_refused_and_nothing_old_is_shown(pages, picture, type
     assert page.locator(f"#calculator-{picture.id}-{name}-error").text_content().startswith("Got ")
     assert type_in(page, picture.id, **picture.start)["state"] == "computed"
     assert page.faults == []
-
-
-@PICTURES
-def test_the_words_of_a_drawing_fit_and_do_not_collide(pages, picture):
-    page = pages(picture.id)
-    found = type_in(page, picture.id, **picture.start)
-    boxes = found["boxes"]
-    assert all(
-        x0 >= -0.5 and y0 >= 0 and x1 <= found["width"] + 0.5 and y1 <= found["height"] for x0, y0, x1, y1 in boxes
-    )
-    words = [text for *_, text in found["texts"]]
-    for i, (a0, b0, a1, b1) in enumerate(boxes):
-        for j, (c0, d0, c1, d1) in enumerate(boxes[:i]):
-            assert min(a1, c1) <= max(a0, c0) or min(b1, d1) - max(b0, d0) < 4, (words[i], words[j])
 
 
 @PICTURES

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.ledger.checks import rolling as material
@@ -57,13 +54,6 @@ def test_an_off_tuned_deroll_costs_what_theory_says(digits):
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-7)
 
 
-def test_rounded_rates():
-    assert experiment.rounded_rate_error(600.0, FloatFormat(10, 6)) == pytest.approx(
-        0.0104720 - math.pi / 300, rel=1e-8, abs=0
-    )
-    assert experiment.rounded_rate_error(600.0, FloatFormat(10, 10)) == pytest.approx(-1.966e-12, rel=1e-3, abs=0)
-
-
 # -- spectra --------------------------------------------------------------------------------------------
 
 
@@ -104,21 +94,6 @@ def test_a_slope_is_exact_where_its_corrections_are():
     # Of the weighted fit, with the variance 1/m of each natural logarithm.
     x = np.log(f) - np.average(np.log(f), weights=m)
     assert found.error == pytest.approx(math.sqrt(np.sum((m * x) ** 2 / m)) / np.sum(m * x**2), rel=1e-12)
-
-
-def test_an_estimate_is_worth_what_its_windows_leave():
-    """Segments that overlap by half, and neighbouring frequencies: both correlations computed from the window."""
-    samples, channels, segment = 5 * 64 + 7, 3, 64
-    window = signal.get_window("hann", segment)
-    whole = np.sum(window**2)
-    overlap = (np.sum(window[: segment // 2] * window[segment // 2 :]) / whole) ** 2
-    neighbours = np.abs(np.fft.fft(window**2)[1 : segment // 2] / whole) ** 2
-    f, p, averages = experiment.welch(rng(1).standard_normal((samples, channels)), 10.0, segment)
-    segments = 9
-    expected = channels * segments / (1 + 2 * (segments - 1) / segments * overlap) / (1 + 2 * np.sum(neighbours))
-    assert averages == pytest.approx(expected, rel=1e-12)
-    assert f == pytest.approx(np.arange(3, 33) / 640, rel=1e-12)
-    assert p.shape == f.shape
 
 
 # -- drift rates --------------------------------------------------------------------------------------------
@@ -170,43 +145,12 @@ def test_the_stored_survey_agrees_with_theory():
     assert gain == pytest.approx(expected, rel=4 * 2**0.5 * study.uncertainty())
 
 
-def test_a_sample_of_the_survey_has_one_to_three_gyros(monkeypatch):
-    monkeypatch.setattr(experiment, "survey_of", lambda gyros: gyros)
-    rng = np.random.default_rng(1)
-    assert {experiment.first_gyros(20, rng) for _ in range(30)} == {1, 2, 3}
-
-
-@pytest.mark.parametrize("folder", [None, Path("saved")])
-def test_the_stored_survey_is_that_of_its_periods_and_seed(folder, monkeypatch):
-    asked = []
-    monkeypatch.setattr(experiment, "drift_rates", lambda *given, **options: asked.append((given, options)))
-    monkeypatch.setattr(experiment, "survey_rng", lambda: "seeded")
-    monkeypatch.setattr(experiment, "survey_rows", lambda study: [("0", "1")])
-    assert experiment.survey_of(7, folder) == [("0", "1")]
-    assert asked == [((experiment.SURVEY_PERIODS, 7, "seeded"), {"progress": folder is not None})]
-
-
 def test_the_stored_survey_is_computed_again_for_one_gyro_to_the_last_digit():
     study = experiment.drift_rates(experiment.SURVEY_PERIODS, 1, experiment.survey_rng())
     assert study.samples == 3153600
     stored = list(SWEEP.load().rows)
     assert experiment.survey_rows(study) == stored[:1]
     assert experiment.survey_rows(experiment.survey()) == stored
-
-
-def peak(samples):
-    tracemalloc.start()
-    try:
-        experiment.drift_rates([None, 77.5], 8, rng(), duration=samples * 10.0)
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-
-
-def test_memory_does_not_grow_with_the_record():
-    peak(100)
-    block = 2**18 // 8
-    assert peak(5 * block) < 1.05 * peak(2 * block)
 
 
 # -- filters ---------------------------------------------------------------------------------------------------
@@ -234,11 +178,3 @@ def test_wandering_roll_rates_agree_with_theory():
         expected = theory.rate_walk_error(DRIFTS[0], material.WALK, reset=reset)
         assert size == pytest.approx(expected, rel=4 / math.sqrt(2 * errors.shape[1]))
     assert sizes[0] > 300 * sizes[1]
-
-
-def test_rate_walks_have_their_variance():
-    ends = np.array([walk[-1] for walk in experiment.rate_walks(2e-6, 500, 100, 5.0, rng(3))])
-    assert np.mean(ends**2) == pytest.approx(2e-6 * 500, rel=4 * math.sqrt(2 / 500))
-
-
-# -- refusals -------------------------------------------------------------------------------------------------

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import tracemalloc
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from scipy import signal
 
 from gpbnb.report.rolling import experiment, theory
-from gpbnb.report.rolling.flicker import LONGEST, exponentials, flicker, record
+from gpbnb.report.rolling.flicker import exponentials, flicker, record
 
 LEVEL = 7.0
 
@@ -46,11 +44,6 @@ def test_a_sum_of_exponentials_is_the_response_to_the_accuracy_asked_for(accurac
     assert len(poles) < 150
 
 
-def test_the_accuracy_has_limits():
-    few, many = (len(exponentials(accuracy, 1000)[0]) for accuracy in (0.1, 1e-12))
-    assert 2 < few < many / 8
-
-
 def test_it_is_accurate_for_three_thousand_years():
     poles, weights = exponentials()
     for k in (1e7, 1e8, 1e9, 1e10):
@@ -82,28 +75,6 @@ def test_blocks_channels_and_length_do_not_change_a_record():
     assert [len(b) for b in flicker(LEVEL, 100, 1, rng(), block=40)] == [40, 40, 20]
 
 
-def test_channels_are_independent():
-    x = record(1.0, 2**15, 6, rng(8))
-    k = np.arange(1, len(x))
-    inverse = np.concatenate([[1.0], np.cumprod((k - 1.5) / k)])  # the difference of order one half the other way
-    white = signal.fftconvolve(x, inverse[:, np.newaxis], axes=0)[: len(x)]
-    assert np.std(white) == pytest.approx(math.sqrt(math.pi), rel=0.01)
-    correlation = np.corrcoef(white.T)[np.triu_indices(6, 1)]
-    assert np.max(abs(correlation)) < 4 / math.sqrt(2**15)
-
-
-def test_the_level_is_a_variance():
-    assert np.allclose(record(9.0, 500, 1, rng(2)), 3 * record(1.0, 500, 1, rng(2)), rtol=1e-13)
-    assert not record(0.0, 50, 1, rng(2)).any()
-
-
-def test_the_variance_grows_as_the_sum_of_squares_of_the_response():
-    n, channels = 300, 4000
-    last = record(LEVEL, n, channels, rng(3))[-1]
-    expected = math.pi * LEVEL * np.sum(theory.impulse_response(n) ** 2)
-    assert np.mean(last**2) == pytest.approx(expected, rel=4 * math.sqrt(2 / channels))
-
-
 # -- the density --------------------------------------------------------------------------------------
 
 
@@ -117,38 +88,6 @@ def test_the_slope_over_four_decades():
     # 24 nearly normal values: their mean square has the standard error sqrt(2/24) = 0.3.
     assert 0.1 < np.mean(z**2) < 1.9
     assert np.max(abs(z)) < 4
-
-
-@pytest.mark.parametrize("exponent", [0.9, 1.1])
-def test_another_slope_would_be_noticed(exponent):
-    """White noise through the fractional difference of another order."""
-    n = 2**18
-    k = np.arange(1, n)
-    h = np.concatenate([[1.0], np.cumprod((k - 1 + exponent / 2) / k)])
-    white = rng(1).standard_normal((4, n))
-    x = np.array([signal.fftconvolve(w, h)[:n] for w in white]).T
-    f, p, averages = experiment.welch(x, 10.0, 2**16)
-    slope = experiment.fit_slope(experiment.in_bands(f, p, averages, 4 / (2**16 * 10), 0.012, 20))
-    assert abs(slope.value + 1) > 20 * slope.error
-    assert slope.value == pytest.approx(-exponent, abs=0.02)  # sampling adds to the slope where the order is another
-
-
-def test_the_standard_error_of_a_band_is_right():
-    """White noise, whose density is known and level: the spread over bands and records is that stated."""
-    z = []
-    for seed in range(12):
-        x = rng(seed).standard_normal((2**14, 2))
-        f, p, averages = experiment.welch(x, 1.0, 2**11)
-        band = experiment.in_bands(f, p, averages, 0.05, 0.45, 8)
-        mean = [np.sum(f[(f >= a) & (f < b)]) / np.sum(f[(f >= a) & (f < b)] > 0) / m for a, b, m in _edges(band)]
-        z += list((band.density / (2 * np.array(mean)) - 1) / band.error)
-    # 96 values: their mean square has the standard error sqrt(2/96) = 0.14.
-    assert np.mean(np.square(z)) == pytest.approx(1, abs=0.6)
-
-
-def _edges(band):
-    edges = np.geomspace(0.05, 0.45, 9)
-    return [(a, b, m) for (a, b), m in zip(itertools.pairwise(edges), band.frequency, strict=True)]
 
 
 # -- memory and refusals --------------------------------------------------------------------------------
@@ -169,7 +108,3 @@ def test_memory_does_not_grow_with_the_length():
     short, long = peak(2**13), peak(2**17)
     assert long < 1.2 * short
     assert short < 2**20
-
-
-def test_the_longest_record_is_taken():
-    assert next(flicker(0.0, LONGEST, 2, rng(), 5)).tolist() == [[0, 0]] * 5

@@ -99,30 +99,10 @@ def test_a_year_is_within_its_bound():
         assert found.bound[-1] == pytest.approx(3153600 * (1 + 2 * 2**0.5) * float(fmt.unit_roundoff), rel=0.01)
 
 
-def test_chopping_shrinks_the_amplitude_steadily():
-    marks = np.linspace(1000, 20000, 5).astype(int)
-    found = rotations.recursion(FloatFormat(10, 10, CHOP), 77.5, marks)
-    assert np.all(found.amplitude < 0)
-    assert np.all(np.diff(found.amplitude) < 0)
-    assert found.amplitude[-1] / found.amplitude[0] == pytest.approx(20, rel=0.2)
-
-
 def test_a_rounded_rotation_may_lock_into_a_cycle():
     """With sixty samples a turn and few digits the error stops growing; the bound knows nothing of it."""
     found = rotations.recursion(FloatFormat(10, 4), 600.0, [60000, 60060, 120000, 600000])
     assert found.size[2] == found.size[0] == found.size[1] == found.size[3]
-
-
-def test_before_the_first_sample_nothing_has_been_rounded():
-    found = rotations.recursion(FloatFormat(10, 8), 77.5, [0, 10])
-    assert found.size[0] == 0
-    assert found.size[1] == rotations.recursion(FloatFormat(10, 8), 77.5, [10]).size[0]
-
-
-def test_what_a_rotation_costs_a_drift():
-    found = rotations.recursion(FloatFormat(10, 8), 77.5, [10, 100, 1000])
-    errors = found.size * np.array([100, 1000, 10000]) * 6600.0 / theory.YEAR
-    assert found.drift_error(6600.0) == pytest.approx(np.max(errors))
 
 
 @pytest.mark.parametrize(("digits", "period", "samples", "locked"), [(10, 600.0, 60, True), (14, 600.0, 60, False)])
@@ -131,17 +111,3 @@ def test_where_samples_come_back_the_recursion_may_lock(digits, period, samples,
     found = rotations.recursion(FloatFormat(10, digits), period, [year - 2 * samples, year - samples, year])
     assert (len(set(found.size)) == 1) is locked
     assert (len(set(found.phase)) == 1) is locked
-
-
-def test_without_a_cycle_the_error_is_that_of_the_step_times_their_number():
-    found = rotations.recursion(FloatFormat(10, 10), 77.51, [1, 10**5, experiment.YEAR_SAMPLES])
-    assert found.size[1:] / found.step[1:] == pytest.approx([found.size[0]] * 2, rel=0.1)
-
-
-def test_every_term_of_the_bounds_with_three_bits():
-    """γ₂ is 1/3 and γ₃ 3/5: no term is small beside another."""
-    beta = Fraction(1, 8)
-    angle, product = 1 + beta, 1 + math.sqrt(2) * Fraction(1, 3)
-    assert theory.recursion_bound(3, beta) == pytest.approx(float((angle * product) ** 3 - 1), rel=1e-14)
-    assert theory.recursion_bound(5000, beta) == math.inf
-    assert theory.direct_bound(-0.75, beta) == float(Fraction(3, 4) * Fraction(3, 5) + beta)

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from scipy import integrate, signal, special
+from scipy import integrate, signal
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
@@ -22,23 +22,10 @@ CHOP = Rounding.CHOP
 # -- roll and deroll --------------------------------------------------------------------------------
 
 
-def test_the_rotation_is_that_of_5_and_its_transpose_undoes_it():
-    phase = 0.7
-    r = theory.rotation(phase)
-    assert r.tolist() == [[math.cos(phase), math.sin(phase)], [-math.sin(phase), math.cos(phase)]]
-    assert np.allclose(r.T @ r, np.eye(2), atol=4e-16)
-
-
 @pytest.mark.parametrize("phase", [1e-9, 0.01, math.radians(1), -2.0])
 def test_the_cost_of_a_phase_error_is_that_of_the_matrices(phase):
     off = theory.rotation(0.3 + phase).T @ theory.rotation(0.3) - np.eye(2)
     assert theory.phase_error_cost(DRIFTS, phase) == pytest.approx(off @ np.array(DRIFTS), abs=2e-12)
-
-
-def test_a_degree_costs_more_than_frame_dragging():
-    x, y = theory.phase_error_cost(DRIFTS, math.radians(1))
-    assert x == pytest.approx(6600 * (math.cos(math.radians(1)) - 1) - 40 * math.sin(math.radians(1)))
-    assert y > 2.8 * DRIFTS[1]
 
 
 @pytest.mark.parametrize("error", [1e-3, 1.0, 6000.0])
@@ -157,23 +144,12 @@ def test_without_rolling_the_closed_forms_are_reached():
     )
 
 
-def test_the_integral_of_the_fit_is_a_quarter():
-    value = integrate.quad(lambda z: special.spherical_jn(1, z) ** 2 / z, 0, 200, limit=400)[0]
-    # The tail beyond z is less than 1/(2 z²).
-    assert value == pytest.approx(0.25, abs=1 / (2 * 200**2))
-
-
 @pytest.mark.parametrize(("period", "samples"), [(600.0, 6000), (77.5, 7750), (100.0, 1000)])
 def test_with_rolling_the_closed_form_is_reached_after_many_turns(period, samples):
     exact = exact_error(samples, period)
     closed = theory.drift_error_rolled(LEVEL, period, samples * 10.0, 10.0)
     # Slow noise leaks into the fit as log(n) over the number of turns.
     assert exact == pytest.approx(closed, rel=math.log(samples) / (samples * 10 / period))
-
-
-def test_phases_of_roll():
-    assert theory.roll_phase([0, 15, 30, 60, 75], 600.0) == pytest.approx([0, math.pi / 2, math.pi, 0, math.pi / 2])
-    assert np.all(theory.roll_phase(np.arange(1000), 77.5) < 2 * math.pi)
 
 
 # -- filters -------------------------------------------------------------------------------------------------
@@ -199,15 +175,6 @@ def test_a_moving_average_over_whole_turns_stops_the_roll_frequency_and_its_doub
         assert abs(np.sum(weights * np.exp(2j * np.pi * turns * np.arange(60) / 60))) < 1e-14
     assert theory.filter_lag(weights) == pytest.approx(295.0)
     assert theory.noise_bandwidth(weights) == pytest.approx(1 / 1200)
-
-
-def test_filtered_noise_in_the_limits():
-    weights = theory.moving_average(600.0)
-    rolled = theory.filtered_variance(weights, LEVEL, 3000, 600.0)
-    assert rolled == pytest.approx(LEVEL * 600 * theory.noise_bandwidth(weights), rel=0.3)
-    single = theory.filtered_variance(np.ones(1), LEVEL, 500, None)
-    assert single == pytest.approx(math.pi * LEVEL * np.sum(theory.impulse_response(500) ** 2), rel=1e-12)
-    assert theory.filtered_variance(np.ones(1), LEVEL, 500, 77.5) == pytest.approx(single, rel=1e-12)
 
 
 @pytest.mark.parametrize("drift", [40.0, 6600.0])
@@ -247,26 +214,6 @@ def test_a_wandering_rate_is_the_sum_over_its_steps(reset):
 
 
 # -- rotations ------------------------------------------------------------------------------------------------------
-
-
-def test_the_bounds_of_rotations():
-    beta = Fraction(1, 2 * 10**9)
-    assert theory.recursion_bound(0, beta) == 0
-    assert theory.recursion_bound(1000, beta) == pytest.approx(1000 * (1 + 2 * math.sqrt(2)) * float(beta), rel=1e-5)
-    assert theory.recursion_bound(10**7, Fraction(1, 100)) == math.inf
-    assert theory.direct_bound(1e4, beta) == pytest.approx(3e4 * float(beta), rel=1e-3)
-
-
-REFUSED = [
-    (theory.largest_phase, (DRIFTS, 0.0), "got an error of 0.0 for a drift of 6600.12; needed 0 < error <= 13200.2"),
-    (theory.largest_phase, (DRIFTS, 1e5), "got an error of 100000.0"),
-    (
-        theory.roll_rate,
-        (0.0,),
-        "got a roll period of 0.0 s; needed a positive number; omit rolling if there is no roll",
-    ),
-    (theory.roll_rate, (math.inf,), "got a roll period of inf s"),
-]
 
 
 def test_a_wandering_roll_rate_has_the_derived_coefficients():

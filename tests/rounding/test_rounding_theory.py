@@ -12,7 +12,6 @@ import oracles
 import pytest
 from flint import fmpq_mat
 
-from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
@@ -25,7 +24,6 @@ A = np.array([[1, -2, 3], [4, 5, -6]], dtype=object)
 B = np.array([[2, -1], [3, 7], [-4, 1]], dtype=object)
 C = np.array([[1, -3], [2, 5]], dtype=object)
 D = np.array([[100, -7], [1, 2]], dtype=object)
-ONE = np.array([[1]], dtype=object)
 
 
 def g(n):
@@ -88,13 +86,6 @@ def test_chains_and_examples_as_printed():
     assert theory.printed_example_bound(*square, BETA) == BETA * ((2 * 2 + 1) * ccc + 8)
 
 
-def test_interfaces_and_products_of_many():
-    assert theory.interfaces([A, B, C]) == [3, 2]
-    assert theory.interfaces([A]) == []
-    assert theory.product([A, B, C]).tolist() == (A @ B @ C).tolist()
-    assert theory.product([A]).tolist() == A.tolist()
-
-
 # -- what the weights mean ------------------------------------------------------------------------
 
 
@@ -109,33 +100,6 @@ def test_weights_count_the_roundings_of_each_term(n):
             passed[term] += 1
     assert theory.sum_weights(n) == [passed[j] for j in range(n)]
     assert theory.dot_weights(n) == [passed[j] + 1 for j in range(n)]
-
-
-def test_bounds_are_ordered():
-    weights = sum(w * abs(x) for w, x in zip([3, 3, 2, 1], X, strict=True))
-    assert theory.sum_bound(X, BETA) == BETA * weights
-    assert theory.strict_sum_bound(X, BETA) == sum(g(w) * abs(x) for w, x in zip([3, 3, 2, 1], X, strict=True))
-    assert theory.sum_bound(X, BETA) < theory.strict_sum_bound(X, BETA) < g(3) * sum(map(abs, X))
-    assert theory.printed_sum_bound(X, BETA) <= theory.printed_sum_bound_coarse(X, BETA)
-    # Of equal terms the two forms of the sum bound differ by what cancels: nothing here.
-    assert theory.sum_bound([1, 1, 1], BETA) == 5 * BETA
-    assert theory.printed_sum_bound([1, 1, 1], BETA) == 7 * BETA
-
-
-def test_bounds_of_nothing():
-    for bound in (theory.sum_bound, theory.strict_sum_bound, theory.printed_sum_bound):
-        assert bound([], BETA) == 0
-        assert bound([5], BETA) == 0
-    assert theory.strict_dot_bound([], [], BETA) == theory.dot_bound([], [], BETA) == 0
-
-
-def test_everything_stays_exact():
-    tiny = FloatFormat(10, 60)
-    x = tiny.array(["1", "1e-50"])
-    assert theory.sum_bound(x, tiny.unit_roundoff) == (1 + Fraction(1, 10**50)) * Fraction(1, 2 * 10**59)
-    assert theory.strict_dot_bound(x, x, tiny.unit_roundoff) == gamma(2, tiny.unit_roundoff) * (
-        1 + Fraction(1, 10**100)
-    )
 
 
 # -- the root-n law -------------------------------------------------------------------------------

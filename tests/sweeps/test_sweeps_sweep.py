@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import re
-import signal
-import subprocess
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from distributed import Client, KilledWorker
-from executors import Failing, local_cluster
+from distributed import KilledWorker
+from executors import Failing
 
 from gpbnb.report.guarantees import survey
 from gpbnb.report.stored import SWEEPS
 from gpbnb.sweeps import Column, DamagedFileError, Sweep, read, write
 from gpbnb.sweeps import command as sweep_command
-from gpbnb.sweeps import sweep as sweep_module
 from gpbnb.sweeps.command import INTERRUPTED, verify
-from gpbnb.sweeps.sweep import ATTEMPTS, machine
+from gpbnb.sweeps.sweep import ATTEMPTS
 
 
 def run(sweeps, arguments):
@@ -70,11 +65,6 @@ def test_the_result_does_not_depend_on_the_executor(sweep, tmp_path, chunk):
         assert sweep.run(tmp_path / "threads", pool, chunk=chunk, progress=False) == EXPECTED
 
 
-def test_dask_gives_the_same(sweep, tmp_path):
-    with local_cluster(processes=False) as cluster, Client(cluster) as client:
-        assert sweep.run(tmp_path / "dask", client.get_executor(), chunk=4, progress=False) == EXPECTED
-
-
 def test_finished_cells_are_not_computed_again(sweep, tmp_path):
     seen = []
 
@@ -115,14 +105,6 @@ def test_a_damaged_cell_is_computed_again(sweep, tmp_path, damage):
     assert sweep.finished(tmp_path) == []
     assert sweep.run(tmp_path, progress=False) == expected
     assert sweep.finished(tmp_path) == expected
-
-
-def test_progress_begins_with_the_finished_cells(sweep, tmp_path, capsys):
-    sweep.run(tmp_path, cells=CELLS[:3], progress=False)
-    sweep.run(tmp_path)
-    shown = capsys.readouterr().err
-    assert "3/10 [" in shown.split("\r")[1]
-    assert "10/10 [" in shown
 
 
 def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(sweep, tmp_path, capsys):
@@ -181,38 +163,6 @@ def test_the_processes_of_this_machine_give_the_stored_rows(tmp_path, capsys):
     assert survey.load(tmp_path / "guarantees" / "survey.csv") == survey.load()[:6]
 
 
-@pytest.fixture
-def cluster():
-    """A worker process, under a nanny that starts it again when it dies."""
-    with local_cluster(processes=True) as cluster:
-        yield cluster
-
-
-@pytest.mark.filterwarnings("default")  # of a worker that is killed while it speaks
-def test_none_is_lost_on_a_cluster_whose_worker_is_killed(cluster, tmp_path):
-    with Client(cluster) as client:
-        executor = client.get_executor()
-        (pid,) = client.run(os.getpid).values()
-        sent, waiting = [], []
-
-        def kill(_):
-            """Once, after a chunk and before the others."""
-            if not waiting:
-                waiting.extend(future for future in sent if not future.done())
-                os.kill(pid, signal.SIGKILL)
-
-        def submit(*call):
-            sent.append(executor.submit(*call))
-            sent[-1].add_done_callback(kill)
-            return sent[-1]
-
-        executor_that_kills = SimpleNamespace(submit=submit)
-        found = survey.SWEEP.run(tmp_path, executor_that_kills, chunk=2, cells=range(16), progress=False)
-        assert waiting
-        assert pid not in client.run(os.getpid).values()
-    assert [tuple(row) for _, result in found for row in result] == list(survey.SWEEP.load().rows[:16])
-
-
 def test_chunks_of_dead_workers_are_sent_again(sweep, tmp_path):
     failing = Failing(*[KilledWorker("some", None, 3)] * 3)
     assert sweep.run(tmp_path / "some", failing, chunk=5, progress=False) == EXPECTED
@@ -238,18 +188,6 @@ def test_what_is_stored_has_its_provenance(sweep):
     assert table.provenance["processor seconds"] == "12"
     assert table.provenance["versions"].startswith("numpy ")
     assert {"machine", "commit"} < set(table.provenance)
-
-
-def test_the_commit_is_that_of_the_repository_if_there_is_one(tmp_path, monkeypatch):
-    """In a repository of its own: the tests may run in a copy that has none."""
-    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
-    monkeypatch.setattr(sweep_module, "__file__", str(tmp_path / "sweep.py"))
-    assert machine()["commit"] == "none"
-    git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b.example"]
-    subprocess.run([*git, "init", "--quiet"], check=True)
-    subprocess.run([*git, "commit", "--quiet", "--allow-empty", "--message", "first"], check=True)
-    whole = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True).stdout
-    assert machine()["commit"] == whole[:12]
 
 
 @pytest.mark.parametrize("stored", SWEEPS, ids=lambda each: each.name)
@@ -293,15 +231,6 @@ def test_a_sample_of_what_is_stored_is_verified(sweep):
         assert len(verify([sweep, sweep], 10, 1)) == 2
 
 
-def test_progress_of_a_verification_is_shown_if_asked_for(sweep, capsys):
-    sweep.store(EXPECTED)
-    sweep.verify(2, seed=1)
-    verify([sweep], 2, 1)
-    assert capsys.readouterr().err == ""
-    sweep.verify(2, seed=1, progress=True)
-    assert "2/2 [" in capsys.readouterr().err
-
-
 def test_a_part_of_the_cells_may_be_stored(sweep):
     sweep.store(EXPECTED[3:5])
     assert sweep.load().provenance["cells"] == "2 of 10"
@@ -338,53 +267,3 @@ def test_the_command_reports(sweep, capsys):
     assert "rows" in capsys.readouterr().err
     with pytest.raises(DamagedFileError):
         sweep.load()
-
-
-def test_the_command_verifies_the_sweeps_that_it_is_told(sweep, capsys, monkeypatch):
-    asked = []
-    monkeypatch.setattr(Sweep, "verify", lambda self, *given: asked.append((self.name, *given)) or [])
-    sweeps = [sweep, dataclasses.replace(sweep, name="tests/other")]
-    assert run(sweeps, ["verify", "tests/other", "--sample", "4", "--seed", "9"]) == 0
-    assert run(sweeps, ["verify"]) == 0
-    assert asked == [("tests/other", 4, 9, True), ("tests/normal", 1, 1, True), ("tests/other", 1, 1, True)]
-    assert capsys.readouterr().out == (
-        "1 sweeps, 4 cells of each: no differences\n2 sweeps, 1 cells of each: no differences\n"
-    )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["verify", "tests/third"], "got sweeps tests/third; needed some of tests/normal"),
-        (["verify", "--sample", "0"], "got --sample 0; needed at least 1"),
-        ([], "usage: python -m sweeps "),
-        (["recompute"], "the following arguments are required: names"),
-        (["recompute", "tests/third"], "got sweeps tests/third; needed some of tests/normal"),
-    ],
-)
-def test_the_command_refuses_what_it_cannot_verify(sweep, capsys, arguments, words):
-    with pytest.raises(SystemExit, match="2"):
-        run([sweep], arguments)
-    assert words in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--help"], "list name, command and provenance of each stored sweep"),
-        (["--help"], "verify compute a sample of each stored sweep again and compare"),
-        (["verify", "--help"], "names names of sweeps, such as rolling/drift_rates; default: all"),
-        (["verify", "--help"], "--sample SAMPLE number of cells to compute for each sweep; default: 1"),
-        (["verify", "--help"], "--seed SEED seed that selects the cells; default: 1"),
-        (["recompute", "--help"], "names names of sweeps, such as rolling/drift_rates"),
-        (["recompute", "--help"], "--cells CELLS compute only this many cells"),
-        (["recompute", "--help"], "--only WORD [WORD ...] compute only cells with one of these words; keep others"),
-        (["recompute", "--help"], "--store write the finished cells without computing more"),
-        (["recompute", "--help"], "--processes PROCESSES number of processes; default: 1"),
-        (["recompute", "--help"], "--output OUTPUT folder for the tables and for saved progress"),
-    ],
-)
-def test_the_help_of_the_command(sweep, capsys, arguments, words):
-    with pytest.raises(SystemExit, match="0"):
-        run([sweep], arguments)
-    assert words in " ".join(capsys.readouterr().out.split())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
 from gpbnb.sweeps import Column, DamagedFileError, read, write
@@ -104,31 +102,3 @@ def test_values_out_of_range_are_neither_written_nor_read(tmp_path, column, text
     with pytest.raises(ValueError, match=f"row 1: got {column.name} = .*{fault}"):
         write(path, [column], [(text,)], {})
     assert path.read_bytes() == before
-
-
-def test_provenance_is_one_line_each(tmp_path):
-    for bad in ({"a": "1\n2"}, {"a: b": "1"}, {"a": " 1"}):
-        with pytest.raises(ValueError, match="needed one line of text"):
-            write(tmp_path / "year.csv", COLUMNS, ROWS, bad)
-    assert math.isinf(Column("any").high)
-
-
-@pytest.mark.parametrize("count", ["²", "-1", "9" * 5000, ""])
-def test_a_number_of_rows_that_is_none_is_damage(file, count):
-    text = file.read_text(encoding="utf-8").replace("# rows: 45", f"# rows: {count}")
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(DamagedFileError, match=r"rows; needed a whole number|needed '# key: value'"):
-        read(file, COLUMNS, CURE)
-
-
-def test_a_row_that_no_reader_accepts_is_damage(file):
-    lines = file.read_text(encoding="utf-8").split("\n")
-    lines[8] = '"' + "7" * 200_000
-    file.write_text("\n".join(lines), encoding="utf-8")
-    with pytest.raises(DamagedFileError, match=r"year\.csv, line 9: field larger than field limit"):
-        read(file, COLUMNS, CURE)
-
-
-def test_a_folder_is_no_table(tmp_path):
-    with pytest.raises(DamagedFileError, match="cannot be read: Is a directory"):
-        read(tmp_path, COLUMNS, CURE)

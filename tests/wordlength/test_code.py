@@ -34,16 +34,13 @@ from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
 from gpbnb.filters.simulation import simulated_measurements
-from gpbnb.filters.tracing import kalman_program, without_exact
-from gpbnb.filters.words import integers_of, run_checked
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.c_files import FLAGS
 from gpbnb.wordlength.c_integers import Integers, Needs
 from gpbnb.wordlength.c_source import places
-from gpbnb.wordlength.code import _in_long_words, model_coefficients, prepared
+from gpbnb.wordlength.code import prepared
 from gpbnb.wordlength.models import read_model
 from tests.corpus import conformance
-from tests.plain_program import steps_in_python
 
 needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang")
 
@@ -71,34 +68,6 @@ GROWING = LinearSystem([["1.5"]], [[1]])
 BIQUAD = FilterDesign(["0.1", "0.2", "0.1"], [1, "-1.2", "0.5"], name="a low-pass section")
 
 
-@needs_compiler
-def test_another_order_of_operations_fails_the_test_that_comes_with_the_code(tmp_path):
-    write_code(BIQUAD, BINARY32, tmp_path, form="direct form I")
-    assert built(tmp_path)[0] == 0
-    source = (tmp_path / "filter.c").read_text()
-    products = re.findall(r"const float (r\d+) = (\w+ \* r\d+);", source)
-    sums = re.findall(r"const float (r\d+) = (r\d+) \+ (r\d+);", source)
-    (first, a, b), (second, c, d) = sums[:2]
-    assert c == first
-    assert len(products) == 5
-    changed = source.replace(f"{first} = {a} + {b};", f"{first} = {b} + {d};").replace(
-        f"{second} = {c} + {d};", f"{second} = {first} + {a};"
-    )
-    later = next(line for line in source.splitlines() if f"const float {d} =" in line)
-    changed = changed.replace(f"{later}\n", "", 1).replace(
-        f"    const float {first} =", f"{later}\n    const float {first} ="
-    )
-    (tmp_path / "filter.c").write_text(changed)
-    status, text = built(tmp_path)
-    assert status == 1
-    assert re.search(r"step \d+: number \d+ differs", text)
-
-
-def test_statements_are_those_of_the_program():
-    found = prepared(BIQUAD, BINARY32, "direct form II transposed")
-    assert found.step.program.operations.tolist() == BIQUAD.system().as_filter().program.operations.tolist()
-
-
 # -- the operations of a covariance ----------------------------------------------------------------------------------
 
 
@@ -107,49 +76,6 @@ def numbers(run, x, P):
     upper = run.form is Form.UD
     n = len(x)
     return [*x[:, 0], *(P[i, j] for i in range(n) for j in range(n) if not upper or i <= j)]
-
-
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 12), FloatFormat(10, 5, "chop"), FixedFormat(8, 20)], ids=str)
-@pytest.mark.parametrize("form", Form, ids=str)
-def test_traced_operations_have_the_digits_of_the_compiled_step(form, fmt):
-    for model in models().values():
-        run = Run(model, fmt, form, range(1, 8))
-        z = np.random.default_rng(3).uniform(-1, 1, (7, model.m)).round(2)
-        whole, coefficients = kalman_program(model.n, model.m, form), model_coefficients(run)
-        shorter = without_exact(whole, coefficients)
-        assert len(shorter.operations) < len(whole.operations)
-        x = y = numbers(run, run.exactly(run.x), run.exactly(run.P))
-        run.take(z)
-        for k, measured in enumerate(fmt.array(z).to_fractions().tolist()):
-            c = coefficients[k % len(coefficients)]
-            x = steps_in_python(whole, fmt.round, c, x, measured)
-            y = steps_in_python(shorter, fmt.round, c, y, measured)
-            assert x == y == numbers(run, run.exactly(run.X)[k], run.exactly(run.C)[k])
-
-
-@pytest.mark.parametrize("form", [each for each in Form if each is not Form.UD], ids=str)
-@pytest.mark.parametrize("rounding", ["nearest", "even", "chop", "up", "down", "odd"])
-def test_long_words_have_the_digits_of_the_compiled_step_and_of_fractions(rounding, form):
-    for model in models().values():
-        z = np.random.default_rng(4).uniform(-1, 1, (6, model.m))
-        short, narrow = FixedFormat(8, 20, rounding, "saturate"), FixedFormat(3, 12, rounding, "wrap")
-        for fmt in (short, FixedFormat(8, 55, rounding), narrow):
-            program = kalman_program(model.n, model.m, form)
-            coefficients, x = _in_long_words(model, fmt, form)
-            start, inputs = (integers_of(each, fmt) for each in (x, z))
-            found = run_checked(program, fmt, coefficients, start, inputs).states.tolist()
-            for k, measured in enumerate(fmt.array(z).to_fractions().tolist()):
-                try:
-                    x = steps_in_python(program, fmt.round, coefficients[k % len(coefficients)], x, measured)
-                except ZeroDivisionError:
-                    assert len(found) == k
-                    break
-                assert found[k] == [each / fmt.unit for each in x]
-            if fmt is short:
-                run = Run(model, fmt, form, range(1, 7))
-                run.take(z)
-                exact = [numbers(run, *each) for each in zip(run.exactly(run.X), run.exactly(run.C), strict=True)]
-                assert found == [[each / fmt.unit for each in row] for row in exact]
 
 
 DIVISIONS = """
@@ -189,19 +115,6 @@ def test_the_longest_words_are_divided_as_fractions(integer, fraction, overflow,
         assert list(map(int, done.stdout.split())) == [fmt.round(Fraction(a, b)) / fmt.unit for a, b in pairs]
 
 
-def blind(form):
-    """A filter whose second state no sensor sees and no noise moves, and one variance of which is zero."""
-    Q, P0 = np.diag([0.25, 0.0, 0.5]), np.diag([1.0, 2.0, 0.0])
-    return LinearModel(np.diag([0.5, 1, 0]), [[1, 0, 0], [0, 0, 1]], Q, np.diag([0.5, 1]), [0, 1, 0], P0, "blind")
-
-
-@needs_compiler
-def test_what_is_chosen_by_a_zero_is_chosen_in_the_code():
-    formats = BINARY32, FixedFormat(8, 23, "even", "raise")
-    z = np.random.default_rng(0).uniform(-1, 1, (50, 2))
-    assert [disagreement(blind(form), fmt, form, z) for form in Form for fmt in formats] == [""] * 2 * len(Form)
-
-
 def sparse(seed):
     """A small model with many zeros, which covariances may have in their factors, too."""
     rng = np.random.default_rng(seed)
@@ -234,23 +147,6 @@ def fits(model, fmt, form):
         return bool(prepared(model, fmt, form))
     except (ValueError, OverflowError):
         return False
-
-
-@needs_compiler
-@pytest.mark.parametrize(
-    ("fmt", "gain", "u"),
-    [
-        (BINARY32, "1e30", 1e10),
-        (FixedFormat(3, 8), "6", 3),
-        (WordFormats(FixedFormat(3, 8), 8, FixedFormat(4, 12)), "6", 3),
-    ],
-    ids=["binary32", "fixed point", "words"],
-)
-def test_an_overflow_before_a_section_of_zeros_ends_the_code(fmt, gain, u, tmp_path):
-    system = LinearSystem.from_sections([[gain, gain, 0, 1, 0, 0], [0, 0, 0, 1, "0.5", 0]], "direct form I")
-    write_code(system, fmt, tmp_path, inputs=np.full((3, 1), u))
-    assert [line.split()[0] for line in (tmp_path / "filter_vectors.txt").read_text().splitlines()] == ["-2"]
-    assert built(tmp_path)[0] == 0
 
 
 @pytest.mark.parametrize("form", Form, ids=str)
@@ -508,15 +404,6 @@ def test_the_command_writes_no_code_if_the_tolerance_is_missed(asked, capsys):
     assert main([*arguments, "--tolerance", "1e-6", "--format", "BINARY16"]) == 1
     assert "no code, since no format is known to meet the tolerance" in capsys.readouterr().err
     assert not folder.exists()
-
-
-def test_the_command_writes_no_code_for_a_format_without_a_type(asked, capsys):
-    arguments, folder = asked
-    assert main([*arguments, "--tolerance", "1", "--format", "BINARY16"]) == 2
-    assert "got BINARY16, for which C99 has no type" in capsys.readouterr().err
-    folder.write_text("")
-    assert main([*arguments, "--tolerance", "1"]) == 2
-    assert "which is a file; needed a folder" in capsys.readouterr().err
 
 
 TRACKER = """

@@ -14,16 +14,6 @@ from gpbnb import BINARY16, BINARY32, BINARY64, FixedFormat, FloatFormat, Nonlin
 from gpbnb.wordlength.c_files import FLAGS
 from tests.step_functions import SYSTEMS
 
-STEPS = 2_000
-FORMATS = (BINARY32, BINARY64, FixedFormat(10, 21, "even", "saturate"), FixedFormat(12, 51, "odd", "raise"))
-
-
-@pytest.mark.skipif(not installed(), reason="no gcc and no clang")
-@pytest.mark.parametrize("system", SYSTEMS, ids=lambda each: each.name)
-def test_code_has_the_digits_of_its_emulation(system):
-    z = np.random.default_rng(0).uniform(-0.25, 0.25, (STEPS, system.m))
-    assert [disagreement(system, fmt, None, z) for fmt in FORMATS] == [""] * len(FORMATS)
-
 
 def short_words():
     for rounding in ("nearest", "even", "chop", "up", "down", "odd"):

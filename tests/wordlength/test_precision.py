@@ -15,20 +15,16 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.search import Outcome
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
-from gpbnb.filters.model import LinearModel, real_numbers
+from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named
-from gpbnb.filters.nonlinear import NonlinearModel
-from gpbnb.filters.run import Run, reference
+from gpbnb.filters.run import reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
 from gpbnb.filters.system import LinearSystem, unobserved
-from gpbnb.wordlength import strategies
-from gpbnb.wordlength.required import judge
 from tests.surveying import survey
 
 STEPS = 60
@@ -66,108 +62,6 @@ def test_the_smallest_precision_meets_the_tolerance_and_one_less_does_not(base, 
     assert (found.basis, found.steps) == ("emulation", STEPS)
     assert str(found).startswith(arithmetic(FloatFormat(base, t, rounding)))
     assert str(found).endswith("of the tolerance, observed in 60 steps")
-
-
-def test_errors_of_storing_the_model_count():
-    """With few digits, most of the error: the transition itself is off."""
-    found = required_precision(MODEL, Z, 1e-3, base=10)
-    alone = np.abs(emulate(MODEL, Z, found.format, Form.INNOVATION).state).max()
-    assert dict(found.tried)[found.digits] * 1e-3 != alone
-    assert error(found.format).max() <= 3e-3
-
-
-def errors_in(model, z, base, options):
-    """Largest error of each state in so many digits; None where the run is lost."""
-    form, rounding = options.get("form", Form.INNOVATION), options.get("rounding", Rounding.NEAREST)
-    checkpoint_steps = range(1, len(z) + 1)
-    true = reference(model, z, checkpoint_steps)
-
-    @cache  # for all tolerances
-    def largest(digits):
-        fmt = FloatFormat(base, digits, rounding)
-        try:
-            if options.get("basis") == "bound":
-                return emulate_with_bound(model, z, fmt, form, checkpoint_steps).state.max(axis=0)
-            history = emulate(model, z, fmt, form, checkpoint_steps, true)
-        except ValueError:
-            return None
-        return None if history.indefinite or history.stopped else np.abs(history.state).max(axis=0)
-
-    return largest
-
-
-def upward(largest, tolerance, base):
-    """The slow way: every precision from 2 up, until two in succession meet the tolerance."""
-    met = []
-    for digits in range(2, {2: 53, 10: 18, 16: 13}[base] + 1):
-        errors = largest(digits)
-        met.append(errors is not None and bool((errors <= tolerance).all()))
-        if met[-2:] == [True, True]:
-            return digits - 1, met
-    return (digits if met[-1] else None), met
-
-
-MODELS = {
-    "damped": (MODEL, Z),
-    "tracker": (
-        LinearModel([[1, "0.1"], [0, 1]], [[1, 0]], [["1e-4", 0], [0, "1e-2"]], [[4]], [0, 0], 100 * np.eye(2)),
-    )
-    * 2,
-    "units far apart": (
-        LinearModel([[1, 0], ["1e-3", 1]], [[0, 1]], [["1e-6", 0], [0, 0]], [["1e-4"]], [1, 1], [["1e6", 0], [0, 1]]),
-    )
-    * 2,
-}
-
-
-@pytest.mark.parametrize("name", list(MODELS))
-@pytest.mark.parametrize(
-    ("base", "options"),
-    [
-        (2, {}),
-        (2, {"rounding": Rounding.CHOP}),
-        (2, {"form": Form.UD}),
-        (2, {"basis": "bound"}),
-        (10, {"form": Form.HUNG}),
-        (16, {"form": Form.JOSEPH, "basis": "bound"}),
-    ],
-)
-def test_bisection_finds_what_trying_each_precision_finds(name, base, options):
-    model, z = MODELS[name]
-    if z is model:
-        z = Simulation(model, tuple(model.x0.astype(float)), 0, fine_resolution(model)).measurements(40)
-    largest = errors_in(model, z, base, options)
-    for tolerance in (1e-1, 1e-4, 1e-7):
-        found = required_precision(model, z, tolerance, base=base, **options)
-        digits, met = upward(largest, tolerance, base)
-        assert (found.digits if found.format else None) == digits
-        assert all(met[t - 2] == (ratio <= 1) for t, ratio in found.tried if t - 2 < len(met))
-        assert len(found.tried) <= 11  # of up to 52
-
-
-def test_a_lucky_precision_does_not_count(monkeypatch):
-    """Below a threshold some meet the tolerance by luck, never two in succession: they are passed over."""
-    rng = np.random.default_rng(8)
-    passed = 0
-    for _ in range(200):
-        threshold = int(rng.integers(2, 55))
-        lucky = {t for t in rng.integers(2, 54, 6).tolist() if t < threshold}
-        lucky -= {t + 1 for t in lucky}
-        monkeypatch.setattr(
-            strategies.Emulated,
-            "error",
-            lambda self, fmt, least=threshold, by_luck=lucky: Outcome(
-                0.5 if fmt.precision in by_luck or fmt.precision >= least else 2.0
-            ),
-        )
-        found = required_precision(MODEL, Z[:4], 1.0, base=2)
-        expected = min(53 if threshold > 53 else threshold - (threshold - 1 in lucky), 53)
-        if threshold > 53 and 53 not in lucky:
-            assert found.format is None
-            continue
-        assert found.digits == expected
-        passed += any(t < expected and ratio <= 1 for t, ratio in found.tried)
-    assert passed > 10  # some of them were tried
 
 
 def test_the_bound_asks_for_more_digits_and_holds():
@@ -306,19 +200,6 @@ def test_a_seed_selects_the_random_roundings_of_a_run():
     assert not np.array_equal(first, other)
 
 
-def test_a_seed_selects_the_random_roundings_of_a_compiled_run():
-    """The inverse of R is computed in compiled loops."""
-    two = LinearModel(MODEL.Phi, np.eye(2), MODEL.Q, [["0.7", "0.3"], ["0.3", "1.1"]], MODEL.x0, MODEL.P0)
-    seen = []
-    for seed in (1, 1, 2):
-        run = Run(two, FloatFormat(2, 9, Rounding.STOCHASTIC, seed=seed), Form.HUNG_SECOND_GAIN, ())
-        inverse, measured = run.exactly(run.matrices.RI), run.exactly(run.pack_measurements(Z[:30].reshape(-1, 2)))
-        seen.append((inverse.tolist(), measured.tolist()))
-    assert seen[0] == seen[1]
-    assert seen[0][0] != seen[2][0]
-    assert seen[0][1] != seen[2][1]
-
-
 def squares(fmt, z):
     return [x * x for x in z]
 
@@ -376,19 +257,6 @@ def test_a_state_without_variance_is_named(form):
     assert required_precision(little, np.ones((5, 1)), 1e-3, form=form).format is not None
 
 
-def test_a_state_of_a_nonlinear_filter_without_variance_is_named():
-    still = NonlinearModel(lambda x: x, None, lambda x: x * x, None, [[0]], [[1]], [1], [[0]])
-    found = required_precision(still, np.ones((5, 1)), 1e-3)
-    assert found.format is None
-    assert "the model gives state 0 no variance, whatever the precision; give it a little in P0 or Q" in found.why
-
-
-def test_a_variance_lost_to_rounding_does_not_blame_the_model():
-    sure = LinearModel([[1]], [[1]], [[0]], [["1e-9"]], [0], [[1]])
-    found = judge(sure, FloatFormat(2, 12), np.ones((2, 1)), 1e-3)
-    assert found.why == "a computed variance was not positive at step 1"
-
-
 def test_an_answer_says_why_fewer_digits_were_refused():
     """A state without a variance, in which no run can go on; and a Q of rank one, which few bits make indefinite."""
     known = LinearModel(MODEL.Phi, MODEL.H, [[0, 0], [0, 0]], MODEL.R, MODEL.x0, [[2, 0], [0, 0]])
@@ -436,25 +304,9 @@ def test_an_answer_that_higher_precisions_miss_is_refused():
     assert required_precision(ALMOST_KNOWN, 100, 0.1, form=other).digits == int(advice.split()[-2])
 
 
-def test_an_answer_lies_above_every_precision_that_misses():
-    model = LinearModel(
-        [[1, "0.1"], [0, 1]], [["-0.09", "-0.26"]], [["1e-8", 0], [0, "1e-8"]], [["1e-23"]], [0, 0], 10**4 * np.eye(2)
-    )
-    found = required_precision(model, 100, 1e-3)
-    missed = [digits for digits, ratio in found.tried if not ratio <= 1]
-    assert found.irregular  # bisection alone would have stopped at one of these
-    assert found.digits == max(missed) + 1
-    assert set(range(found.irregular[0], 54)) <= {digits for digits, _ in found.tried}
-
-
 def test_the_precisions_of_processors_are_always_tried():
     tried = {digits for digits, _ in required_precision(MODEL, Z, 1e-1).tried}
     assert {24, 53} <= tried
-
-
-def test_names_of_forms_and_roundings_are_taken():
-    by_name = required_precision(MODEL, Z[:20], 1e-4, form="ud", rounding="chop")
-    assert by_name == required_precision(MODEL, Z[:20], 1e-4, form=Form.UD, rounding=Rounding.CHOP)
 
 
 def in_other_units(model, states, measurements):
@@ -484,19 +336,6 @@ def test_answers_do_not_depend_on_units(basis, form, unit):
     assert first.tried == second.tried
 
 
-@pytest.mark.parametrize("basis", ["guarantee", "probable"])
-def test_guarantees_do_not_depend_on_units(basis):
-    tolerance, state, innovation = np.array([1e-3, 1e-3]), np.array([100.0, 100.0]), np.array([20.0])
-    scale = 2.0 ** np.array([-40, -43])
-    other = in_other_units(MODEL, (-40, -43), (-35,))
-    first = required_precision(MODEL, 1, tolerance, basis=basis, within=limits(state=state, innovation=innovation))
-    within = limits(state=state * scale, innovation=innovation * 2.0**-35)
-    second = required_precision(other, 1, tolerance * scale, basis=basis, within=within)
-    assert first.format is not None
-    assert first.format == second.format
-    assert [ratio <= 1 for _, ratio in first.tried] == [ratio <= 1 for _, ratio in second.tried]
-
-
 def test_a_missing_measurement_changes_nothing_but_the_prediction():
     """NaN, a mask, and a row of zeros in H give the same run; two sensors with correlated noise, one of them silent."""
     two = LinearModel(MODEL.Phi, [[1, "0.3"], [0, 1]], MODEL.Q, [["0.4", "0.1"], ["0.1", "0.5"]], MODEL.x0, MODEL.P0)
@@ -521,14 +360,6 @@ def test_a_missing_measurement_changes_nothing_but_the_prediction():
     within = limits(state=100, innovation=20)
     with pytest.raises(ValueError, match='got missing measurements and basis "guarantee"'):
         required_precision(two, with_nan, 1e-4, basis="guarantee", within=within)
-
-
-def test_a_missing_measurement_keeps_the_repairs_of_the_model():
-    asymmetric = np.array([[1.0, 0.1], [0.1 * (1 + 2.0**-50), 1.0]])
-    model, z = replace(MODEL, P0=asymmetric), np.where(np.arange(len(Z)) == 3, np.nan, Z[:, 0])[:, np.newaxis]
-    repairs = tuple(map(str, model.repairs))
-    assert len(repairs) == 1
-    assert emulate(model, z, FloatFormat(2, 24)).repairs == emulate(model, Z, FloatFormat(2, 24)).repairs == repairs
 
 
 WHOLE, WITH_INPUTS = np.round(Z[:12] * 4), replace(MODEL, d=["0.5"])
@@ -563,20 +394,6 @@ def test_measurements_of_any_type_are_read_exactly(dtype, masked, expected):
     assert answers_for(np.ma.masked_array(z, GAPS) if masked else z) == expected[masked]
     if not masked:
         assert answers_for_system(z) == expected["system"]
-
-
-def test_a_measurement_that_only_longdouble_holds_is_not_rounded_to_float64():
-    fine = np.longdouble(1) + np.finfo(np.longdouble).eps
-    if fine == np.float64(fine):
-        pytest.skip("longdouble is float64 on this processor")
-    z = np.array([[fine], [1]])
-    answers = [required_precision(MODEL, each, 1e-3) for each in (z, [[Fraction(*fine.as_integer_ratio())], [1]])]
-    assert answers[0] == answers[1]
-    assert real_numbers(z)[0, 0] == Fraction(*fine.as_integer_ratio()) != 1
-    with pytest.raises(ValueError, match="entry 1, 0: got nan; needed a finite number"):
-        required_precision(MODEL, np.array([[fine], [np.nan]], dtype=np.longdouble), 1e-3)
-    by_nan = required_precision(MODEL, np.array([[1], [np.nan]], dtype=np.longdouble), 1e-3)
-    assert by_nan == required_precision(MODEL, [[1], [math.nan]], 1e-3)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from gpbnb import BFLOAT16, FixedFormat, FloatFormat, LinearSystem, NonlinearModel, required_precision, survey_records
-from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.forms import Form
@@ -103,33 +102,6 @@ def test_a_function_that_stops_in_few_digits():
     assert found.digits > 3
 
 
-REFUSED = [
-    (
-        lambda fmt, z: z.to_float(),
-        TypeError,
-        "got to_float.. of a FloatArray in a function whose precision is searched",
-    ),
-    (lambda fmt, z: np.cumsum(Z), TypeError, "got a ndarray from the function; needed arrays of the format"),
-    (lambda fmt, z: (x for x in z), TypeError, "got a generator from the function"),
-    (lambda fmt, z: [*z[:199], 0.1], TypeError, "got a list from the function"),
-    (lambda fmt, z: [1.0] * 200, TypeError, "got a list from the function"),
-    (
-        lambda fmt, z: FloatFormat(2, 300).array(z),
-        TypeError,
-        "got a conversion from .*precision=237.* to .*precision=300",
-    ),
-    (lambda fmt, z: FloatFormat(2, 300).array(Z), TypeError, "got a FloatArray in .*300"),
-    (lambda fmt, z: [x * 0.1 for x in z], ValueError, "got the operand 0.1; needed a number that .* holds exactly"),
-    (lambda fmt, z: z * (1 if fmt.precision < 300 else 2), ValueError, "got a function whose reference in 237 bits"),
-]
-
-
-@pytest.mark.parametrize(("run", "kind", "message"), REFUSED)
-def test_functions_that_leave_the_format_are_refused(run, kind, message):
-    with pytest.raises(kind, match=message):
-        required_precision(run, Z, 1e-3)
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -200,52 +172,6 @@ def test_without_digits_for_its_reference_a_function_is_refused_with_the_limit_t
         required_precision(muller(50), 50, 1e-3, base=10)
     assert "If errors only grow" in str(caught.value)
     assert required_precision(muller(50), 50, 1e-3, base=10, highest=144).digits > 60
-
-
-def test_an_answer_below_the_limit_of_compiled_loops_is_found_without_trying_more():
-    assert max(digits for digits, _ in required_precision(smoother, Z, 1e-3).tried) == 53
-    found = required_precision(smoother, Z, 1e-3, highest=12)
-    assert max(digits for digits, _ in found.tried) <= 12
-    assert found.digits == required_precision(smoother, Z, 1e-3).digits
-
-
-def test_a_model_ends_at_the_compiled_loops_or_below():
-    system, z = LinearSystem([["0.9"]], [["0.1"]]), Z.reshape(-1, 1)
-    found = required_precision(system, z, 1e-30, rounding="even")
-    assert str(found).startswith("no precision up to 53 bits, the most with compiled loops in base 2, rounded even, ")
-    assert "up to 9 bits, where highest=9 ends" in str(required_precision(system, z, 1e-30, highest=9))
-    for model, measured in ((system, z), (examples.tracker(), 5)):
-        with pytest.raises(
-            ValueError, match=r"got highest=54 for a model; needed at most 53 bits, .* function of a format"
-        ):
-            required_precision(model, measured, 1e-3, highest=54)
-    for wrong in (1, 2.5, "20"):
-        with pytest.raises(ValueError, match=r"got .* highest; needed a whole number, at least 2"):
-            required_precision(smoother, Z, 1e-3, highest=wrong)
-
-
-def angles(fmt, z):
-    """The arcsine of nearly a sum of squares that is 1, and in some precisions more."""
-    one = fmt.array("0.6") ** 2 + fmt.array("0.8") ** 2
-    return np.arcsin(one * fmt.array("0.99999")) * z
-
-
-def test_leaving_the_domain_of_a_function_is_a_lack_of_digits():
-    with pytest.raises(DomainError, match=r"got np.arcsin of 1\.000244140625; needed an argument for which"):
-        angles(FloatFormat(2, 13), FloatFormat(2, 13).array([1, 2]))
-    found = required_precision(angles, [1, 2], 0.02)
-    assert found.digits == 14
-    assert dict(found.tried)[13] == np.inf
-    assert "in 13 bits the function stops: got np.arcsin of 1.000244140625" in str(found)
-    with pytest.raises(DomainError, match=r"the function stops in its reference of .* np.arcsin of 1.6"):
-        required_precision(lambda fmt, z: np.arcsin(z + fmt.array("0.6")), [1], 0.02)
-
-
-def test_a_function_that_stops_in_its_reference_says_so():
-    with pytest.raises(
-        ZeroDivisionError, match=r"the function stops in its reference of 237 bits: .* division by zero"
-    ):
-        required_precision(lambda fmt, z: 1 / (z - z), Z, 1e-3)
 
 
 def running_mean(fmt, values):

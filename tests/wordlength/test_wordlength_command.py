@@ -8,7 +8,6 @@ import json
 import math
 import shlex
 import sys
-from dataclasses import replace
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -16,7 +15,6 @@ import numpy as np
 import pytest
 from markup import Elements
 
-from gpbnb import __main__ as top
 from gpbnb import required_precision
 from gpbnb.bounds.check import prove
 from gpbnb.bounds.guarantee import limits
@@ -25,7 +23,7 @@ from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength import running as command
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_filter, read_measurements, read_model
-from gpbnb.wordlength.report import Answer, Report, study
+from gpbnb.wordlength.report import study
 
 MODEL = """
 name = "tracker <1>"
@@ -290,74 +288,11 @@ def test_limits_that_are_missing_or_of_no_use_are_refused(files, capsys, options
     assert message in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"tolerance": "small"}, "got --tolerance small; needed numbers"),
-        ({"tolerance": "-1"}, "needed an error above 0"),
-        ({"model": "absent.toml"}, "absent.toml"),
-        ({"form": "square"}, "got form 'square'"),
-        ({"rounding": "sideways"}, "got rounding 'sideways'"),
-        ({"text": MODEL.replace("R =", "S =")}, "model.toml: R missing; S unknown"),
-        ({"text": "Phi = ["}, "model.toml is not TOML"),
-        ({"text": MODEL.replace("[[4]]", "[[-4]]")}, "model.toml: got R with a least eigenvalue"),
-        ({"z": "1\n2\nx\n"}, "z.csv, line 3: got 'x'"),
-        ({"z": "1\n2,3\n"}, "z.csv, line 2: got 2 cells; needed 1"),
-        ({"z": "1_0\n1\n"}, "z.csv, line 1"),
-        ({"z": "range\n"}, "z.csv: got no rows"),
-    ],
-)
-def test_bad_files_and_options_are_refused_with_the_place(files, capsys, change, message):
-    folder = files[0]
-    given = {"model": "model.toml", "tolerance": "0.01", "form": "UD", "rounding": "nearest"} | change
-    if "text" in change:
-        (folder / "model.toml").write_text(change["text"], encoding="utf-8")
-    (folder / "z.csv").write_text(change.get("z", "1\n2\n"), encoding="utf-8")
-    options = [f"--{name}={given[name]}" for name in ("tolerance", "form", "rounding")]
-    assert main([str(folder / given["model"]), "--measurements", str(folder / "z.csv"), *options]) == 2
-    assert message in capsys.readouterr().err
-
-
 def test_a_header_and_gaps_in_measurements(files):
     found = read_measurements(files[0] / "z.csv")
     assert found.shape == (60, 1)
     assert np.isnan(found[7, 0])
     assert np.array_equal(found, files[1], equal_nan=True)
-
-
-@pytest.mark.parametrize("header", ["z1,z2", " north , east"])
-def test_names_of_measurements_may_have_digits_and_spaces(header, tmp_path):
-    (tmp_path / "z.csv").write_text(f"{header}\n1,2\n3,4\n", encoding="utf-8")
-    assert read_measurements(tmp_path / "z.csv").tolist() == [[1, 2], [3, 4]]
-    (tmp_path / "z.csv").write_text("1,2\nz1,z2\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"z\.csv, line 2: got 'z1'"):
-        read_measurements(tmp_path / "z.csv")
-
-
-def test_a_mapping_is_read():
-    assert read_model(MATRICES).p == 2
-    with pytest.raises(ValueError, match="the mapping: C2 unknown"):
-        read_model(MATRICES | {"C2": 1})
-
-
-def test_the_commands_are_listed(capsys):
-    assert top.main([]) == 0
-    shown = capsys.readouterr().out
-    assert all(f"  {name} " in shown for name in top.COMMANDS)
-    with pytest.raises(SystemExit, match="2"):
-        top.main(["bake"])
-
-
-def test_the_curve_of_two_precisions_spans_the_figure():
-    """From 60 to 620 across; 10 times the tolerance is at the top, 30, and the tolerance at the bottom, 280."""
-    answer = Answer("innovation, emulation", "emulation", 21, "", ((20, 10.0), (21, 1.0), (22, None)))
-    report = Report("a", "filter", 21, "", 2, "nearest", 5, (1.0,), "", (answer,), (), (), "", {})
-    assert '<polyline points="60.0,30.0 620.0,280.0" ' in report.to_html()
-    # The baseline of a label is 4 px below its grid line, which thus points at the middle of the digits.
-    assert '<text x="52" y="34.0" text-anchor="end">10¹</text><line x1="60" x2="620" y1="30.0"' in report.to_html()
-    assert '<text x="52" y="284.0" text-anchor="end">10⁰</text><line x1="60" x2="620" y1="280.0"' in report.to_html()
-    alone = replace(report, answers=(replace(answer, tried=answer.tried[:1]),))
-    assert "Too few precisions" in alone.to_html()
 
 
 def test_the_command_takes_known_inputs(files, capsys):

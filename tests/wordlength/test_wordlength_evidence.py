@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import math
-import re
-from fractions import Fraction
 
 import numpy as np
 import pytest
 from scipy import signal
 
-from gpbnb import BINARY16, FixedFormat, FloatFormat, LinearSystem, WordFormats, limits, required_precision
+from gpbnb import BINARY16, FixedFormat, FloatFormat, LinearSystem, limits, required_precision
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.sections import scaled
-from gpbnb.filters.structures import DIRECT, cascade, sections_of
-from gpbnb.filters.system import LinearFilter
-from gpbnb.filters.words import run_words
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.fixed import scaled_sections
 from gpbnb.wordlength.required import judge
 
 SLOW = LinearSystem([["0.99997"]], [["0.00003"]], name="slow")
@@ -71,15 +64,6 @@ def test_coefficients_that_limit_a_filter_are_named(basis):
     assert required_precision(LOW_PASS, u, 1e-3, kind="fixed", basis=basis, coefficient_bits=enough - 1).format is None
 
 
-def test_coefficients_in_a_format_and_a_stored_filter_that_is_not_stable_are_named():
-    words = WordFormats(FixedFormat(2, 15), FixedFormat(1, 14))
-    found = required_precision(LOW_PASS, np.ones((3000, 1)), 1e-3, kind="fixed", like=words)
-    assert "stored in fixed point of 16 bits, 14 of them fraction, they give" in found.why
-    near = LinearSystem.from_coefficients(["1e-7"], [1, "-1.9995", "0.99950006"])
-    found = required_precision(near, np.ones((100, 1)), 1e-3, kind="fixed", basis="guarantee")
-    assert "stored in 15 significant bits, words are refused: the system is stable, but not with" in found.why
-
-
 @pytest.mark.parametrize("basis", ["emulation", "guarantee"])
 def test_a_cascade_says_what_scaling_its_sections_saves(basis):
     """A low-pass of order 8, whose sections have gains from about 1e-5 to 1e3."""
@@ -107,33 +91,6 @@ def test_a_cascade_without_an_answer_says_whether_scaling_gives_one():
     assert "scale" not in str(required_precision(LOW_PASS, np.ones((50, 1)), 1e-30, kind="fixed"))
 
 
-@pytest.mark.parametrize("form", DIRECT)
-def test_the_sections_of_a_cascade_are_scaled_as_its_design_scales_them(form):
-    sos = signal.ellip(6, 1, 60, 0.1, output="sos")
-    given, scaled = (LinearSystem.from_sections(sos, form, scale=scale) for scale in (False, True))
-    assert (scaled_sections(given).made.coefficients == scaled.made.coefficients).all()
-    assert scaled_sections(scaled) is None
-    assert scaled_sections(LinearSystem.from_sections(sos, "lattice")) is None
-    moving = LinearSystem.from_filter(given.made, x0=np.ones(given.n))
-    assert scaled_sections(moving) is None
-
-
-def test_a_first_section_without_states_does_not_hide_the_form_of_the_others():
-    sections = [([Fraction(1)], []), *sections_of(signal.ellip(6, 1, 60, 0.1, output="sos"))]
-    found = {}
-    for form in DIRECT:
-        made, want = (cascade(each, form) for each in (sections, scaled(sections, form)))
-        system = LinearSystem.from_filter(LinearFilter(made.program, made.coefficients, cascade=made.cascade))
-        found[form] = scaled_sections(system).made.coefficients.tolist()
-        assert found[form] == want.coefficients.tolist()
-    assert found["direct form II"] != found["direct form II transposed"]
-
-
-def test_a_tolerance_below_the_last_bit_still_blames_the_fraction_bits():
-    found = required_precision(LOW_PASS, np.ones((50, 1)), 1e-30, kind="fixed")
-    assert found.why.endswith("fraction bits are the most tried")
-
-
 def test_the_command_takes_the_bits_of_coefficients(tmp_path, capsys):
     rows = ", ".join(str([float(c) for c in row]) for row in SECTIONS)
     (tmp_path / "low.toml").write_text(f"sos = [{rows}]\n")
@@ -151,26 +108,6 @@ def test_the_command_takes_the_bits_of_coefficients(tmp_path, capsys):
         assert message in capsys.readouterr().err
     assert main([*given[:-1], "--coefficients", "24"]) == 2
     assert "got --coefficients; needed --fixed with it" in capsys.readouterr().err
-
-
-def test_of_all_structures_the_one_with_the_shortest_word_answers(tmp_path, capsys):
-    """Here direct form II needs as few fraction bits, but more integer bits, and stands first in the list."""
-    (tmp_path / "low.toml").write_text('b = [0.02, 0.04, 0.02]\na = [1, -1.56, 0.64]\nstructure = "all"\n')
-    given = [str(tmp_path / "low.toml"), "--tolerance", "0.001", "--simulate", "noise", "--steps", "200", "--fixed"]
-    assert main([*given, "--basis", "emulation"]) == 0
-    printed = capsys.readouterr()
-    lines = re.findall(r"^(.+), emulation: \d+ .* in a word of (\d+) bits", printed.out + printed.err, re.MULTILINE)
-    words = {name: int(bits) for name, bits in lines}
-    named, answer = printed.out.splitlines()[-1].split(": ", 1)
-    assert len(words) > 5
-    assert f"in a word of {min(words.values())} bits" in answer
-    assert words[named] == min(words.values())
-
-
-def test_a_tolerance_for_other_outputs_is_refused_in_fixed_point():
-    system = LinearSystem.from_coefficients(["0.1"], [1, "-0.9"])
-    with pytest.raises(ValueError, match="needed an error above 0 for each of the 1 outputs"):
-        required_precision(system, np.ones((50, 1)), [0.001, 1], kind="fixed")
 
 
 # -- what a refusal says ----------------------------------------------------------------------------------------------
@@ -200,21 +137,6 @@ def test_a_slow_system_that_no_precision_suits_names_its_slowness():
     assert found.endswith("because the system is slow: its slowest response takes 47000000 steps to decay to 1 %")
 
 
-@pytest.mark.parametrize("basis", ["emulation", "bound", "guarantee"])
-def test_a_coefficient_beyond_a_format_is_named_alike_on_every_basis(basis):
-    sections = LinearSystem.from_sections(signal.butter(4, 0.02, output="sos"))
-    z, within = np.full((20, 1), 0.5), limits(measurement=0.5) if basis == "guarantee" else None
-    found = str(judge(sections, FixedFormat(0, 15), z, 1e-3, basis=basis, within=within))
-    assert re.search(r"a1_1( = |: got a result of about )-1\.", found)
-    words = "16-bit fixed point (15 fraction bits)"
-    verdict = {
-        "emulation": f"{words} misses the tolerance, in a run of 20 steps",
-        "bound": f"nothing is proved for {words}, without a bound on this run of 20 steps",
-        "guarantee": f"nothing is proved for {words}, without a guarantee for ever",
-    }[basis]
-    assert found.startswith(f"{verdict}: ")
-
-
 def test_a_bound_that_is_too_large_proves_no_miss():
     system, u, within = LinearSystem([["0.875"]], [["0.125"]]), np.ones((60, 1)), limits(measurement=1)
     text = {
@@ -231,15 +153,3 @@ def test_a_bound_that_is_too_large_proves_no_miss():
     saturated = FixedFormat(3, 4, Rounding.CHOP, overflow="saturate")
     found = str(judge(system, saturated, u, 1e-4))
     assert found.startswith("8-bit fixed point (4 fraction bits, chopped, saturated) misses the tolerance: its error")
-
-
-def test_refusals_describe_formats_in_words():
-    system = LinearSystem([["0.5"]], [[1]])
-    for basis in ("emulation", "bound", "guarantee"):
-        z, within = np.full((3, 1), 100), limits(measurement=100) if basis == "guarantee" else None
-        found = str(judge(system, FixedFormat(3, 12), z, 1, basis=basis, within=within))
-        assert "16-bit fixed point (12 fraction bits)" in found
-        assert "FixedFormat(" not in found
-    words = WordFormats(FixedFormat(2, 12), FixedFormat(0, 15))
-    with pytest.raises(OverflowError, match="beyond the range of fixed point of 16 bits, 15 of them fraction; needed"):
-        run_words(LOW_PASS, np.ones((3, 1)), words)

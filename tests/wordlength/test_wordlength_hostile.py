@@ -118,69 +118,6 @@ def test_a_value_of_a_wrong_type_is_refused_with_its_key(folder, capsys, entries
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (b"", "z.csv: got no rows of numbers"),
-        (b"\n\n", "z.csv: got no rows of numbers"),
-        (b"\x00\xff", "z.csv, line 1: got the byte 0xff, which is not UTF-8; needed a file in UTF-8"),
-        ("1\n2\n".encode("utf-16"), "z.csv, line 1: got the byte 0xff, which is not UTF-8; needed a file"),
-        (b"1\n\xe9\n", "z.csv, line 2: got the byte 0xe9, which is not UTF-8; needed a file in UTF-8"),
-        (b"1\n\x00\n", r"z.csv, line 2: got '\x00'; needed a number"),
-        (b"1\n" + b"1" * 200_000, "z.csv, line 2: field larger than field limit (131072)"),
-        (b'1\n"2\n3\n', r"z.csv, line 3: got '2\n3"),
-        (b"1\n" + b"7" * 100_000 + b"x\n", "z.csv, line 2: got '7777777"),
-        (b"1\n1e999\n", "z.csv, line 2: got '1e999'; needed a number that float64 holds"),
-        (b"z,z\n1,2\n3\n", "z.csv, line 3: got 1 cells; needed 2"),
-        (b"z\n1\nz\n", "z.csv, line 3: got 'z'; needed a number"),
-        (b"1;2\n", "z.csv, line 1: got semicolons between the cells; needed commas"),
-        (b"1\n" + "१\n".encode(), "z.csv, line 2: got '१'; needed a number"),
-    ],
-)
-@pytest.mark.parametrize("model", ["filter.toml", "system.toml"])
-def test_measurements_that_are_none(folder, capsys, model, content, message):
-    (folder / "z.csv").write_bytes(content)
-    shown = refused(capsys, model, "--measurements", "z.csv")
-    assert shown.startswith(message)
-    assert len(shown) < 200
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (
-            ["filter.toml", "--measurements", "folder"],
-            "got folder, which cannot be read: Is a directory; needed a file",
-        ),
-        (["folder"], "got folder, which cannot be read: Is a directory; needed a file"),
-        (["absent.toml"], "got absent.toml, which cannot be read: No such file or directory; needed a file"),
-        (
-            ["filter.toml", "--inputs", "absent.csv"],
-            "got absent.csv, which cannot be read: No such file or directory; needed a file",
-        ),
-        (["\0"], "embedded null byte"),
-        (["filter.toml", "--steps", "0"], "got 0 steps; needed a whole number"),
-        (["filter.toml", "--steps", "1000000000000"], "got 1,000,000,000,000 steps to simulate; needed at most"),
-        (["filter.toml", "--base", "7"], "got --base 7; needed one of 2, 10, 16"),
-        (["filter.toml", "--tolerance=1_0"], "got --tolerance 1_0; needed numbers"),
-        (["filter.toml", "--tolerance=1e400"], "got --tolerance 1e400; needed numbers"),
-        (["filter.toml", "--inputs", "z.csv"], "filter.toml: got u without B"),
-        (["system.toml"], "got a linear system without inputs; needed --measurements"),
-        (["system.toml", "--basis", "bound"], "got a linear system without inputs; needed --measurements"),
-        (["system.toml", "--inputs", "z.csv"], "system.toml: got known inputs for a linear system; needed none"),
-        (["system.toml", "--measurements", "z.csv", "--form", "UD"], "got --form UD for a linear system; needed none"),
-        (["system.toml", "--measurements", "z.csv", "--form", "innovation"], "got --form innovation for a linear sys"),
-    ],
-)
-def test_options_that_do_not_fit(folder, capsys, arguments, message):
-    tolerance = [] if any(each.startswith("--tolerance") for each in arguments) else ["--tolerance", "0.1"]
-    assert main([*arguments, *tolerance]) == 2
-    shown = capsys.readouterr().err
-    assert message in shown
-    assert "z=" not in shown
-    assert "unknown" not in shown
-
-
-@pytest.mark.parametrize(
     ("report", "message"),
     [
         ("z.csv", "got z.csv and z.csv, which are one file"),
@@ -207,12 +144,6 @@ def test_a_report_over_a_file_that_is_read_is_refused_before_anything_is_compute
     assert {path: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
 
 
-def test_one_file_for_two_purposes_is_refused(folder, capsys):
-    (folder / "model.toml").write_text(toml(INPUTS), encoding="utf-8")
-    message = refused(capsys, "model.toml", "--measurements", "z.csv", "--inputs", "./z.csv")
-    assert message == "got z.csv and z.csv, which are one file; needed a file for each purpose"
-
-
 def test_a_report_may_replace_an_older_one_and_names_files_that_are_not_utf8(folder, capsys):
     name = os.fsdecode(b"z\xff.csv")
     (folder / "z.csv").rename(name)
@@ -221,11 +152,6 @@ def test_a_report_may_replace_an_older_one_and_names_files_that_are_not_utf8(fol
         assert main(asked) == 0
     assert r"z\xff.csv" in (folder / "a.html").read_text(encoding="utf-8")
     assert r"z\\xff.csv" in (folder / "a.json").read_text(encoding="utf-8")
-
-
-def test_a_model_that_an_editor_marked_as_utf8_is_read(folder):
-    (folder / "marked.toml").write_bytes(b"\xef\xbb\xbf" + (folder / "filter.toml").read_bytes())
-    assert read_model("marked.toml").n == 2
 
 
 def test_measurements_that_are_all_missing_leave_a_filter_at_zero(folder, capsys):

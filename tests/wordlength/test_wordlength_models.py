@@ -76,16 +76,6 @@ def test_a_filter_of_filterpy_gives_its_estimates(kind, inputs):
     np.testing.assert_allclose(found, theirs, **CLOSE)
 
 
-def test_a_state_may_be_a_row_of_numbers_and_a_matrix_of_one_entry_a_number():
-    given = tracker(column=False)
-    found = estimates(read_model(given))
-    np.testing.assert_allclose(found, [advance(given, z) for z in Z], **CLOSE)
-    scalar = KalmanFilter(dim_x=1, dim_z=1)
-    scalar.F, scalar.H, scalar.R, scalar.Q = np.array([[0.9]]), np.array([[1.0]]), 0.5, 0.1
-    found = estimates(read_model(scalar), Z[:, :1])
-    np.testing.assert_allclose(found, [advance(scalar, z) for z in Z[:, :1]], **CLOSE)
-
-
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
@@ -132,26 +122,6 @@ def test_inputs_are_used_or_refused():
     given.B = np.ones(3)
     with pytest.raises(ValueError, match=r"B of shape \(3,\); needed \(3, p\)"):
         read_model(given, U)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("F", np.ones((2, 3, 3))),
-        ("H", np.ones(3)),
-        ("H", np.ones((1, 3))),
-        ("Q", 0.1),
-        ("R", 0.5),
-        ("P", 10.0),
-        ("x", np.ones((1, 3))),
-        ("x", np.ones((3, 2))),
-    ],
-)
-def test_a_shape_that_filterpy_would_broadcast_is_refused(name, value):
-    given = tracker()
-    setattr(given, name, value)
-    with pytest.raises(ValueError, match=rf"^got a KalmanFilter with {name} of shape"):
-        read_model(given)
 
 
 @pytest.mark.filterwarnings("ignore:Use KalmanFilter class instead:DeprecationWarning")
@@ -265,15 +235,3 @@ def test_a_system_of_control_gives_its_outputs(given):
 def test_a_system_that_is_not_discrete_or_has_no_states_is_refused(given, message):
     with pytest.raises(ValueError, match=f"^{message}"):
         read_model(given)
-
-
-def test_complex_coefficients_are_refused_not_cut():
-    given = signal.dlti([[0.5 + 1j]], [[1.0]], [[1.0]], [[0.0]], dt=1)
-    with pytest.raises(TypeError, match=r"A: entry 0, 0: got \(0\.5\+1j\) of type complex"):
-        read_model(given)
-
-
-def test_inputs_for_a_system_are_refused():
-    for given in (signal.dlti(*MIMO, dt=1), LinearSystem(*MIMO)):
-        with pytest.raises(ValueError, match=f"got inputs for a {type(given).__name__}"):
-            read_model(given, U)

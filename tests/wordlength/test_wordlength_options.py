@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 
 import gpbnb
-from gpbnb import BFLOAT16, BINARY32, FixedFormat, FloatFormat, LinearSystem, limits
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.simulation import simulated_inputs
@@ -25,8 +24,6 @@ from gpbnb.report.ledger.render import FORMATS
 from gpbnb.wordlength import options, running
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.answer import Basis
-from gpbnb.wordlength.report import Question, study
-from gpbnb.wordlength.required import judge
 
 SYSTEM = 'A = [[0.875]]\nB = [[0.125]]\ninputs = ["sensor (V)"]\noutputs = ["level (V)"]\n'
 FILTER = "Phi = [[1]]\nH = [[1]]\nQ = [[0.01]]\nR = [[1]]\nx0 = [0]\nP0 = [[1]]\n"
@@ -148,29 +145,6 @@ def test_a_report_is_written_whole(folder, computed):
     assert ((folder / "a.html").read_text(), (folder / "a.json").read_text()) == ("<p>new</p>", "{}\n")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "name", "value"),
-    [
-        (["--format", "bfloat16"], "fmt", BFLOAT16),
-        (["--format", "FP8_E4M3", "--rounding", "floor"], "fmt", "FP8_E4M3 down"),
-        (["--format", "Q15"], "fmt", FixedFormat(0, 15)),
-        (["--format", "fixed 4.12", "--rounding", "chop"], "fmt", FixedFormat(4, 12, "chop")),
-        (["--digits", "24"], "fmt", FloatFormat(2, 24)),
-        (["--digits", "7", "--base", "10", "--emin", "-9", "--emax", "9"], "fmt", FloatFormat(10, 7, emin=-9, emax=9)),
-        (["--emin", "-9", "--emax", "12"], "emin", -9),
-        (["--emin", "-9", "--emax", "12"], "emax", 12),
-        ([], "fmt", None),
-    ],
-)
-def test_each_format_is_the_one_that_is_named(folder, computed, arguments, name, value):
-    assert main([str(folder / "system.toml"), "--tolerance", "1", "--simulate", "step", *arguments]) == 0
-    (question,) = computed
-    if value == "FP8_E4M3 down":
-        assert (question.fmt.largest, question.fmt.rounding.value) == (448, "down")
-    else:
-        assert getattr(question, name) == value
-
-
 def test_every_named_format_is_taken(folder, computed):
     taken = [name for name in gpbnb.NAMED_FORMATS if isinstance(getattr(gpbnb, name).backend, Compiled)]
     for name in taken:
@@ -213,41 +187,6 @@ def test_simulated_inputs_are_those_of_a_converter_of_16_bits():
     ):
         with pytest.raises(ValueError, match=message):
             simulated_inputs(kind, level, 3, 2)
-
-
-def test_a_system_runs_with_simulated_inputs(folder, capsys):
-    given = [str(folder / "system.toml"), "--tolerance", "1e-3", "--simulate", "sine", "--level", "2", "--steps", "50"]
-    assert main([*given, "--basis", "emulation"]) == 0
-    system = LinearSystem([["0.875"]], [["0.125"]])
-    expected = study(Question(system, 1e-3, simulated_inputs("sine", 2, 50, 1), bases=["emulation"]))
-    assert capsys.readouterr().out.strip() == expected.text
-    assert main([str(folder / "filter.toml"), *given[1:]]) == 2
-    assert "got --simulate sine for a Kalman filter; needed none" in capsys.readouterr().err
-    assert main([str(folder / "system.toml"), "--tolerance", "1"]) == 2
-    assert "got a linear system without inputs; needed --measurements" in capsys.readouterr().err
-
-
-def test_a_judged_format_meets_the_tolerance_where_a_search_finds_fewer_digits(folder, capsys):
-    system, u = LinearSystem([["0.875"]], [["0.125"]]), simulated_inputs("noise", 1, 60, 1)
-    ratio = judge(system, BINARY32, u, 1e-3).ratio
-    found = dict(gpbnb.required_precision(system, u, 1e-3, rounding="even").tried)
-    assert ratio == found[24]
-    assert judge(system, BFLOAT16, u, 1e-3).ratio > 1
-    given = [str(folder / "system.toml"), "--tolerance", "1e-3", "--simulate", "noise", "--steps", "60"]
-    assert main([*given, "--format", "binary32"]) == 0
-    assert capsys.readouterr().out == f"BINARY32 meets the tolerance: {ratio:.2g} of it, observed in 60 steps\n"
-    assert main([*given, "--format", "bfloat16"]) == 1
-    assert "BFLOAT16 misses the tolerance: " in capsys.readouterr().out
-    assert main([*given, "--format", "fixed -3.20"]) == 1
-    assert "misses the tolerance, in a run of 60 steps: " in capsys.readouterr().out
-    within = limits(measurement=9)
-    bounds = [
-        judge(system, BINARY32, u, 1e-3, basis=basis, within=None if basis == "bound" else within)
-        for basis in ("bound", "guarantee", "probable")
-    ]
-    assert bounds[0].ratio > ratio
-    assert bounds[1].ratio > bounds[2].ratio
-    assert str(bounds[1]).endswith("of it, guaranteed for ever")
 
 
 @pytest.mark.parametrize("module", ["gpbnb.wordlength", "gpbnb", "gpbnb.ledger"])

@@ -9,8 +9,6 @@ from dataclasses import replace
 import pytest
 
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.structures import WITH_FIR
-from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.report import Answer, Question, Report, study
 
 REPORT = Report(
@@ -55,40 +53,6 @@ def test_a_name_is_text_not_markup():
     assert "<script>alert" not in page
     assert "<b>" not in page
     assert page.count("Wordlength for &lt;script&gt;alert(1)&lt;/script&gt;") == 2
-
-
-def test_each_power_stands_beside_its_grid_line():
-    """The tolerance is the power zero. Logarithms from -1 to 2 take 250 pixels."""
-    drawn = REPORT.to_html()
-    names = re.findall(r'<text x="52" y="([^"]*)" text-anchor="end">10([^<]*)</text>', drawn)
-    assert [(float(y) - 4, power) for y, power in names] == [
-        (pytest.approx(30 + 250 * (2 - k) / 3, abs=0.06), power)
-        for k, power in ((-1, "⁻¹"), (0, "⁰"), (1, "¹"), (2, "²"))
-    ]
-    lines = re.findall(r'<line x1="60" x2="620" y1="([^"]*)" y2="([^"]*)" stroke="var\(--grid\)"/>', drawn)
-    assert [float(y) for pair in lines for y in pair] == pytest.approx([float(y) - 4 for y, _ in names for _ in "12"])
-
-
-@pytest.mark.parametrize(
-    ("ratios", "powers"),
-    [
-        ((300.0, 0.4, 0.2), range(-1, 4)),
-        ((5e-3, 2e-9), range(-9, 1)),
-        ((5e8, 2e-9), range(-9, 10)),
-        ((9e7, 2e5), range(9)),
-        ((8e12, 1e6), range(0, 14)),
-    ],
-)
-def test_about_seven_powers_cover_the_ratios_and_the_tolerance(ratios, powers):
-    """Every second power if there are twelve steps between them, and every third if there are eighteen."""
-    tried = tuple((20 + k, ratio) for k, ratio in enumerate(ratios))
-    drawn = replace(REPORT, answers=(replace(REPORT.answers[0], tried=tried),)).to_html()
-    names = re.findall(r'<text x="52" y="[^"]*" text-anchor="end">10([^<]*)</text>', drawn)
-    shown = [int(name.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))) for name in names]
-    assert shown == list(powers)[:: max(1, (len(powers) - 1) // 6)]
-    heights = [float(y) for y in re.findall(r"translate\(\S+ (\S+)\)", drawn.partition('<ul class="legend">')[0])]
-    assert len(heights) == len(ratios)
-    assert all(30 <= y <= 280 for y in heights)
 
 
 def test_the_figure_names_the_states_that_it_judges():
@@ -197,26 +161,6 @@ def test_a_study_says_where_its_measurements_come_from(given, source):
     assert told[:2] == ["innovation, emulation …", f"innovation, emulation: {found.text}"]
 
 
-def test_a_study_of_a_system_names_only_the_bases():
-    found = study(Question(LinearSystem([["0.5"]], [[1]]), 0.1, [[1], [2]], bases=("bound", "emulation")))
-    assert (found.kind, found.source) == ("linear system", "given")
-    assert [each.label for each in found.answers] == ["bound", "emulation"]
-
-
-def test_curves_of_all_structures_are_told_apart_without_colours():
-    """Each form or structure has a marker of its own, in the figure and in the legend, so that a grey print will do."""
-    tried = ((20, 10.0), (21, 0.4))
-    answers = tuple(Answer(f"{name}, emulation", "emulation", 21, "", tried) for name in WITH_FIR)
-    figure, _, legend = replace(REPORT, answers=answers).to_html().partition('<ul class="legend">')
-    drawn = re.findall(r'<path transform="[^"]*" d="([^"]*)" fill="([^"]*)"', figure)
-    assert len(drawn) == 2 * len(WITH_FIR)
-    assert drawn[::2] == drawn[1::2]
-    assert len({shape for shape, _ in drawn}) == len(WITH_FIR) >= 12
-    assert [fill for _, fill in drawn[2:]] == ["none"] * len(drawn[2:])  # so that one shows what it surrounds
-    items = legend.split("<li>")[1:]
-    assert [re.findall(r'd="([^"]*)"', item) for item in items] == [[shape] for shape, _ in drawn[::2]]
-
-
 def test_a_report_on_a_linear_system_speaks_of_inputs():
     system = replace(REPORT, kind="linear system", ranges=(), errors=(), limits={})
     shown = text_of(system.to_html())
@@ -225,19 +169,6 @@ def test_a_report_on_a_linear_system_speaks_of_inputs():
     assert "Colour and marker stand for the structure" in shown
     assert "measurements" not in shown
     assert "the ranges below" not in shown  # there are none
-
-
-def test_names_stand_in_every_table_and_sentence():
-    named = replace(REPORT, names=("a (m)", "b <2>", "c"), measurement_names=("z (V)",), limits={"measurement": (5.0,)})
-    tables = tables_of(named.to_html())
-    assert [row[0] for row in tables["Error of each state at the answer"][1:]] == ["a (m)", "b &lt;2&gt;", "c"]
-    question = dict(tables["Basis of the answer"][1:])
-    assert question["limit on the measurement"] == "z (V): 5"
-    assert "State c limits the answer: its error is 0.5 of its tolerance." in text_of(named.to_html())
-    assert (
-        dict(tables_of(replace(named, tolerance=(0.1, None, 2.0)).to_html())["Basis of the answer"][1:])["tolerance"]
-        == "a (m): 0.1, b &lt;2&gt;: any, c: 2"
-    )
 
 
 def test_a_judged_format_is_named_in_the_answer():

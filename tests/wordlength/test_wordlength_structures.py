@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 
 import numpy as np
 import pytest
@@ -15,10 +14,9 @@ from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.design import SIDE_BY_SIDE, FilterDesign
 from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, run_words
-from gpbnb.wordlength import models
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.fixed import exact_sums, with_fraction_bits
-from gpbnb.wordlength.models import DESIGN, read_filter, read_model
+from gpbnb.wordlength.fixed import with_fraction_bits
+from gpbnb.wordlength.models import read_filter, read_model
 
 SOS = signal.butter(4, 0.1, output="sos")
 B, A = signal.butter(4, 0.1)
@@ -124,25 +122,6 @@ def test_structures_that_a_filter_lacks_are_named_with_the_reason(filters, capsy
     assert "Left out: lattice: got a filter with the reflection coefficient" in report.read_text(encoding="utf-8")
 
 
-def test_the_command_reads_its_file_once(filters, monkeypatch):
-    read, plain = list[str](), models._text
-
-    def noted(path):
-        read.append(path.name)
-        return plain(path)
-
-    monkeypatch.setattr(models, "_text", noted)
-    main([str(filters / "sections.toml"), "--tolerance", "0.01", "--simulate", "step", "--steps", "20"])
-    assert read.count("sections.toml") == 1
-
-
-def test_the_help_names_every_key_of_a_digital_filter(capsys):
-    with pytest.raises(SystemExit, match="0"):
-        main(["--help"])
-    shown = re.findall(r"\w+", capsys.readouterr().out.partition("A digital filter has ")[2].partition("\nWith ")[0])
-    assert {*DESIGN} <= {*shown}
-
-
 def test_a_file_names_its_structure_or_all(filters):
     text = (filters / "sections.toml").read_text(encoding="utf-8")
     path = filters / "lattice.toml"
@@ -182,14 +161,6 @@ def test_designs_that_are_refused(given, message):
         read_model(given)
 
 
-def test_an_unstable_filter_has_a_cause():
-    system = LinearSystem.from_coefficients([1], [1, "-1.01"])
-    found = required_precision(system, np.ones((20, 1)), 1e-30, basis="bound")
-    assert found.digits is None
-    assert "the system as given is not stable, since A has an eigenvalue of size 1.01" in str(found)
-    assert required_precision(system, np.ones((20, 1)), 0.01, basis="bound").steps == 20
-
-
 @pytest.mark.parametrize("structure", ["direct form I", "cascade", "lattice"])
 def test_systems_of_scipy_are_read_in_a_structure(structure):
     z, p, k = signal.butter(4, 0.1, output="zpk")
@@ -200,22 +171,6 @@ def test_systems_of_scipy_are_read_in_a_structure(structure):
         assert found == pytest.approx(expected, abs=1e-12)  # z, p and k differ from b and a in their last digits
     with pytest.raises(ValueError, match="needed a TransferFunction or a ZerosPolesGain"):
         read_model(signal.StateSpace([[0.5]], [[1]], [[1]], [[0]], dt=1), structure=structure)
-
-
-def test_delays_and_leading_zeros_are_those_of_scipy():
-    """Three poles beyond the zeros, so that b begins with zeros."""
-    system = signal.dlti([0.5], [1, -0.5, 0.25], dt=1)
-    expected = signal.dimpulse(system, n=12)[1][0][:, 0]
-    for structure in STRUCTURES:
-        found = read_model(system, structure=structure).outputs(np.eye(12, 1))[:, 0, 0]
-        assert found == pytest.approx(expected, abs=1e-15), structure
-
-
-def test_a_filter_without_feedback():
-    taps = signal.firwin(9, 0.3)
-    design = FilterDesign(b=taps)
-    for name, system in {**design.systems("all"), **design.systems("FIR")}.items():
-        assert system.outputs(np.eye(12, 1))[:9, 0, 0] == pytest.approx(taps, abs=1e-15), name
 
 
 # -- sections ---------------------------------------------------------------------------------------------------------
@@ -240,20 +195,6 @@ def test_sections_are_paired_and_ordered_as_stated():
         assert each == pytest.approx(outputs[0], abs=1e-13)
 
 
-def test_scaled_sections_stay_within_one_between_them():
-    sos = np.array([[1, 2, 1, 1, -1.7, 0.8], [4, 8, 4, 1, -1.2, 0.7], [0.01, 0, 0, 1, 0.3, 0.1]])
-    impulse = np.eye(400, 1)
-    plain, scaled = (LinearSystem.from_sections(sos, scale=each) for each in (False, True))
-    assert scaled.outputs(impulse)[:, 0, 0] == pytest.approx(plain.outputs(impulse)[:, 0, 0], rel=1e-12, abs=1e-13)
-    coefficients = scaled.made.coefficients.astype(float).reshape(3, 5)[:2]
-    response = impulse[:, 0]
-    for b0, b1, b2, a1, a2 in coefficients:
-        response = signal.lfilter([b0, b1, b2], [1, a1, a2], response)
-        assert 0.5 < np.abs(response).sum() <= 1
-    powers = coefficients[:, 0] / sos[:2, 0]
-    assert np.log2(powers).tolist() == np.round(np.log2(powers)).tolist()
-
-
 # -- fraction bits ----------------------------------------------------------------------------------------------------
 
 
@@ -274,18 +215,6 @@ def test_fraction_bits_of_a_system(structure):
     errors = WordGuarantee(system, np.abs(u).max()).errors(proved.format)
     assert dict(proved.tried)[proved.digits] == pytest.approx(errors[0] / 1e-3)
     assert errors[0] <= 1e-3
-
-
-def test_one_rounding_in_a_sum_saves_bits():
-    """Nine products in one sum: nine roundings of half a unit against one."""
-    u = np.ones((20, 1))
-    system = LinearSystem.from_coefficients(signal.firwin(9, 0.3), structure="FIR")
-    likes = (WordFormats(FixedFormat(1, 20), 20), exact_sums(system.as_filter(), FixedFormat(1, 20), 20))
-    single, wide = (required_precision(system, u, 1e-3, kind="fixed", basis="guarantee", like=each) for each in likes)
-    assert single.digits > wide.digits
-    formats = [with_fraction_bits(each.format, 12) for each in (single, wide)]
-    errors = [WordGuarantee(system, 1.0).errors(each)[0] for each in formats]
-    assert errors[0] - errors[1] == pytest.approx(8 / 2 / 2**12, rel=2.0**-19)  # a claim has a margin of 2**-20
 
 
 def test_fraction_bits_of_a_function():

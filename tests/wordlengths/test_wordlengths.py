@@ -7,21 +7,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-import small_filter
-from tabulated import by_header
 
 from gpbnb import required_precision
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.inverse import smallest_precision
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import log_spaced, reference
-from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.guarantees import table as guarantees
-from gpbnb.report.integration.theory import needed_precision
-from gpbnb.report.wordlengths import study, tables
+from gpbnb.report.wordlengths import study
 from gpbnb.wordlength import examples, ranges
 from tests.surveying import survey
 
@@ -76,14 +70,6 @@ def test_normal_matrix():
 
 
 # -- study --------------------------------------------------------------------------------------------
-
-
-def test_growth_answers_for_the_first_steps():
-    model = year.model(year.MODELS[0], 2)
-    z = year.simulation(year.MODELS[0]).measurements(12)
-    tolerance = [1] * 4 + [math.inf] * 6
-    (found,) = study.required_precision_by_steps(model, z, tolerance, [12], form=Form.UD)
-    assert found == required_precision(model, z, tolerance, form=Form.UD)
 
 
 def test_growth_knows_nothing_of_what_comes_later():
@@ -149,16 +135,6 @@ def test_what_the_watch_of_a_state_refuses():
         ranges.binary_ranges(TILT, Z * math.nan)
 
 
-def test_a_companion_bounds_closely():
-    thirds, checkpoint_steps = Z / 3, log_spaced(300, 16)  # which no format of base 2 holds
-    error, bound = study.companion_run(TILT, thirds, FloatFormat(2, 20))
-    history = emulate(TILT, thirds, FloatFormat(2, 20), Form.INNOVATION, checkpoint_steps)
-    assert error == pytest.approx(np.abs(history.state).max(axis=0), rel=1e-12)
-    assert (error > 0).all()
-    assert (error <= bound).all()
-    assert (bound <= 1.001 * error).all()
-
-
 def test_a_companion_where_the_running_bound_says_nothing():
     model, z = examples.precise_tracker(), np.full((20, 1), 1.0)
     assert survey(model, z, 0.01, [40], basis="bound") == ((40, math.inf),)
@@ -169,42 +145,6 @@ def test_a_companion_where_the_running_bound_says_nothing():
     error, bound = study.companion_run(model, z, FloatFormat(2, 40))
     assert (error <= bound).all()
     assert bound[0] < 0.01
-
-
-def test_a_sensor_that_is_silent_is_a_row_of_zeros():
-    """Whatever stands for its measurement; and as if there were no such sensor."""
-    others = {"x0": TILT.x0, "P0": TILT.P0, "Phi": TILT.Phi, "Q": TILT.Q}
-    H, R = np.stack([TILT.H[0], TILT.H[0]]), TILT.R
-    H[1, 1] = 0
-    given, alone = LinearModel(H=H, R=R, **others), LinearModel(H=TILT.H[:, :1], R=R[:, :1, :1], **others)
-    z = Z[:2].copy()
-    states = []
-    for value in (0.0, 77.0):
-        z[1, 1] = value
-        states.append([small_filter.run(FloatFormat(2, 24), form, given, z).checkpoints().x.tolist() for form in Form])
-    assert states[0] == states[1]
-    first = reference(TILT, z, (1,))
-    after = LinearModel(alone.Phi, alone.H, alone.Q, alone.R, first.x[0], (first.P[0] + first.P[0].T) / 2)
-    assert reference(given, z, (2,)).x[0].astype(float) == pytest.approx(
-        reference(after, z[1:, :1], (1,)).x[0].astype(float), rel=1e-12
-    )
-
-
-def test_a_known_input_is_a_column_for_a_state_of_one():
-    pushes = np.round(np.sin(np.arange(50) / 7), 3)
-    step = Fraction(1, 50)
-    Phi = [[[1, step, 0], [0, 1, step * Fraction(u)], [0, 0, 1]] for u in pushes.tolist()]
-    Q = np.diag([Fraction("1e-6"), Fraction("1e-4"), Fraction(0)])
-    P0 = np.diag([Fraction(9), Fraction(1), Fraction(1, 2**60)])
-    z = Z[:50, :1]
-    found = reference(LinearModel(Phi, [[1, 0, 0]], Q, [["0.25"]], [0, 0, 1], P0), z, range(1, 51)).x.astype(float)
-    x, P, A = np.zeros(2), np.diag([9.0, 1.0]), np.array([[1, 0.02], [0, 1]])
-    for k, u in enumerate(pushes):
-        x, P = A @ x + [0, 0.02 * u], A @ P @ A.T + np.diag([1e-6, 1e-4])
-        K = P[:, 0] / (P[0, 0] + 0.25)
-        x, P = x + K * (z[k, 0] - x[0]), P - np.outer(K, P[0])
-        assert found[k, :2] == pytest.approx(x, rel=1e-9, abs=1e-12)
-    assert found[:, 2] == pytest.approx(1, abs=1e-12)
 
 
 def test_a_row_of_the_table_of_guarantees_is_as_stored():
@@ -224,18 +164,6 @@ def test_each_bit_of_a_guarantee_halves_its_bound(halvings):
         assert guarantees._bits(case, made, "guarantee", tolerance, bound) == str(24 + halvings + more)
     assert guarantees._bits(case, made, "guarantee", bound * 2.0**40, bound) != ""
     assert guarantees._bits(case, made, "guarantee", bound / 2.0**40, bound) == ""
-
-
-def test_inverse_knows_its_condition():
-    matrix = examples.normal_matrix(2, range(11))
-    found = study.inverse_precision("fit", matrix, 1e-3)
-    plain = matrix.astype(float)
-    assert found.condition == pytest.approx(np.linalg.cond(plain, 1), rel=1e-9)
-    scale = 2.0 ** -np.round(np.log2(plain.diagonal()) / 2)
-    assert found.scaled == pytest.approx(np.linalg.cond(plain * np.outer(scale, scale), 1), rel=1e-9)
-    beta = float(FloatFormat(2, found.expected).unit_roundoff)
-    assert found.scaled * beta <= 1e-3 < 2 * found.scaled * beta
-    assert found.needed == smallest_precision(matrix, 1e-3, 2).fmt.precision
 
 
 def test_units_of_powers_of_two_change_nothing():
@@ -259,70 +187,6 @@ def test_units_change_the_estimates_and_nothing_else():
 
 
 # -- tables -------------------------------------------------------------------------------------------
-
-
-def test_cells():
-    deaf = tables.update_stagnation([study.UpdateStagnation(FloatFormat(2, 12), 0.54321, 0.8765, 0.03)], 0.01)
-    assert deaf.title == "1 formats"
-    assert by_header(deaf) == [
-        {
-            "arithmetic": "12 bits",
-            "variance, computed / true": "0.543",
-            "steps without a change": "88 %",
-            "error / tolerance": "3",
-        }
-    ]
-    spans = tables.binary_ranges(
-        [ranges.BinaryRange("gain", -20, 3), ranges.BinaryRange("all", -2000, 2000), ranges.BinaryRange("x", -14, 15)]
-    )
-    assert spans.header == ("numbers", "smallest", "largest", "normal in")
-    assert spans.title == "3 kinds of numbers"
-    assert spans.body[0][:3] == ("gain", "$2^{-20}$", "$2^{3}$")
-    assert [row[-1] for row in spans.body] == [
-        "binary32, binary64, bfloat16, TF32",
-        "none",
-        "binary16, binary32, binary64, bfloat16, TF32",
-    ]
-    inverses = tables.inverse_precisions([study.InversePrecision("fit", 123.0, 45.0, 6, 7)])
-    assert inverses.title == "1 inverses"
-    assert by_header(inverses) == [
-        {
-            "matrix": "fit",
-            "condition $\\kappa_1$": "120",
-            "$\\kappa_1$, scaled": "45",
-            "bits, rule of thumb": "6",
-            "bits needed": "7",
-        }
-    ]
-
-
-def test_ranges_of_processors():
-    """As in IEEE 754-2019, table 3.5; accelerators have the exponents of binary32."""
-    assert examples.NORMAL_RANGE == {
-        "binary16": (-14, 15),
-        "binary32": (-126, 127),
-        "binary64": (-1022, 1023),
-        "bfloat16": (-126, 127),
-        "TF32": (-126, 127),
-    }
-
-
-def test_integrator():
-    table = tables.integrator(300.0, 1000.0, {"an hour": 3600.0}, FloatFormat(2, 24))
-    needed = [str(needed_precision(300.0, 1000.0, 3600.0, 2, rounding)) for rounding in Rounding.documented()]
-    assert table.body[0][1:3] == tuple(needed)
-    best, stall = (float(cell.replace(",", "")) for cell in table.body[0][3:])
-    assert best < stall
-    assert table.title == "1 durations"
-    assert by_header(table) == [
-        {
-            "duration": "an hour",
-            "bits, rounded": "17",
-            "bits, chopped": "28",
-            "best rate with 24 bits, Hz": "1.86e+05",
-            "increments vanish at, Hz": "4.66e+06",
-        }
-    ]
 
 
 # -- figures ------------------------------------------------------------------------------------------

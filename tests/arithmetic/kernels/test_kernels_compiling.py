@@ -16,7 +16,6 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 import gpbnb
-from gpbnb.arithmetic.kernels.compiling import compiled
 
 PACKAGE = Path(gpbnb.__file__).parent
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
@@ -131,15 +130,6 @@ def test_a_damaged_file_is_compiled_again(copy, damage):
     assert copy.run() == (VALUES, [])
 
 
-def test_files_that_changed_places_are_compiled_again(copy):
-    copy.run()
-    one, two = (path for path in copy.kept if "scaled" in path.name)
-    first = one.read_bytes()
-    one.write_bytes(two.read_bytes())
-    two.write_bytes(first)
-    assert copy.run() == (VALUES, ["scaled", "scaled"])
-
-
 def test_without_a_folder_to_write_to_functions_are_compiled_each_time(copy):
     """numba writes to ``__pycache__``, or else to the user's cache folder."""
     blocked = copy.folder / "blocked"
@@ -175,15 +165,6 @@ def test_a_change_is_noticed_of_every_function_that_is_compiled_in():
 def test_every_cache_has_this_key():
     for path in PACKAGE.rglob("*.py"):
         assert "cache=True" not in path.read_text(encoding="utf-8"), f"{path.name}: use `compiled` for a cache"
-
-
-def test_functions_of_the_package_are_kept():
-    @compiled
-    def half(x):
-        return 0.5 * x
-
-    assert half(3.0) == 1.5
-    assert half.stats.cache_path == str(Path(__file__).parent / "__pycache__")
 
 
 @pytest.mark.parametrize(

@@ -13,12 +13,10 @@ import numpy as np
 import pytest
 from numba import njit
 
-from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels import scalar
-from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.elementwise import product
 from gpbnb.arithmetic.kernels.scalar import (
@@ -38,13 +36,6 @@ from gpbnb.arithmetic.kernels.scalar import (
     zero,
 )
 from gpbnb.arithmetic.kernels.tags import Binary, Decimal, Double, DoubleDouble, Hexadecimal
-from gpbnb.arithmetic.rounding import Rounding
-
-FORMATS = [
-    FloatFormat(base, precision, rounding)
-    for base, precision in ((2, 11), (2, 24), (2, 53), (10, 8), (10, 17), (16, 6))
-    for rounding in Rounding.documented()
-]
 
 
 @compiled
@@ -75,16 +66,6 @@ def by_hand(x: FloatArray, steps: int) -> list[Fraction]:
     return results
 
 
-@pytest.mark.parametrize("fmt", FORMATS, ids=str)
-def test_a_recursion_is_that_of_the_exact_kernel(fmt: FloatFormat) -> None:
-    x = fmt.array(["0.7310586", "2.7182818284590452"])
-    assert isinstance(fmt.backend, Compiled)
-    y = fmt.backend.pack(fmt.array([0] * 40).components)
-    recursion(fmt.backend.tag, fmt.backend.pack(x.components), y)
-    result = FloatArray.from_components(fmt.backend, fmt.backend.unpack(y), fmt)
-    assert result.to_fractions().tolist() == by_hand(x, 40)
-
-
 def test_the_recursion_in_the_reference_and_in_float64() -> None:
     exact = np.array([Fraction(7310586, 10**7), Fraction(2718281828, 10**9)], dtype=object)
     wide = FloatFormat(2, 300).array(exact)
@@ -113,17 +94,6 @@ def test_only_the_lowest_fixed_point_number_has_no_opposite() -> None:
     tag = FloatFormat(2, 4, emin=-3, emax=3).run_tag()
     for x in (15.0, -15.0, 0.0, 2.0**-6):
         assert opposite(tag, x) == -x
-
-
-@pytest.mark.parametrize("fmt", FORMATS, ids=str)
-def test_products_of_matrices_in_the_stated_order(fmt: FloatFormat) -> None:
-    rng = np.random.default_rng(5)
-    a, b = fmt.array(rng.standard_normal((3, 7))), fmt.array(rng.standard_normal((7, 4)))
-    expected = (a.on_exact_backend() @ b.on_exact_backend()).to_fractions()
-    assert a.backend is fmt.backend
-    assert np.array_equal((a @ b).to_fractions(), expected)
-    assert np.array_equal((b.T @ a.T).T.to_fractions(), expected)
-    assert linalg.dot(a[0], b[:, 0]).to_fractions() == expected[0, 0]
 
 
 @njit
@@ -174,40 +144,6 @@ def test_a_decimal_exponent_beyond_int64_raises() -> None:
         powers(Decimal(2, True), big, np.zeros((20, 2), np.int64))
     with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
         powers(Decimal(2, True), big * [1, -1], np.zeros((20, 2), np.int64))
-
-
-@njit
-def quotient(fmt: Any, x: Any) -> Any:
-    return divide(fmt, load(fmt, x, 0), load(fmt, x, 1))
-
-
-@njit
-def root(fmt: Any, x: Any) -> Any:
-    return sqrt(fmt, load(fmt, x, 0))
-
-
-PLACES = [
-    (Binary(24, True), np.array([-1.0, 0.0])),
-    (Hexadecimal(6, False), np.array([-1.0, 0.0])),
-    (Decimal(1, True), np.array([[-1, 0], [0, 0]])),
-    (DoubleDouble(), np.array([[-1.0, 0.0], [0.0, 0.0]])),
-]
-
-
-@pytest.mark.parametrize(("tag", "x"), PLACES, ids=lambda p: type(p).__name__)
-def test_division_by_zero_and_negative_roots_raise(tag: Any, x: Any) -> None:
-    with pytest.raises(ZeroDivisionError):
-        quotient(tag, x)
-    with pytest.raises(ValueError, match="negative"):
-        root(tag, x)
-
-
-@pytest.mark.parametrize("name", ["add", "sqrt", "load", "store", "zero", "compare"])
-def test_python_cannot_call_them(name: str) -> None:
-    function = getattr(scalar, name)
-    count = function.__code__.co_argcount
-    with pytest.raises(TypeError, match="compiled by numba"):
-        function(*[None] * count)
 
 
 def test_the_gil_is_released() -> None:
