@@ -100,7 +100,7 @@ class Arithmetic:
         if self.rounding == "odd":
             return m % 2 == 0
         if 2 * rest == unit:
-            return self.rounding == "nearest" or m % 2 == 1
+            return {"nearest": True, "even": m % 2 == 1, "half up": not negative}[self.rounding]
         return 2 * rest > unit
 
     # -- operations -----------------------------------------------------------------------------------------

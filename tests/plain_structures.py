@@ -27,6 +27,7 @@ def to_multiple(x, base, power, mode):
             "odd": low % 2 == 0,
             "even": 2 * rest > q or (2 * rest == q and low % 2 == 1),
             "nearest": 2 * rest > q or (2 * rest == q and x > 0),
+            "half up": 2 * rest >= q,
         }[mode]
     )
     return Fraction((low + up) * base ** max(power, 0), base ** max(-power, 0))

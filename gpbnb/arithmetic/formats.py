@@ -271,7 +271,7 @@ class FloatFormat(NumberFormat[FloatArray]):
         hung1984, ch. II, (8) and (13).
         """
         step = Fraction(1, self.base ** (self.precision - 1))
-        return step / 2 if self.rounding in (Rounding.NEAREST, Rounding.EVEN) else step
+        return step / 2 if self.rounding.to_nearest else step
 
     def split(self, value: Any) -> tuple[Fraction, Fraction, int]:
         r"""Split a number at its t-th digit, :math:`x = u\,b^e + v\,b^{e-t}`.

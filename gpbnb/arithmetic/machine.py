@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import selection, tags
-from gpbnb.arithmetic.kernels.tags import AWAY, EVEN, ZERO
+from gpbnb.arithmetic.kernels.tags import AWAY, EVEN, HALF_UP, ZERO
 
 # fmt: off
 CODES = {
@@ -97,14 +97,17 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
     whole[:3], numbers[:] = (bits, precision, mode), limits
     exact = mode == EVEN and precision == 53
     fixed = fmt.rules.limits is not None and fmt.rules.limits.fixed
-    quick = bits == 1 and not fixed and mode in (AWAY, EVEN, ZERO, tags.UP, tags.DOWN) and (precision < 53 or exact)
+    known = (AWAY, EVEN, HALF_UP, ZERO, tags.UP, tags.DOWN)
+    quick = bits == 1 and not fixed and mode in known and (precision < 53 or exact)
     short = exact or (mode in (AWAY, EVEN) and precision <= tags.SAFE_TWICE)
     unit = 1 << (53 - precision)
     half, even = unit >> 1, mode == EVEN and not exact
-    nearest = half - even if mode in (AWAY, EVEN) else 0
+    nearest = half - even if mode in (AWAY, EVEN, HALF_UP) else 0
     outward = unit - 1
-    below, above = (outward if mode == tags.DOWN else nearest), (outward if mode == tags.UP else nearest)
-    sticky = even or mode == tags.DOWN, even or mode == tags.UP
+    ties_up = mode == HALF_UP
+    below = outward if mode == tags.DOWN else nearest - ties_up
+    above = outward if mode == tags.UP else nearest
+    sticky = even or ties_up or mode == tags.DOWN, even or mode == tags.UP
     low, high = max(low, machine.LEAST), min(high, 1 / machine.LEAST)
     bits_low, bits_high = np.array([low, high]).view(np.int64).tolist()
     whole[3:13] = quick, short, unit, below, above, *sticky, even, bits_low, bits_high - bits_low

@@ -97,6 +97,7 @@ _ROUNDINGS = {
     Rounding.NEAREST: "rounded to nearest",
     Rounding.CHOP: "chopped",
     Rounding.EVEN: "ties to even",
+    Rounding.HALF_UP: "ties rounded up",
     Rounding.UP: "rounded up",
     Rounding.DOWN: "rounded down",
     Rounding.ODD: "rounded to odd",

@@ -33,6 +33,8 @@ class Rounding(Enum):
     CHOP = "chop"
     #: To nearest, ties to the neighbour with an even last digit, the default of IEEE 754.
     EVEN = "even"
+    #: To nearest, ties toward plus infinity, as ``(p + half) >> n`` does in C.
+    HALF_UP = "half up"
     #: Toward plus infinity.
     UP = "up"
     #: Toward minus infinity.
@@ -46,6 +48,11 @@ class Rounding(Enum):
     def _missing_(cls, value: object) -> Rounding:
         """Find the member that a name means, so that ``Rounding("floor")`` and ``Rounding("UP")`` are roundings."""
         return rounding_named(value)
+
+    @property
+    def to_nearest(self) -> bool:
+        """Whether a result moves by at most half a unit of its last digit."""
+        return self in (Rounding.NEAREST, Rounding.EVEN, Rounding.HALF_UP)
 
     @staticmethod
     def documented() -> tuple[Rounding, Rounding]:
@@ -70,7 +77,7 @@ def rounding_named(rounding: object) -> Rounding:
     if isinstance(rounding, Rounding):
         return rounding
     if isinstance(rounding, str):
-        wanted = rounding.strip().lower()
+        wanted = rounding.strip().lower().replace("_", " ").replace("-", " ")
         if wanted in ALIASES:
             return ALIASES[wanted]
         for each in Rounding:

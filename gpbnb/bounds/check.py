@@ -69,7 +69,8 @@ from typing import Any
 # What a file looks like: a tuple lists words, a list holds any number of entries, and a set stands for one or none.
 KNOWN, VECTOR, CYCLE = [{Fraction}], [Fraction], [[[Fraction]]]
 LIMITS = {"state": KNOWN, "innovation": KNOWN}
-RULES = {"base": int, "precision": int, "rounding": ("nearest", "even", "chop", "up", "down", "odd", "stochastic")}
+NEAREST = ("nearest", "even", "half up")
+RULES = {"base": int, "precision": int, "rounding": (*NEAREST, "chop", "up", "down", "odd", "stochastic")}
 FIXED = RULES | {"fraction_bits": int, "overflow": ("raise", "saturate", "wrap")}
 FLOAT = RULES | {"emin": {int}, "emax": {int}, "subnormal": bool, "largest": {Fraction}}
 FORMS = ("innovation", "joseph", "hung", "hung second gain", "ud")
@@ -185,7 +186,7 @@ class Arithmetic:
         self.wraps = given.get("overflow") == "wrap"
         powers = self.powers = [b**k for k in range(2 * scale + t + 2)]
         self.tops, self.exact = [b**t * p for p in powers], set(powers)
-        self.nearest, self.fixed = self.rounding in ("nearest", "even"), "overflow" in given
+        self.nearest, self.fixed = self.rounding in NEAREST, "overflow" in given
         self.finest, self.normal, self.largest = 0, 0, inf
         if self.fixed:  # all numbers have one exponent, or are below; the most negative one is left out
             only = t - 1 - given["fraction_bits"]
@@ -228,7 +229,8 @@ class Arithmetic:
         if rest or r:
             if self.nearest:
                 beyond = 2 * (rest * d + r) - p * d
-                m += beyond > 0 or (beyond == 0 and (self.rounding == "nearest" or m & 1))
+                ties = {"nearest": True, "even": m & 1, "half up": n > 0}
+                m += beyond > 0 or (beyond == 0 and ties[self.rounding])
             elif self.rounding != "chop":
                 m += {"up": n > 0, "down": n < 0, "odd": not m & 1, "stochastic": True}[self.rounding]
         need(m * p <= self.largest, "a computed number exceeds the largest of the format")

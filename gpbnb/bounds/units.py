@@ -40,7 +40,7 @@ def units(fmt: FloatFormat | FixedFormat) -> Units:
     limits, most = fmt.limits, int(850 / np.log2(fmt.base))
     sizes, aligned = [Fraction(fmt.base) ** k for k in range(-most, most + 1)], 0.0
     exact = [float(power) for power in sizes]
-    share = 2 if fmt.rounding in (Rounding.NEAREST, Rounding.EVEN) else 1
+    share = 2 if fmt.rounding.to_nearest else 1
     errors = [power / fmt.base**fmt.precision / share for power in sizes]
     if limits is not None and limits.fixed:
         sizes, exact, aligned = [limits.largest], [1.0], np.inf

@@ -37,7 +37,7 @@ from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program
 
 def largest_rounding(rounding: Rounding) -> float:
     """Return the largest rounding error, in units of the last bit."""
-    return 0.5 if rounding in (Rounding.NEAREST, Rounding.EVEN) else 1.0
+    return 0.5 if rounding.to_nearest else 1.0
 
 
 def rounding_limits(made: IntegerProgram) -> NDArray[np.float64]:

@@ -52,8 +52,9 @@ _MODES = {
     Rounding.UP: 3,
     Rounding.DOWN: 4,
     Rounding.ODD: 5,
+    Rounding.HALF_UP: 6,
 }
-_NEAREST, _EVEN, _CHOP, _UP, _DOWN, _ODD = range(6)
+_NEAREST, _EVEN, _CHOP, _UP, _DOWN, _ODD, _HALF_UP = range(7)
 _POLICIES = ("raise", "saturate", "wrap")
 _RAISE, _SATURATE, _WRAP = range(3)
 _FITS = 62
@@ -266,6 +267,8 @@ def _rounded_up(low: NDArray[np.float64], rest: NDArray[np.float64], rounding: R
         up = (rest > 0.5) | ((rest == 0.5) & (low >= 0))
     elif rounding is Rounding.EVEN:
         up = (rest > 0.5) | ((rest == 0.5) & (low % 2 == 1))
+    elif rounding is Rounding.HALF_UP:
+        up = rest >= 0.5
     elif rounding is Rounding.CHOP:
         up = (rest > 0) & (low < 0)
     elif rounding is Rounding.ODD:
@@ -425,6 +428,8 @@ def _shifted(n: int, shift: int, mode: int) -> int:
         up = 2 * rest > unit or (2 * rest == unit and n > 0)
     elif mode == _EVEN:
         up = 2 * rest > unit or (2 * rest == unit and m % 2 == 1)
+    elif mode == _HALF_UP:
+        up = 2 * rest >= unit
     elif mode == _ODD:
         up = m % 2 == 0
     else:

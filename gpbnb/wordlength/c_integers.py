@@ -23,6 +23,7 @@ LONGEST_SHIFT = 126
 _UP = {
     Rounding.NEAREST: "rest > half || (rest == half && value >= 0)",
     Rounding.EVEN: "rest > half || (rest == half && floor_is_odd)",
+    Rounding.HALF_UP: "rest > half || rest == half",
     Rounding.CHOP: "rest > 0 && value < 0",
     Rounding.UP: "rest > 0",
     Rounding.DOWN: "0",
@@ -33,6 +34,7 @@ _UP = {
 _AWAY = {
     Rounding.NEAREST: "rest >= size - rest",
     Rounding.EVEN: "rest > size - rest || (rest == size - rest && odd)",
+    Rounding.HALF_UP: "rest > size - rest || (rest == size - rest && !negative)",
     Rounding.CHOP: "0",
     Rounding.UP: "rest > 0 && !negative",
     Rounding.DOWN: "rest > 0 && negative",
@@ -44,6 +46,7 @@ _AWAY = {
 _ROOT_GROWS = {
     Rounding.NEAREST: "rest > found",
     Rounding.EVEN: "rest > found",
+    Rounding.HALF_UP: "rest > found",
     Rounding.CHOP: "0",
     Rounding.UP: "rest > 0",
     Rounding.DOWN: "0",
@@ -140,7 +143,7 @@ class Integers:
         data, sums = self.words.data, self.words.accumulator
         found = dict(_WIDE) if self.bits == 128 else {}
         for each in _UP:
-            found[f"rounded_{each.value}"] = self._rounded(each)
+            found[f"rounded_{each.name.lower()}"] = self._rounded(each)
         for name, fmt in (("data", data), ("sums", sums)):
             found[f"in_{name}"] = self._kept(name, fmt)
         first = "sums" if self.words.sums is not None else "data"
@@ -156,7 +159,7 @@ class Integers:
         comment = f"/* c x, which loses `shift` fraction bits, in the format of the {first} */"
         found["multiply"] = (
             f"{comment}\nstatic {V} multiply({V} c, {V} x, int shift{overflow})\n{{\n"
-            f"    return in_{first}(rounded_{mode.value}({product}, shift){passed});\n}}\n"
+            f"    return in_{first}(rounded_{mode.name.lower()}({product}, shift){passed});\n}}\n"
         )
         found["lifted"] = (
             f"/* a number of the data in units of the {first} */\n"
@@ -169,7 +172,7 @@ class Integers:
             )
         found["store"] = (
             f"/* a sum in the format of the data, rounded once */\nstatic {V} store({V} x{overflow})\n{{\n"
-            f"    return in_data(rounded_{data.rounding.value}({as_wide}, {self.words.gap}){passed});\n}}\n"
+            f"    return in_data(rounded_{data.rounding.name.lower()}({as_wide}, {self.words.gap}){passed});\n}}\n"
         )
         found["divide"] = self._quotient(overflow, passed)
         found["modulo"] = _function(
@@ -227,7 +230,7 @@ class Integers:
             lines["2"] = "return floor_;"
         chosen = [line for name, line in lines.items() if name not in ("rest", "half") or name in _declared(up)]
         comment = f"/* value / 2**shift, {_describe(rounding)} */"
-        return _function(comment, f"static {W} rounded_{rounding.value}({W} value, int shift)", chosen)
+        return _function(comment, f"static {W} rounded_{rounding.name.lower()}({W} value, int shift)", chosen)
 
     def _kept(self, name: str, fmt: FixedFormat) -> str:
         V, W = self.value, self.value if self.bits < 128 else "wide"
@@ -326,9 +329,9 @@ class Integers:
     def _whole(self, name: str, rounding: Rounding, overflow: str, passed: str) -> str:
         V, point = self.value, max(self.words.data.fraction_bits, 0)
         if self.bits == 128:
-            found = f"wide_left(rounded_{rounding.value}(wide_of(a), {point}), {point})"
+            found = f"wide_left(rounded_{rounding.name.lower()}(wide_of(a), {point}), {point})"
         else:
-            found = f"rounded_{rounding.value}(a, {point}) * (({V})1 << {point})"
+            found = f"rounded_{rounding.name.lower()}(a, {point}) * (({V})1 << {point})"
         comment = f"/* a whole number, {_describe(rounding)} */"
         return _function(comment, f"static {V} whole_{name}({V} a{overflow})", [f"return in_data({found}{passed});"])
 
@@ -346,6 +349,7 @@ def _describe(rounding: Rounding) -> str:
     return {
         Rounding.NEAREST: "to nearest, ties away from zero",
         Rounding.EVEN: "to nearest, ties to even",
+        Rounding.HALF_UP: "to nearest, ties up",
         Rounding.CHOP: "toward zero",
         Rounding.UP: "up",
         Rounding.DOWN: "down",

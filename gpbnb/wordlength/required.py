@@ -401,7 +401,7 @@ def _float_answer(
 
 def _processors_with(fmt: FloatFormat | None) -> tuple[tuple[str, FloatFormat], ...]:
     """Return the names and formats of processors that have the digits of a format and round to nearest as it does."""
-    if fmt is None or fmt.base != 2 or fmt.limits is not None or fmt.rounding not in (Rounding.NEAREST, Rounding.EVEN):
+    if fmt is None or fmt.base != 2 or fmt.limits is not None or not fmt.rounding.to_nearest:
         return ()
     return tuple((n, f) for n, f in (("binary32", BINARY32), ("binary64", BINARY64)) if f.precision >= fmt.precision)
 

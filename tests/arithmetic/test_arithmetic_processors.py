@@ -35,6 +35,7 @@ def up(mode: Rounding, negative: Any, odd: Any, inexact: Any, half: Any) -> Any:
         & {
             Rounding.NEAREST: half >= 0,
             Rounding.EVEN: (half > 0) | ((half == 0) & odd),
+            Rounding.HALF_UP: (half > 0) | ((half == 0) & ~negative),
             Rounding.CHOP: False,
             Rounding.UP: ~negative,
             Rounding.DOWN: negative,

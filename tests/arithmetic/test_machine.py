@@ -24,6 +24,7 @@ FORMATS = [
     *(FloatFormat(2, t, rounding) for t in (1, 11, 24, 26, 40, 52, 53) for rounding in ("nearest", "chop")),
     *(FloatFormat(2, t, rounding) for t in (2, 24, 33, 53) for rounding in ("even", "up", "down")),
     FloatFormat(2, 20, "odd"),
+    *(FloatFormat(*each, "half up") for each in ((2, 11), (2, 30), (2, 52), (2, 53), (10, 9), (16, 6), (16, 13))),
     *(FloatFormat(16, t, rounding) for t in (1, 6, 13) for rounding in ("nearest", "chop", "even")),
     *(FloatFormat(10, t, rounding) for t in (1, 8, 9, 18) for rounding in ("nearest", "chop")),
     FloatFormat(10, 12, "even"),
@@ -50,6 +51,7 @@ def rounded(x, fmt):
     whole, rest = divmod(size / unit, 1)
     away = {
         "nearest": rest >= Fraction(1, 2),
+        "half up": rest > Fraction(1, 2) or (rest == Fraction(1, 2) and x > 0),
         "chop": False,
         "even": rest > Fraction(1, 2) or (rest == Fraction(1, 2) and whole % 2 == 1),
         "up": rest > 0 and x > 0,

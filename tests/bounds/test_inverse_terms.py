@@ -43,7 +43,7 @@ def test_sizes_beyond_float64_count_in_full():
 def test_bounds_from_the_factors_hold_where_results_underflow(subnormal):
     """Entries near the smallest number of a format, whose inverse is wrong by many times the unit roundoff."""
     rng, worst = np.random.default_rng(5), 0.0
-    for rounding in ("nearest", "even", "odd", "chop"):
+    for rounding in ("nearest", "even", "half up", "odd", "chop"):
         fmt = FloatFormat(2, 16, rounding, emin=-10, emax=60, subnormal=subnormal)
         for n in [2, 3] * 30:
             scale = rng.choice([2.0**-4, 2.0**-9, 2.0**-15])

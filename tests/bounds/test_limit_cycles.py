@@ -13,7 +13,7 @@ from gpbnb import FixedFormat, LinearSystem
 from gpbnb.bounds.limit_cycles import limit_cycles
 from gpbnb.filters.words import WordFormats
 
-MODES = ["nearest", "even", "chop", "up", "down", "odd"]
+MODES = ["nearest", "even", "half up", "chop", "up", "down", "odd"]
 
 
 def ends_of(step, states):

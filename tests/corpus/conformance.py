@@ -57,7 +57,7 @@ def rows() -> Iterator[Row]:
     for storage, table in (("one word", SHORT), ("two words", WIDE), ("integers", INTEGERS)):
         for base, precisions in table.items():
             for precision in precisions:
-                for i, rounding in enumerate(ROUNDINGS):
+                for i, rounding in enumerate((*ROUNDINGS, "half up")):
                     plain = Float(base, precision, rounding)
                     yield Row(storage, plain)
                     kind = (i + precision) % 4
@@ -67,7 +67,7 @@ def rows() -> Iterator[Row]:
                         limited = plain._replace(emin=-reach, emax=reach + 1, subnormal=kind != 0, overflow=overflow)
                         yield Row(f"{storage}, range", limited)
     for bits in (4, 8, 16, 24, 32, 53, 60, 80):
-        for i, rounding in enumerate(ROUNDINGS):
+        for i, rounding in enumerate((*ROUNDINGS, "half up")):
             overflow = ("raise", "saturate", "wrap")[(i + bits // 4) % 3]
             yield Row(
                 "fixed point", Fixed((i * 3 + 1) % (bits - 1), bits - 1 - (i * 3 + 1) % (bits - 1), rounding, overflow)

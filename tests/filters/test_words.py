@@ -14,7 +14,7 @@ from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, integers_of, run_words
 
-MODES = ["nearest", "even", "chop", "up", "down", "odd"]
+MODES = ["nearest", "even", "chop", "up", "down", "odd", "half up"]
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -67,6 +67,35 @@ def test_a_coefficient_beyond_its_range_is_named():
         OverflowError, match=r"got a1 = -1\.9, beyond the range of fixed point of 16 bits, 15 of them fraction"
     ):
         run_words(system, np.zeros((3, 1)), WordFormats(FixedFormat(4, 15), FixedFormat(0, 15)))
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_half_up_is_the_shift_of_integers_in_c(wide):
+    """Two sections in direct form I, as fixed-point C has them: (p + half) >> n for each product, or for each sum."""
+    bits, half = 14, 1 << 13
+    sections = [[0.25, 0.5, 0.25, 1, -1.5, 0.75], [0.5, -0.25, 0.125, 1, -1.25, 0.625]]
+    rng = np.random.default_rng(7252)
+    x = rng.integers(-2000, 2000, 2000).tolist()
+    signal = x
+    for b0, b1, b2, _, a1, a2 in sections:
+        factors, kept, made = [int(each * 2**bits) for each in (b0, b1, b2, a1, a2)], [0] * 4, []
+        for each in signal:
+            products = [c * v for c, v in zip(factors, (each, *kept), strict=True)]
+            if not wide:
+                products = [(p + half) >> bits for p in products]
+            y = sum(products[:3]) - sum(products[3:])
+            y = (y + half) >> bits if wide else y
+            kept, _ = [each, kept[0], y, kept[2]], made.append(y)
+        signal = made
+    system = LinearSystem.from_sections(sections, "direct form I")
+    differ = {}
+    for rounding in ("half up", "nearest"):
+        data = FixedFormat(23, 0, rounding)
+        words = WordFormats(data, FixedFormat(1, bits), FixedFormat(40, bits, rounding) if wide else None)
+        found = run_words(system, np.array(x)[:, None], words).states[:, -1]
+        differ[rounding] = int((found != np.array(signal)).sum())
+    assert differ["half up"] == 0
+    assert differ["nearest"] > 0
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)

@@ -100,7 +100,7 @@ def test_the_longest_words_are_divided_as_fractions(integer, fraction, overflow,
     edges = [2**63 - 1, 2**62, 2**40 + 1, 3, 1]
     drawn = np.random.default_rng(9).integers(-(2**63), 2**63 - 1, 12).tolist()
     numbers = [-(2**63), *edges, *(-each for each in edges), *drawn, *(each >> 40 for each in drawn)]
-    for rounding in ("nearest", "even", "chop", "up", "down", "odd"):
+    for rounding in ("nearest", "even", "half up", "chop", "up", "down", "odd"):
         fmt = FixedFormat(integer, fraction, rounding, overflow)
         helpers = Integers(WordFormats(fmt), Needs(fmt.precision + abs(fraction), 63)).text("divide")
         (tmp_path / "run.c").write_text(DIVISIONS.format(helpers=helpers))

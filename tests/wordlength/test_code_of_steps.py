@@ -16,7 +16,7 @@ from tests.step_functions import SYSTEMS
 
 
 def short_words():
-    for rounding in ("nearest", "even", "chop", "up", "down", "odd"):
+    for rounding in ("nearest", "even", "half up", "chop", "up", "down", "odd"):
         yield FixedFormat(4, 11, rounding, "saturate")
         yield FixedFormat(0, 15, rounding, "wrap")
 
@@ -34,7 +34,7 @@ def test_short_words_in_every_rounding():
     """At a quarter of all numbers, also the most negative one, whose opposite has no word."""
     system = NonlinearSystem(one_of_each, [0], 2, "each")
     z = np.random.default_rng(0).uniform(-1, 1, (800, 2))
-    assert [disagreement(system, fmt, None, z) for fmt in short_words()] == [""] * 12
+    assert [disagreement(system, fmt, None, z) for fmt in short_words()] == [""] * 14
 
 
 def last_status(system, fmt, u, folder):

@@ -16,7 +16,7 @@ from numba.extending import overload
 from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros
 from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.integers import divided_by_word
-from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, EVEN, ODD, UP, LimitedDecimal, Wide
+from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, EVEN, HALF_UP, ODD, UP, LimitedDecimal, Wide
 
 NARROW = 9  # precision up to which the dividend fits into 64 bits
 LARGEST_EXPONENT = 2**60
@@ -43,8 +43,8 @@ _RECIPROCAL = np.array([(2**128 - 1) // (10**k << (63 - n)) - 2**64 for k, n in 
 
 def _rounds_up(mode: int, odd: int, up: int, tie: int, inexact: int, negative: int) -> bool:
     """Whether a magnitude rounds up in a mode, by its last digit and what is cut off; see :func:`increment`."""
-    if mode in (AWAY, EVEN):
-        return bool(up and not (mode == EVEN and tie and not odd))
+    if mode in (AWAY, EVEN, HALF_UP):
+        return bool(up and not (tie and ((mode == EVEN and not odd) or (mode == HALF_UP and negative))))
     outward = (mode == UP and not negative) or (mode == DOWN and negative) or (mode == ODD and not odd)
     return bool(inexact and outward)
 
@@ -53,7 +53,7 @@ def _rounds_up(mode: int, odd: int, up: int, tie: int, inexact: int, negative: i
 # processor cannot predict which combination comes next, so looking it up costs less than branches.
 _BITS = [[at >> k & 1 for k in range(5)] for at in range(32)]
 _INCREMENTS = np.array(
-    [sum(_rounds_up(mode, *bits) << at for at, bits in enumerate(_BITS)) for mode in range(6)], np.uint64
+    [sum(_rounds_up(mode, *bits) << at for at, bits in enumerate(_BITS)) for mode in range(7)], np.uint64
 )
 
 

@@ -60,7 +60,7 @@ class ExactKernel:
         self.rules = rules
         self.base, self.precision, self.rounding, self.limits, _ = rules
         #: Whether ties are the only numbers that are not rounded to their nearest neighbour.
-        self.nearest = self.rounding in (Rounding.NEAREST, Rounding.EVEN)
+        self.nearest = self.rounding.to_nearest
         self.count = 0  # roundings so far, which select the random bits
         self._unlimited = self.limits is None  # what has no limits takes shorter ways
         self._bits = log2(self.base)
@@ -289,6 +289,8 @@ class ExactKernel:
                 return 2 * rest >= unit
             case Rounding.EVEN:
                 return 2 * rest > unit or (2 * rest == unit and m % 2 == 1)
+            case Rounding.HALF_UP:
+                return 2 * rest > unit or (2 * rest == unit and not negative)
             case Rounding.CHOP:
                 return False
             case Rounding.UP:

@@ -19,7 +19,18 @@ from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits, select
 from gpbnb.arithmetic.kernels.compiling import borrowing, compiled, inner
 from gpbnb.arithmetic.kernels.processor import fused_sum
 from gpbnb.arithmetic.kernels.rows import copy_row, same_rows
-from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, EVEN, ODD, UP, DoubleDouble, LimitedDecimal, ShortDecimal, Wide
+from gpbnb.arithmetic.kernels.tags import (
+    AWAY,
+    DOWN,
+    EVEN,
+    HALF_UP,
+    ODD,
+    UP,
+    DoubleDouble,
+    LimitedDecimal,
+    ShortDecimal,
+    Wide,
+)
 from gpbnb.arithmetic.rounding import DRAW_BITS
 
 # fmt: off
@@ -175,6 +186,8 @@ def _rounded_magnitude(fmt: Any, random: Any, u: Any, k: Any, sticky: Any, negat
     rest = u & (unit - 1)
     if mode == EVEN:
         return (u + ((unit >> 1) - 1) + np.int64(((u & unit) != 0) | sticky)) & -unit
+    if mode == HALF_UP:
+        return (u + (unit >> 1) - np.int64(negative & (not sticky))) & -unit
     if mode == RANDOM:
         scaled = _draw(random) << (k - DRAW_BITS)
         up = (scaled < rest) | ((scaled == rest) & sticky)

@@ -21,6 +21,7 @@ from gpbnb.arithmetic.kernels.doubledouble import two_sum
 from gpbnb.arithmetic.kernels.tags import (
     AWAY,
     DOWN,
+    HALF_UP,
     LEAST,
     ODD,
     UP,
@@ -65,6 +66,8 @@ def _even(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
 
 def _coded(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
     unit, code = _ONE << k, fmt.mode.code
+    if code == HALF_UP:
+        return (u + (unit >> 1) - np.int64(negative & (not sticky))) & -unit
     outward = ((code == UP) & (not negative)) | ((code == DOWN) & negative)
     added = (unit - 1) + np.int64(sticky) if outward else unit >> 1 if code == AWAY else 0
     inexact = ((u & (unit - 1)) != 0) | sticky

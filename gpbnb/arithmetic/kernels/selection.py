@@ -22,6 +22,7 @@ _CODES = {
     Rounding.UP: tags.UP,
     Rounding.DOWN: tags.DOWN,
     Rounding.ODD: tags.ODD,
+    Rounding.HALF_UP: tags.HALF_UP,
 }
 _REACH = 320  # largest binary exponent for which products, quotients and their residuals are normal float64
 _HARDWARE = {(24, -126, 127): tags.Hardware32(), (53, -1022, 1023): tags.Hardware64()}
@@ -177,7 +178,7 @@ def _longest(base: int, rounding: Rounding, limited: bool) -> int:
     if rounding is Rounding.STOCHASTIC:
         return 53 - DRAW_BITS
     # With 53 bits, the sign of a residual does not tell a tie.
-    return 52 if limited and rounding is Rounding.NEAREST else LARGEST_PRECISION[2]
+    return 52 if rounding is Rounding.HALF_UP or (limited and rounding is Rounding.NEAREST) else LARGEST_PRECISION[2]
 
 
 def check_order(order: Order, fused: bool, block: int) -> None:

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 LARGEST_SHORT = 8  # precision of ShortDecimal
 SAFE_TWICE = 25  # bits; results rounded to float64 first and then to nearest with this precision are correct
 LEAST, LIMIT = 2.0**-960, 2.0**1023  # magnitudes of Binary and Hexadecimal, from LEAST to below LIMIT
-# Codes of rounding modes. AWAY and EVEN round to nearest, with ties away from zero or to the even last digit. ZERO, UP
-# and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to neighbours with an odd last digit.
-AWAY, EVEN, ZERO, UP, DOWN, ODD = range(6)
+# Codes of rounding modes. AWAY, EVEN and HALF_UP round to nearest, with ties away from zero, to the even last digit or
+# toward plus infinity. ZERO, UP and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to
+# neighbours with an odd last digit.
+AWAY, EVEN, ZERO, UP, DOWN, ODD, HALF_UP = range(7)
 # What happens below the smallest normal number of a Wide format: there is none; its spacing is kept; numbers become
 # zero; or all numbers have one spacing.
 UNLIMITED, GRADUAL, ABRUPT, FIXED = range(4)
@@ -79,7 +80,7 @@ class LongEven(NamedTuple):
 class Mode(NamedTuple):
     """Any other mode but the random one; the same compiled loop serves them all."""
 
-    code: int  # AWAY to ODD
+    code: int  # AWAY to HALF_UP
 
 
 class Random(NamedTuple):
@@ -174,7 +175,7 @@ class Wide(NamedTuple):
     """
 
     bits: int  # of a digit; 0 in base 10
-    mode: int  # AWAY to ODD
+    mode: int  # AWAY to HALF_UP
     precision: int
     room: int  # digits of the integers that are rounded
     split: int  # bits of the lower part of a stored significand

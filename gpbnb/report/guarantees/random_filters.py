@@ -22,7 +22,8 @@ from gpbnb.filters.run import reference_states
 
 STEPS = 200
 """Steps of a run."""
-DETERMINISTIC = tuple(each for each in Rounding if each is not Rounding.STOCHASTIC)
+DETERMINISTIC = tuple(each for each in Rounding if each not in (Rounding.STOCHASTIC, Rounding.HALF_UP))
+"""Roundings of the filters that a seed draws."""
 KINDS = ("plain", "singular", "nearly singular", "cycle", "unstable", "unseen")
 """Covariances of full rank; without it; almost without it; matrices that change; a transition with growing states that
 are observable; and H = 0."""
