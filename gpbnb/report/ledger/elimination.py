@@ -173,28 +173,14 @@ class Elimination:
             )
 
         return {
-            **COMMON,
-            "n": Fraction(self.n),
-            "epsilon": EPSILON,
-            "beta": EPSILON,
-            "m": known(multipliers),
-            "a": a_exact,
-            "a_hat": a_computed,
-            "b": b_exact,
-            "b_hat": b_computed,
+            **COMMON, "n": Fraction(self.n), "epsilon": EPSILON, "beta": EPSILON, "m": known(multipliers), "fl": fl,
+            "a": a_exact, "a_hat": a_computed, "b": b_exact, "b_hat": b_computed,
             "a_tilde": lambda i, j, k: self.errors(False)[int(k)].tolist()[int(i) - 1][int(j) - 1],
-            "A": staged(exact, False),
-            "A_hat": staged(computed, False),
-            "A_tilde": staged(computed, False, errors=True),
-            "b_underline": staged(exact, True),
-            "b_hat_underline": staged(computed, True),
-            "b_tilde_underline": staged(computed, True, errors=True),
-            "A_hat_T": Named(upper, lambda i, j: upper.tolist()[i - 1][j - 1]),
-            "b_hat_T_underline": Named(
-                column(self.part(computed[-1], True)), lambda k: computed[-1].tolist()[k - 1][self.n]
-            ),
-            "fl": fl,
-        }
+            "A": staged(exact, False), "A_hat": staged(computed, False), "b_underline": staged(exact, True),
+            "A_tilde": staged(computed, False, errors=True), "b_hat_underline": staged(computed, True),
+            "b_tilde_underline": staged(computed, True, errors=True), "A_hat_T": square(upper),
+            "b_hat_T_underline": vector(column(self.part(computed[-1], True))),
+        }  # fmt: skip
 
 
 def column(x: FirstOrder, j: int = 1) -> FirstOrder:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import random
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
@@ -286,45 +286,27 @@ def weights(n: int) -> tuple[FirstOrder, FirstOrder]:
 @cache
 def substitutions(n: int) -> tuple[Names, ...]:
     """Return symbols of section 11.2 for random triangular systems of n rows; k and j are the indices of some entry."""
-    found = []
-    for seed, (k, j, sign) in enumerate(((1, n, 1), (2, 3, -1), (1, 3, Fraction(1, 2)))):
-        rng = random.Random(7000 + 10 * n + seed)
-        upper = np.triu(random_matrix(rng, n, n)) + Fraction(0)
-        right = random_matrix(rng, n, 1)
-        e = EPSILON * sign
-        run = Elimination(upper, right, lambda x, e=e: x * (1 + e))  # type: ignore[misc]
-        of_matrix, of_right = weights(n)
-        a, b, x_hat = FirstOrder(upper), FirstOrder(right), matrix(run.solution)
-        x = a.inv() * b
-        change = FirstOrder(upper * of_matrix.value) * e
-        right_change = of_right * b * e
-        found.append(
-            {
-                **COMMON,
-                "n": Fraction(n),
-                "k": Fraction(k),
-                "j": Fraction(j),
-                "epsilon": e,
-                "beta": EPSILON,
-                "A": square(a),
-                "a": square(a),
-                "b": vector(b),
-                "x": vector(x),
-                "x_hat": vector(x_hat),
-                "A_hat": a + change,
-                "a_hat": square(a + change),
-                "b_hat": vector(b + right_change),
-                "DeltaA": square(change),
-                "Deltaa": square(change),
-                "Deltab": vector(right_change),
-                "Deltax": x_hat - x,
-                "A_D": FirstOrder(np.triu(upper, 1) + Fraction(0)),
-                "diag": lambda *numbers: diagonal([quantity(each).value for each in numbers]),
-                "M_A": on_diagonal(diagonal([Fraction(x) for x in roundings(n)[0][0]])),
-                "M_b": on_diagonal(of_right),
-            }
-        )
-    return tuple(found)
+    return tuple(_substitution_names(n, *each) for each in enumerate(((1, n, 1), (2, 3, -1), (1, 3, Fraction(1, 2)))))
+
+
+def _substitution_names(n: int, seed: int, indices: tuple[int, int, Any]) -> Names:
+    k, j, sign = indices
+    rng, e = random.Random(7000 + 10 * n + seed), EPSILON * sign
+    upper = np.triu(random_matrix(rng, n, n)) + Fraction(0)
+    right = random_matrix(rng, n, 1)
+    run = Elimination(upper, right, lambda x: x * (1 + e))
+    of_matrix, of_right = weights(n)
+    a, b, x_hat = FirstOrder(upper), FirstOrder(right), matrix(run.solution)
+    x, change, right_change = a.inv() * b, FirstOrder(upper * of_matrix.value) * e, of_right * b * e
+    return {
+        **COMMON, "n": Fraction(n), "k": Fraction(k), "j": Fraction(j), "epsilon": e, "beta": EPSILON,
+        "A": square(a), "a": square(a), "b": vector(b), "x": vector(x), "x_hat": vector(x_hat),
+        "A_hat": a + change, "a_hat": square(a + change), "b_hat": vector(b + right_change),
+        "DeltaA": square(change), "Deltaa": square(change), "Deltab": vector(right_change), "Deltax": x_hat - x,
+        "A_D": FirstOrder(np.triu(upper, 1) + Fraction(0)),
+        "diag": lambda *numbers: diagonal([quantity(each).value for each in numbers]),
+        "M_A": on_diagonal(diagonal([Fraction(x) for x in roundings(n)[0][0]])), "M_b": on_diagonal(of_right),
+    }  # fmt: skip
 
 
 def rows_of(*sizes: int) -> list[Names]:
@@ -415,55 +397,35 @@ def single_equation(document: str) -> Names:
 # -- computed inverses ----------------------------------------------------------------------------
 
 
+def columns(x: FirstOrder) -> Callable[[Any], FirstOrder]:
+    """Return the function that returns the columns of a matrix."""
+    return lambda j: column(x, int(j))
+
+
 @cache
 def inverses(n: int = 3) -> tuple[Names, ...]:
     """Return symbols of section 11.3 for the inverse of a random matrix by elimination and back substitution."""
-    found = []
-    for seed, j in enumerate((1, 2, n)):
-        rng = random.Random(9000 + seed)
-        given = random_matrix(rng, n, n)
-        unit = np.array([[Fraction(i == j) for j in range(n)] for i in range(n)], dtype=object)
-        run = Elimination(given, unit, to_first_order)
-        of_matrix, of_right = weights(n)
-        _exact, computed, _ = run.stages
-        upper, rights = (run.part(computed[-1], right) for right in (False, True))
-        tilde, b_tilde = (sum(run.errors(right)[1:], start=run.errors(right)[0]) for right in (False, True))
-        delta = FirstOrder(upper.value * of_matrix.value) * EPSILON
-        b_delta = of_right * rights * EPSILON
-        a, x_hat = FirstOrder(given), matrix(run.solution)
-        delta_a = tilde + run.lower * delta
-        delta_b = b_tilde + run.lower * b_delta
-        solved = a + delta_a
-        error = x_hat - a.inv()
-        e = joined([column(delta_b, c) - delta_a * column(x_hat, c) for c in range(1, n + 1)])
-        found.append(
-            {
-                **COMMON,
-                "n": Fraction(n),
-                "j": Fraction(j),
-                "A": a,
-                "A_hat": solved,
-                "A_tilde": tilde,
-                "DeltaA": delta,
-                "deltaA": delta_a,
-                "L": run.lower,
-                "b": column(FirstOrder(unit), j),
-                "b_hat": column(FirstOrder(unit) + delta_b, j),
-                "b_tilde": column(b_tilde, j),
-                "Deltab": column(b_delta, j),
-                "deltab": Named(column(delta_b, j), lambda c, d=delta_b: column(d, c)),
-                "u": lambda c, u=unit: column(FirstOrder(u), int(c)),
-                "x": column(a.inv(), j),
-                "x_hat": lambda c, x=x_hat: column(x, int(c)),
-                "deltax": lambda c, d=error: column(d, int(c)),
-                "delta": lambda x, a=a, d=error: d if x == a.inv() else None,
-                "column": lambda x, c: column(x, int(c)),
-                "matrix": joined,
-                "E": e,
-                "D": e,
-            }
-        )
-    return tuple(found)
+    return tuple(_inverse_names(n, *each) for each in enumerate((1, 2, n)))
+
+
+def _inverse_names(n: int, seed: int, j: int) -> Names:
+    a, unit = FirstOrder(random_matrix(random.Random(9000 + seed), n, n)), diagonal([Fraction(1)] * n)
+    run = Elimination(a.value, unit.value, to_first_order)
+    of_matrix, of_right = weights(n)
+    upper, rights = (run.part(run.stages[1][-1], right) for right in (False, True))
+    tilde, b_tilde = (sum(run.errors(right)[1:], start=run.errors(right)[0]) for right in (False, True))
+    delta, b_delta = FirstOrder(upper.value * of_matrix.value) * EPSILON, of_right * rights * EPSILON
+    delta_a, delta_b, x_hat = tilde + run.lower * delta, b_tilde + run.lower * b_delta, matrix(run.solution)
+    error = x_hat - a.inv()
+    e = joined([column(delta_b, c) - delta_a * column(x_hat, c) for c in range(1, n + 1)])
+    return {
+        **COMMON, "n": Fraction(n), "j": Fraction(j), "A": a, "A_hat": a + delta_a, "A_tilde": tilde, "DeltaA": delta,
+        "deltaA": delta_a, "L": run.lower, "b": column(unit, j), "b_hat": column(unit + delta_b, j),
+        "b_tilde": column(b_tilde, j), "Deltab": column(b_delta, j),
+        "deltab": Named(column(delta_b, j), lambda c: column(delta_b, c)), "u": columns(unit), "x": column(a.inv(), j),
+        "x_hat": columns(x_hat), "deltax": columns(error), "delta": lambda x: error if x == a.inv() else None,
+        "column": lambda x, c: column(x, int(c)), "matrix": joined, "E": e, "D": e,
+    }  # fmt: skip
 
 
 def with_resultants() -> list[dict[str, Any]]:
@@ -478,24 +440,18 @@ def with_resultants() -> list[dict[str, Any]]:
 @cache
 def factored_errors() -> tuple[Names, ...]:
     """Return symbols of (96) and (97) for first-order errors that are a computed inverse times a matrix E or D."""
-    found = []
-    for seed in range(3):
-        rng = random.Random(9600 + seed)
-        solved = 3 * np.eye(3, dtype=int) + 0 * random_matrix(rng, 3, 3) if seed == 0 else random_matrix(rng, 3, 3)
-        a_hat, e = FirstOrder(solved), FirstOrder(random_matrix(rng, 3, 3)) * EPSILON
-        error = a_hat.inv() * e
-        found.append(
-            {
-                **COMMON,
-                "A": a_hat,
-                "A_hat": a_hat,
-                "E": e,
-                "D": e,
-                "delta": lambda x, d=error: d,
-                "epsilon": error.norm() / a_hat.inv().norm(),
-            }
-        )
-    return tuple(found)
+    return tuple(map(_factored_error, range(3)))
+
+
+def _factored_error(seed: int) -> Names:
+    rng = random.Random(9600 + seed)
+    drawn = random_matrix(rng, 3, 3)
+    a, e = FirstOrder(drawn) if seed else diagonal([Fraction(3)] * 3), FirstOrder(random_matrix(rng, 3, 3)) * EPSILON
+    error = a.inv() * e
+    return {
+        **COMMON, "A": a, "A_hat": a, "E": e, "D": e, "delta": lambda x: error,
+        "epsilon": error.norm() / a.inv().norm(),
+    }  # fmt: skip
 
 
 @cache
@@ -507,42 +463,25 @@ def residues(changed: bool, sharp: bool = False) -> tuple[Names, ...]:
     changed : whether there is a ΔA. If so, residue and ΔA are of first order; otherwise the residue has any size.
     sharp : whether to add a multiple of the identity, for which the documents' norms are attained.
     """
-    found = []
-    for seed in range(3):
-        rng = random.Random(3300 + seed)
-        n = 3
-        given = random_matrix(rng, n, n)
-        size = FirstOrder(random_matrix(rng, n, n)) * Fraction(1, 5)
-        change = FirstOrder(random_matrix(rng, n, n)) * EPSILON if changed else FirstOrder(given * 0)
-        if sharp and seed == 0:
-            given = 3 * np.array([[Fraction(i == j) for j in range(n)] for i in range(n)], dtype=object)
-            size, change = abs(size), FirstOrder(change.value, -abs(change.slope))
-            size = FirstOrder(-change.slope * Fraction(2, 5)) if changed else size  # the same column is the largest
-        residue = size * EPSILON if changed else size
-        unit = FirstOrder(np.array([[Fraction(i == j) for j in range(n)] for i in range(n)], dtype=object))
-        a = FirstOrder(given)
-        inverse, computed = a.inv(), (a + change).inv() * (unit + residue)
-        error = computed - inverse
-        found.append(
-            {
-                **COMMON,
-                "A": a,
-                "DeltaA": change,
-                "I": unit,
-                "R": residue,
-                "E": error,
-                "epsilon": error.norm() / inverse.norm(),
-                "j": Fraction(seed + 1),
-                "u": lambda c, m=unit: column(m, int(c)),
-                "h": lambda c, m=inverse: column(m, int(c)),
-                "h_hat": lambda c, m=computed: column(m, int(c)),
-                "h_tilde": lambda c, m=error: column(m, int(c)),
-                "r": lambda c, m=residue: column(m, int(c)),
-                "x": column(inverse, seed + 1),
-                "fl": lambda x, i=inverse, c=computed: c if x == i else None,
-            }
-        )
-    return tuple(found)
+    return tuple(_residue_names(seed, changed, sharp and seed == 0) for seed in range(3))
+
+
+def _residue_names(seed: int, changed: bool, sharp: bool) -> Names:
+    rng, unit = random.Random(3300 + seed), diagonal([Fraction(1)] * 3)
+    a, size = FirstOrder(random_matrix(rng, 3, 3)), FirstOrder(random_matrix(rng, 3, 3)) * Fraction(1, 5)
+    change = FirstOrder(random_matrix(rng, 3, 3)) * EPSILON if changed else a * 0
+    if sharp:
+        a, size, change = unit * 3, abs(size), FirstOrder(change.value, -abs(change.slope))
+        size = FirstOrder(-change.slope * Fraction(2, 5)) if changed else size  # the same column is the largest
+    residue = size * EPSILON if changed else size
+    inverse, computed = a.inv(), (a + change).inv() * (unit + residue)
+    error = computed - inverse
+    return {
+        **COMMON, "A": a, "DeltaA": change, "I": unit, "R": residue, "E": error,
+        "epsilon": error.norm() / inverse.norm(), "j": Fraction(seed + 1), "u": columns(unit), "h": columns(inverse),
+        "h_hat": columns(computed), "h_tilde": columns(error), "r": columns(residue), "x": column(inverse, seed + 1),
+        "fl": lambda x: computed if x == inverse else None,
+    }  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ which say so by ``emulated``; ``tight`` are those in which every rounding error 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -18,7 +18,7 @@ import numpy as np
 
 from gpbnb.arithmetic.algebra import EXACT, Algebra, rounded_algebra
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
+from gpbnb.arithmetic.rational import exact, inverse_of, row_sum_norm
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel, gain, predicted, reduction, second_gain, updated
 from gpbnb.report.kalman import report_bounds, smallest
@@ -94,6 +94,16 @@ def tilde(error: Any) -> FirstOrder:
     return FirstOrder(exact(error) * 0, exact(error))
 
 
+def with_errors(**quantities: tuple[Any, Any]) -> Names:
+    """Return quantities, their rounded values and their errors, given over β, by the names of the documents."""
+    found: Names = {}
+    for name, (value, error) in quantities.items():
+        letter, index = name.split("_")
+        found |= {name: FirstOrder(exact(value)), f"{letter}_hat_{index}": hat(value, error)}
+        found[f"{letter}_tilde_{index}"] = tilde(error)
+    return found
+
+
 def at(index: int, value: Any, others: dict[int, Any] | None = None) -> Callable[[Any], FirstOrder]:
     """Return a letter that has a value only at some indices."""
     known = {index: value} | (others or {})
@@ -139,73 +149,74 @@ def cases() -> tuple[smallest.FilterCase, ...]:
     return (*SCALARS, cancelling, product, *(_mixed(i, n) for i, n in ((1, 2), (2, 3))))
 
 
+@dataclass(frozen=True)
+class Kind:
+    """How to compute, how to make numbers, and which errors to take."""
+
+    algebra: Algebra
+    number: Callable[[Any], Matrix]
+    emulated: bool
+
+    def take(self, case: smallest.FilterCase) -> ComputedStep:
+        """Take the first step of a case."""
+        return take(self.algebra, self.number, case, self.number(case.x[:, None]), self.number(case.P))
+
+    def error(self, computed: Any, true: Any = 0) -> Matrix:
+        """Return the error over β in four digits, or the largest one."""
+        return np.asarray(abs(computed - true) / FOUR.unit_roundoff if self.emulated else largest(computed))
+
+
+_TRACKED = rounded_algebra(tracked, rounded)
+KINDS = (
+    Kind(_TRACKED, tracked, False),
+    Kind(rounded_algebra(exact, np.vectorize(FOUR.round, otypes=[object])), exact, True),
+)
+
+
 @cache
-def one_step(gain: str = "K_2") -> tuple[Names, ...]:
-    """Return one step of each case, with first-order errors and in four digits; `gain` gives K_tilde_k its error."""
+def _steps() -> tuple[tuple[smallest.FilterCase, ComputedStep, Kind, dict[str, Matrix]], ...]:
+    """Return for each case and kind the exact step and the errors of its quantities."""
     found = []
     for case in cases():
-        true, *others = _steps(case)
-        for errors, emulated in zip(others, (False, True), strict=True):
-            names = _names_of_a_step(case, true, errors | {"K_2": errors[gain]})
-            found.append(names | {"emulated": emulated})
+        true = take(EXACT, exact, case, exact(case.x[:, None]), exact(case.P))
+        for kind in KINDS:
+            errors = {name: kind.error(each, getattr(true, name)) for name, each in vars(kind.take(case)).items()}
+            found.append((case, true, kind, errors))
     return tuple(found)
 
 
 @cache
-def local_gain() -> tuple[Names, ...]:
+def one_step(gain: str = "K_2") -> list[Names]:
+    """Return one step of each case, with first-order errors and in four digits; `gain` gives K_tilde_k its error."""
+    return [
+        _names_of_a_step(case, true, errors | {"K_2": errors[gain]}) | {"emulated": kind.emulated}
+        for case, true, kind, errors in _steps()
+    ]
+
+
+@cache
+def local_gain() -> list[Names]:
     """Return one step of each case, where the covariance and the inverse of R have no error before the gain."""
     found = []
-    for case in cases():
-        true, *_ = _steps(case)
-        for algebra, number, emulated in KINDS:
-            of_state = algebra.times(number(true.P), number(case.H).T)
-            computed: Any = algebra.times(of_state, number(inverse_of(case.R)))
-            error = abs(computed - true.K) / FOUR.unit_roundoff if emulated else largest(computed)
-            none = {name: abs(each) * 0 for name, each in vars(true).items()}
-            names = _names_of_a_step(case, true, none | {"K_2": error})
-            found.append(names | {"R_hat_k": FirstOrder(case.R), "emulated": emulated})
-    return tuple(found)
-
-
-def _errors(computed: ComputedStep, true: ComputedStep, emulated: bool) -> dict[str, Matrix]:
-    """Return the errors of a step over β: the largest, or those in four digits."""
-    if emulated:
-        return {name: abs(each - getattr(true, name)) / FOUR.unit_roundoff for name, each in vars(computed).items()}
-    return {name: largest(each) for name, each in vars(computed).items()}
-
-
-_FOUR = rounded_algebra(exact, np.vectorize(FOUR.round, otypes=[object]))
-_TRACKED = rounded_algebra(tracked, rounded)
-KINDS: tuple[tuple[Algebra, Callable[[Any], Matrix], bool], ...] = ((_TRACKED, tracked, False), (_FOUR, exact, True))
-"""How to compute, how to make numbers, and whether the errors are those in four digits instead of the largest ones."""
-
-
-@cache
-def _steps_of(place: int) -> tuple[ComputedStep, dict[str, Matrix], dict[str, Matrix]]:
-    case = cases()[place]
-    x, P = case.x[:, None], case.P
-    true = take(EXACT, exact, case, exact(x), exact(P))
-    moved = take(_TRACKED, tracked, case, tracked(x), tracked(P))
-    computed = take(_FOUR, exact, case, exact(x), exact(P))
-    return true, _errors(moved, true, False), _errors(computed, true, True)
-
-
-def _steps(case: smallest.FilterCase) -> tuple[ComputedStep, dict[str, Matrix], dict[str, Matrix]]:
-    """Return the exact step of a case, the largest errors, and those in four digits."""
-    return _steps_of(next(i for i, each in enumerate(cases()) if each is case))
+    for case, true, kind, errors in _steps():
+        of_state = kind.algebra.times(kind.number(true.P), kind.number(case.H).T)
+        computed: Any = kind.algebra.times(of_state, kind.number(inverse_of(case.R)))
+        none = {name: error * 0 for name, error in errors.items()}
+        names = _names_of_a_step(case, true, none | {"K_2": kind.error(computed, true.K)})
+        found.append(names | {"R_hat_k": FirstOrder(case.R), "emulated": kind.emulated})
+    return found
 
 
 def _names_of_a_step(case: smallest.FilterCase, true: ComputedStep, errors: dict[str, Matrix]) -> Names:
-    return letters(len(case.Phi), len(case.H)) | {
+    given = {
         "phi": at(2, case.Phi), "P": at(2, case.P), "Q": at(2, case.Q), "x": at(2, case.x[:, None]),
         "H_k": FirstOrder(case.H), "R_k": FirstOrder(case.R), "z_k": FirstOrder(case.z[:, None]),
-        "P_kp": FirstOrder(true.P_kp), "P_hat_kp": hat(true.P_kp, errors["P_kp"]), "P_tilde_kp": tilde(errors["P_kp"]),
-        "P_k": FirstOrder(true.P), "P_hat_k": hat(true.P, errors["P"]), "P_tilde_k": tilde(errors["P"]),
-        "K_k": FirstOrder(true.K), "K_hat_k": hat(true.K, errors["K_2"]), "K_tilde_k": tilde(errors["K_2"]),
-        "F_k": FirstOrder(true.F), "F_hat_k": hat(true.F, errors["F"]), "F_tilde_k": tilde(errors["F"]),
-        "u_k": FirstOrder(true.u), "u_hat_k": hat(true.u, errors["u"]), "u_tilde_k": tilde(errors["u"]),
-        "x_hat_k": hat(true.x, errors["x"]), "x_k": FirstOrder(true.x),
     }  # fmt: skip
+    rounded = with_errors(
+        P_kp=(true.P_kp, errors["P_kp"]), P_k=(true.P, errors["P"]), K_k=(true.K, errors["K_2"]),
+        F_k=(true.F, errors["F"]), u_k=(true.u, errors["u"]), x_k=(true.x, errors["x"]),
+    )  # fmt: skip
+    return letters(len(case.Phi), len(case.H)) | given | rounded
 
 
 # -- instances in which all errors add up: each group of equations has its own -------------------
@@ -225,152 +236,66 @@ def _alternating(seed: int, n: int) -> Matrix:
     return (half + half.T) * (2 * exact(np.eye(n, dtype=int)) - 1)
 
 
-def _tight(n: int, m: int, **names: Any) -> Names:
-    return letters(n, m) | names | {"tight": True}
+@cache
+def tight(instance: Callable[..., Names], *arguments: Any) -> tuple[Names, ...]:
+    """Return an instance of each size, in which all errors add up."""
+    return tuple(letters(n, m) | instance(n, m, *arguments) | {"tight": True} for n, m in SIZES)
 
 
 @cache
-def second_prediction() -> tuple[Names, ...]:
+def second_prediction() -> list[Names]:
     """Return the prediction in the second step of each case, which starts from a covariance with an error."""
     found = []
-    for case in cases():
-        true, *others = _steps(case)
+    for case, true, kind, errors in _steps():
         value = case.Phi @ true.P @ case.Phi.T + case.Q
-        for (algebra, number, emulated), errors in zip(KINDS, others, strict=True):
-            P = take(algebra, number, case, number(case.x[:, None]), number(case.P)).P
-            computed: Any = predicted(algebra, number(case.Phi), P, number(case.Q))
-            error = abs(computed - value) / FOUR.unit_roundoff if emulated else largest(computed)
-            names = letters(len(case.Phi), len(case.H)) | {
-                "phi": at(2, case.Phi), "P": at(2, true.P), "P_tilde": at(2, tilde(errors["P"])), "Q": at(2, case.Q),
-                "P_kp": FirstOrder(value), "P_hat_kp": hat(value, error), "P_tilde_kp": tilde(error),
-            }  # fmt: skip
-            found.append(names | {"emulated": emulated})
-    return tuple(found)
+        computed = predicted(kind.algebra, kind.number(case.Phi), kind.take(case).P, kind.number(case.Q))
+        before = {"phi": at(2, case.Phi), "P": at(2, true.P), "P_tilde": at(2, tilde(errors["P"])), "Q": at(2, case.Q)}
+        after = with_errors(P_kp=(value, kind.error(computed, value)))
+        found.append(letters(len(case.Phi), len(case.H)) | before | after | {"emulated": kind.emulated})
+    return found
 
 
-@cache
-def tight_prediction() -> tuple[Names, ...]:
+def prediction_alone(n: int, m: int) -> Names:
     """Return positive matrices for (102) and (103), with errors of P_{k-1} of any size."""
-    found = []
-    for n, m in SIZES:
-        Phi, half, Q, of_covariance = _positive(1, n, n), _positive(2, n, n), _positive(3, n, n), _positive(19, n, n)
-        P = half + half.T
-        error = largest(predicted(_TRACKED, tracked(Phi), tracked(P, of_covariance), tracked(Q)))
-        value = Phi @ P @ Phi.T + Q
-        found.append(
-            _tight(
-                n,
-                m,
-                phi=at(2, Phi),
-                P=at(2, P),
-                P_tilde=at(2, tilde(of_covariance)),
-                Q=at(2, Q),
-                P_kp=FirstOrder(value),
-                P_hat_kp=hat(value, error),
-                P_tilde_kp=tilde(error),
-            )
-        )
-    return tuple(found)
+    Phi, half, Q, of_covariance = _positive(1, n, n), _positive(2, n, n), _positive(3, n, n), _positive(19, n, n)
+    P = half + half.T
+    error = largest(predicted(_TRACKED, tracked(Phi), tracked(P, of_covariance), tracked(Q)))
+    before = {"phi": at(2, Phi), "P": at(2, P), "P_tilde": at(2, tilde(of_covariance)), "Q": at(2, Q)}
+    return before | with_errors(P_kp=(Phi @ P @ Phi.T + Q, error))
 
 
-@cache
-def tight_covariance() -> tuple[Names, ...]:
+def covariance_alone(n: int, m: int) -> Names:
     """Return matrices for (104), (105) and the line before (107), with errors of K_k and P_kp of any size."""
-    found = []
-    for n, m in SIZES:
-        K, H, P_kp, unit = _positive(4, n, m) / 20, _positive(5, m, n), _alternating(6, n), EXACT.identity(n)
-        of_gain, of_prediction = _positive(7, n, m), _positive(8, n, n)
-        error = largest(reduce(_TRACKED, tracked(K, of_gain), tracked(H), tracked(P_kp, of_prediction)))
-        value = (unit - K @ H) @ P_kp
-        found.append(
-            _tight(
-                n,
-                m,
-                K_k=FirstOrder(K),
-                H_k=FirstOrder(H),
-                P_kp=FirstOrder(P_kp),
-                P_k=FirstOrder(value),
-                K_hat_k=hat(K, of_gain),
-                K_tilde_k=tilde(of_gain),
-                P_hat_kp=hat(P_kp, of_prediction),
-                P_tilde_kp=tilde(of_prediction),
-                P_hat_k=hat(value, error),
-                P_tilde_k=tilde(error),
-            )
-        )
-    return tuple(found)
+    K, H, P_kp, unit = _positive(4, n, m) / 20, _positive(5, m, n), _alternating(6, n), EXACT.identity(n)
+    of_gain, of_prediction = _positive(7, n, m), _positive(8, n, n)
+    error = largest(reduce(_TRACKED, tracked(K, of_gain), tracked(H), tracked(P_kp, of_prediction)))
+    rounded = with_errors(K_k=(K, of_gain), P_kp=(P_kp, of_prediction), P_k=((unit - K @ H) @ P_kp, error))
+    return {"H_k": FirstOrder(H)} | rounded
 
 
-@cache
-def tight_gain(local: bool = False) -> tuple[Names, ...]:
+def gain_alone(n: int, m: int, local: bool = False) -> Names:
     """Return positive matrices for (106)-(108); without errors of P_k and of the inverse of R if `local`."""
-    found = []
-    for n, m in SIZES:
-        P, H = _positive(9, n, n), _positive(10, m, n)
-        R_inverse = _positive(11, m, m) + 2 * exact(np.eye(m, dtype=int))
-        of_covariance = _positive(12, n, n) * (not local)
-        inverse = tracked(R_inverse) if local else rounded(tracked(R_inverse))
-        of_state = _TRACKED.times(tracked(P, of_covariance), tracked(H).T)
-        error = largest(_TRACKED.times(of_state, inverse))
-        K, R = P @ H.T @ R_inverse, FirstOrder(inverse_of(R_inverse))
-        found.append(
-            _tight(
-                n,
-                m,
-                P_k=FirstOrder(P),
-                P_kp=FirstOrder(P),
-                H_k=FirstOrder(H),
-                R_k=R,
-                R_hat_k=R,
-                K_k=FirstOrder(K),
-                P_hat_k=hat(P, of_covariance),
-                P_tilde_k=tilde(of_covariance),
-                K_hat_k=hat(K, error),
-                K_tilde_k=tilde(error),
-            )
-        )
-    return tuple(found)
+    P, H = _positive(9, n, n), _positive(10, m, n)
+    R_inverse = _positive(11, m, m) + 2 * exact(np.eye(m, dtype=int))
+    of_covariance = _positive(12, n, n) * (not local)
+    inverse = tracked(R_inverse) if local else rounded(tracked(R_inverse))
+    of_state = _TRACKED.times(tracked(P, of_covariance), tracked(H).T)
+    error, R = largest(_TRACKED.times(of_state, inverse)), FirstOrder(inverse_of(R_inverse))
+    given = {"P_kp": FirstOrder(P), "H_k": FirstOrder(H), "R_k": R, "R_hat_k": R}
+    return given | with_errors(P_k=(P, of_covariance), K_k=(P @ H.T @ R_inverse, error))
 
 
-@cache
-def tight_loop() -> tuple[Names, ...]:
+def loop_alone(n: int, m: int) -> Names:
     """Return matrices for (112)-(114), with errors of K_k of any size, and of F_k and u_k for (114)."""
-    found = []
-    for n, m in SIZES:
-        K, H, Phi, unit = (
-            _positive(13, n, m) / 20,
-            _positive(14, m, n),
-            _alternating(15, n),
-            exact(np.eye(n, dtype=int)),
-        )
-        z, of_gain = _positive(16, m, 1), _positive(17, n, m)
-        of_loop = largest(reduce(_TRACKED, tracked(K, of_gain), tracked(H), tracked(Phi)))
-        of_input = largest(_TRACKED.times(tracked(K, of_gain), tracked(z)))
-        F, u = (unit - K @ H) @ Phi, K @ z
-        x = np.sign(F[:1].T.astype(float)).astype(int) * _positive(18, n, 1)
-        error = largest(update(_TRACKED, tracked(F, of_loop), tracked(x), tracked(u, of_input)))
-        found.append(
-            _tight(
-                n,
-                m,
-                phi=at(2, Phi),
-                x=at(2, x),
-                K_k=FirstOrder(K),
-                H_k=FirstOrder(H),
-                z_k=FirstOrder(z),
-                K_hat_k=hat(K, of_gain),
-                K_tilde_k=tilde(of_gain),
-                F_k=FirstOrder(F),
-                F_hat_k=hat(F, of_loop),
-                F_tilde_k=tilde(of_loop),
-                u_k=FirstOrder(u),
-                u_hat_k=hat(u, of_input),
-                u_tilde_k=tilde(of_input),
-                x_k=FirstOrder(F @ x + u),
-                x_hat_k=hat(F @ x + u, error),
-            )
-        )
-    return tuple(found)
+    K, H, Phi, unit = _positive(13, n, m) / 20, _positive(14, m, n), _alternating(15, n), EXACT.identity(n)
+    z, of_gain = _positive(16, m, 1), _positive(17, n, m)
+    of_loop = largest(reduce(_TRACKED, tracked(K, of_gain), tracked(H), tracked(Phi)))
+    of_input = largest(_TRACKED.times(tracked(K, of_gain), tracked(z)))
+    F, u = (unit - K @ H) @ Phi, K @ z
+    x = np.sign(F[:1].T.astype(float)).astype(int) * _positive(18, n, 1)
+    error = largest(update(_TRACKED, tracked(F, of_loop), tracked(x), tracked(u, of_input)))
+    given = {"phi": at(2, Phi), "x": at(2, x), "H_k": FirstOrder(H), "z_k": FirstOrder(z)}
+    return given | with_errors(K_k=(K, of_gain), F_k=(F, of_loop), u_k=(u, of_input), x_k=(F @ x + u, error))
 
 
 # -- several steps, (119)-(125) -------------------------------------------------------------------
@@ -379,109 +304,84 @@ LAST = 5
 """Steps of the longest run."""
 
 
-@cache
-def _runs() -> tuple[tuple[smallest.FilterCase, list[ComputedStep], list[list[Matrix]], list[list[Matrix]]], ...]:
-    """Return exact runs, and for both kinds of errors in each step: of x, of F, of u, and of x from this step alone."""
-    found = []
-    for case in cases()[:-1]:
-        exact_steps: list[ComputedStep] = []
-        kinds: list[list[list[Matrix]]] = []
-        x, P = exact(case.x)[:, None], exact(case.P)
-        for _ in range(LAST):
-            exact_steps.append(take(EXACT, exact, case, x, P, second=False))
-            x, P = exact_steps[-1].x, exact_steps[-1].P
-        for algebra, number, emulated in KINDS:
-            x, P, errors = number(case.x[:, None]), number(case.P), []
-            for true in exact_steps:
-                step = take(algebra, number, case, x, P, second=False)
-                alone = step.x - (number(true.F) @ x + number(true.u))
-                size = (lambda each: abs(each) / FOUR.unit_roundoff) if emulated else largest
-                pairs = ((step.x, true.x), (step.F, true.F), (step.u, true.u))
-                errors.append([*(size(a - number(b)) for a, b in pairs), size(alone)])
-                x, P = step.x, step.P
-            kinds.append(errors)
-        found.append((case, exact_steps, kinds[0], kinds[1]))
-    return tuple(found)
+def _exact_run(case: smallest.FilterCase) -> list[ComputedStep]:
+    found: list[ComputedStep] = []
+    x, P = exact(case.x)[:, None], exact(case.P)
+    for _ in range(LAST):
+        found.append(take(EXACT, exact, case, x, P, second=False))
+        x, P = found[-1].x, found[-1].P
+    return found
 
 
-def row_sum_norm(a: Matrix) -> Fraction:
-    """Return the largest row sum of sizes, the norm of matrices that is compatible with (21)."""
-    return column_sum_norm(a.T)
-
-
-def _named(letter: str, values_of: Iterable[Any], first: int = 1) -> Names:
-    return {f"{letter}_{i}": each for i, each in enumerate(values_of, start=first)}
+def _errors_of_a_run(case: smallest.FilterCase, run: list[ComputedStep], kind: Kind) -> list[list[Matrix]]:
+    """Return for each step the errors of x, of F, of u, and of x from this step alone."""
+    x, P, errors = kind.number(case.x[:, None]), kind.number(case.P), []
+    for true in run:
+        step = take(kind.algebra, kind.number, case, x, P, second=False)
+        alone = step.x - (kind.number(true.F) @ x + kind.number(true.u))
+        pairs = ((step.x, true.x), (step.F, true.F), (step.u, true.u))
+        errors.append([*(kind.error(found, each) for found, each in pairs), kind.error(alone)])
+        x, P = step.x, step.P
+    return errors
 
 
 def _names_of_a_run(
     m: int, k: int, x_0: Matrix, loops: list[Matrix], inputs: list[Matrix], of_loops: list[Matrix],
-    of_inputs: list[Matrix], states: list[Matrix], of_states: list[Matrix], e: Fraction,
+    of_inputs: list[Matrix], states: list[Matrix], of_states: Sequence[Matrix], e: Fraction,
 ) -> Names:  # fmt: skip
     """Return the names of (119)-(125); the lists have an entry for each step."""
-    return (
-        letters(len(x_0), m)
-        | _named("F", map(FirstOrder, loops)) | _named("u", map(FirstOrder, inputs))
-        | _named("F_tilde", map(tilde, of_loops)) | _named("u_tilde", map(tilde, of_inputs))
-        | _named("x", map(FirstOrder, [x_0, *states]), 0) | _named("x_tilde", map(tilde, of_states))
-        | _named("x_hat", map(hat, states, of_states))
-        | {
-            "k": Fraction(k), "x_k": FirstOrder(states[k - 1]), "x_tilde_k": tilde(of_states[k - 1]),
-            "F": max(map(row_sum_norm, loops)), "e": FirstOrder(Fraction(0), e),
-            "B": report_bounds.printed_input_bound(loops, [u[:, 0] for u in inputs]),
-        }
-    )  # fmt: skip
+    names = letters(len(x_0), m) | {
+        "k": Fraction(k), "x_0": FirstOrder(x_0), "x_k": FirstOrder(states[k - 1]),
+        "x_tilde_k": tilde(of_states[k - 1]),
+        "F": max(map(row_sum_norm, loops)), "e": FirstOrder(Fraction(0), e),
+        "B": report_bounds.printed_input_bound(loops, [u[:, 0] for u in inputs]),
+    }  # fmt: skip
+    for letter, values, errors in (("F", loops, of_loops), ("u", inputs, of_inputs), ("x", states, of_states)):
+        pairs = zip(values, errors, strict=True)
+        names |= with_errors(**{f"{letter}_{i}": pair for i, pair in enumerate(pairs, start=1)})
+    return names
 
 
 @cache
-def several_steps() -> tuple[Names, ...]:
+def several_steps() -> list[Names]:
     """Return runs of five steps of each case; k is the first or the last step."""
     found = []
-    for case, steps, *kinds in _runs():
-        n, m = len(case.Phi), len(case.H)
-        for errors, emulated in zip(kinds, (False, True), strict=True):
-            of_states, of_loops, of_inputs, alone = zip(*errors, strict=True)
-            loops, inputs = [step.F for step in steps], [step.u for step in steps]
-            for k in (1, LAST):
-                names = _names_of_a_run(
-                    m, k, exact(case.x)[:, None], loops, inputs,
-                    [error + (n + 1) * abs(F) for error, F in zip(of_loops, loops, strict=True)],
-                    [error + abs(u) for error, u in zip(of_inputs, inputs, strict=True)],
-                    [step.x for step in steps], list(of_states), max(abs(each).max() for each in alone),
-                )  # fmt: skip
-                found.append(names | {"emulated": emulated})
-    return tuple(found)
+    for case, kind in itertools.product(cases()[:-1], KINDS):
+        n, m, steps = len(case.Phi), len(case.H), _exact_run(case)
+        of_states, of_F, of_u, alone = zip(*_errors_of_a_run(case, steps, kind), strict=True)
+        loops, inputs = [step.F for step in steps], [step.u for step in steps]
+        of_loops = [error + (n + 1) * abs(F) for error, F in zip(of_F, loops, strict=True)]
+        of_inputs = [error + abs(u) for error, u in zip(of_u, inputs, strict=True)]
+        x_0, states, e = exact(case.x)[:, None], [step.x for step in steps], max(abs(each).max() for each in alone)
+        for k in (1, LAST):
+            names = _names_of_a_run(m, k, x_0, loops, inputs, of_loops, of_inputs, states, of_states, e)
+            found.append(names | {"emulated": kind.emulated})
+    return found
+
+
+def _run_with_errors(x: Matrix, *steps: Sequence[Matrix]) -> list[Matrix]:
+    """Return the states of a run with given closed loops, inputs and errors of both."""
+    found = [tracked(x)]
+    for F, u, of_loop, of_input in zip(*steps, strict=True):
+        found.append(tracked(F, of_loop) @ found[-1] + tracked(u, of_input))
+    return found[1:]
+
+
+def _steps_alone(n: int, k: int) -> Names:
+    share, x_0, e = _positive(20, n, n), _positive(60, n, 1), Fraction(7, 3)
+    loops = [exact(np.array([row / sum(row) for row in share])) * Fraction(3, 2)] * LAST
+    inputs = [_positive(30 + i, n, 1) * (-1) ** i for i in range(LAST)]
+    of_loops, of_inputs = ([_positive(40 + 9 * j + i, n, c) for i in range(LAST)] for j, c in ((0, n), (1, 1)))
+    run = _run_with_errors(x_0, loops, inputs, of_loops, of_inputs)
+    states = [np.vectorize(lambda each: each.value, otypes=[object])(x) for x in run]
+    names = _names_of_a_run(1, k, x_0, loops, inputs, of_loops, of_inputs, states, list(map(largest, run)), e)
+    equal = _run_with_errors(x_0, loops, inputs, [loops[0] * 0] * LAST, [exact(np.full((n, 1), e))] * LAST)
+    norms = {id(names[f"x_tilde_{i}"]): tilde(largest(x)).norm() for i, x in enumerate(equal, start=1)}
+    norms[id(names["x_tilde_k"])] = norms[id(names[f"x_tilde_{k}"])]
+    return names | {"norm": lambda x: norms.get(id(x)) or x.norm(), "tight": True}
 
 
 @cache
-def tight_steps() -> tuple[Names, ...]:
-    """Return products of given closed loops and inputs, whose errors have any size; norms of all steps are equal."""
-    found = []
-    for n, k in itertools.product((1, 2), (1, LAST)):
-        share = _positive(20, n, n)
-        loop = exact(np.array([row / sum(row) for row in share])) * Fraction(3, 2)
-        loops = [loop] * LAST
-        inputs = [_positive(30 + i, n, 1) * (-1) ** i for i in range(LAST)]
-        of_loops, of_inputs = ([_positive(40 + 9 * j + i, n, c) for i in range(LAST)] for j, c in ((0, n), (1, 1)))
-        e = Fraction(7, 3)
-        x_0 = exact_x = _positive(60, n, 1)
-        x, same = tracked(x_0), tracked(x_0)
-        states, of_states, of_norms = [], [], []
-        for F, u, of_loop, of_input in zip(loops, inputs, of_loops, of_inputs, strict=True):
-            x = tracked(F, of_loop) @ x + tracked(u, of_input)
-            same = tracked(F) @ same + tracked(u, exact(np.full((n, 1), e)))
-            exact_x = F @ exact_x + u
-            states.append(exact_x)
-            of_states.append(largest(x))
-            of_norms.append(largest(same))
-        names = _names_of_a_run(1, k, x_0, loops, inputs, of_loops, of_inputs, states, of_states, e)
-        alone = _named("x_tilde", map(tilde, of_norms)) | {"x_tilde_k": tilde(of_norms[k - 1])}
-        found.append(names | {"norm": lambda each, alone=alone, names=names: _norm(each, names, alone), "tight": True})
-    return tuple(found)
-
-
-def _norm(x: FirstOrder, names: Names, alone: Names) -> FirstOrder:
-    """Return the norm of a state, or of the error that steps with equal errors give it."""
-    for name, error in alone.items():
-        if x is names[name]:
-            return error.norm()
-    return x.norm()
+def tight_steps() -> list[Names]:
+    """Return runs with errors of any size; the norm of an error is that which steps with equal errors give."""
+    return [_steps_alone(n, k) for n, k in itertools.product((1, 2), (1, LAST))]
