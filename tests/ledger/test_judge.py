@@ -7,10 +7,11 @@ import pytest
 import sympy as sp
 
 from gpbnb.report.ledger.finding import Verdict
+from gpbnb.report.ledger.first_order import matrix
 from gpbnb.report.ledger.formula import Link, read
 from gpbnb.report.ledger.judge import CheckRow, holds, judge
 from gpbnb.report.ledger.judge import read as read_rows
-from gpbnb.report.ledger.quantities import BETA, Matrix
+from gpbnb.report.ledger.quantities import BETA
 from gpbnb.report.ledger.statements import Statement
 
 
@@ -27,7 +28,7 @@ def test_a_bound_is_right_if_it_holds_and_is_attained():
     assert str(loose) == "holds in all 1 instances, but the bound is never attained"
     assert judged("x <= y", {"x": Fraction(2), "y": Fraction(1)}).count == "holds in 0 of 1 instances"
     assert not judged("x <= y", {"x": Fraction(0), "y": Fraction(0)}).right
-    one, other = Matrix([[1, 0]]), Matrix([[1, 3]])
+    one, other = matrix([[1, 0]]), matrix([[1, 3]])
     assert judged("x <= y", {"x": one, "y": other}).right  # in one entry
     assert judged("x >= 0", {"x": Fraction(0)}).right
 
@@ -92,15 +93,15 @@ def test_strict_and_weak_comparisons(symbol, right):
 
 
 def test_matrices_are_multiplied_and_compared_entry_by_entry():
-    a, b = Matrix([[1, 2], [3, 4]]), Matrix([[0, 1], [1, 0]])
-    assert holds(Link(a * b, "==", Matrix([[2, 1], [4, 3]])))
+    a, b = matrix([[1, 2], [3, 4]]), matrix([[0, 1], [1, 0]])
+    assert holds(Link(a * b, "==", matrix([[2, 1], [4, 3]])))
     assert not holds(Link(a, "<=", b))
     for symbol in ("<=", "<", ">=", ">", "=="):
-        assert not holds(Link(Matrix([[0, 2]]), symbol, Matrix([[1, 1]])))
-    assert not holds(Link(Matrix([[1, 2]]), ">", Matrix([[1, 1]])))
-    assert not holds(Link(Matrix([[0, 1]]), "<", Matrix([[1, 1]])))
+        assert not holds(Link(matrix([[0, 2]]), symbol, matrix([[1, 1]])))
+    assert not holds(Link(matrix([[1, 2]]), ">", matrix([[1, 1]])))
+    assert not holds(Link(matrix([[0, 1]]), "<", matrix([[1, 1]])))
     assert holds(Link(2 * a - a, "==", a + 0 * b))
-    assert not holds(Link(a, "==", Matrix([[1, 2]])))
+    assert not holds(Link(a, "==", matrix([[1, 2]])))
     assert not holds(Link(sp.zeros(1, 2), "==", sp.zeros(2, 1)))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.report.ledger.first_order import EPSILON, FirstOrder, matrix
+from gpbnb.report.ledger.first_order import EPSILON, FirstOrder, looked_up, matrix
 
 Round = Callable[[FirstOrder], FirstOrder]
 COMMON: Mapping[str, Any] = {"matrix": matrix, "norm": lambda x: x.norm()}
@@ -162,19 +163,12 @@ class Elimination:
         )
         upper = self.part(computed[-1], False)
 
-        def fl(value: FirstOrder) -> FirstOrder:
-            for k in range(1, self.n):
-                for true, new in zip(exact[k].tolist(), computed[k].tolist(), strict=True):
-                    for t, c in zip(true, new, strict=True):
-                        if t.value and t == value:
-                            return c
-            raise LookupError(
-                "got a value that no quantity of the elimination has; needed the exact value of one of them"
-            )
-
+        cells = ((true.tolist(), new.tolist()) for true, new in zip(exact[1:], computed[1:], strict=True))
+        rows = itertools.chain.from_iterable(zip(*each, strict=True) for each in cells)
+        results = [(t, c) for row in rows for t, c in zip(*row, strict=True) if t.value]
         return {
-            **COMMON, "n": Fraction(self.n), "epsilon": EPSILON, "beta": EPSILON, "m": known(multipliers), "fl": fl,
-            "a": a_exact, "a_hat": a_computed, "b": b_exact, "b_hat": b_computed,
+            **COMMON, "n": Fraction(self.n), "epsilon": EPSILON, "beta": EPSILON, "m": known(multipliers),
+            "fl": looked_up(results), "a": a_exact, "a_hat": a_computed, "b": b_exact, "b_hat": b_computed,
             "a_tilde": lambda i, j, k: self.errors(False)[int(k)].tolist()[int(i) - 1][int(j) - 1],
             "A": staged(exact, False), "A_hat": staged(computed, False), "b_underline": staged(exact, True),
             "A_tilde": staged(computed, False, errors=True), "b_hat_underline": staged(computed, True),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from typing import Any
 
@@ -129,6 +130,19 @@ def matrix(rows: list[Any]) -> FirstOrder:
         np.array([[cell.value for cell in row] for row in table], dtype=object),
         np.array([[cell.slope for cell in row] for row in table], dtype=object),
     )
+
+
+def looked_up(pairs: Iterable[tuple[FirstOrder, FirstOrder]]) -> Callable[[FirstOrder], FirstOrder]:
+    """Return the function that returns the second of the pair with a given first one; LookupError if there is none."""
+    pairs = tuple(pairs)
+
+    def look(first: FirstOrder) -> FirstOrder:
+        for each, second in pairs:
+            if each == first:
+                return second
+        raise LookupError("got a value that no result has; needed the exact value of one of them")
+
+    return look
 
 
 def joined(columns: list[FirstOrder]) -> FirstOrder:

@@ -215,7 +215,7 @@ def entries(value: Any) -> Any:
         found = np.empty(len(flat), dtype=object)
         found[:] = flat
         return found.reshape(shape)
-    return np.asarray(getattr(value, "entries", value), dtype=object)
+    return np.asarray(value, dtype=object)
 
 
 def sign(x: Any, slack: Any = 0) -> int:

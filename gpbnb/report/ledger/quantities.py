@@ -1,42 +1,15 @@
-"""Exact matrices, vectors and random numbers, as printed relations name them."""
+"""Exact vectors and random numbers, as printed relations name them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.rational import exact
-
 BETA = Fraction(1, 10**40)
 """Unit roundoff of the instances for first-order statements, so small that its square is negligible."""
-
-
-class Matrix:
-    """A matrix of exact numbers with ``*`` as matrix product; relations between matrices hold entry by entry."""
-
-    def __init__(self, entries: Any) -> None:
-        self.entries = exact(entries)
-
-    def __add__(self, other: Matrix) -> Matrix:
-        return Matrix(self.entries + other.entries)
-
-    def __sub__(self, other: Matrix) -> Matrix:
-        return Matrix(self.entries - other.entries)
-
-    def __mul__(self, other: Any) -> Matrix:
-        if isinstance(other, Matrix):
-            return Matrix(self.entries @ other.entries)
-        return Matrix(self.entries * Fraction(other))
-
-    def __rmul__(self, factor: Any) -> Matrix:
-        return Matrix(self.entries * Fraction(factor))
-
-    def __abs__(self) -> Matrix:
-        return Matrix(abs(self.entries))
 
 
 class IndexedVector(dict[int, Fraction]):

@@ -18,7 +18,8 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report import ledger
 from gpbnb.report.ledger.checks import rounding as checks
 from gpbnb.report.ledger.finding import Verdict
-from gpbnb.report.ledger.quantities import BETA, Matrix
+from gpbnb.report.ledger.first_order import matrix
+from gpbnb.report.ledger.quantities import BETA
 from gpbnb.report.ledger.statements import statement
 from gpbnb.report.rounding import derivation, experiment, theory
 
@@ -295,7 +296,7 @@ AGREE = [
 
 
 def matrices_of_one():
-    a, b = Matrix([[2]]), Matrix([[-3]])
+    a, b = matrix([[2]]), matrix([[-3]])
     return [{"A": a, "B": b, "x": a, "y": b}]
 
 

@@ -16,8 +16,9 @@ import sympy as sp
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm, row_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.report.ledger.first_order import FirstOrder, looked_up, quantity
 from gpbnb.report.ledger.judge import read
-from gpbnb.report.ledger.quantities import BETA, Matrix, fractions, numbered, small
+from gpbnb.report.ledger.quantities import BETA, fractions, numbered, small
 from gpbnb.report.ledger.statements import statement
 from gpbnb.report.rounding import derivation, experiment, theory
 
@@ -430,20 +431,20 @@ def roundings_counted() -> bool:
 # -- sections 7 and 8: norms, and the sum of two matrices -----------------------------------------
 
 
-def norm(matrix: Matrix) -> Fraction:
+def norm(matrix: FirstOrder) -> Fraction:
     """Return norm (22), the largest column sum; TypeError for anything but a matrix."""
-    return column_sum_norm(_matrix(matrix).entries)
+    return column_sum_norm(_entries(matrix))
 
 
-def vector_norm(vector: Matrix) -> Fraction:
+def vector_norm(vector: FirstOrder) -> Fraction:
     """Return norm (21), the largest entry; TypeError for anything but a vector."""
-    return max_norm(_matrix(vector).entries)
+    return max_norm(_entries(vector))
 
 
-def _matrix(value: object) -> Matrix:
-    if not isinstance(value, Matrix):
+def _entries(value: object) -> Any:
+    if not isinstance(value, FirstOrder) or not value.shape:
         raise TypeError(f"got {value!r}; needed a vector or a matrix")
-    return value
+    return value.value
 
 
 def incompatible() -> str:
@@ -468,14 +469,14 @@ def norm_instances(shape: tuple[int, ...]) -> tuple[dict[str, Any], ...]:
     pairs += [(3 * a, a) for a, _ in pairs[:4]] + [(0 * a, a) for a, _ in pairs[:2]]
     pairs.append((exact(np.ones(shape, dtype=int)), exact(np.ones(shape, dtype=int))))
     return tuple(
-        {"x": Matrix(a), "y": Matrix(b), "A": Matrix(a), "B": Matrix(b), "a": fractions(rng, 1)[0]} for a, b in pairs
+        dict(zip("xyAB", map(quantity, (a, b, a, b)), strict=True)) | {"a": fractions(rng, 1)[0]} for a, b in pairs
     )
 
 
-def norms(size: Callable[[Matrix], Fraction], shape: tuple[int, ...]) -> list[dict[str, Any]]:
+def norms(size: Callable[[FirstOrder], Fraction], shape: tuple[int, ...]) -> list[dict[str, Any]]:
     """Return arrays with their norms; the norm is zero only for zero, or also for other arrays."""
     instances = norm_instances(shape)
-    only = not any(np.any(names["x"].entries != 0) for names in instances if size(names["x"]) == 0)
+    only = not any(np.any(names["x"].value != 0) for names in instances if size(names["x"]) == 0)
     return [{**names, "norm": size, "zero": lambda phrase: phrase.startswith("only if") == only} for names in instances]
 
 
@@ -496,7 +497,7 @@ def rounded_sums() -> tuple[dict[str, Any], ...]:
         true = a.to_fractions() + b.to_fractions()
         error = (a + b).to_fractions() - true
         instances.append(
-            {"A": Matrix(a.to_fractions()), "B": Matrix(b.to_fractions()), "R": Matrix(error), "norm": norm,
+            {"A": quantity(a.to_fractions()), "B": quantity(b.to_fractions()), "R": quantity(error), "norm": norm,
              "beta": gap(10, 4) / 2, "b": Fraction(10), "t": Fraction(4),
              "epsilon": column_sum_norm(error) / column_sum_norm(true) if np.any(true) else Fraction(0)}
         )  # fmt: skip
@@ -620,7 +621,7 @@ def matrix_products() -> tuple[dict[str, Any], ...]:
             instances.append(
                 {**entry, "n": Fraction(n), "i": Fraction(m), "j": Fraction(p), "beta": BETA, "norm": norm,
                  "positive": a is cases[-1][0],
-                 "bracket": abs, "A": Matrix(a), "B": Matrix(b), "C_tilde": Matrix(error), "D": Matrix(weights)}
+                 "bracket": abs, "A": quantity(a), "B": quantity(b), "C_tilde": quantity(error), "D": quantity(weights)}
             )  # fmt: skip
     return tuple(instances)
 
@@ -631,7 +632,7 @@ def long_products() -> list[dict[str, Any]]:
     Where all numbers and errors are positive, each entry attains its bound.
     """
     return [
-        {**each, "diag": lambda *numbers: Matrix(np.diag(numbers)), "tight": each["positive"]}
+        {**each, "diag": lambda *numbers: quantity(np.diag(numbers)), "tight": each["positive"]}
         for each in matrix_products()
         if each["n"] >= 4
     ]
@@ -663,22 +664,14 @@ def _chain_names(factors: list[Any], errors: Any) -> dict[str, Any]:
         products.append(products[-1] @ factor)
         computed.append(rounded_product(computed[-1], factor, errors))
     count = len(factors)
-    rounded = {
-        Matrix(left @ factor): value
-        for left, factor, value in zip(computed[:-1], factors[1:], computed[1:], strict=True)
-    }
-
-    def fl(argument: Matrix) -> Matrix:
-        for true, value in rounded.items():
-            if true.entries.shape == argument.entries.shape and np.all(true.entries == argument.entries):
-                return Matrix(value)
-        raise LookupError("this product is not computed")
-
+    steps = zip(computed[:-1], factors[1:], computed[1:], strict=True)
+    rounded = [(quantity(left @ factor), quantity(value)) for left, factor, value in steps]
     return {
-        "N": Fraction(count), "M": {i + 1: Matrix(f) for i, f in enumerate(factors)}, "norm": norm, "fl": fl,
+        "N": Fraction(count), "M": {i + 1: quantity(f) for i, f in enumerate(factors)}, "norm": norm,
+        "fl": looked_up(rounded),
         "d": {i + 1: Fraction(f.shape[1]) for i, f in enumerate(factors[:-1])}, "beta": BETA, "epsilon": BETA,
-        "P_hat": {i + 1: Matrix(p) for i, p in enumerate(computed)},
-        "P_tilde": {i + 1: Matrix(c - p) for i, (c, p) in enumerate(zip(computed, products, strict=True))},
+        "P_hat": {i + 1: quantity(p) for i, p in enumerate(computed)},
+        "P_tilde": {i + 1: quantity(c - p) for i, (c, p) in enumerate(zip(computed, products, strict=True))},
     }  # fmt: skip
 
 
@@ -739,9 +732,9 @@ def _example_names(factors: list[Any], d: Any, errors: Any, size: int) -> dict[s
     computed = rounded_product(rounded_product(a, b, errors), c, errors) + d
     rounded = exact([[x * (1 + errors(1)[0]) for x in row] for row in computed])
     true = a @ b @ c + d
-    return {
-        "A": Matrix(a), "B": Matrix(b), "C": Matrix(c), "D": Matrix(d), "R": Matrix(true), "R_hat": Matrix(rounded),
-        "R_tilde": Matrix(rounded - true), "n": Fraction(size), "m": Fraction(a.shape[1]), "r": Fraction(b.shape[1]),
+    matrices = {"A": a, "B": b, "C": c, "D": d, "R": true, "R_hat": rounded, "R_tilde": rounded - true}
+    return {name: quantity(each) for name, each in matrices.items()} | {
+        "n": Fraction(size), "m": Fraction(a.shape[1]), "r": Fraction(b.shape[1]),
         "beta": BETA, "epsilon": BETA, "norm": norm,
     }  # fmt: skip
 
