@@ -171,7 +171,7 @@ def test_no_error_in_many_digits_exceeds_the_largest_error():
     for case, true, kind, moved in worst_case._steps():
         if kind.emulated:
             continue
-        computed = worst_case.Kind(algebra, worst_case.exact, True).take(case)
+        computed = worst_case.Roundings(algebra, worst_case.exact, True).take(case)
         for name, bound in moved.items():
             error = abs(getattr(computed, name) - getattr(true, name)) / fmt.unit_roundoff
             assert (error <= bound * (1 + Fraction(1, 10**20))).all(), name

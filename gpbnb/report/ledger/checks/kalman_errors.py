@@ -150,7 +150,7 @@ def cases() -> tuple[smallest.FilterCase, ...]:
 
 
 @dataclass(frozen=True)
-class Kind:
+class Roundings:
     """How to compute, how to make numbers, and which errors to take."""
 
     algebra: Algebra
@@ -168,13 +168,13 @@ class Kind:
 
 _TRACKED = rounded_algebra(tracked, rounded)
 KINDS = (
-    Kind(_TRACKED, tracked, False),
-    Kind(rounded_algebra(exact, np.vectorize(FOUR.round, otypes=[object])), exact, True),
+    Roundings(_TRACKED, tracked, False),
+    Roundings(rounded_algebra(exact, np.vectorize(FOUR.round, otypes=[object])), exact, True),
 )
 
 
 @cache
-def _steps() -> tuple[tuple[smallest.FilterCase, ComputedStep, Kind, dict[str, Matrix]], ...]:
+def _steps() -> tuple[tuple[smallest.FilterCase, ComputedStep, Roundings, dict[str, Matrix]], ...]:
     """Return for each case and kind the exact step and the errors of its quantities."""
     found = []
     for case in cases():
@@ -313,7 +313,7 @@ def _exact_run(case: smallest.FilterCase) -> list[ComputedStep]:
     return found
 
 
-def _errors_of_a_run(case: smallest.FilterCase, run: list[ComputedStep], kind: Kind) -> list[list[Matrix]]:
+def _errors_of_a_run(case: smallest.FilterCase, run: list[ComputedStep], kind: Roundings) -> list[list[Matrix]]:
     """Return for each step the errors of x, of F, of u, and of x from this step alone."""
     x, P, errors = kind.number(case.x[:, None]), kind.number(case.P), []
     for true in run:
