@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,40 +84,6 @@ class CodeStep(NamedTuple):
     def may_be_indefinite(self) -> bool:
         """Whether the step notes a covariance that is not definite."""
         return any(kind in (POSITIVE, NOT_NEGATIVE) for _, kind in self.program.checks)
-
-
-class CodeNumbers(Protocol):
-    """How the operations of a program are written for a type of number."""
-
-    @property
-    def number(self) -> str:
-        """C type of inputs, states and outputs."""
-
-    @property
-    def value(self) -> str:
-        """C type of the results of operations."""
-
-    @property
-    def may_overflow(self) -> bool:
-        """Whether an overflow ends a run."""
-
-    def constant(self, step: CodeStep, coefficient: int, member: int) -> str:
-        """Return a coefficient as a constant."""
-
-    def number_text(self, value: Fraction) -> str:
-        """Return a number of the data as a constant."""
-
-    def vector_text(self, value: float) -> str:
-        """Return a float64, or an integer in units of the data, as ``fscanf`` reads it."""
-
-    def operation(self, step: CodeStep, o: int, coefficient: str) -> str:
-        """Return the expression for an operation."""
-
-    def helpers(self, body: str) -> str:
-        """Return the functions that the statements use."""
-
-    def finite(self, step: CodeStep) -> list[str]:
-        """Return conditions under which no result has overflowed."""
 
 
 @dataclass(frozen=True)
@@ -244,9 +210,7 @@ class CodeWords:
         """Return a term of a sum in units of the accumulator."""
         o = value - program.n - program.m
         is_sum = self.words.sums is None or (o >= 0 and bool(program.wide[o]))
-        if self.integers.bits < 128 and (is_sum or self.words.gap == 0):
-            return f"r{value}"
-        return f"as_sum(r{value})" if is_sum else f"lifted(r{value})"
+        return f"r{value}" if is_sum or self.words.gap == 0 else f"lifted(r{value})"
 
     def helpers(self, body: str) -> str:
         """Return the functions that the statements use."""
@@ -255,6 +219,10 @@ class CodeWords:
     def finite(self, step: CodeStep) -> list[str]:
         """Return no conditions: each operation notes its overflow."""
         return []
+
+
+CodeNumbers = CodeFloats | CodeWords
+"""How the operations of a program are written for a type of number."""
 
 
 def limits(code: int, a: int, b: int, coefficient: str) -> str:
