@@ -462,31 +462,16 @@ def _plain(label: str, answer: Requirement) -> Answer:
 # -- the page -------------------------------------------------------------------------------------------------
 
 _STYLE = """
-:root { color-scheme: light dark; --text: #1b1b1b; --page: #fff; --soft: #f3f3f3; --line: #ccc; --grid: #ddd;
-  --c0: #0b5cad; --c1: #a3341f; --c2: #2e7d32; --c3: #7b3fa0; --c4: #7a5b00; --c5: #555 }
-@media (prefers-color-scheme: dark) {
-  :root { --text: #e8e8e8; --page: #16181b; --soft: #24272b; --line: #4a4f55; --grid: #33373c;
-    --c0: #6db3f8; --c1: #ff9c86; --c2: #7fd183; --c3: #d3a2f2; --c4: #e3c15a; --c5: #b5b5b5 }
-}
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 1rem; color: var(--text);
-  background: var(--page); overflow-wrap: anywhere }
-h1 { font-size: 1.6rem; line-height: 1.25 } h2 { font-size: 1.2rem; margin-top: 2rem }
-table { border-collapse: collapse; width: 100% } th, td { text-align: left; padding: .25rem .8rem .25rem 0;
-  vertical-align: top; border-bottom: 1px solid var(--line); overflow-wrap: break-word }
-td:first-child { min-width: 6rem } td:last-child { overflow-wrap: anywhere }
-pre { background: var(--soft); padding: .6rem; white-space: pre-wrap; overflow-wrap: anywhere; font-size: .85rem }
-svg { display: block; width: 100%; height: auto; fill: var(--text) } figure { margin: 0 }
-.legend { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; padding: 0; list-style: none; font-size: .9rem }
-.legend .mark { display: inline-block; width: 1.3rem; height: 1.3rem; vertical-align: middle }
-.legend i { display: inline-block; width: 1.4rem; border-top: .2rem solid; margin-right: .4rem; vertical-align: middle }
-.answer { font-size: 1.25rem; border-left: .3rem solid var(--c0); padding-left: .8rem }
-@media (max-width: 34rem) { svg { font-size: 20px } th, td { padding-right: .5rem } }
-@page { size: A4; margin: 14mm }
-@media print {
-  html { font-size: 11px } body { font-size: 11px; max-width: none; margin: 0; padding: 0 }
-  h2 { margin: 1rem 0 .4rem; break-after: avoid } th, td { padding-block: .1rem } .answer { font-size: 1.1rem }
-  tr, svg, figure, pre { break-inside: avoid } figure svg { width: 75% } .legend svg { width: 1.3rem }
-}
+:root { color-scheme: light dark }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 1rem;
+  overflow-wrap: anywhere }
+h1 { font-size: 1.6rem; line-height: 1.25 } h2 { font-size: 1.2rem; margin-top: 2rem; break-after: avoid }
+table { border-collapse: collapse; width: 100% } tr, pre { break-inside: avoid }
+th, td { text-align: left; padding: .25rem .8rem .25rem 0; vertical-align: top; border-bottom: 1px solid GrayText }
+th, td { overflow-wrap: break-word } td:first-child { min-width: 6rem } td:last-child { overflow-wrap: anywhere }
+pre { white-space: pre-wrap; font-size: .85rem }
+.answer { font-size: 1.25rem; border-left: .3rem solid; padding-left: .8rem }
+@page { size: A4; margin: 14mm } @media print { body { font-size: 11px; max-width: none; margin: 0; padding: 0 } }
 """
 
 
@@ -520,6 +505,10 @@ def page(report: Report) -> str:
     if report.ranges and not report.exponents:
         meant.append("These runs have unlimited exponents; the ranges below show which formats suffice.")
     rows = [(each.label, "none" if each.digits is None else str(each.digits), each.text) for each in report.answers]
+    tried = [
+        (each.label, ", ".join(f"{t}: {ratio:.3g}" for t, ratio in each.tried if ratio is not None))
+        for each in report.answers
+    ]
     parts = [
         f"<h1>Wordlength for {html.escape(report.name)}</h1>",
         f'<p class="answer">This {report.kind} {verdict}.</p>',
@@ -543,8 +532,8 @@ def page(report: Report) -> str:
         f"<h2>{what}s and bases compared</h2>",
         _table((f"{what.lower()} and basis", unit, "answer"), rows),
         *(f"<p>{html.escape(f'Left out: {name}: {why}')}.</p>" for name, why in report.lacking.items()),
-        "<h2>Error against precision</h2>",
-        _curves(report, unit, what.lower()),
+        "<h2>Error / tolerance at each precision</h2>",
+        _table((f"{what.lower()} and basis", f"{unit}: error / tolerance"), tried),
     ]
     if report.blocks:
         columns = ("block of the filter", f"{unit}, with the others", f"{unit}, alone")
@@ -557,7 +546,7 @@ def page(report: Report) -> str:
         ]
         parts += ["<h2>Error of each state at the answer</h2>", _table(("state", "error / tolerance"), body)]
     if report.ranges:
-        ranges = [(name, _power(2, low), _power(2, high)) for name, low, high in report.ranges]
+        ranges = [(name, _power(low), _power(high)) for name, low, high in report.ranges]
         parts += ["<h2>Range of the numbers</h2>", _table(("numbers", "smallest", "largest"), ranges)]
     about = "\n".join(f"{key}: {value}" for key, value in report.versions.items())
     parts += [
@@ -593,93 +582,5 @@ def _table(header: Sequence[str], body: Sequence[Sequence[str]]) -> str:
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def _power(base: int, exponent: int) -> str:
-    return f"{base}{str(exponent).translate(_SUPERSCRIPTS)}"
-
-
-_COLOURS = 6  # of _STYLE, one a form
-_MARKERS = (
-    "M-3 0a3 3 0 1 0 6 0a3 3 0 1 0 -6 0z",
-    "M-5 -5h10v10h-10z",
-    "M0 -8l8 14h-16z",
-    "M0 -11l11 11l-11 11l-11 -11z",
-    "M-11 0h22M0 -11v22",
-    "M-9 -9l18 18M9 -9l-18 18",
-    "M-11 0a11 11 0 1 0 22 0a11 11 0 1 0 -22 0z",
-    "M0 9l-10 -17h20z",
-    "M-3 -11h6v22h-6z",
-    "M-11 -3h22v6h-22z",
-    "M-7 -7h14v14h-14zM-7 -7l14 14",
-    "M0 -8l8 8l-8 8l-8 -8zM-8 0h16",
-)  # one for each form or structure; only the first is filled, and others surround it where errors are equal
-_DASHES = (("", "solid"), ("7 3", "dashed"), ("2 3", "dotted"), ("9 3 2 3", "double"))  # one a basis
-
-
-def _marker(form: int, x: float, y: float, colour: str) -> str:
-    """Draw the marker of a form or structure at a point."""
-    at, fill = form % len(_MARKERS), colour if form % len(_MARKERS) == 0 else "none"
-    return (
-        f'<path transform="translate({x:.1f} {y:.1f})" d="{_MARKERS[at]}" fill="{fill}" stroke="{colour}" '
-        'stroke-width="1.6"/>'
-    )
-
-
-def _judged(report: Report) -> str:
-    """Say which states or outputs a point of the figure judges: those with a finite tolerance."""
-    kind = "state" if report.kind == "Kalman filter" else "output"
-    kept = [name for name, most in zip(report.names, report.tolerance, strict=False) if most is not None]
-    if len(report.names) != len(report.tolerance) or not kept:
-        return f"the worst {kind}"
-    if len(kept) == 1:
-        return f"the {kind} {kept[0]}"
-    return f"the worst of the {kind}s {', '.join(kept[:-1])} and {kept[-1]}"
-
-
-def _curves(report: Report, unit: str, what: str) -> str:
-    """Draw error / tolerance against precision as inline SVG; the dashed line is the tolerance."""
-    answers = report.answers
-    points = [(t, r) for each in answers for t, r in each.tried if r is not None and r > 0]
-    if len(points) < 2:
-        return "<p>Too few precisions have a finite error for a figure.</p>"
-    left, right = min(t for t, _ in points), max(t for t, _ in points)
-    logs = [math.log10(r) for _, r in points]
-    low, high = math.floor(min(0.0, *logs)), math.ceil(max(0.0, *logs))
-
-    def place(t: float, log: float) -> tuple[float, float]:
-        return 60 + 560 * (t - left) / max(right - left, 1), 30 + 250 * (high - log) / max(high - low, 1)
-
-    drawn = []
-    for log in range(low, high + 1, max(1, (high - low) // 6)):
-        _, y = place(left, log)
-        drawn.append(f'<text x="52" y="{y + 4:.1f}" text-anchor="end">{_power(10, log)}</text>')
-        drawn.append(f'<line x1="60" x2="620" y1="{y:.1f}" y2="{y:.1f}" stroke="var(--grid)"/>')
-    for t in range(left, right + 1, max(1, (right - left) // 8)):
-        x, _ = place(t, low)
-        drawn.append(f'<text x="{x:.1f}" y="302" text-anchor="middle">{t}</text>')
-    _, one = place(left, 0)
-    drawn.append(f'<line x1="60" x2="620" y1="{one:.1f}" y2="{one:.1f}" stroke="var(--text)" stroke-dasharray="6 4"/>')
-    legend = []
-    bases = list(dict.fromkeys(each.basis for each in answers))
-    forms = list(dict.fromkeys(each.label.removesuffix(each.basis) for each in answers))
-    for each in answers:
-        form, basis = forms.index(each.label.removesuffix(each.basis)), bases.index(each.basis)
-        colour, (dash, border) = f"var(--c{form % _COLOURS})", _DASHES[basis % len(_DASHES)]
-        line = [place(t, math.log10(r)) for t, r in each.tried if r is not None and r > 0]
-        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in line)
-        drawn.append(
-            f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
-        )
-        drawn += [_marker(form, x, y, colour) for x, y in line]
-        mark = f'<svg class="mark" viewBox="0 0 24 24" aria-hidden="true">{_marker(form, 12, 12, colour)}</svg>'
-        legend.append(f'<li>{mark}<i style="border-top: .2rem {border} {colour}"></i>{html.escape(each.label)}</li>')
-    judged = html.escape(_judged(report))
-    return (
-        '<figure><svg viewBox="0 0 640 336" role="img" aria-label="Error divided by tolerance, against precision, of '
-        f'{judged}; one line for each {what} and basis" font-size="12" font-family="system-ui, sans-serif">'
-        f"{''.join(drawn)}"
-        '<text x="4" y="17">error / tolerance</text>'
-        f'<text x="340" y="329" text-anchor="middle">{html.escape(unit)}</text></svg>'
-        f'<ul class="legend">{"".join(legend)}</ul><figcaption>'
-        f"Error or bound, divided by the tolerance, of {judged}. The dashed line marks the tolerance. Colour and "
-        f"marker stand for the {what}, the kind of line for the basis.</figcaption></figure>"
-    )
+def _power(exponent: int) -> str:
+    return f"2{str(exponent).translate(_SUPERSCRIPTS)}"

@@ -32,13 +32,6 @@ def test_it_prints_on_two_pages(report):
     assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 2
 
 
-def test_the_figure_names_the_states_and_tells_the_forms_apart(report):
-    assert "position (m) and velocity (m/s)" in report.locator("figcaption").text_content()
-    marks = report.locator(".legend .mark path").evaluate_all("all => all.map(p => p.getAttribute('d'))")
-    words = [text.partition(",")[0].strip() for text in report.locator(".legend li").all_text_contents()]
-    assert len(dict(zip(words, marks, strict=True))) == len(set(marks)) == 3
-
-
 @pytest.mark.parametrize("size", tools.SIZES)
 def test_it_fits_the_window_and_axe_finds_nothing(report, size):
     report.set_viewport_size(tools.SIZES[size])
