@@ -26,7 +26,7 @@ def in_units(seconds: float) -> str:
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """What the tables show of a row."""
+    """What is printed of a row."""
     least = "" if row.least is None else f"≥ {row.least:.3g}×"
     return row.library, in_units(row.seconds), amount(row.ratio), least, row.reached
 
@@ -46,8 +46,8 @@ def write(table: Sequence[Row], about: dict[str, str], folder: Path) -> None:
         for row in table:
             least = "" if row.least is None else f"{row.least:g}"
             writer.writerow((row.task, row.library, f"{row.seconds:.4g}", f"{row.ratio:.4g}", least, row.reached))
-    header = ("task", "library", "time", "time / time of gpbnb", "to be reached", "reached")
-    body = tuple((row.task if row.library == "gpbnb" else "", *cells(row)) for row in table)
+    header = ("task", "library", "time", "time / time of gpbnb")
+    body = tuple((row.task if row.library == "gpbnb" else "", *cells(row)[:3]) for row in table)
     machine_line = "Measured on: " + ", ".join(f"{name} {value}" for name, value in about.items()) + "."
     (folder / "timings.md").write_text(
         f"{Table('timings', header, body).markdown()}\n\n{machine_line}\n", encoding="utf-8"

@@ -35,7 +35,9 @@ Search.makeSearchSummary = (html, words, anchor) => {
   const page = new DOMParser().parseFromString(html, "text/html");
   const place = (anchor && page.getElementById(anchor.slice(1))) || page.querySelector("article");
   if (!place) return null;
-  const begins = [...words].map((word) => new RegExp(`(?<![\\p{L}\\p{N}])${_escapeRegExp(word)}`, "iu"));
+  // A word may go on, a number may not: 33 is not found in 333.
+  const ends = (word) => (/^\d+$/.test(word) ? "(?!\\p{N})" : "");
+  const begins = [...words].map((word) => new RegExp(`(?<![\\p{L}\\p{N}])${_escapeRegExp(word)}${ends(word)}`, "iu"));
   let best = { found: 0 };
   for (const block of place.querySelectorAll(BLOCKS)) {
     const text = readable(block).replace(SEPARATOR, "");
