@@ -12,7 +12,6 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.kalman.exact_step import exact_step
-from gpbnb.report.processors.scaled import ScaledFilter
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = (
@@ -57,12 +56,6 @@ def run(fmt, form, given=None, z=None):
     found = Run(given, fmt, form, range(1, len(z) + 1))
     found.take(z)
     return found
-
-
-def unscaled(made):
-    """A linear filter in its own units."""
-    n, m = made.program.n, made.program.m
-    return ScaledFilter(made, np.zeros(n, np.int64), np.zeros(m, np.int64), np.zeros((0, m)))
 
 
 def exact_steps(given, z):

@@ -13,7 +13,7 @@ import gpbnb
 
 ROOT = Path(gpbnb.__file__).parent
 LONGEST_FILE = 800
-TOPICS = ("rounding", "inversion", "kalman", "guarantees", "rolling", "integration", "budget", "geometry", "processors")
+TOPICS = ("rounding", "inversion", "kalman", "guarantees", "rolling", "integration", "budget", "geometry")
 LIBRARY = (("files", "interrupts", "names"), ("arithmetic",), ("sweeps",), ("filters",), ("bounds",), ("wordlength",))
 REPORT = (
     ("display", "measurement", "confidence"),

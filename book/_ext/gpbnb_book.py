@@ -31,6 +31,7 @@ REDIRECT = """<!DOCTYPE html>
 """
 MOVED = {
     "calculators": "rounding.html#on-your-own-format",
+    "code": "processors.html#choose-a-structure",
     "contraction": "kalman.html#measure-each-step-then-add-up",
     "open": "errata.html#what-the-documents-leave-undone",
     "reading": "index.html#run-and-cite",

@@ -1,4 +1,4 @@
-"""Nonlinear examples: a vehicle seen in range and bearing, an aircraft's height, a clipped controller."""
+"""Nonlinear examples: a vehicle seen in range and bearing, and an aircraft's height."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from gpbnb.arithmetic.derivatives import jacobian
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
-from gpbnb.filters.nonlinear_system import NonlinearSystem
 
 _WIDE = FloatFormat(2, 53)
 
@@ -92,15 +91,3 @@ def _outer(turns: NDArray[np.float64], deviations: NDArray[np.float64]) -> NDArr
     for turn, deviation in zip(turns.T, deviations.tolist(), strict=True):
         found = found + np.multiply.outer(turn * deviation, turn * deviation)
     return found
-
-
-def clipped_step(fmt: Any, x: Any, u: Any) -> Any:
-    """Take a step of a PI controller whose integral x[0] and whose command stay between -1 and 1."""
-    proportional, integral = fmt.array(["0.8", "0.05"])
-    total = np.clip(x[0] + integral * u[0], -1, 1)
-    return total, np.clip(proportional * u[0] + total, -1, 1)
-
-
-def clipped_controller() -> NonlinearSystem:
-    """A PI controller with two clips, which moves a valve by the error u[0] of a level; n = m = p = 1."""
-    return NonlinearSystem(clipped_step, [0], name="a PI controller with two clips")

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from independent_filter import Arithmetic, transposed
 
-from gpbnb import BINARY32, FloatFormat, emulate
+from gpbnb import FloatFormat, emulate
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.run import Run
 from gpbnb.report.display import style
 from gpbnb.report.wordlengths import figures, study
 from gpbnb.wordlength import nonlinear_examples as examples
-from tests.step_functions import Native
+from gpbnb.wordlength.examples import turns
 
 COLLAPSE = 1791
 """The step that the book names."""
@@ -129,13 +129,7 @@ def test_the_beacon_is_tracked_behind_the_instrument():
     assert found.largest.max() < 1e-4
 
 
-def test_the_clipped_controller_is_clipped():
-    controller = examples.clipped_controller()
-    u = np.concatenate([np.ones(30), np.random.default_rng(2).uniform(-1, 1, 400)])
-    found = controller.states(BINARY32, u).to_float()
-    x, native = np.float32([0]), Native(np.float32)
-    for k, each in enumerate(native.array(u)):
-        x, y = examples.clipped_step(native, x, each.reshape(1))
-        x = np.atleast_1d(x)
-        assert found[k].tolist() == [x[0], y]
-    assert np.abs(found).max(axis=0).tolist() == [1, 1]
+def test_the_first_turn_is_that_of_the_stated_rates() -> None:
+    """0, 0.1 and 0.3 rad/s over 10 ms: 1048.576 and 3145.728 units of 2**-20 rad, rounded, and halved."""
+    y, z = 1049 / 2**21, 3146 / 2**21
+    assert turns(1).tolist() == [[[0, 0, -y, -z], [0, 0, z, -y], [y, -z, 0, 0], [z, y, 0, 0]]]

@@ -169,11 +169,6 @@ def bits_colour(fmt: HasPrecision) -> str:
     return to_hex(_RAMP(min((bits - _FEWEST) / (_MOST - _FEWEST), 1.0))).upper()
 
 
-def line_styles(count: int, markers: str = MARKERS) -> list[tuple[str, str]]:
-    """Return a marker and a colour for each of `count` curves; see :func:`colours`."""
-    return list(zip(markers, colours(count), strict=False))
-
-
 def loglog(ax: Axes) -> None:
     """Make both axes logarithmic."""
     ax.set_xscale("log")

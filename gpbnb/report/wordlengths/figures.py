@@ -2,46 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.display.style import (
     REFERENCE,
-    bits_colour,
     colours,
     label,
-    legend,
-    line_styles,
     name_ends,
 )
 
 Curve = Sequence[tuple[int, float]]
-
-
-def changes(names: Sequence[str], errors: Mapping[tuple[str, int], Sequence[float]], ax: Axes) -> list[Artist]:
-    """Draw the error for each way of computing over that for the first way; skip rejected ones.
-
-    Parameters
-    ----------
-    names : ways of computing.
-    errors : for each filter and number of bits, the error with each way, or infinity.
-    """
-    artists: list[Artist] = []
-    for ((filter_, bits), values), (marker, _) in zip(errors.items(), line_styles(len(errors), "osD^"), strict=True):
-        colour, words = bits_colour(FloatFormat(2, bits)), f"{filter_}, {bits} bits"
-        points = [(value / values[0], y) for y, value in enumerate(values) if math.isfinite(value)]
-        artists += ax.plot(*zip(*points, strict=True), marker, color=colour, mfc="none", ms=7, label=words)
-    ax.axvline(1, color=REFERENCE, lw=0.8)
-    ax.set_xscale("log")
-    ax.set_yticks(range(len(names)), names)
-    ax.invert_yaxis()
-    ax.set_xlabel("error / error with ties away and any exponent")
-    legend(ax, loc="upper center", bbox_to_anchor=(0.3, -0.18), ncols=2)
-    return artists
 
 
 def variances(found: Mapping[str, Curve], rate: float, ax: Axes) -> list[Artist]:

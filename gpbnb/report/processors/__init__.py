@@ -1,1 +1,0 @@
-"""Filters on processors: fused operations, wide accumulators and other orders of addition."""
