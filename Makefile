@@ -33,6 +33,8 @@ export HYPOTHESIS_STORAGE_DIRECTORY := $(HERE)/.cache/hypothesis
 export RUFF_CACHE_DIR := $(HERE)/.cache/ruff
 export MYPY_CACHE_DIR := $(HERE)/.cache/mypy
 export PYTHONNOUSERSITE := 1
+# Long comparisons draw other inputs each day. Slices of one day's, SLICE=0/20 to 19/20, are together the whole.
+SEED ?= $(shell date -u +%Y%m%d)
 # Without bytecode, which images of containers turn off, each process compiles up to 2,700 modules again.
 unexport PYTHONDONTWRITEBYTECODE
 unexport NUMBA_CACHE_DIR PYTHONPATH PYTHONHOME MPLBACKEND JUPYTER_PATH JUPYTER_CONFIG_PATH
@@ -72,8 +74,8 @@ test: .venv/made-for ## unit and property tests, the examples in docstrings, and
 certificates: .venv/made-for ## write a certificate of every guarantee in the book and check it; WORDS="tracker Nile" picks filters
 	$(PY) -m gpbnb.report.guarantees.certificates $(WORDS)
 
-attack: .venv/made-for ## attack guarantees of random filters with 20,000 runs, which takes most of an hour
-	$(PY) -m gpbnb.report.guarantees.attack
+attack: .venv/made-for ## attack guarantees of random filters, other ones each day; SLICE=0/20 takes a part, SEED=20261128 those of a day
+	$(PY) -m gpbnb.report.guarantees.attack --first $(SEED)0000 $(if $(SLICE),--slice $(SLICE))
 
 proof: ## check proof/guarantee.v, the theorem behind a certificate; needs Coq (apt-get install coq)
 	@mkdir -p .cache/proof
@@ -106,10 +108,10 @@ format: .venv/with-dev ## let ruff lay out the code and mend what it can
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-exactness: .venv/made-for ## more altered statements, the golden corpus, and fresh inputs compared with independent arithmetic, digit for digit; SLICE=0/10 takes a part
-	GPBNB_ALTERATIONS=more $(PY) -m pytest -q tests/ledger/test_alterations.py
+exactness: .venv/made-for ## the golden corpus, other inputs each day compared with independent arithmetic, and more altered statements; SLICE, SEED
 	$(PY) -m tests.corpus $(if $(SLICE),--slice $(SLICE))
-	$(PY) -m tests.corpus.conformance $(if $(SLICE),--slice $(SLICE))
+	$(PY) -m tests.corpus.conformance --seed $(SEED) $(if $(SLICE),--slice $(SLICE))
+	$(if $(SLICE),,GPBNB_ALTERATIONS=more $(PY) -m pytest -q tests/ledger/test_alterations.py)
 
 bench: .venv/with-bench ## timings against peers, side by side, the short formats against gfloat, and guarantees
 	$(PY) -m benchmarks

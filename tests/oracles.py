@@ -31,15 +31,6 @@ def split(x: Number, base: int, precision: int) -> tuple[int, int, int, int]:
     return *divmod(p, q), q, e
 
 
-def as_pair(x: Fraction, base: int, precision: int) -> tuple[int, int]:
-    """The normalized significand and exponent of a number of the format."""
-    if x == 0:
-        return 0, 0
-    digits, p, _, e = split(abs(x), base, precision)
-    assert p == 0
-    return (digits if x > 0 else -digits), e
-
-
 def rounded(x: Number, base: int, precision: int, nearest: bool) -> Number:
     """The number of `precision` digits nearest to x, half away from zero; or x with the further digits dropped."""
     if x < 0:
@@ -63,16 +54,6 @@ def square_root(x: Fraction, base: int, precision: int, nearest: bool) -> Fracti
     if nearest and (2 * root + 1) ** 2 <= 4 * square:
         root += 1
     return root * Fraction(base) ** e
-
-
-def numbers_below(limit: int, base: int, precision: int) -> list[int]:
-    """All integers from 0 to `limit`, and the first beyond, that have at most `precision` digits and then zeros."""
-    numbers = list(range(base**precision))
-    step = base
-    while numbers[-1] <= limit:
-        numbers += range(base**precision // base * step, base**precision * step, step)
-        step *= base
-    return numbers
 
 
 class Arithmetic:

@@ -282,15 +282,8 @@ class PlainFilter:
         return [r(a + b) for a, b in zip(ahead, change, strict=True)], U
 
 
-def factors_of_two(seed, spread):
-    return np.random.default_rng([seed, 1]).integers(-spread, spread + 1, 3)
-
-
-def case(motion, seed, spread=0, **options):
-    """A model that passes a beacon, so that its bearing crosses π, with measurements of 50 steps.
-
-    The covariances are multiplied by random powers of two up to `spread`. The options are those of the model.
-    """
+def case(motion, seed):
+    """A model that passes a beacon, so that its bearing crosses π, with measurements of 50 steps."""
     rng = np.random.default_rng(seed)
     n = motion.n
     Q = np.diag([2.0**-8] * n)
@@ -298,9 +291,8 @@ def case(motion, seed, spread=0, **options):
     P0 = np.eye(n) + 2.0**-3
     x0 = [4.0, -1.5, 2.0, 0.25][:n]
     u = np.round(rng.normal(size=(STEPS, 2)) * 0.2, 3) + np.array([-0.2, 0.05])
-    Q, R, P0 = (each * 2.0**power for each, power in zip((Q, R, P0), factors_of_two(seed, spread), strict=True))
     sight = Ranges(["0.3", "0.2"])
-    model = NonlinearModel(motion.emulated, None, sight.emulated, None, Q, R, x0, P0, u=u, angles=[1], **options)
+    model = NonlinearModel(motion.emulated, None, sight.emulated, None, Q, R, x0, P0, u=u, angles=[1])
     x, z = np.array(x0), []
     for k in range(STEPS):
         fmt = FloatFormat(2, 53)
@@ -308,21 +300,10 @@ def case(motion, seed, spread=0, **options):
         a, b = 0.3 - x[0], 0.2 - x[1]
         bearing = np.arctan2(b, a) + rng.normal() / 16
         z.append([np.hypot(a, b) + rng.normal() / 4, (bearing + np.pi) % (2 * np.pi) - np.pi])
-    exactly = [[[Fraction(a) for a in row] for row in each] for each in (Q.tolist(), R.tolist(), P0.tolist())]
-    return model, np.round(z, 4), sight, (exactly[0], exactly[1], [Fraction(a) for a in x0], exactly[2]), u
+    return model, np.round(z, 4)
 
 
 MOTIONS = {motion.n: motion for motion in (Moving(), Turning(), Coasting())}
-
-
-def plain_estimates(filter_, z, u):
-    for measured, known in zip(z.tolist(), u.tolist(), strict=True):
-        filter_.step(measured, known)
-        yield list(filter_.x)
-
-
-UNSCENTED = {"method": "unscented", "points": ("0.5", 2, 1)}
-"""Options of the model whose filter is the next one."""
 
 
 class PlainUnscented(PlainFilter):

@@ -13,16 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Requirement, Rounding, linalg, required_precision
-from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.bounds.guarantee import guarantee
 from gpbnb.filters.emulation import emulate
-from gpbnb.filters.named import form_named, whole_number
 from gpbnb.filters.run import Sums
-from gpbnb.filters.simulation import Simulation
-from gpbnb.report.budget import theory as budget
-from gpbnb.report.rounding import theory
-from gpbnb.sweeps import plain_integer, plain_number
-from gpbnb.wordlength.models import read_model
 from gpbnb.wordlength.records import survey_records
 
 # GPBNB_EXAMPLES=20000 tries more.
@@ -129,13 +122,6 @@ def test_functions_as_models(value, place):
 
 
 @MANY
-@given(st.one_of(matrices, st.sampled_from(["Phi", "", "ud", "Cholesky"])))
-def test_inputs_read_from_a_mapping(value):
-    accepted(read_model, GOOD | {"B": [[1]]}, value)
-    accepted(form_named, value)
-
-
-@MANY
 @given(st.sampled_from(["A", "B", "C", "D", "x0"]), matrices)
 def test_linear_systems(letter, value):
     accepted(LinearSystem, **({"A": [["0.5"]], "B": [[1]]} | {letter: value}))
@@ -173,27 +159,6 @@ def test_arrays(values):
     accepted(FloatFormat(2, 24, Rounding.CHOP).array, values)
 
 
-@MANY
-@given(numbers, matrices)
-def test_small_readers_and_bounds(number, values):
-    for call in (plain_number, plain_integer):
-        if isinstance(number, str):
-            accepted(call, number)
-    for call in (form_named, rounding_named, lambda each: whole_number("steps", each)):
-        assert not accepted(call, number) or not isinstance(number, bool)
-    if not isinstance(values, str):  # a path, and OSError is documented
-        accepted(read_model, values)
-    accepted(theory.strict_sum_bound, values, Fraction(1, 2**24))
-    accepted(Simulation, MODEL, (0.0,), 0, number)
-
-
-@MANY
-@given(st.text(max_size=60))
-def test_budgets(text):
-    accepted(budget.parse, text)
-    accepted(budget.parse, "name,kind,form,error_mas\n" + text)
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -205,18 +170,6 @@ def test_budgets(text):
 def test_measurements_that_are_none(given, message):
     with pytest.raises(ValueError, match=message):
         required_precision(**{"model": MODEL, "z": Z, "tolerance": 0.1} | given)
-
-
-@pytest.mark.parametrize("model", [MODEL, LinearSystem([["0.3"]], [["0.1"]])])
-def test_a_tolerance_that_no_precision_meets_gives_no_warning(model):
-    found = required_precision(model, Z, 5e-324)
-    assert found.format is None
-    assert found.tried[-1][1] > 1
-
-
-def test_too_many_steps_are_refused_before_they_are_simulated():
-    with pytest.raises(ValueError, match=r"got 1000000000000 steps; needed .* at most 100,000,000"):
-        required_precision(MODEL, 10**12, 0.1)
 
 
 @pytest.mark.parametrize(

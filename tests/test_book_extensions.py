@@ -11,7 +11,6 @@ import pytest
 from docutils import nodes
 from docutils.utils import new_document
 from sphinx.application import Sphinx
-from sphinx.errors import ConfigError
 from sphinx.util.docutils import docutils_namespace
 
 from gpbnb.names import HOMES, NAMED_FORMATS
@@ -46,21 +45,6 @@ def test_a_field_in_one_line_becomes_two(section):
     rule = "-" * len(section)
     found = unfolded("About : f.", "", section, rule, "x, *args : the numbers: all", "    and more : of it", "")
     assert found == ["About : f.", "", section, rule, "x, *args", "    the numbers: all", "    and more : of it", ""]
-
-
-def test_other_sections_stay_as_they_are():
-    lines = (
-        "Parameters",
-        "----------",
-        "x : one",
-        "References",
-        "----------",
-        "Higham : 2002",
-        "Notes",
-        "-----",
-        "a : b",
-    )
-    assert unfolded(*lines) == [*lines[:2], "x", "    one", *lines[3:]]
 
 
 @pytest.mark.parametrize(
@@ -117,14 +101,6 @@ def app(folder, builder="html"):
     )
 
 
-def test_a_page_that_moved_leads_to_its_place(tmp_path):
-    (tmp_path / "book").mkdir()
-    book.write_redirects(app(tmp_path), None)
-    assert {path.stem for path in (tmp_path / "book").iterdir()} == set(book.MOVED)
-    for name, target in book.MOVED.items():
-        assert f"url={target}" in (tmp_path / "book" / f"{name}.html").read_text(encoding="utf-8")
-
-
 def test_no_page_that_moved_is_still_there():
     there = {path.stem for path in FOLDER.parent.glob("*.*")}
     assert there.isdisjoint(book.MOVED)
@@ -147,13 +123,6 @@ def test_a_number_is_one_word_of_the_search(text, words):
     assert search.Numbers({}).split(text) == words
 
 
-def test_mathjax_loads_the_parts_that_come_along():
-    settings = (FOLDER.parents[1] / "_config.yml").read_text(encoding="utf-8")
-    listed = re.search(r"^        load: \[(.*)\]$", settings, re.MULTILINE)[1].replace('"', "").split(", ")
-    files = {f"{part.replace('[tex]', 'input/tex/extensions')}.js" for part in listed}
-    assert files | {"startup.js", "output/chtml/fonts"} == set(weight.MATHJAX_PARTS)
-
-
 @pytest.mark.parametrize(("equations", "kept"), [({"book/a": True}, 3), ({"book/b": True}, 1), ({}, 1)])
 def test_mathjax_is_left_out_where_a_page_has_no_formula(equations, kept):
     """Sphinx asks the pages below a page, too."""
@@ -168,26 +137,6 @@ def test_mathjax_is_left_out_where_a_page_has_no_formula(equations, kept):
     weight.leave_out_mathjax(made, "book/a", "page.html", context, None)
     assert len(context["script_files"]) == kept
     assert scripts[2] in context["script_files"]
-
-
-STYLES = """@import "a;b{c";
-.used { color: red } /* .used{ */ .unused, .used > p:not(.unused) { content: "}" } .unused{}
-:is(.used, .unused), .w-50\\% { margin: 0 } a[href=".x"] {b:c}
-@media print { .unused { d: e } .used { f: g } } @media screen { .unused { h: i } }
-@font-face { font-family: "x" }"""
-
-
-def test_rules_stay_that_fit_a_class_of_a_page_or_no_class():
-    kept = [
-        '@import "a;b{c";',
-        ".used{ color: red }",
-        ' .used > p:not(.unused){ content: "}" }',
-        ":is(.used, .unused){ margin: 0 }",
-        'a[href=".x"]{b:c}',
-        "@media print{.used{ f: g }}",
-        '@font-face{ font-family: "x" }',
-    ]
-    assert weight.applying(STYLES, {"used"}) == "".join(kept)
 
 
 # -- the ledger's rows as labels, its formulas and links -----------------------------------------------
@@ -224,18 +173,6 @@ def tree(html):
 def html_of(document):
     _, raw = document.findall(nodes.raw)
     return raw
-
-
-@pytest.mark.parametrize(
-    ("html", "wanted"),
-    [('<span class="math notranslate">\\(x\\)</span>', {"book/errata": True}), ("<table></table>", {})],
-)
-def test_mathjax_is_asked_for_where_html_has_formulas(html, wanted):
-    data = {"has_equations": {}}
-    math = SimpleNamespace(data=data)
-    env = SimpleNamespace(docname="book/errata", get_domain={"math": math}.__getitem__)
-    ledger.ask_for_mathjax(SimpleNamespace(env=env), tree(html))
-    assert data["has_equations"] == wanted
 
 
 LINKS = (
@@ -327,20 +264,3 @@ def test_a_published_book_has_full_addresses(build, given):
     assert f'<meta property="og:url" content="{there}/book/second.html">' in page
     assert f'<link rel="canonical" href="{there}/book/second.html"' in page
     assert f"<loc>{there}/book/second.html</loc>" in (html / "sitemap.xml").read_text(encoding="utf-8")
-
-
-def test_the_environment_has_priority_and_no_address_is_needed(build):
-    page = build("https://new.example.org", "https://old.example.org") / "book" / "second.html"
-    assert 'content="https://new.example.org/_static' in page.read_text(encoding="utf-8")
-    page = build() / "book" / "second.html"
-    text = page.read_text(encoding="utf-8")
-    assert '<meta property="og:image" content="../_static/preview.png">' in text
-    assert "og:url" not in text
-    assert "canonical" not in text
-
-
-@pytest.mark.parametrize("given", ["example.org", "/srv/book", "https://", "https://example.org/?page=1"])
-def test_an_address_that_is_none_is_refused(monkeypatch, given):
-    monkeypatch.setenv("BOOK_ADDRESS", given)
-    with pytest.raises(ConfigError, match="needed one such as https://"):
-        metadata.read_address(None, SimpleNamespace(html_baseurl=""))

@@ -190,42 +190,6 @@ def test_random_inputs_agree_with_the_package(page, name):
     assert np.median(relative) < 1e-13  # no tolerance is so wide that a lost digit would pass
 
 
-def test_the_walk_keeps_its_digits_where_its_formula_cancels(page):
-    small = [10.0**-k for k in range(1, 13)]
-    walks = page.evaluate(
-        "all => all.map(m => gpbnbCalculators.formulas.integration({sigma: 1, omega: m, rate: 1}).walk)", small
-    )
-    assert walks == pytest.approx([mu / 6 - mu**3 / 360 + mu**5 / 15120 for mu in small], rel=1e-11)
-    assert walks[3:] == pytest.approx([mu / 6 for mu in small[3:]], rel=1e-9)
-    # Both sides of the place where the script changes its formula.
-    below, above = page.evaluate(
-        "all => all.map(m => gpbnbCalculators.formulas.integration({sigma: 1, omega: m, rate: 1}).walk)",
-        [4.0, math.nextafter(4, 5)],
-    )
-    assert below == pytest.approx(above, rel=1e-15)
-
-
-@pytest.mark.parametrize(("base", "precision"), [(2, 1), (2, 3), (3, 2), (10, 1), (10, 2)])
-def test_chopping_never_reaches_the_sharper_bound_but_comes_near(base, precision):
-    beta, low = Fraction(1, base ** (precision - 1)), base ** (precision - 1)
-    worst = max((x - int(x)) / x for x in (Fraction(i, 500) for i in range(500 * low, 500 * base * low)))
-    assert Fraction(9, 10) * beta / (1 + beta) < worst < beta / (1 + beta)
-
-
-@pytest.mark.parametrize(("k", "n", "m"), [(1, 1, 1), (3, 2, 1), (40, 4, 3)])
-def test_forgotten_inputs_are_bounded_term_by_term(k, n, m):
-    """The sum of (a_0 + a_i) f^(k-i), each a_i counted step by step, is not above the coefficient of the last line."""
-    more = report_bounds.covariance_count(n, m)
-    loops = [report_bounds.transition_count(n, m) + j * more for j in range(k)]
-    counts = [sum(loops[i:]) + report_bounds.input_count(n, m) + (i - 1) * more for i in range(1, k + 1)]
-    for f in (0.0, 0.3, 0.97, 1.0):
-        given = {"k": k, "n": n, "m": m, "x": 1, "u": 1, "f": f, "b": 10, "goal": 1}
-        last = float(kalman_reference(given)["b5"][0])
-        total = sum((sum(loops) + a) * f ** (k - i) for i, a in enumerate(counts, 1))
-        assert total <= last * (1 + 1e-12)
-        assert last <= 2.5 * total
-
-
 # -- forms -----------------------------------------------------------------------------------------
 
 
@@ -279,13 +243,6 @@ def test_no_result_stands_beside_an_invalid_field(page, name, typed, message):
     assert results.all_inner_texts() == before[0]
 
 
-def test_a_message_names_the_cure(page):
-    field(page, "kalman", "f").fill("1.1")
-    assert "grows as its power k − 1" in field(page, "kalman", "f", "-error").inner_text()
-    field(page, "rounding", "t").fill("1")
-    assert cell(page, "rounding", "gamma") == "none: nβ is 500; needed less than 1; use more digits or fewer operations"
-
-
 def test_sliders_choices_and_examples_fill_the_form(page):
     field(page, "rounding", "t", "-slider").focus()
     page.keyboard.press("ArrowRight")
@@ -302,15 +259,3 @@ def test_sliders_choices_and_examples_fill_the_form(page):
     assert cell(page, "rounding", "beta") == "1.110\u00a0×\u00a010⁻¹⁶"
     field(page, "deroll", "drift").fill("\u22121")  # the minus sign of a typesetter
     assert field(page, "deroll", "drift", "-error").inner_text().startswith("Got -1; needed a number from 1e-9 to 1e9")
-
-
-def test_each_control_has_a_name(page):
-    for name in REFERENCES:
-        form = page.locator(f"#calculator-{name}")
-        labels = [text.split("\n")[0].strip() for text in form.locator("label").all_inner_texts()]
-        for label in labels:
-            if label.startswith("Rounding ") or label == "Rounding":
-                assert form.get_by_role("combobox", name="Rounding").count() == 1
-            else:
-                assert form.get_by_role("textbox", name=label, exact=True).count() == 1
-                assert form.get_by_role("slider", name=f"{label}, slider", exact=True).count() == 1

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import runpy
 from pathlib import Path
-from typing import Any, NoReturn
 
 import pytest
 from forks import answering
@@ -78,19 +76,3 @@ def test_tables_are_written_below_the_working_directory_by_default(monkeypatch, 
     assert written == [Path(".cache/sweeps")] * len(SWEEPS)
     assert stored() == before
     assert len(capsys.readouterr().out.splitlines()) == len(SWEEPS)
-
-
-@pytest.mark.filterwarnings("ignore:.*found in sys.modules")  # a module that is imported is run once more
-@pytest.mark.parametrize("name", COMMANDS)
-def test_an_interrupted_command_ends_in_one_line(
-    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def interrupt(*_: Any, **__: Any) -> NoReturn:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("argparse.ArgumentParser.parse_args", interrupt)
-    monkeypatch.setattr("sys.argv", [name])
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_module(name, run_name="__main__", alter_sys=False)
-    assert ended.value.code == 130
-    assert capsys.readouterr().err == f"python -m {name}: interrupted\n"

@@ -19,16 +19,6 @@ def test_compared_operations_are_counted(tmp_path):
         evidence.operations(file)
 
 
-def test_builds_of_generated_code_are_counted(tmp_path):
-    file = tmp_path / "code.md"
-    head = "| format | combinations | builds | different |\n| --- | --- | --- | --- |\n"
-    file.write_text(head + "| int16 | 400 | 1,997 | 3 |\n| words | 2 | 10 | 0 |\n")
-    assert evidence.compiled(file) == Checked(2010, 3)
-    file.write_text("| format | steps |\n| --- | --- |\n| int16 | 1 |\n")
-    with pytest.raises(ValueError, match="needed the columns 'builds' and 'different'"):
-        evidence.compiled(file)
-
-
 def test_a_run_beyond_its_bound_is_wrong(monkeypatch):
     row = evidence.survey.load()[0]
     monkeypatch.setattr(
@@ -39,12 +29,6 @@ def test_a_run_beyond_its_bound_is_wrong(monkeypatch):
     assert evidence.attacks() == Checked(kalman.runs + 2 * row.runs, 1)
     monkeypatch.setattr(evidence.filters, "load", lambda: (kalman._replace(chosen="1.001"),))
     assert evidence.attacks().wrong == 2
-
-
-def test_a_worst_error_beyond_its_bound_is_wrong(monkeypatch):
-    rows = [row for row in evidence.scalar.load() if row.result == "compared"][:3]
-    monkeypatch.setattr(evidence.scalar, "load", lambda: (*rows[:2], rows[2]._replace(ratio="1.01")))
-    assert evidence.true_errors() == Checked(3, 1)
 
 
 def test_nothing_that_the_page_counts_disagrees():

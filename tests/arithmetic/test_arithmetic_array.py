@@ -55,26 +55,6 @@ class TestConversion:
             with pytest.raises(OverflowError, match="within the range of float64"):
                 x.to_float()
 
-    @pytest.mark.parametrize(
-        ("value", "expected"),
-        [
-            (Fraction(2) ** 1024 - Fraction(2) ** 970 - 1, float.fromhex("0x1.fffffffffffffp1023")),
-            (Fraction(2) ** 1024 - Fraction(2) ** 970, None),
-            (Fraction(2) ** -1075, None),  # halfway between zero and the smallest: even is zero
-            (Fraction(2) ** -1075 + Fraction(2) ** -1200, 5e-324),
-            (Fraction(2) ** -1074 * Fraction(3, 2), 1e-323),
-            (Fraction(2) ** 53 + 1, 2.0**53),
-            (Fraction(0), 0.0),
-        ],
-    )
-    def test_edges_of_float64(self, value: Fraction, expected: float | None) -> None:
-        x = FloatFormat(2, 1100).array([value, -value])
-        if expected is None:
-            with pytest.raises(OverflowError, match="within the range of float64"):
-                x.to_float()
-        else:
-            assert x.to_float().tolist() == [expected, -expected]
-
     def test_kinds_of_result(self) -> None:
         x = D4.array([["1.5", "-2"], ["0", "1e-3"]])
         assert x.to_float().dtype == np.float64
@@ -128,15 +108,6 @@ class TestText:
         assert str(B8.array("2/3")) == "0.66797"  # 171 / 256 = 0.66796875
         assert str(FloatFormat(2, 8, CHOP).array(Fraction(171, 512))) == "0.33399"
 
-    def test_a_value_too_far_for_decimal_digits_has_a_repr_too(self) -> None:
-        x = B8.array(3)
-        for _ in range(30):
-            x = x * x
-        assert "*2**" in repr(x)
-
-    def test_long_arrays_are_shortened(self) -> None:
-        assert str(D4.array(range(2000))) == "[   0    1    2 ... 1997 1998 1999]"
-
 
 class TestArithmetic:
     X = D4.array([["1.5", "-2", "0.25"], ["3", "4", "-0.5"]])
@@ -160,14 +131,6 @@ class TestArithmetic:
         for comparison in (operator.eq, operator.ne, operator.lt, operator.le, operator.gt, operator.ge):
             assert np.array_equal(comparison(self.X, other), comparison(self.X, y))
             assert np.array_equal(comparison(other, self.X), comparison(y, self.X))
-
-    def test_signs(self) -> None:
-        x = D4.array(["1.5", "-2", "0"])
-        assert str(-x) == "[-1.5    2    0]"
-        assert str(abs(x)) == "[1.5   2   0]"
-        assert +x is x
-        assert str(np.negative(x)) == str(-x)
-        assert str(np.abs(x)) == str(np.fabs(x)) == str(abs(x))
 
     def test_numpy_functions(self) -> None:
         x, y = self.X, self.X * 2
@@ -240,20 +203,6 @@ class TestArithmetic:
         assert np.all(np.multiply.reduce(x, axis=1) == np.prod(x, axis=1))
         assert np.all(np.prod(x, axis=1) == x[:, 0] * x[:, 1] * x[:, 2])
 
-    def test_sums_of_nothing(self) -> None:
-        assert D4.array([]).sum() == 0
-        assert D4.array([]).prod() == 1
-        assert np.all(D4.array(np.zeros((0, 3))).sum(0) == D4.array([0, 0, 0]))
-        assert np.all(D4.array(np.zeros((0, 3))).prod(0) == D4.array([1, 1, 1]))
-        assert D4.array(np.zeros((3, 0))).sum(0).shape == (0,)
-        assert D4.array(5).sum() == 5
-
-    def test_truth_and_float(self) -> None:
-        assert D4.array(1)
-        assert not D4.array(0)
-        assert D4.array([["-1"]])
-        assert float(D4.array(["0.5"])) == 0.5
-
     def test_copies(self) -> None:
         x = self.X[:, ::2].T
         for y in (copy.copy(x), copy.deepcopy(x), pickle.loads(pickle.dumps(x))):
@@ -289,10 +238,6 @@ class TestArithmetic:
             with pytest.raises(AttributeError):
                 setattr(x, name, None)
 
-    def test_not_hashable(self) -> None:
-        with pytest.raises(TypeError, match="unhashable"):
-            hash(self.X)
-
 
 class TestMatmul:
     def test_stacks(self) -> None:
@@ -312,13 +257,6 @@ class TestMatmul:
                 left = a if a.ndim <= 2 else np.broadcast_to(a, (*stack, *a_shape[-2:]))[index]
                 right = b if b.ndim <= 2 else np.broadcast_to(b, (*stack, *b_shape[-2:]))[index]
                 assert np.array_equal(found[index], left @ right)
-
-    def test_of_nothing(self) -> None:
-        for a_shape, b_shape in [((2, 0), (0, 3)), ((0,), (0,)), ((0, 2), (2, 3)), ((4, 2, 0), (0, 3))]:
-            a, b = D4.array(np.zeros(a_shape)), D4.array(np.zeros(b_shape))
-            expected = np.zeros(a_shape) @ np.zeros(b_shape)
-            assert (a @ b).shape == expected.shape
-            assert np.all(a @ b == 0)
 
     def test_plain_operands(self) -> None:
         x = D4.array([[1, 2], [3, 4]])
@@ -363,12 +301,6 @@ class TestLeavingTheFormat:
         stream.seek(0)
         assert np.load(stream).tolist() == [0.5, -2.0, 0.0]
         assert pickle.loads(pickle.dumps(self.LONG)).tolist() == self.LONG.tolist()
-
-    def test_numbers_below_the_normal_ones_count(self) -> None:
-        tiny = FloatFormat(2, 2).array(Fraction(3, 2**1075))  # 1.5 times the least subnormal number
-        with pytest.raises(ValueError, match="is no float64"):
-            float(tiny)
-        assert float(FloatFormat(2, 2).array(Fraction(1, 2**1074))) == 5e-324
 
     def test_the_nearest_and_the_exact_are_asked_for(self) -> None:
         assert self.TENTH.to_float().tolist() == [0.1, 0.5]

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gpbnb import LinearModel
 from gpbnb.arithmetic import definiteness
 from gpbnb.arithmetic.definiteness import factor, is_definite
 from gpbnb.arithmetic.rational import exact
@@ -65,15 +64,3 @@ def test_definite_matrices_are_told_from_those_that_miss_it_by_the_least(n, with
     for change, definite in ((Fraction(1, 10**50), True), (-Fraction(1, 10**50), False)):
         changed = singular + change * exact(np.eye(n, dtype=int))
         assert is_definite(changed, strictly=True) is is_definite(changed) is definite
-
-
-def test_a_large_model_is_checked_without_elimination(without_elimination):
-    n, rng = 40, np.random.default_rng(5)
-    G, few = rng.standard_normal((n, n)), rng.standard_normal((n, 3))
-    model = LinearModel(0.9 * np.eye(n), rng.standard_normal((2, n)), few @ few.T, np.eye(2), np.zeros(n), G @ G.T)
-    assert model.n == n
-    (repair,) = model.repairs
-    assert repair.letter == "Q"
-    assert 0 < repair.shift < 2.0**-40
-    with pytest.raises(ValueError, match="got P0 with a least eigenvalue near -1; needed a positive semidefinite"):
-        LinearModel(np.eye(n), np.eye(n)[:2], np.eye(n), np.eye(2), np.zeros(n), np.diag([*np.ones(n - 1), -1.0]))

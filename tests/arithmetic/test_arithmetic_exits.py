@@ -14,7 +14,6 @@ import statistics
 import struct
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -219,15 +218,6 @@ def test_exits_open_again_after_the_run_and_for_code_of_the_library():
     assert x.to_float().tolist() == NUMBERS
 
 
-def test_runs_nest():
-    with kept_in(FMT) as outer:
-        x = outer.array(NUMBERS)
-        with kept_in(replace(FMT, precision=20)) as inner, pytest.raises(TypeError, match=r"needed all .*precision=20"):
-            float(inner.array(1))
-        with pytest.raises(TypeError, match=r"needed all .*precision=11"):
-            float(x[0])
-
-
 def test_other_threads_are_free_and_those_of_the_function_are_not():
     begun, ended = threading.Event(), threading.Event()
     found = []
@@ -265,18 +255,6 @@ def test_peeked_numbers_arrive_after_the_run_unless_nothing_is_searched():
             pool.submit(lambda: peek(x[1], lambda each: seen.append(float(each)))).result(60)
         assert len(seen) == 1
     assert seen[1:] == [(FMT.array(NUMBERS) / 3).to_float().tolist(), "inner 0.5", 0.75]
-
-
-def test_peeked_numbers_of_a_run_that_fails_arrive_too():
-    seen = []
-
-    def fails(fmt):
-        peek("before the end", seen.append)
-        return 1 / fmt.array(0)
-
-    with kept_in(FMT) as fmt, pytest.raises(ZeroDivisionError):
-        fails(fmt)
-    assert seen == ["before the end"]
 
 
 # -- questions -------------------------------------------------------------------------------------------------------

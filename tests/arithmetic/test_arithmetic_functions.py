@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import pickle
 from fractions import Fraction
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,8 +12,7 @@ import pytest
 from gpbnb import FloatFormat, Rounding
 from gpbnb.arithmetic import elementary
 from gpbnb.arithmetic.elementary import ELEMENTARY
-from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
+from gpbnb.arithmetic.named import BFLOAT16, BINARY32
 
 FORMATS = [FloatFormat(2, 11), FloatFormat(10, 4), FloatFormat(2, 113), FloatFormat(2, 24, Rounding.CHOP)]
 
@@ -115,13 +113,6 @@ def test_reductions_keep_dimensions(name, fmt):
             assert np.array_equal(getattr(x, name)(axis), flat), axis
 
 
-def test_ufuncs_reduce(fmt):
-    x = drawn(fmt, 3, 4)
-    for ufunc, method in ((np.add, x.sum), (np.multiply, x.prod), (np.maximum, x.max), (np.minimum, x.min)):
-        assert ufunc.reduce(x).tolist() == method(0).tolist()
-        assert ufunc.reduce(x, axis=1, keepdims=True).tolist() == method(1, keepdims=True).tolist()
-
-
 def test_finding_and_comparing_rounds_nothing(fmt):
     x = fmt.array(np.random.default_rng(3).integers(-3, 4, (4, 6)) / 2)  # with ties and zeros
     rows = x.to_float()
@@ -170,18 +161,6 @@ def test_closeness_is_computed_exactly_from_any_numbers():
     assert np.allclose(x, FloatFormat(2, 8).array(1))
 
 
-def test_differences_are_one_subtraction_each(fmt):
-    x = drawn(fmt, 3, 5)
-    rows = x.to_fractions()
-    assert np.diff(x).tolist() == [[fmt.round(b - a) for a, b in pairwise(row)] for row in rows]
-    assert np.diff(x, axis=0).tolist() == (x[1:] - x[:-1]).tolist()
-    assert np.diff(x, 2).tolist() == np.diff(np.diff(x)).tolist()
-    assert np.diff(x, n=0).tolist() == x.tolist()
-    solid = fmt.array(np.arange(24).reshape(2, 3, 4) % 7)
-    for axis in range(3):
-        assert (np.diff(solid, axis=axis).to_float() == np.diff(solid.to_float(), axis=axis)).all()
-
-
 def test_products_of_vectors_and_diagonals(fmt):
     a, b, cube = drawn(fmt, 3, 3), drawn(fmt, 2, 4), drawn(fmt, 2, 2, 3)
     for first, second in ((a[0], b[0]), (a[0], b), (b, a[0]), (a, cube), (b[0], 2)):
@@ -215,33 +194,6 @@ def test_stochastic_rounding_of_elementary_functions_has_the_exact_mean():
     up = (math.e - 2.5) / 0.25  # between the neighbours 2.5 and 2.75
     assert set(found) == {2.5, 2.75}
     assert abs(np.mean(found == 2.75) - up) < 4 * math.sqrt(up * (1 - up) / count)  # four standard errors
-
-
-def test_elementary_functions_at_exact_points_and_outside():
-    fmt = FloatFormat(2, 24)
-    assert np.exp(fmt.array(0)).item() == 1
-    assert np.log(fmt.array(1)).item() == 0
-    assert np.sin(fmt.array([0])).tolist() == [0]
-    for name, value in (("log", 0), ("log", -1), ("arcsin", 2)):
-        with pytest.raises(ValueError, match=f"got np.{name} of .*finite and real"):
-            getattr(np, name)(fmt.array(value))
-
-
-@pytest.mark.parametrize(("fmt", "high"), [(BINARY16, 12), (FixedFormat(3, 8), 7.5)], ids=["binary16", "fixed"])
-def test_elementary_functions_name_themselves_and_the_entry(fmt, high):
-    with pytest.raises(OverflowError, match=r"^np\.exp at \[1\]: got a result of about .*; needed"):
-        np.exp(fmt.array([1, high]))
-    with pytest.raises(OverflowError, match=r"^np\.exp: got a result"):
-        np.exp(fmt.array(high))
-    with pytest.raises(ValueError, match=r"got np\.log of 0\.0 at \[1, 0\]; needed"):
-        np.log(fmt.array([[1], [0]]))
-
-
-def test_unknown_names_give_the_nearest():
-    x = FloatFormat(2, 24).array([1, 2])
-    with pytest.raises(AttributeError, match=r"the nearest is x\.to_fractions"):
-        x.to_fraction  # noqa: B018
-    assert not hasattr(x, "nothing_like_it_at_all")
 
 
 @pytest.mark.parametrize(

@@ -119,21 +119,6 @@ class TestPivoting:
             assert linalg.lu(a, pivot=True).permutation.tolist() == [1, 0]
         assert linalg.lu(fmt.array([[-4, 1], [fmt.largest, 1]]), pivot=True).permutation.tolist() == [0, 1]
 
-    def test_nothing_is_swapped_for_an_equal(self) -> None:
-        a = self.FMT.array([[2, 1], [-2, 5]])
-        assert linalg.lu(a, pivot=True).permutation.tolist() == [0, 1]
-
-    def test_multipliers_move_with_their_rows(self) -> None:
-        a = self.FMT.array([[4, 1, 0], [1, 1, 1], [2, 8, 3]])
-        found = linalg.lu(a, pivot=True)
-        assert found.permutation.tolist() == [0, 2, 1]
-        assert str(found.lower[1:, 0]) == "[ 0.5 0.25]"
-
-    def test_without_it_rows_stay(self) -> None:
-        a = self.FMT.array([[1, 2], [100, 3]])
-        assert linalg.lu(a).permutation.tolist() == [0, 1]
-        assert linalg.lu(a).lower[1, 0] == 100
-
 
 class TestSingular:
     FMT = FloatFormat(10, 4)
@@ -154,12 +139,6 @@ class TestSingular:
             linalg.inv(a)
         assert str(linalg.inv(a, pivot=True)) == "[[-0.1667  0.3333]\n [    0.5       0]]"
 
-    def test_singular_only_in_few_digits(self) -> None:
-        a = [["1", "1"], ["1", "1.0001"]]
-        with pytest.raises(np.linalg.LinAlgError, match="use more decimal digits"):
-            linalg.inv(self.FMT.array(a), pivot=True)
-        assert str(linalg.inv(FloatFormat(10, 5).array(a))[1, 1]) == "10000"
-
 
 def test_shapes() -> None:
     fmt = FloatFormat(10, 4)
@@ -171,16 +150,6 @@ def test_shapes() -> None:
     assert linalg.dot(fmt.array([1, 2]), fmt.array([3, 4])).shape == ()
     assert linalg.matmul(fmt.array(np.ones((5, 2, 3))), fmt.array(np.ones((3, 4)))).shape == (5, 2, 4)
     assert linalg.matmul(a, fmt.array([1, 2])).shape == (2,)
-
-
-def test_operands_do_not_change() -> None:
-    fmt = FloatFormat(10, 4)
-    a, b = fmt.array([[1, 2], [3, 4]]), fmt.array([5, 6])
-    before = repr(a), repr(b)
-    linalg.solve(a, b, pivot=True)
-    found = linalg.lu(a, pivot=True)
-    found.permutation[:] = 0
-    assert (repr(a), repr(b)) == before
 
 
 @pytest.mark.parametrize("fmt", [FloatFormat(10, 2), FloatFormat(2, 4, "even")], ids=str)

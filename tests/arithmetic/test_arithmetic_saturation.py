@@ -15,9 +15,7 @@ import gpbnb
 from gpbnb import (
     BINARY32,
     DECIMAL32,
-    FixedFormat,
     FloatFormat,
-    Rounding,
 )
 from gpbnb.arithmetic.kernels.backends import Compiled
 
@@ -69,13 +67,3 @@ def test_every_pair_saturated(name, operation):
 def test_what_a_format_does_not_have_is_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
-
-
-def test_overflow_raises_unless_the_format_says_otherwise():
-    assert BINARY32.overflow == "raise"
-    assert "overflow" not in repr(BINARY32)
-    saturating = replace(BINARY32, overflow="saturate")
-    assert eval(repr(saturating), {"FloatFormat": FloatFormat, "Rounding": Rounding}) == saturating
-    assert FixedFormat(0, 15, overflow="saturate").round(2) == FixedFormat(0, 15).largest
-    with pytest.raises(ZeroDivisionError):
-        saturating.array(1) / 0

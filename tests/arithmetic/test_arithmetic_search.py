@@ -34,13 +34,6 @@ def test_a_monotone_requirement_is_found_in_every_range(least, largest, monotone
         assert set(calls) <= set(range(least, largest + 1))
 
 
-def test_a_precision_qualifies_only_if_the_next_one_does_too():
-    assert smallest_precision(among({6, 8, *range(9, 20)}), largest=19).precision == 8
-    assert smallest_precision(among({7, *range(9, 20)}), largest=19).precision == 9
-    assert smallest_precision(among({19}), largest=19).precision == 19  # there is no higher one to try
-    assert smallest_precision(among({10}), largest=19) is None
-
-
 def test_whatever_meets_the_requirement_the_answer_qualifies_and_the_next_lower_one_does_not():
     """All requirements on eight precisions."""
     for bits in range(2**8):
@@ -79,11 +72,6 @@ def test_without_a_largest_the_range_grows(base, power):
     found = smallest_precision(lambda fmt: fmt.unit_roundoff <= bound, base, monotone=True)
     below = Fraction(1) if found.precision == 1 else FloatFormat(base, found.precision - 1).unit_roundoff
     assert found.unit_roundoff <= bound < below
-
-
-def test_an_empty_range_is_refused():
-    with pytest.raises(ValueError, match="got precisions from 3 to 2"):
-        smallest_precision(lambda fmt: True, least=3, largest=2)
 
 
 def test_the_reason_is_that_of_the_highest_precision_below_the_answer_that_has_one():

@@ -155,17 +155,6 @@ def test_an_error_that_peaks_within_a_block_of_steps_counts(peak: int) -> None:
     assert f"may exceed its bound after step {peak}" in refused(content)
 
 
-def test_a_row_is_bounded_by_rows_near_it() -> None:
-    rng = np.random.default_rng(41)
-    for _ in range(200):
-        segments, (row, *others) = rng.integers(-99, 100, (5, 3)).tolist(), rng.integers(-9, 10, (3, 3)).tolist()
-        most = lambda row, segments=segments: int(np.abs(np.array(segments) @ row).sum())  # noqa: E731
-        box, shares, whole = [most(unit) for unit in np.eye(3, dtype=int)], rng.integers(-9, 10, 2).tolist(), 7
-        known = [(share, other, most(other)) for share, other in zip(shares, others, strict=True)]
-        assert most(row) <= check.near(row, known, whole, box)
-        assert check.near(row, [(whole, row, most(row))], whole, box) == most(row)
-
-
 def test_a_running_sum_is_proved_for_its_steps() -> None:
     """It keeps its errors, so only a number of steps has a bound."""
     made = LinearSystem([["1"]], [["1"]]).as_filter()
@@ -175,13 +164,6 @@ def test_a_running_sum_is_proved_for_its_steps() -> None:
     assert "after 50 steps" in prove(content)
     scale_bound("0.99")(content)
     assert "may exceed its bound" in refused(content)
-
-
-def test_a_certificate_holds_the_model_as_given() -> None:
-    content = written(tracker(), FORMAT, limits(state=[1000, 30], innovation=8))
-    assert content["filter"]["Phi"] == [[["1", "1/10"], ["0", "1"]]]
-    assert content["limits"] == {"state": ["1000", "30"], "innovation": ["8"], "measurement": [None]}
-    assert (content["repeat"], content["period"], content["steps"]) == (173, 1, None)
 
 
 # -- the checker stands alone -----------------------------------------------------------------------------------------
@@ -470,12 +452,6 @@ def test_factors_that_were_raised_twice_are_rejected() -> None:
     assert "may exceed" in refused(content | {"bound": [content["bound"][0], "0.0097876", content["bound"][2]]})
 
 
-def test_a_filter_that_must_not_be_repaired_is_rejected() -> None:
-    content = written(raised_while_factored(), NINE, WITHIN, Form.UD)
-    content["filter"]["repair"] = False
-    assert "factors of a covariance are not definite" in refused(content)
-
-
 def test_stochastic_rounding_is_not_covered() -> None:
     """Bound "for ever" of 4.82, but an error of 5.217 at the third step: the covariance occurs again by chance."""
     model = LinearModel([[0]], [[1]], [[1]], [["0.4375"]], [0], [[1]])
@@ -538,19 +514,6 @@ def test_signs_of_a_first_estimate_count() -> None:
     assert "may exceed its limit" in refused(content)
     content |= {"derived": {"state": ["40000", "1100"], "innovation": ["50000"]}, "bound": ["40000", "40000"]}
     prove(content)
-
-
-def test_limits_of_zero_are_numbers() -> None:
-    """An input that is zero moves nothing; its limit, a Fraction, once met an operation of integers."""
-    content = written(small(), FloatFormat(2, 11), limits(measurement=0))
-    assert content["limits"]["measurement"] == ["0"]
-    prove(content)
-
-
-def test_a_first_estimate_beyond_its_limit_is_rejected() -> None:
-    content = written(small(), FORMAT, limits(state=6, innovation=6))
-    content["filter"]["x0"] = ["1", "-11"]
-    assert "the first estimate is beyond its limit" in refused(content)
 
 
 def test_innovations_of_correlated_measurements_are_limited() -> None:

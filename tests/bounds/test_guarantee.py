@@ -24,7 +24,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.program import innovation_program, loop_program, sequential_program
 from gpbnb.filters.run import Run
-from gpbnb.filters.system import biquad, controller, state_space
+from gpbnb.filters.system import biquad, state_space
 from gpbnb.report.guarantees.published import fixif_longitudinal, nile_local_level
 from gpbnb.report.kalman.exact_step import exact_step
 from tests.plain_program import steps_in_python
@@ -192,15 +192,6 @@ def test_a_periodic_model() -> None:
     assert 0.05 < outcome.ratio <= 1
 
 
-def test_the_computed_covariance_repeats_digit_for_digit() -> None:
-    model, fmt = tracker(), FloatFormat(2, 24)
-    found = schedule(model, fmt, Form.JOSEPH)
-    run = Run(model, fmt, Form.JOSEPH, range(1, 3 * found.repeat))
-    run.take(np.zeros((3 * found.repeat - 1, 1)))
-    assert (run.C[found.repeat - 1 :] == run.C[found.repeat - 1]).all()
-    assert (run.C[found.repeat - 2] != run.C[found.repeat - 1]).any()
-
-
 def test_the_error_of_the_gain_matters() -> None:
     """The first gain of the Nile filter cancels: without its part, an admissible run violates the bound."""
     found = guarantee(nile_local_level(), FloatFormat(2, 24), limits(state=1500, innovation=1200))
@@ -259,12 +250,6 @@ def test_a_covariance_that_loses_definiteness_ends_the_bound() -> None:
     assert not run.stopped
 
 
-def test_an_integrator_has_no_bound_for_all_time() -> None:
-    found = from_schedule(filter_schedule(controller("1", "0.01", "2", "5"), FloatFormat(2, 24)), limits(measurement=1))
-    assert not found.for_ever
-    assert "not stable" in found.why
-
-
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8), FloatFormat(2, 12, Rounding.CHOP)], ids=str)
 def test_a_second_order_section(fmt: FloatFormat) -> None:
     found = from_schedule(filter_schedule(biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), fmt), limits(measurement=1))
@@ -277,18 +262,6 @@ def test_published_error_coefficients() -> None:
     models = fixif_longitudinal()
     found = error_coefficients(models["A"], models["B"], models["C"], models["D"], models["input_bound"])
     assert [round(float(e), 6) for e in found] == models["published_E"]
-
-
-def test_a_largest_state_that_may_be_a_power_of_two_has_no_coefficients() -> None:
-    """The sum of 1, 1/2, 1/4, ... is two; the output, 1.5 times the state, is not near a power of two."""
-    with pytest.raises(ArithmeticError, match="too near a power of two"):
-        error_coefficients([["0.5"]], [["1"]], [["1.5"]], [["0"]], 1)
-
-
-@pytest.mark.parametrize("given", [{}, {"state": 1}, {"measurement": -1}, {"measurement": float("nan")}])
-def test_limits_that_are_none_are_refused(given: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match="needed"):
-        limits(**given)
 
 
 def test_the_probable_error_is_that_of_independent_roundings() -> None:
@@ -312,17 +285,6 @@ def test_the_probable_error_is_the_scatter_of_an_emulated_run() -> None:
     scatter = random_errors(found, 20_000, [750, 0])[10_000:].std(axis=0)
     assert (0.9 * probable_error(found) < scatter).all()
     assert (scatter < 1.1 * probable_error(found)).all()
-
-
-def test_the_ceiling_of_a_run_lies_between_its_error_and_the_guarantee():
-    """A constant is measured: only the rounding of one product in each step, of known size, has an effect."""
-    model = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-    found = guarantee(model, FloatFormat(2, 11), limits(state=100, innovation=10))
-    outcome = attack(found, 200, 50)
-    z = outcome.z[: outcome.step]
-    most = ceiling(found, z, outcome.state)
-    assert outcome.errors[outcome.state] <= most <= found.bound[outcome.state]
-    assert ceiling(found, z / 2**20, 0) < most / 1000
 
 
 def test_the_ceiling_adds_up_roundings_by_the_size_of_their_results():

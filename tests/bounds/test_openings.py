@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from decimal import Decimal, localcontext
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
-from oracles import rounded
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, Rounding
 from gpbnb.arithmetic.rational import exact
@@ -16,143 +14,10 @@ from gpbnb.bounds.gains import schedule
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.array_run import ArrayRun
-from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
 from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
 from gpbnb.report.wordlengths.study import companion_run
-
-Matrix = list[list[Fraction]]
-
-
-# -- one filter in plain fractions, which shares no code with the package ---------------------------------------------
-
-
-def _digits(x: Any, bits: int) -> Fraction:
-    return Fraction(rounded(Fraction(x), 2, bits, True))
-
-
-def _factors(a: Matrix, bits: int) -> Matrix | None:
-    """U with D on its diagonal, a = U D U'; None if a pivot is negative, or zero below a covariance that is not."""
-    n, a = len(a), [row[:] for row in a]
-    u = [[Fraction(0)] * n for _ in range(n)]
-    for j in range(n - 1, -1, -1):
-        d = u[j][j] = a[j][j]
-        if d < 0 or (d == 0 and any(a[i][j] for i in range(j))):
-            return None
-        for i in range(j if d else 0):
-            u[i][j] = _digits(a[i][j] / d, bits)
-        for i in range(j if d else 0):
-            for k in range(i + 1):
-                a[k][i] = _digits(a[k][i] - _digits(u[k][j] * a[i][j], bits), bits)
-    return u
-
-
-def _stored(a: Matrix, bits: int) -> Matrix:
-    return [[_digits(x, bits) for x in row] for row in a]
-
-
-def _raised_factors(given: Matrix, bits: int) -> tuple[Matrix, Fraction]:
-    """The factors of a covariance as a format stores it, and the share by which its variances as given were raised."""
-    shift = Fraction(0)
-    while True:
-        raised = [[x * (1 + shift) if i == j else x for j, x in enumerate(row)] for i, row in enumerate(given)]
-        if (found := _factors(_stored(raised, bits), bits)) is not None:
-            return found, shift
-        shift = 2 * shift or Fraction(1, 2**bits)
-
-
-def _unit_triangle(u: Matrix) -> Matrix:
-    return [[x if i < j else Fraction(int(i == j)) for j, x in enumerate(row)] for i, row in enumerate(u)]
-
-
-def _ud_estimates(model: LinearModel, z: list[Fraction], bits: int) -> list[list[Fraction]]:
-    """The estimates of Thornton's and Bierman's updates with one measurement, every operation rounded to nearest."""
-
-    def fl(x: Fraction) -> Fraction:
-        return _digits(x, bits)
-
-    n = model.n
-    Phi, (h,), Q, ((r,),), P0 = (each.tolist() for each in (model.Phi[0], model.H[0], model.Q[0], model.R[0], model.P0))
-    Phi, h, r = _stored(Phi, bits), [fl(x) for x in h], fl(r)
-    (UQ, _), (U, _) = _raised_factors(Q, bits), _raised_factors(P0, bits)
-    x, found = [fl(v) for v in model.x0], []
-    for measured in z:
-        T, G = _unit_triangle(U), _unit_triangle(UQ)
-        W = []
-        for i in range(n):
-            row = []
-            for j in range(n):
-                s = Fraction(0)
-                for k in range(n):
-                    s = fl(s + fl(Phi[i][k] * T[k][j]))
-                row.append(s)
-            W.append(row + G[i])
-        D = [U[i][i] for i in range(n)] + [UQ[i][i] for i in range(n)]
-        U = [[Fraction(0)] * n for _ in range(n)]
-        for j in range(n - 1, -1, -1):
-            C = [fl(d * w) for d, w in zip(D, W[j], strict=True)]
-            for c, w in zip(C, W[j], strict=True):
-                U[j][j] = fl(U[j][j] + fl(w * c))
-            for i in range(j):
-                s = Fraction(0)
-                for c, w in zip(C, W[i], strict=True):
-                    s = fl(s + fl(w * c))
-                U[i][j] = s = fl(s / U[j][j]) if U[j][j] else Fraction(0)
-                W[i] = [fl(w - fl(s * v)) for w, v in zip(W[i], W[j], strict=True)]
-        predicted = []
-        for i in range(n):
-            s = Fraction(0)
-            for k in range(n):
-                s = fl(s + fl(Phi[i][k] * x[k]))
-            predicted.append(s)
-        y = fl(measured)
-        for c, v in zip(h, predicted, strict=True):
-            y = fl(y - fl(c * v))
-        f = []
-        for j in range(n):
-            s = Fraction(0)
-            for k in range(j):
-                s = fl(s + fl(U[k][j] * h[k]))
-            f.append(fl(s + h[j]))
-        g = [fl(U[j][j] * f[j]) for j in range(n)]
-        a, K = r, [Fraction(0)] * n
-        for j in range(n):
-            before = a
-            if g[j]:
-                a = fl(before + fl(f[j] * g[j]))
-                U[j][j] = fl(fl(U[j][j] * before) / a)
-                factor = -fl(f[j] / before)
-                for k in range(j):
-                    u = U[k][j]
-                    U[k][j] = fl(u + fl(factor * K[k]))
-                    K[k] = fl(K[k] + fl(g[j] * u))
-            K[j] = g[j]
-        x = [fl(v + fl(fl(c / a) * y)) for v, c in zip(predicted, K, strict=True)]
-        found.append(x)
-    return found
-
-
-def _exact_estimates(model: LinearModel, z: list[Fraction], bits: int) -> list[list[Decimal]]:
-    """The estimates of the textbook's filter with the stored model, one measurement, in 60 decimal digits."""
-
-    def stored(a: Any) -> Any:
-        values = [_digits(x, bits) for x in np.ravel(a)]
-        return np.array([Decimal(x.numerator) / x.denominator for x in values], dtype=object).reshape(np.shape(a))
-
-    with localcontext() as context:
-        context.prec = 60
-        Phi, H, Q, R, x, P = map(stored, (model.Phi[0], model.H[0], model.Q[0], model.R[0], model.x0, model.P0))
-        found = []
-        for measured in map(stored, z):
-            V = Phi @ P @ Phi.T + Q
-            K = V @ H.T / (H @ V @ H.T + R)[0, 0]
-            x = Phi @ x
-            x = x + K[:, 0] * (measured - H[0] @ x)
-            P = V - K @ H @ V
-            found.append(list(x))
-        return found
-
 
 # -- the guarantee is for that filter ---------------------------------------------------------------------------------
 
@@ -173,30 +38,6 @@ def raised_while_factored(**changes: Any) -> LinearModel:
 
 NINE = FloatFormat(2, 9)
 WITHIN = limits(state=[19.6905, 1.21509, 19.40933], innovation=59.8751)
-
-
-def test_the_guarantee_of_factors_that_were_raised_is_for_the_run_of_the_model_as_given() -> None:
-    """An independent emulation of a constant measurement reaches 0.011478; other factors would allow 0.0097876."""
-    model, z = raised_while_factored(), [Fraction(479, 8)] * 60
-    _, shift = _raised_factors(model.Q[0].tolist(), 9)
-    assert shift > 0
-    computed, true = _ud_estimates(model, z, 9), _exact_estimates(model, z, 9)
-    run = Run(model, NINE, Form.UD, range(1, 61))
-    run.take(np.full((60, 1), 479 / 8))
-    assert run.checkpoints().x.tolist() == computed
-    errors = np.array(
-        [[abs(float(Decimal(a.numerator) / a.denominator - b)) for a, b in zip(*rows, strict=True)]
-         for rows in zip(computed, true, strict=True)]
-    )  # fmt: skip
-    sizes = np.abs(np.array(true, dtype=float))
-    assert (sizes.max(axis=0) <= WITHIN.state).all()
-    found = guarantee(model, NINE, WITHIN, form=Form.UD)
-    assert found.for_ever
-    assert errors[:, 1].max() == pytest.approx(0.011478, abs=5e-7)
-    assert (errors.max(axis=0) <= found.bound).all()
-    # The exact filter of a guarantee is that of an emulation: the stored model, without what factoring adds.
-    history = emulate(model, np.full((60, 1), 479 / 8), NINE, Form.UD, range(1, 61))
-    assert np.abs(np.abs(history.state) - errors).max() < 1e-12
 
 
 def _drawn(seed: int) -> LinearModel:

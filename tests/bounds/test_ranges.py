@@ -20,7 +20,6 @@ from gpbnb.bounds.units import units
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, reference_states
-from gpbnb.filters.system import LinearSystem
 from tests.surveying import survey
 
 HALF = {"range": (-14, 15), "rounding": "even"}
@@ -75,22 +74,6 @@ def test_a_run_names_what_overflows(form, given, reason):
     run = Run(model, BINARY16, form, range(1, 3))
     run.take(BINARY16.array(np.full((2, 1), 4e4)))
     assert run.reason == f"overflow in {reason}"
-
-
-def test_a_linear_system_and_a_function_have_ranges():
-    smoother, ten = LinearSystem([["0.9"]], [["0.1"]]), np.full((50, 1), 10.0)
-    assert required_precision(smoother, ten, 0.01, **HALF).digits < 20
-    found = required_precision(smoother, ten, 0.01, **HALF | {"range": (-14, 2)})
-    assert found.format is None
-    assert "needed at most" in str(found)
-
-    def squares(fmt, z):
-        return [x * x for x in z]
-
-    assert required_precision(squares, ten, 0.5, range=(-14, 15)).digits < 20
-    found = required_precision(squares, ten, 0.5, range=(-14, 4))
-    assert found.format is None
-    assert "the function stops: multiplication at [0]" in found.why
 
 
 # -- guarantees -------------------------------------------------------------------------------------------
@@ -164,14 +147,6 @@ def test_in_fixed_point_only_products_are_rounded():
     assert table.aligned == math.inf
     assert units(BINARY16).aligned == 2.0**-13
     assert units(FixedFormat(8, 12, Rounding.DOWN)).errors.tolist() == [2 * half]
-
-
-def test_fixed_point_that_may_overflow_has_no_guarantee():
-    found = guarantee(WALK, FixedFormat(5, 16, EVEN), WITHIN)
-    assert found.bound[0] == math.inf
-    assert "a number may exceed the largest" in found.why
-    with pytest.raises(TypeError, match="needed a FloatFormat or a FixedFormat"):
-        guarantee(WALK, 24, WITHIN)
 
 
 # -- formats of any exponent ------------------------------------------------------------------------------

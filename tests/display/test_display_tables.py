@@ -18,13 +18,6 @@ def cells(line):
     return [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
 
 
-def test_a_table_has_a_header_a_rule_and_its_rows():
-    table = Table("two", ("a", "b"), (("1", "2"), ("3", "4")))
-    assert table.markdown() == "| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 | 4 |"
-    assert table._repr_markdown_() == table.page() == table.markdown()
-    assert repr(table) == "<two>"
-
-
 @pytest.mark.parametrize(
     ("text", "cell"),
     [

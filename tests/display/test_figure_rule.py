@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import ast
-import itertools
 import json
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import pytest
 
-from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.display import style
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
@@ -33,16 +30,6 @@ def test_every_figure_of_the_book_was_judged_and_found_right(cell):
     calls = [node.func for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
     assert any(isinstance(func, ast.Attribute) and func.attr == "figure" and func.value.id == "style" for func in calls)
     assert [output for output in cell["outputs"] if output.get("name") == "stderr"] == []
-
-
-def test_a_figure_in_a_notebook_warns_once_of_a_departure(monkeypatch):
-    monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
-    fig, (ax,) = style.figure()
-    style.label(ax, "length (no unit)", "time (s)")
-    with pytest.warns(UserWarning, match="names the lack of a unit") as warned:
-        fig.canvas.draw()
-    fig.canvas.draw()
-    assert len(warned) == 1
 
 
 def good():
@@ -167,28 +154,3 @@ def test_each_departure_is_named(spoil, words):
     spoil(axes[1])
     found = judged(fig)
     assert any(words in each for each in found), found
-
-
-def test_the_colours_of_formats_are_ordered_by_their_bits_and_can_be_read():
-    formats = [FloatFormat(2, t) for t in (2, 11, 24, 32, 40, 53, 64)]
-    colours = [style.bits_colour(fmt) for fmt in formats]
-    contrasts = [style.contrast(colour) for colour in colours]
-    assert all(4.5 <= one < other for one, other in itertools.pairwise(contrasts[:-1]))
-    assert colours[-1] == colours[-2]  # more than 53 bits are as many
-    # Ten decimal digits have 30.9 bits.
-    assert style.contrast(style.bits_colour(FloatFormat(10, 10))) == pytest.approx(
-        style.contrast(style.bits_colour(FloatFormat(2, 31))), rel=0.01
-    )
-
-
-def test_panels_that_share_an_axis_name_it_once():
-    _, axes = style.figure(rows=2, share="xy")
-    for ax in axes:
-        style.label(ax, "time (s)", "length (m)")
-    assert [(ax.get_xlabel(), ax.get_ylabel()) for ax in axes] == [("", "length (m)"), ("time (s)", "length (m)")]
-    axes[0].set_ylim(1, 7)
-    assert axes[1].get_ylim() == (1, 7)
-    _, axes = style.figure(columns=2, share="y")
-    for ax in axes:
-        style.label(ax, "time (s)", "length (m)")
-    assert [ax.get_ylabel() for ax in axes] == ["length (m)", ""]

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.named import BINARY64
 from gpbnb.filters import checkpoints as module
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 
@@ -76,16 +73,3 @@ def test_differences_of_decimals_are_those_of_fractions(precision, monkeypatch):
     if precision == 8:  # a difference that is not certain is asked of Fractions
         monkeypatch.setattr(module, "_SHARE", 0.0)
         assert not np.array_equal(difference(packed, fmt, true)[0], expected)
-
-
-def test_other_checkpoints_than_those_of_loops():
-    """Fractions, steps that differ, and a difference beyond the range of float64."""
-    exact = np.array([[Fraction(1, 3)]], dtype=object)
-    packed = Packed(np.array([[[0.25, 0.0]]]), None)
-    assert Checkpoints((1,), exact, exact, exact).minus(Checkpoints((1, 2), packed, packed, packed))[0] == 1 / 12
-    with pytest.raises(ValueError, match="needed equal steps"):
-        Checkpoints((1,), exact, exact, exact).minus(Checkpoints((2,), exact, exact, exact))
-    huge = Packed(np.array([[1.7e308]]), BINARY64)
-    opposite = Packed(np.array([[[-1.7e308, 0.0]]]), None)
-    with pytest.raises(OverflowError):
-        Checkpoints((1,), huge, huge, huge).minus(Checkpoints((1,), opposite, opposite, opposite))

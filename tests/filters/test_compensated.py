@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gpbnb import required_precision
-from gpbnb.arithmetic import linalg, named
+from gpbnb.arithmetic import named
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
@@ -17,7 +15,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.run import Run, Sums
+from gpbnb.filters.run import Run
 
 STEPS = 40
 
@@ -36,12 +34,6 @@ def model(**changes: Any) -> LinearModel:
 
 
 MEASURED = np.random.default_rng(3).normal(size=(STEPS, 1)) + 2
-
-
-def test_sums_in_a_wider_format_change_digits() -> None:
-    both = Sums(), Sums(fmt=named.BINARY32)
-    first, second = (emulate(model(), MEASURED, named.BFLOAT16, Form.JOSEPH, sums=each) for each in both)
-    assert not np.array_equal(first.state, second.state)
 
 
 def test_compensation_keeps_what_a_step_rounds_away() -> None:
@@ -78,17 +70,3 @@ def test_a_run_names_what_overflows() -> None:
 def test_only_forms_that_add_to_the_estimate_are_compensated() -> None:
     with pytest.raises(ValueError, match="needed the innovation form or Joseph's"):
         Run(model(), named.BINARY32, Form.UD, (), compensated=True)
-
-
-def test_sums_need_as_many_digits_as_numbers() -> None:
-    for sums in (FloatFormat(2, 6), FloatFormat(10, 8)):
-        with pytest.raises(ValueError, match="needed"):
-            Run(model(), named.BFLOAT16, Form.INNOVATION, (), Sums(fmt=sums))
-        with pytest.raises(ValueError, match="needed the same base and at least as many digits"):
-            linalg.dot(named.BFLOAT16.array([1, 2]), named.BFLOAT16.array([1, 2]), sums=sums)
-
-
-def test_a_precision_without_range_is_never_refused() -> None:
-    answer = required_precision(model(), MEASURED, 0.01)
-    assert answer.format is not None
-    assert not math.isinf(answer.ratio)

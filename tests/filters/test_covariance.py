@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from gpbnb import required_precision
 from gpbnb.arithmetic.definiteness import factor
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.covariance import REPAIR_TOLERANCE, in_floats
@@ -80,12 +79,6 @@ def test_a_repair_is_off_for_exact_input_and_on_demand():
     assert model(as_fractions, repair=True).repairs == model(Q).repairs
 
 
-def test_symmetry_is_judged_by_both_variances():
-    """The second is 1e32 times the first, in other units."""
-    found = model([[1e-16, 0.5], [0.5 + 1e-9, 1e16]])
-    assert (found.Q[0] == found.Q[0].T).all()
-
-
 @pytest.mark.parametrize(
     ("Q", "message"),
     [
@@ -100,29 +93,6 @@ def test_symmetry_is_judged_by_both_variances():
 def test_what_no_rounding_explains_is_refused(Q, message):
     with pytest.raises(ValueError, match=message):
         model(Q)
-
-
-def test_noise_of_measurements_is_made_symmetric_but_never_raised():
-    H, R = np.eye(2), [[1.0, 0.25], [0.25 + 2.0**-50, 1.0]]
-    found = model(np.eye(2), H=H, R=R)
-    assert found.R[0, 0, 1] == found.R[0, 1, 0] == Fraction(1, 4) + Fraction(1, 2**51)
-    with pytest.raises(ValueError, match="needed a positive definite matrix"):
-        model(np.eye(2), H=H, R=[[1.0, 1.0], [1.0, 1.0]])
-
-
-def test_units_by_powers_of_two_change_no_repair():
-    Q = not_quite(3)
-    scale = 2.0 ** np.array([-30, 3, 41])
-    first, second = model(Q), model(Q * np.multiply.outer(scale, scale))
-    assert first.repairs == second.repairs != ()
-
-
-def test_cycles_and_answers_report_their_repairs():
-    found = model([np.eye(2), not_quite(2)])
-    assert [(each.letter, each.member) for each in found.repairs] == [("Q", 1)]
-    answer = required_precision(found, 5, 0.1)
-    assert answer.notes == tuple(str(each) for each in found.repairs)
-    assert answer.notes[0] in str(answer)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, LinearModel, required_precision, survey_records
-from gpbnb.filters.run import Run, Sums
+from gpbnb import FloatFormat, LinearModel, required_precision
+from gpbnb.filters.run import Run
 
 MODEL = LinearModel([["0.9"]], [["1"]], [["0.01"]], [["1"]], ["0"], [["1"]])
 STEPS = 5000
@@ -46,17 +46,6 @@ def test_an_estimate_has_its_digits_until_it_becomes_zero():
         assert Fraction(x[k]) == fmt.round(ahead - fmt.round(Fraction(K[k]) * ahead))
 
 
-@pytest.mark.parametrize("options", [{"compensated": True}, {"sums": Sums(fused=True)}, {"form": "Hung"}], ids=str)
-def test_how_many_steps_are_taken_at_once_does_not_matter(options):
-    z, found = impulse(STEPS), []
-    for at_once in (STEPS, 700):
-        run = Run(MODEL, FloatFormat(2, 20), **{"form": "innovation", "checkpoint_steps": (), **options})
-        found.append(np.concatenate([run.states(z[begin : begin + at_once]) for begin in range(0, STEPS, at_once)]))
-        assert run.stopped is None
-    assert (found[0] == found[1]).all()
-    assert not found[0][-1].any()
-
-
 def test_two_estimates_decay_at_their_own_time_and_a_late_measurement_counts():
     model = LinearModel(
         [["0.5", 0], [0, "0.9"]], np.eye(2), [["0.01", 0], [0, "0.01"]], np.eye(2), [1, 1], np.eye(2), name="two"
@@ -70,23 +59,3 @@ def test_two_estimates_decay_at_their_own_time_and_a_late_measurement_counts():
     checkpoints = Run(model, FloatFormat(2, 20), "innovation", (first, STEPS))
     checkpoints.take(z)
     assert (checkpoints.checkpoints().to_float("x") == late[[first - 1, -1], :, 0]).all()
-
-
-def test_many_records_that_end_in_silence_are_surveyed():
-    z = impulse(STEPS)
-    found = survey_records(MODEL, [z, z / 2], 1e-3, [FloatFormat(2, 20)])
-    assert "refused" not in str(found)
-
-
-def test_a_covariance_that_decays_beyond_the_loops_is_not_called_an_overflow():
-    still = LinearModel([["0.9"]], [["1"]], [[0]], [["1"]], ["0"], [["1"]])
-    found = required_precision(still, np.ones((STEPS, 1)), 1e-3, highest=12)
-    assert not found.met
-    assert "a number beyond the range of the compiled loops in the " in found.why
-    assert "overflow" not in str(found)
-
-
-def test_a_decimal_format_with_subnormal_numbers_says_that_they_have_no_loops():
-    found = required_precision(MODEL, impulse(3000), 1e-3, base=10, range=(-95, 96), highest=8)
-    assert not found.met
-    assert "a subnormal number, which has no compiled loops in base 10, in the estimate" in found.why

@@ -19,7 +19,7 @@ from gpbnb.filters.emulation import compare_runs, emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, reference
-from gpbnb.filters.simulation import BLOCK, Simulation
+from gpbnb.filters.simulation import Simulation
 
 # -- the reference --------------------------------------------------------------------------------
 
@@ -184,16 +184,6 @@ def test_what_a_run_refuses():
 # -- simulated measurements -----------------------------------------------------------------------
 
 
-def test_a_cycle_and_the_noise_go_on_from_block_to_block():
-    """A truth that stays at 5, seen through 1, 2 and 3 in turn; 4096 is no multiple of 3. And noise alone."""
-    turning = LinearModel([[1]], [[[1]], [[2]], [[3]]], [[0]], [["1e-20"]], [5], [[1]])
-    z = Simulation(turning, (5.0,), seed=1, resolution=1.0).measurements(2 * BLOCK + 10)
-    assert z[:, 0].tolist() == [5 * (1 + k % 3) for k in range(2 * BLOCK + 10)]
-    z = Simulation(scalar(1), (0.0,), seed=1, resolution=2.0**-20).measurements(2 * BLOCK)
-    assert not np.array_equal(z[:BLOCK], z[BLOCK:])
-    assert abs(np.corrcoef(z[:BLOCK, 0], z[BLOCK:, 0])[0, 1]) < 5 / math.sqrt(BLOCK)
-
-
 def test_measurements_are_those_of_the_model():
     """The filter that knows the model finds its innovations white, with the covariance that it predicts."""
     given = model()
@@ -214,14 +204,6 @@ def test_measurements_are_those_of_the_model():
     # Means of 4000 products of unit normals: variance 2 or 1; five standard errors.
     assert np.abs(np.mean(squares, axis=0) - np.eye(2)).max() < 5 * math.sqrt(2 / 4000)
     assert np.abs(np.mean(lagged, axis=0)).max() < 5 / math.sqrt(3999)
-
-
-def test_what_a_simulation_refuses():
-    with pytest.raises(ValueError, match="got a start of 2 numbers; needed 3"):
-        Simulation(model(), (1.0, 2.0), 0, 1.0)
-    for resolution in (0.0, -1.0, math.inf, math.nan):
-        with pytest.raises(ValueError, match="got resolution"):
-            Simulation(model(), (1.0, 2.0, 3.0), 0, resolution)
 
 
 # -- the bound beside a run -----------------------------------------------------------------------
@@ -277,13 +259,6 @@ def test_the_bound_of_the_reference_holds():
             ratio = (np.abs(error).astype(float) / bound).max()
             assert ratio <= 1
             assert (bound < 1e-22).all()
-
-
-def test_the_bound_ends_where_the_gain_is_not_known():
-    found = emulate_with_bound(scalar("1e-6"), np.ones((3, 1)), FloatFormat(10, 4), Form.HUNG, (1, 2, 3))
-    assert np.isfinite(found.state[:2]).all()
-    assert np.isinf(found.state[2]).all()
-    assert found.ratios().max() <= 1
 
 
 COUNTED = """

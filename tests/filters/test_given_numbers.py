@@ -14,10 +14,7 @@ from gpbnb import (
     FloatFormat,
     LinearModel,
     LinearSystem,
-    NonlinearSystem,
     WordFormats,
-    limit_cycles,
-    required_precision,
     write_code,
 )
 from gpbnb.arithmetic.rounding import Rounding
@@ -76,32 +73,6 @@ def test_a_coefficient_or_a_first_state_of_a_system_is_refused(fmt):
         run(system("-2.5"))
     with pytest.raises(OverflowError, match="x0: "):
         run(system(first=(3, 0)))
-
-
-@pytest.mark.parametrize("overflow", ["saturate", "wrap"])
-def test_no_word_stores_another_coefficient(overflow, tmp_path):
-    words = WordFormats(FixedFormat(0, 15, overflow=overflow))
-    for question in (
-        lambda: limit_cycles(system(), words),
-        lambda: write_code(system(), words, tmp_path),
-        lambda: write_code(system(), words.data, tmp_path),
-    ):
-        with pytest.raises(OverflowError, match="a1"):
-            question()
-    assert not list(tmp_path.iterdir())
-    found = required_precision(system(), Z, 0.01, kind="fixed", like=words)
-    assert not found.met
-    assert "a1" in found.why
-
-
-def test_no_code_has_another_first_state(tmp_path):
-    def step(fmt, x, u):
-        y = fmt.array("0.5") * u + x
-        return y, y
-
-    with pytest.raises(OverflowError, match="x0: "):
-        write_code(NonlinearSystem(step, [3], 1), FixedFormat(1, 14, overflow="saturate"), tmp_path)
-    assert not list(tmp_path.iterdir())
 
 
 def test_results_still_saturate_and_inputs_do():

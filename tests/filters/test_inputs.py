@@ -13,10 +13,8 @@ from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.emulation import compare_runs, emulate
 from gpbnb.filters.forms import Form
-from gpbnb.filters.model import LinearModel as Model
 from gpbnb.filters.run import Run, Sums, reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
-from tests.surveying import survey
 
 FORMS = (*Form, *ArrayForm)
 STEPS = 40
@@ -69,18 +67,6 @@ def test_the_bound_holds_with_inputs_and_is_not_vacuous(form):
     assert (errors <= bound).all()
     assert errors.max() > 2.0**-24  # it does round
     assert bound.max() < 2000 * errors.max()
-
-
-@pytest.mark.parametrize("form", [Form.UD, Form.INNOVATION, Form.JOSEPH], ids=str)
-def test_the_bound_is_that_of_the_compiled_run(form):
-    model, fmt = drawn(7, inputs=False), FloatFormat(2, 24)
-    z = fmt.array(simulated_measurements(model, 20))
-    steps = tuple(range(1, 21))
-    fast, slow = Run(model, fmt, form, steps, bounded=True), ArrayRun(model, fmt, form, steps, bounded=True)
-    fast.take(z)
-    slow.take(z)
-    # the evaluation errors, 2**-100, are taken from slightly different magnitudes
-    assert np.allclose(slow.bounds[0], fast.bounds[0], rtol=1e-9, atol=0)
 
 
 def test_without_inputs_the_simulation_is_that_of_the_model():
@@ -136,23 +122,6 @@ def test_functions_of_the_step_are_cycles():
         assert a == b
 
 
-def test_missing_measurements_with_inputs():
-    model = drawn(9)
-    z = simulated_measurements(model, STEPS)
-    z[3, 0] = z[10] = np.nan
-    answers = {form: survey(model, z, 1.0, [20], form=form)[0][1] for form in ("innovation", "Joseph", "UD", "Carlson")}
-    assert all(0 < ratio < 1e-3 for ratio in answers.values())
-
-
-@pytest.mark.parametrize("form", ["symmetrized", "Potter", "Cholesky", "compensated", "square root"])
-def test_answers_of_the_forms_without_compiled_loops(form):
-    cart = LinearModel(**CART)
-    for basis in ("emulation", "bound"):
-        answer = required_precision(cart, 20, 1e-3, form=form, basis=basis)
-        assert answer.format is not None
-        assert isinstance(answer.form, ArrayForm)
-
-
 def test_square_roots_survive_where_the_innovation_form_loses_its_variance():
     """A sensor far more precise than the prior: the classic case for square roots."""
     precise = LinearModel(
@@ -166,29 +135,6 @@ def test_square_roots_survive_where_the_innovation_form_loses_its_variance():
     z = simulated_measurements(precise, 30)
     needed = {form: required_precision(precise, z, 0.1, form=form) for form in ("innovation", "Carlson")}
     assert needed["Carlson"].digits < needed["innovation"].digits
-
-
-REFUSED = [
-    ({"B": [[1], [1]]}, "got B without u; needed both"),
-    ({"u": [[1]]}, "got u without B; needed both"),
-    ({"B": [[1, 2], [1, 2]], "u": [[1]]}, "got B with 2 columns and u with 1 numbers per step"),
-    ({"B": [[1]], "u": [[1]]}, r"got B of shape \(1, 1\); needed \(2, p\)"),
-    ({"B": [[1], [1]], "u": [[[1]]]}, r"got u of shape \(1, 1, 1\); needed \(p,\) or \(steps, p\)"),
-    ({"b": [1]}, r"got b of shape \(1,\); needed \(2,\)"),
-    ({"d": [[[1]]]}, r"got d of shape \(1, 1, 1\); needed \(1,\)"),
-    ({"d": ["nan"]}, "d: "),
-    ({"Phi": lambda k: [[1, 0], [0, 1]]}, "got a function for Phi without steps"),
-    ({"Phi": lambda k: np.eye(1 + k), "steps": 2}, "Phi: the function gave shapes"),
-    ({"steps": 0}, "got steps 0"),
-    ({"steps": True}, "got steps True"),
-    ({"B": [[1], [1]], "u": [[1]], "steps": 5}, "got u for 1 steps; needed one row for each of the 5"),
-]
-
-
-@pytest.mark.parametrize(("given", "message"), REFUSED, ids=[message[:30] for _, message in REFUSED])
-def test_what_does_not_fit_is_refused(given, message):
-    with pytest.raises(ValueError, match=message):
-        LinearModel(**CART | given)
 
 
 def test_inputs_are_refused_where_they_would_be_ignored():
@@ -234,13 +180,6 @@ def test_a_run_is_not_longer_than_its_model():
             required_precision(short, np.zeros((6, 1)), 0.1, basis=basis)
     with pytest.raises(ValueError, match="got a model of 5 steps"):
         required_precision(short, 5, 0.1, basis="guarantee", within=limits(state=1, innovation=1))
-
-
-def test_a_rounded_model_keeps_its_inputs():
-    model = drawn(2).rounded(FloatFormat(2, 12))
-    assert isinstance(model, Model)
-    assert model.has_inputs
-    assert model.steps == STEPS
 
 
 def test_random_rounding_stores_one_model_whose_covariances_are_symmetric():

@@ -31,11 +31,6 @@ def test_runs_have_the_digits_of_the_processor(system, fmt):
     assert np.ptp(found, axis=0).min() > 0.001
 
 
-def test_a_limit_is_one_operation():
-    program, _ = SYSTEMS[0].program(BINARY32)
-    assert len(program.operations) == 13  # 5 products, 4 sums and differences, and 4 limits
-
-
 def test_one_step_and_a_run_agree():
     system = SYSTEMS[1]
     u = inputs(system, 5)
@@ -92,29 +87,3 @@ def test_steps_without_a_program_are_refused(step, message):
 def test_what_has_no_program_runs_nevertheless():
     branching = NonlinearSystem(lambda fmt, x, u: (x if x[0] > 0 else u, np.sin(u)), [1])
     assert branching(BINARY64, [0.25, 0.5]).to_float().tolist() == [[np.sin(0.25)], [np.sin(0.5)]]
-
-
-@needs(
-    ("given", "kind", "message"),
-    [
-        ((3, [0]), TypeError, "got a step int; needed a function step(fmt, x, u)"),
-        ((clipped_controller, 0), ValueError, "got x0 of shape (); needed one entry for each state"),
-        ((clipped_controller, ["a"]), ValueError, "x0: "),
-        ((clipped_controller, [0], 0), ValueError, "m"),
-        ((clipped_controller, [0], 1, None), TypeError, "got name None"),
-    ],
-)
-def test_bad_systems_are_refused(given, kind, message):
-    with pytest.raises(kind, match=re.escape(message)):
-        NonlinearSystem(*given)
-
-
-@needs("u", [[[1, 2]], [], 1.0])
-def test_inputs_of_another_shape_are_refused(u):
-    with pytest.raises(ValueError, match=re.escape("needed (steps, 1)")):
-        SYSTEMS[0](BINARY32, u)
-
-
-def test_a_constant_beyond_the_range_is_refused():
-    with pytest.raises(OverflowError):
-        SYSTEMS[1].program(FixedFormat(3, 12))

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 from scipy import signal
 
-from gpbnb import BINARY16, FixedFormat, FloatFormat, LinearSystem, WordFormats
+from gpbnb import FloatFormat, LinearSystem
 from gpbnb.filters.poles import eigenvalues, stored_response
-from gpbnb.wordlength.__main__ import main
 
 
 @pytest.mark.parametrize("digits", [11, 16, 24])
@@ -31,35 +28,12 @@ def test_the_change_of_a_response_is_that_of_scipy(order, cutoff, digits):
     assert found.stored_pole == pytest.approx(max(abs(p) for row in stored for p in np.roots(row[3:])), rel=1e-9)
 
 
-def test_coefficients_in_words_have_their_own_format():
-    slow, system = (LinearSystem.from_sections(signal.butter(2, cutoff, output="sos")) for cutoff in (0.02, 0.1))
-    data = FixedFormat(2, 29)
-    short, long = (stored_response(system, WordFormats(data, bits)) for bits in (8, 15))
-    assert short.change > 10 * long.change
-    assert "coefficients of 8 significant bits" in str(short)
-    with pytest.raises(ValueError, match="not stable, as given or with data of 32 bits"):
-        stored_response(slow, WordFormats(data, 8))
-    with pytest.raises(ValueError, match="the system as given is not stable"):
-        stored_response(LinearSystem([[1]], [[1]]), BINARY16)
-
-
 def test_eigenvalues_of_a_cascade_are_those_of_its_sections():
     A = np.array([[0.999, 0, 0], [1e6, 0.999, 0], [1e12, 1e6, 0.999]])
     assert np.abs(np.linalg.eigvals(A)).max() == pytest.approx(0.999)
     assert eigenvalues(A).tolist() == [0.999] * 3
     turn = np.array([[0, -0.25], [1, 0]])
     assert sorted(eigenvalues(turn), key=lambda z: z.imag) == pytest.approx([-0.5j, 0.5j])
-
-
-def test_the_command_says_what_storing_does(tmp_path, capsys):
-    (tmp_path / "low.toml").write_text("b = [0.01]\na = [1, -0.99]\n", encoding="utf-8")
-    report = tmp_path / "report.html"
-    given = [str(tmp_path / "low.toml"), "--tolerance", "0.01", "--simulate", "step", "--steps", "2000"]
-    assert main([*given, "--basis", "emulation", "--report", str(report)]) == 0
-    told = capsys.readouterr().err
-    assert "bits move the largest pole from size 0.99 to 0.989990234" in told
-    assert json.loads(report.with_suffix(".json").read_text())["stored"] in told
-    assert "At this answer, coefficients stored in" in report.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("rows", [[[1, 2, 1, 0.5, -0.2]], [1, 2, 1, 0.5, -0.2, 1, 2, 1, 0.5, -0.2]])

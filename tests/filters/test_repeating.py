@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, BlockFormats, FixedFormat, FloatFormat, Form, NonlinearModel
+from gpbnb import BINARY32, FixedFormat, FloatFormat, Form, NonlinearModel
 from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.nonlinear_run import NonlinearRun
@@ -76,17 +74,6 @@ def test_each_form(form, monkeypatch):
     assert repeats(run)
 
 
-@pytest.mark.parametrize("base", [2, 10])
-def test_formats_of_blocks(base, monkeypatch):
-    state, gain, covariance, innovation = (FloatFormat(base, digits) for digits in (16, 12, 17, 18))
-    blocks = BlockFormats(state, gain, covariance, innovation)
-    model, z = sight()
-    run = NonlinearRun(model, blocks)
-    states = run.states(z)
-    assert np.array_equal(states, by_operations(monkeypatch, lambda: NonlinearRun(model, blocks), z))
-    assert repeats(run)
-
-
 def test_a_function_that_depends_on_more_than_its_arguments_is_called_in_each_step(monkeypatch):
     calls = []
 
@@ -110,18 +97,3 @@ def test_a_function_that_branches_on_a_number_is_called_in_each_step():
     run = NonlinearRun(NonlinearModel(turning, None, tracked_sight, None, **PLANE), FloatFormat(2, 24))
     assert len(run.states([[5, 1]] * 3)) == 3
     assert not repeats(run)
-
-
-def test_a_step_without_a_result_on_the_machine_runs_by_operations(monkeypatch):
-    """The estimate leaves the range of float64, which the format has not, and comes back."""
-    factors = [2.0**-900, 2.0**-900, 2.0**900, 2.0**900]
-    model = NonlinearModel(
-        lambda x, u: x * u[0], lambda x, u: [[u[0] * 0 + 1]], lambda x, u: x * 0, lambda x, u: [[u[0] * 0 + 1]],
-        Q=[[1]], R=[[1]], x0=[3], P0=[[1]], u=[[each] for each in factors], residual=lambda z, predicted: z,
-    )  # fmt: skip
-    fmt = FloatFormat(2, 24)
-    run = NonlinearRun(model, fmt, checkpoint_steps=range(1, 5))
-    run.take(np.zeros((4, 1)))
-    assert [x[0] for x in run.checkpoints().x] == [3 * Fraction(2) ** e for e in (-900, -1800, -900, 0)]
-    assert run.stopped is None
-    assert repeats(run)

@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import product, product_by_sparse
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, zero
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.named import BINARY32, BINARY64
-from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.opening import as_packed
-from gpbnb.filters.run import Run, reference
+from gpbnb.filters.run import Run
 
 STEPS = 400
 
@@ -120,26 +117,3 @@ def test_products_in_double_double(scale):
         by_scalars(DoubleDouble(), a, b, expected)
         for each in found:
             assert each.tobytes() == expected.tobytes(), (n, m, p)
-
-
-@pytest.mark.parametrize("exponents", [(400, 700), (-500, -400), (-349, -800)])
-def test_products_in_double_double_beyond_its_range(exponents):
-    a, b = (np.full((6, 6, 2), [2.0**exponent, 0.0]) for exponent in exponents)
-    with pytest.raises(OverflowError):
-        every_product(DoubleDouble(), a, b, *(np.empty((6, 6, 2)) for _ in range(2)))
-
-
-@pytest.mark.parametrize("precision", [3, 8, 15, 16, 18])
-def test_decimal_measurements_become_the_nearest_double_doubles(precision):
-    rng = np.random.default_rng(precision)
-    fmt = FloatFormat(10, precision)
-    x = fmt.array([f"{v:.17e}" for v in rng.standard_normal(200) * 10.0 ** rng.integers(-30, 30, 200)] + ["0", "1e-5"])
-    assert np.array_equal(as_packed(None, x), double_doubles(x.to_fractions()))
-
-
-@pytest.mark.parametrize("fmt", [BINARY32, FloatFormat(10, 6), FloatFormat(16, 6)])
-def test_the_reference_takes_measurements_of_a_format(fmt):
-    given, z = model(3, 4), fmt.array(measurements(60))
-    own = reference(given.rounded(fmt), z.to_fractions(), (5, 60))
-    assert np.array_equal(emulate(given, z, fmt, checkpoint_steps=(5, 60)).reference.P, own.P)
-    assert np.array_equal(emulate(given, z, fmt, checkpoint_steps=(5, 60)).reference.x, own.x)

@@ -17,7 +17,6 @@ from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters import bounded_steps
 from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.array_run import ArrayRun
-from gpbnb.filters.array_steps import predict_root, predict_ud
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.factors import covariance_of_factors
 from gpbnb.filters.forms import Form
@@ -72,15 +71,6 @@ def test_the_variances_are_raised_no_more_than_necessary():
         raised[i, i] = model.Q[0].diagonal() * (1 + Fraction(repair.shift / 2))
         assert not is_definite(fmt.array(raised).to_fractions())
     assert "Q, stored in 24 bits" in str(repair)
-
-
-def test_noise_of_measurements_is_stored_definite():
-    R = [[1, "0.9999"], ["0.9999", 1]]
-    model = LinearModel(np.eye(2, dtype=int), np.eye(2, dtype=int), np.eye(2, dtype=int), R, [0, 0], np.eye(2))
-    stored = model.rounded(FloatFormat(2, 8))
-    assert is_definite(stored.R[0], strictly=True)
-    assert "R, stored in" in str(stored.repairs[0])
-    assert "made definite" in str(stored.repairs[0])
 
 
 def test_without_repair_an_indefinite_covariance_is_refused():
@@ -143,15 +133,6 @@ def test_each_covariance_is_raised_by_itself(letter):
         assert np.abs(off / np.multiply.outer(sizes, sizes)).max() <= 2 * run.repairs[0].shift + 24 * 2.0**-24
 
 
-def test_a_predicted_root_with_a_zero_on_the_diagonal_is_not_definite():
-    fmt = FloatFormat(2, 24)
-    S, zero = fmt.array([[2, 1], [0, 0]]), fmt.array([[0, 0], [0, 0]])
-    root, definite = predict_root(fmt.array([[1, 0], [0, 1]]), S, zero)
-    assert not definite
-    assert (root @ root.T).tolist() == (S @ S.T).tolist()
-    assert predict_root(fmt.array([[1, 0], [0, 1]]), fmt.array([[2, 1], [0, 1]]), zero)[1]
-
-
 ALIKE = LinearModel(np.eye(2), [[1, 0]], np.zeros((2, 2)), [[1]], [0, 0], [[1, 1], [1, 1]], "two states that are one")
 
 
@@ -163,17 +144,6 @@ def test_a_covariance_of_rank_one_has_positive_variances_in_every_form(form):
     assert (found.indefinite, found.stopped) == (None, None)
     assert np.abs(found.state).max() < 2.0**-20  # 20 steps, each with a few roundings of numbers below 1
     assert 5 <= required_precision(ALIKE, z, 0.01, form=form).digits <= 9
-
-
-@pytest.mark.parametrize("zero", [0, 1])
-def test_a_predicted_variance_of_zero_is_reported_whichever_it_is(zero):
-    fmt, nothing = FloatFormat(2, 24), np.zeros((2, 2))
-    Phi = np.eye(2)
-    Phi[zero, zero] = 0
-    found, definite = predict_ud(fmt.array(Phi), fmt.array(np.eye(2)), fmt.array(nothing))
-    assert found.to_float().tolist() == Phi.tolist()
-    assert not definite
-    assert predict_ud(fmt.array(np.eye(2)), fmt.array(np.eye(2)), fmt.array(nothing))[1]
 
 
 @pytest.mark.parametrize("form", [Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON])

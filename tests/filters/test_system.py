@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -58,16 +57,6 @@ def test_a_tolerance_that_float64_does_not_hold_is_not_exceeded():
         assert asked.digits == largest.digits + more
 
 
-@pytest.mark.parametrize("basis", ["emulation", "bound"])
-def test_units_of_states_inputs_and_outputs_do_not_matter(basis):
-    x, u, y = Fraction(2) ** -40, Fraction(2) ** 30, Fraction(2) ** -10
-    other = LinearSystem(SMALL.A, SMALL.B * x / u, SMALL.C * y / x, SMALL.D * y / u)
-    first = required_precision(SMALL, U, 1e-3, basis=basis)
-    second = required_precision(other, U * 2.0**30, 1e-3 * 2.0**-10, basis=basis)
-    assert first.format == second.format is not None
-    assert [ratio for _, ratio in first.tried] == pytest.approx([ratio for _, ratio in second.tried], rel=1e-9, abs=0)
-
-
 def test_probable_errors_are_three_standard_deviations():
     """Of x+ = x/2 + u: the peak gain is 2, and storing an input of at most 1 in 12 bits is off by at most 2**-13."""
     system, fmt = LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 12)
@@ -105,23 +94,6 @@ def vars_of(system):
 def test_what_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         required_precision(**{"model": SMALL, "z": U, "tolerance": 1e-3} | arguments)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"A": [[1, 2]]}, r"got A of shape \(1, 2\); needed \(1, 1\)"),
-        ({"B": [[1], [2]]}, "got B of shape"),
-        ({"C": [[1, 1]]}, "got C of shape"),
-        ({"D": [[1, 1]]}, "got D of shape"),
-        ({"x0": [1, 2]}, "got x0 of shape"),
-        ({"A": 3}, "got A of shape"),
-        ({"A": [["nan"]]}, "A: entry 0, 0"),
-    ],
-)
-def test_shapes_that_do_not_fit(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        LinearSystem(**({"A": [["0.5"]], "B": [[1]]} | arguments))
 
 
 @pytest.mark.parametrize("x0", [[1, 0], [0, 1], [1, 1]])
@@ -196,10 +168,7 @@ def test_stability_is_decided_exactly(roots, stable):
 
 
 UNSTABLE = LinearSystem([["1.1"]], [[1]])
-SHORT = FloatFormat(2, 24, emin=-6, emax=7)
 ACCUMULATOR = LinearSystem([[1]], [[1]])
-# Both poles are 1 - 1e-20: the rounded coefficients have a pole at 1 or beyond in every precision with compiled loops.
-NEAR = LinearSystem(companion([1 - Fraction(1, 10**20)] * 2), [[1], [0]])
 
 
 @pytest.mark.parametrize(("system", "size"), [(UNSTABLE, "1.1"), (ACCUMULATOR, "1 or more")])
@@ -212,16 +181,6 @@ def test_an_unstable_system_has_no_steady_state_in_any_precision_and_the_answer_
         f"A has an eigenvalue of size {size}, mostly in state 0, so that an error of rounding never decays; ask with "
         'basis "bound" or "guarantee" for a number of steps instead, or reset the state now and then'
     )
-
-
-@pytest.mark.parametrize("basis", ["bound", "probable"])
-def test_a_system_that_is_unstable_only_as_stored_is_said_to_be(basis):
-    within = None if basis == "bound" else limits(measurement=1)
-    found = required_precision(NEAR, np.ones((20, 1)), 1e-3, basis=basis, within=within)
-    assert found.digits is None
-    assert "no precision up to 53 bits, the most with compiled loops" in str(found)
-    assert "in 53 bits the system is stable, but as stored in 53 bits it is not, since A has" in found.why
-    assert "eigenvalue of size 1 or more" in found.why
 
 
 def test_below_the_answer_a_system_that_is_unstable_as_stored_is_named_with_the_digits():
@@ -241,46 +200,6 @@ def test_below_the_answer_a_system_that_is_unstable_as_stored_is_named_with_the_
     )
     assert found.digits == 17
     assert system.unstable(found.format) == ""
-
-
-def test_errors_that_grow_in_every_step_are_named_where_no_precision_is_enough():
-    found = required_precision(LinearSystem([[2]], [[1]]), np.full((200, 1), 0.1), 1e-3)
-    assert found.digits is None
-    assert (
-        "is not stable, since A has an eigenvalue of size 2, mostly in state 0, so that errors grow with every"
-        in str(found)
-    )
-    assert "whatever the precision: take fewer steps" in str(found)
-    stable = required_precision(LinearSystem([["0.9"]], [["0.1"]]), np.ones((5, 1)), 1e-30)
-    assert stable.digits is None
-    assert stable.notes[0] == f"53 bits give {stable.tried[-1][1]:.3g} times the tolerance"
-
-
-@pytest.mark.parametrize(
-    ("A", "b", "fmt", "message"),
-    [
-        (2, 1, None, r"range of float64; the system as given is not stable, .* of size 2, .* scaling delays"),
-        ("0.9", "1e305", None, "got a number beyond the range of float64; scale the numbers$"),
-        ("0.9", "3e307", FloatFormat(2, 24), "beyond the range of float64; scale the numbers, or use base 10$"),
-        ("0.9", 100, SHORT, "exponents -6 to 7; scale the numbers, or use a format with a larger range$"),
-        (1, 100, SHORT, r"exponents -6 to 7; the system as given is not stable, .* 1 or more"),
-        ("15/16", 100, replace(SHORT, precision=2), r"stable, but as stored .* it is not, .* of size 1 or more"),
-    ],
-)
-def test_an_overflow_names_its_cause_and_a_cure_that_helps(A, b, fmt, message):
-    with pytest.raises(OverflowError, match=message) as caught:
-        LinearSystem([[A]], [[b]]).outputs(np.full((3000, 1), 1.5), fmt)
-    assert "at step" in str(caught.value)
-
-
-def test_sizes_beyond_float64_are_named():
-    for basis, within in (("bound", None), ("probable", limits(measurement=1))):
-        found = required_precision(
-            LinearSystem([["0.9"]], [["1e308"]]), np.ones((5, 1)), 1e300, basis=basis, within=within
-        )
-        assert "in 53 bits got" in found.why
-        assert "beyond the range of" in found.why
-        assert "; scale " in found.why
 
 
 def test_a_sum_of_too_many_inputs_is_refused_before_it_is_listed():

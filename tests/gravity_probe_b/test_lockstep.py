@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,7 @@ from gpbnb.filters.kernels.records import update_largest
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.gravity_probe_b import threshold
-from gpbnb.report.gravity_probe_b.lockstep import REFERENCE, error_rows
+from gpbnb.report.gravity_probe_b.lockstep import REFERENCE
 from gpbnb.report.gravity_probe_b.threshold import (
     FORMS,
     SimpleYear,
@@ -129,15 +127,3 @@ def test_an_interrupted_cell_goes_on(tmp_path):
     other.restore(tmp_path / "some.npz")
     other.restore(tmp_path / "none.npz")
     assert other.block == 0
-
-
-def test_rows_have_the_larger_error_of_both_drifts_and_of_both_rates():
-    """Of two formats and two records; `end` has signs, and a filter that stopped has no numbers."""
-    largest = [[[1, 20], [10, 2], [3, 40], [30, 4]], [[math.nan, 1], [5, 1], [6, 1], [7, 1]]]
-    end = [[[-0.5, 0.25], [0.125, -8], [0.75, -6], [-7, 0.5]], [[math.nan, 0], [2, 0], [3, 0], [4, 0]]]
-    assert error_rows([("a", "24"), ("b", "53")], 7, {"largest": largest, "end": end}) == [
-        ("a", "24", "7", "10", "30", "0.5", "7"),
-        ("a", "24", "8", "20", "40", "8", "6"),
-        ("b", "53", "7", "inf", "7", "inf", "4"),
-        ("b", "53", "8", "1", "1", "0", "0"),
-    ]

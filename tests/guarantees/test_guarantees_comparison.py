@@ -54,34 +54,3 @@ def test_every_printed_digit_of_fixif_is_ours():
     given = fixif_longitudinal()
     ours = error_coefficients(given["A"], given["B"], given["C"], given["D"], given["input_bound"])
     assert [round(float(each), 6) for each in ours] == given["published_E"]
-
-
-@pytest.mark.parametrize(("digits", "steps"), [(53, 60), (24, 60)])
-def test_the_second_order_filter_stays_within_range_and_bound_in_a_plain_loop(digits, steps):
-    """Inputs with the signs of the reversed impulse response drive the output to its largest size."""
-    r, coefficients = floating(2, digits, "nearest"), [Fraction(each) for each in ("0.7", "-1.3", "1.1", "1.4", "-0.7")]
-
-    def run(rounded, inputs):
-        c = [rounded(each) for each in coefficients]
-        E0 = E1 = S0 = S1 = Fraction(0)
-        found = []
-        for E in map(rounded, inputs):
-            total = rounded(c[0] * E)
-            for a, b in zip(c[1:], (E0, E1, S0, S1), strict=True):
-                total = rounded(total + rounded(a * b))
-            E1, E0, S1, S0 = E0, E, S0, total
-            found.append(total)
-        return found
-
-    def exactly(x):
-        return x
-
-    response = run(exactly, [Fraction(k == 0) for k in range(steps)])
-    worst = [Fraction(int(np.sign(float(each))) or 1) for each in reversed(response)]
-    peak = comparison.rows()[1].ours()
-    assert 0.999 * peak < float(run(exactly, worst)[-1]) <= peak
-    bound = comparison.output_errors(comparison.second_order_filter(), comparison.FloatFormat(2, digits), 1.0)[0]
-    rng = np.random.default_rng(1)
-    for inputs in (worst, [Fraction(float(each)) for each in rng.uniform(-1, 1, steps)]):
-        off = max(abs(a - b) for a, b in zip(run(r, inputs), run(exactly, inputs), strict=True))
-        assert 0 < float(off) <= bound < 100 * float(off)

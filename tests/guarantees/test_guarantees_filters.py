@@ -18,8 +18,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.guarantees import filters, scalar
-from gpbnb.report.guarantees.random_filters import DETERMINISTIC, KINDS, LIMITED, RANGES, Drawn, draw
-from gpbnb.sweeps.command import run
+from gpbnb.report.guarantees.random_filters import DETERMINISTIC, KINDS, RANGES, Drawn, draw
 
 
 def compared(drawn, steps, rng):
@@ -77,25 +76,6 @@ def test_a_filter_in_integers_gives_the_digits_of_a_run():
 # -- the survey -------------------------------------------------------------------------------------------------------
 
 
-def test_the_survey_draws_everything_that_it_names():
-    drawn = [draw(seed) for seed in range(400)]
-    assert {each.form for each in drawn} == set(Form)
-    assert {each.kind for each in drawn} == set(KINDS)
-    assert {each.fmt.rounding for each in drawn} == set(DETERMINISTIC)
-    assert {each.fmt.base for each in drawn} == {2, 3, 10, 16}
-    assert {each.limited for each in drawn} == set(LIMITED)
-    assert {each.model.n for each in drawn} == {1, 2, 3, 4}
-    assert {each.model.m for each in drawn} == {1, 2}
-    assert {each.fmt.precision for each in drawn if each.fmt.base == 2} >= set(range(3, 31))
-    kinds = {kind: [each.model for each in drawn if each.kind == kind] for kind in KINDS}
-    assert all(not model.H.any() for model in kinds["unseen"])
-    assert all(model.cycle > 1 for model in kinds["cycle"])
-    assert all(np.linalg.matrix_rank(model.Q[0].astype(float)) < model.n for model in kinds["singular"])
-    growths = [np.abs(np.linalg.eigvals(model.Phi[0].astype(float))).max() for model in kinds["unstable"]]
-    assert min(growths) > 0.98
-    assert max(growths) > 1.3
-
-
 SLICE = (2, 3, 4, 20, 36, 47)
 examined = cache(filters.examine)
 
@@ -117,30 +97,6 @@ def test_the_survey_finds_a_guarantee_that_is_too_small(seed):
     assert smaller.largest == pytest.approx(1 / 0.95, rel=1e-3)  # four digits are stored
     largest = filters.examine(seed, smaller=0.5 * row.largest).largest * 0.5 * row.largest
     assert 1 < filters.examine(seed, smaller=(1 - 1e-9) * largest).largest < 1 + 1e-8
-
-
-def given_singular():
-    """A model whose Q loses its definiteness when it is factored in 9 bits."""
-    G = exact([["160/101", "54/89"], ["2/101", "-38/97"], ["-151/89", "25/89"]])
-    Phi, unit = exact(np.diag([0, 1, 1])) / 8, exact(np.eye(3, dtype=int))
-    model = LinearModel(Phi, exact([["7/4", -2, "-5/4"]]), G @ G.T, exact([["1/4"]]), exact([0, 0, 0]), unit)
-    within = limits(state=[19.6905, 1.21509, 19.40933], innovation=59.8751)
-    return Drawn("singular", model, FloatFormat(2, 9), Form.UD, "reached", within, np.array([479 / 8]))
-
-
-def test_the_survey_finds_factors_of_another_covariance():
-    """A guarantee for the stored model in place of the model as given is one for a filter that nobody runs."""
-
-    def of_the_stored_model(model, fmt, *arguments, **settings):
-        return guarantee(model.rounded(fmt), fmt, *arguments, **settings)
-
-    drawn = given_singular()
-    found = filters.examine(0, drawn, of_the_stored_model)
-    assert found.largest == pytest.approx(1.173, abs=1e-3)
-    assert found.gains == filters.STEPS
-    repaired = filters.examine(0, drawn)
-    assert 0.5 < repaired.largest <= 1
-    assert not repaired.wrong
 
 
 @pytest.mark.parametrize("seed", [2, 3, 20, 47])
@@ -189,33 +145,6 @@ def test_a_run_counts_until_the_exact_filter_leaves_its_limits():
         assert filters.first_outside(drawn, *columns) == steps
 
 
-def test_an_error_that_explains_nothing_is_a_failure():
-    def broken(*_, **settings):
-        raise ZeroDivisionError("division by zero")
-
-    def refusing(*_, **settings):
-        raise ValueError("got 3; needed a format with compiled loops")
-
-    assert filters.examine(1, bounded=broken).result == "failed"
-    assert (filters.examine(1, bounded=refusing).result, filters.examine(1, bounded=refusing).reason) == (
-        "refused",
-        "no compiled loops",
-    )
-
-
-def test_the_command_fails_where_a_run_exceeds_its_bound(monkeypatch, tmp_path, capsys):
-    row = filters.load()[1]
-    found = {"0": row._replace(chosen="1.002"), "1": row._replace(result="failed"), "2": row._replace(gains=1)}
-    for seed, status in (("0", 1), ("1", 1), ("2", 1), ("3", 0)):
-        made = found.get(seed, row)._replace(seed=0)
-        monkeypatch.setattr(filters, "examine", lambda _, made=made: made)
-        folder = tmp_path / seed
-        given = ["recompute", filters.SWEEP.name, "--cells", "1", "--output", str(folder)]
-        assert run([filters.SWEEP], "python -m sweeps", given) == status
-        assert filters.load(folder / "guarantees" / "filters.csv") == (made,)
-        assert capsys.readouterr().out.splitlines()[1:] == [" ".join(filters.texts(made))] * status
-
-
 def test_no_stored_run_exceeds_its_bound():
     rows = filters.load()
     assert sum(row.runs for row in rows) >= 20_000
@@ -259,17 +188,6 @@ def test_the_worst_error_is_reached_and_within_the_bound(seed):
     bound = guarantee(given.model, given.fmt, limits(measurement=float(given.limit)), form=given.form).bound[0]
     assert found.error + found.later <= bound
     assert scalar.examine(seed) in scalar.load()
-
-
-def test_all_numbers_of_a_format_are_listed():
-    assert scalar.numbers(FloatFormat(2, 3, "chop", 0, 1), Fraction(7, 2)).tolist() == [
-        *(-k / 4 for k in (14, 12, 10, 8, 7, 6, 5, 4, 3, 2, 1)),
-        *(k / 4 for k in (0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14)),
-    ]
-    flushed = scalar.numbers(FloatFormat(2, 3, "chop", 0, 1, False), Fraction(1))
-    assert flushed.tolist() == [-1, 0, 1]
-    with pytest.raises(ValueError, match="needed a format with a range"):
-        scalar.numbers(FloatFormat(2, 3), Fraction(1))
 
 
 def test_no_stored_worst_error_exceeds_its_bound():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,12 +16,6 @@ from gpbnb.report.guarantees.published import dynamax_tracking, filterpy_fusion,
 def test_a_row_comes_out_again(seed: int) -> None:
     (row,) = (row for row in survey.load() if row.seed == seed)
     assert survey.compute(seed) == row
-
-
-def test_rows_are_computed_again_into_the_same_folder(tmp_path) -> None:
-    for _ in range(2):
-        file = survey.SWEEP.recompute(tmp_path / "of" / "results", count=2)
-        assert survey.load(file) == survey.load()[:2]
 
 
 def test_the_noises_of_dynamax_s_tracking_are_independent() -> None:
@@ -41,18 +34,3 @@ def test_noises_of_filterpy_and_px4_are_those_of_their_time_steps() -> None:
     model, dt = px4_landing_target(), Fraction(1, 50)
     assert (model.Q[0] == 10 * exact([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])).all()
     assert (model.R[0, 0, 0], model.Phi[0, 0, 1]) == (Fraction(5, 1000), dt)
-
-
-def test_a_filter_that_rounding_makes_unstable_has_a_row_without_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    unstable = SimpleNamespace(for_ever=False, radius=1.03125)
-    monkeypatch.setattr(survey, "from_schedule", lambda *_: unstable)
-    (kept,) = (row for row in survey.load() if row.seed == 0)
-    assert (kept.n, kept.m) == (3, 1)
-    assert survey.compute(0) == kept._replace(radius="1.0312", runs=0, random="0", constant="0", chosen="0")
-
-
-def test_sizes_in_the_table_are_those_that_are_drawn() -> None:
-    columns = {column.name: column for column in survey.COLUMNS}
-    for name in ("n", "m"):
-        drawn = {getattr(row, name) for row in survey.load()}
-        assert drawn == set(range(int(columns[name].low), int(columns[name].high) + 1))

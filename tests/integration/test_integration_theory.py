@@ -168,30 +168,6 @@ def test_a_resonance_can_be_sampled_at_any_rate(f_c):
         assert step.b[2, 2] == pytest.approx(math.sqrt(4 * 0.2 * 3.0**3 * 1.3**2 / 720 * f_c**-5), rel=1e-7, abs=0)
 
 
-@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
-def test_a_step_keeps_the_steady_state_and_the_autocovariance(process):
-    m = len(process.drift)
-    step = theory.exact_step(process, 5.0)
-    a, b = step.a[:m], step.b[:m]
-    assert a @ a.T * process.sigma**2 + b @ b.T == pytest.approx(process.sigma**2 * np.eye(m), abs=1e-14)
-    covariance = process.sigma**2 * np.eye(m)
-    for k in range(4):
-        assert covariance[0, 0] == pytest.approx(process.autocovariance(k / 5.0), rel=1e-12)
-        covariance = a @ covariance
-
-
-@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
-def test_a_step_has_the_variance_of_one_trapezoid(process):
-    period = 0.35
-    step = theory.exact_step(process, 1 / period)
-    observed = process.sigma**2 * step.a[-1] @ step.a[-1] + step.b[-1] @ step.b[-1]
-    r = process.autocovariance
-    along = integrate.quad(r, 0, period, epsabs=1e-13)[0]
-    twice = 2 * integrate.quad(lambda s: (period - s) * r(s), 0, period, epsabs=1e-13)[0]
-    expected = period**2 * (r(0.0) + r(period)) / 2 - 2 * period * along + twice
-    assert observed == pytest.approx(float(expected), rel=1e-8)  # the quadrature's errors over a small difference
-
-
 # -- the build-up ---------------------------------------------------------------------------------
 
 

@@ -100,23 +100,6 @@ class TestFamilies:
         for i, j in np.ndindex(5, 5):  # in float64, two products of a power of ten: four roundings
             assert found[i, j] == pytest.approx(float(rows[i] * u[i, j] * columns[j]), rel=5e-16, abs=0)
 
-    def test_what_they_are(self):
-        assert draw("Hilbert", 3)[1].tolist() == [Fraction(1, 2), Fraction(1, 3), Fraction(1, 4)]
-        symmetric = draw("symmetric", 6)
-        assert (symmetric == symmetric.T).all()
-        assert draw("Frank", 4).tolist() == [[4, 3, 2, 1], [3, 3, 2, 1], [0, 2, 2, 1], [0, 0, 1, 1]]
-        kahan = draw("Kahan", 3)
-        assert kahan.tolist() == [[1, Fraction(-3, 5), Fraction(-3, 5)], [0, Fraction(4, 5), Fraction(-12, 25)],
-                                  [0, 0, Fraction(16, 25)]]  # fmt: skip
-        graded = abs(draw("graded", 12)).astype(float)
-        assert graded.max() / graded[graded > 0].min() > 1e15
-        assert abs(draw("random", 9)).max() <= 1
-
-    def test_wilkinson_doubles_with_each_step(self):
-        n = 12
-        upper = linalg.lu(FMT.array(draw("Wilkinson", n)), pivot=True).upper.to_float()
-        assert upper[-1, -1] / upper[0, -1] == pytest.approx(2 ** (n - 1), rel=0.02)
-
     def test_nearly_singular_has_the_condition_it_is_meant_to(self):
         # median over draws: one part in 10**6 of a row, to a factor of some hundreds
         conditions = [

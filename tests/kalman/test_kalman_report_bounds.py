@@ -7,7 +7,6 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
-from gpbnb.arithmetic.formats import prints_as
 from gpbnb.arithmetic.rational import exact
 from gpbnb.report.kalman import derivation, report_bounds
 
@@ -73,12 +72,3 @@ def test_the_closing_example():
     assert (first, second) == (258_595_200, 407_752_879_824_000)
     assert (report_bounds.precision_for_coefficient(first), report_bounds.precision_for_coefficient(second)) == (10, 16)
     assert report_bounds.precision_for_coefficient(second, base=2) == 49  # IEEE double has 53
-
-
-def test_which_misprint_leads_to_which_printed_number():
-    k, n, m = report_bounds.EXAMPLE
-    printed = report_bounds.PRINTED
-    assert not prints_as(report_bounds.coefficients(k, n, m).first, printed["first coefficient"])
-    assert report_bounds.one_digit_misprints(k, n, m, printed["first coefficient"]) == [(7, 4, 6), (7, 3, 8)]
-    for name in ("first", "second"):
-        assert prints_as(1 / Fraction(printed[f"{name} coefficient"]), printed[f"{name} beta"])

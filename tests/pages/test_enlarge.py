@@ -69,13 +69,3 @@ def test_axe_finds_nothing_in_an_enlarged_figure(phone):
     finally:
         phone.keyboard.press("Escape")
         phone.emulate_media(color_scheme="light")
-
-
-def test_a_desktop_shows_no_button(open_page):
-    with open_page(ADDRESS, shared=True) as page:
-        assert page.locator("article figure img").count() >= 4
-        assert page.locator(".enlarge:visible").count() == 0
-        page.set_viewport_size(tools.SIZES["phone"])
-        page.locator(".enlarge:visible").first.wait_for()
-        page.emulate_media(media="print")
-        assert page.locator(".enlarge:visible").count() == 0

@@ -83,18 +83,6 @@ def test_on_a_desktop_only_formulas_scroll(page):
     assert scrolling == []
 
 
-def test_a_formula_too_wide_for_a_phone_is_set_smaller_and_grows_back(look_at):
-    read = """[...document.querySelectorAll('article mjx-container[display="true"]')].map((each) =>
-      [parseFloat(getComputedStyle(each).fontSize), each.scrollWidth / each.clientWidth])"""
-    wide, narrow = (look_at("book/kalman.html", size).evaluate(read) for size in ("desktop", "phone"))
-    assert max(ratio for _, ratio in wide + narrow) <= 1
-    shares = [small / large for (small, _), (large, _) in zip(narrow, wide, strict=True)]
-    assert 0.6 <= min(shares) < 0.8
-    assert max(shares) == 1
-    again = look_at("book/kalman.html", "desktop").evaluate(read)
-    assert [size for size, _ in again] == [size for size, _ in wide]
-
-
 def test_only_what_scrolls_is_a_stop_of_the_keyboard(page):
     idle = page.locator("article :is(div, pre, mjx-container)[tabindex='0']").evaluate_all(
         "all => all.filter(e => (e.querySelector(':scope > mjx-math') ?? e).scrollWidth <= e.clientWidth)"
@@ -240,31 +228,6 @@ def test_the_front_page_shows_claim_answers_and_doors_at_once(open_page):
             assert box["y"] + box["height"] <= 900
 
 
-def test_what_was_collapsed_is_ready_once_opened(open_page):
-    with open_page("book/geometry.html", "phone", shared=True) as page:
-        part = page.locator("details.derivation").first
-        assert part.locator("mjx-container").count() == 0
-        part.locator("summary").click()
-        unset = "part => !part.querySelector('.math:not(:has(mjx-container))')"
-        page.wait_for_function(unset, arg=part.element_handle())
-        page.wait_for_timeout(100)
-        boxes = part.locator("mjx-container").evaluate_all(
-            "all => all.map(e => ({ stop: e.tabIndex === 0,"
-            " scrolls: e.scrollWidth > e.clientWidth && getComputedStyle(e).overflowX === 'auto' }))"
-        )
-        assert boxes
-        assert all(box["stop"] == box["scrolls"] for box in boxes)
-
-
-@on_a_desktop(LONG_PAGES)
-def test_a_page_can_be_read_before_all_its_formulas_are_typeset(page):
-    near, shown = page.evaluate("[window.formulas.near, window.formulas.shown]")
-    every = page.locator(".math").count()
-    assert every > 200
-    assert near["count"] < shown["count"] / 4
-    assert shown["count"] <= every
-
-
 @on_a_desktop(CHAPTERS)
 def test_a_chapter_shows_its_text_and_its_formulas_in_time(page, open_page):
     """Of several loads the fastest counts, because other programs delay some of them."""
@@ -293,27 +256,6 @@ def test_nothing_is_cut_on_paper(page, look_at):
     paper = look_at(urlsplit(page.url).path.removeprefix("/"), "paper")
     assert paper.evaluate(CUT) == []
     assert paper.locator(".math:not(:has(mjx-container))").all_text_contents() == []
-
-
-def test_a_narrow_window_shows_what_a_phone_does(open_page, look_at):
-    """The tests of a page on a phone make its window narrow, in place of opening it again."""
-    boxes = """[...document.querySelectorAll("article *")].map((e) => {
-      const { left, top, width, height } = e.getBoundingClientRect();
-      return [e.tagName, e.tabIndex, ...[left, top + scrollY, width, height].map(Math.round)].join(" ");
-    })"""
-    with open_page(LONG_PAGES[0], "phone", shared=True) as page:
-        assert look_at(LONG_PAGES[0], "phone").evaluate(boxes) == page.evaluate(boxes)
-
-
-def test_formulas_far_away_are_typeset_at_once_when_scrolled_to(open_page):
-    with open_page("book/kalman.html") as page:
-        page.add_init_script("window.requestIdleCallback = () => {}")  # a browser that is never idle
-        page.reload(wait_until="load")
-        page.wait_for_function("window.formulas.near")
-        last = page.locator("article section .math:visible").last
-        assert last.locator("mjx-container").count() == 0
-        last.scroll_into_view_if_needed()
-        last.locator("mjx-container").wait_for()
 
 
 def test_no_page_names_a_host_for_scripts():

@@ -150,20 +150,6 @@ def test_a_number_is_rounded_as_the_package_rounds_it(pages, base, t, x, rule):
     assert tip == pytest.approx(marks[0] + float(exact - numbers[0]) * scale, abs=0.1)
 
 
-def test_dragging_moves_the_number(pages):
-    page = pages("numberline")
-    type_in(page, "numberline", base="10", t="1", chop="to nearest", x="2.4")
-    svg = page.locator("#calculator-numberline svg")
-    svg.scroll_into_view_if_needed()
-    box = svg.bounding_box()
-    page.mouse.move(box["x"] + 60, box["y"] + 200)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 44 + (box["width"] - 58) / 2, box["y"] + 200)
-    page.mouse.up()
-    moved = float(page.locator("#calculator-numberline-x").input_value())
-    assert moved == pytest.approx(10**0.5, rel=0.02)
-
-
 def runs(chop):
     rule = Rounding.documented()[chop]
     chosen = [run for run in year.load() if run.case.model == year.MODELS[0] and run.case.base == 2]
@@ -263,17 +249,6 @@ def test_an_operation_shows_its_share_and_its_way(pages, operation, state):
     assert len(found["marked"]) == reached
 
 
-def test_a_tap_chooses_an_operation(pages):
-    page = pages("step")
-    type_in(page, "step", operation=STEP.inputs[0].choices[0], state="position")
-    touched = page.locator("#calculator-step .touch")
-    for k, words in enumerate(STEP.inputs[0].choices):
-        assert touched.nth(k).bounding_box()["height"] >= 24
-        touched.nth(k).click()
-        assert page.locator("#calculator-step-operation option:checked").text_content() == words
-        assert words in page.evaluate(READ, "step")["said"]
-
-
 def said_numbers(text):
     """The numbers of a sentence, with powers of ten as written for people."""
     plain = re.sub(
@@ -282,20 +257,6 @@ def said_numbers(text):
         text,
     )
     return re.findall(r"\d+(?:\.\d+)?(?:e-?\d+)?", plain.partition(". ")[2])
-
-
-@OF_NUMBERS
-def test_each_slider_obeys_the_arrow_keys(pages, picture):
-    page = pages(picture.id)
-    type_in(page, picture.id, **picture.start)
-    for each in picture.inputs:
-        if each.choices:
-            continue
-        before = page.evaluate(READ, picture.id)["said"]
-        page.locator(f"#calculator-{picture.id}-{each.name}-slider").focus()
-        for _ in range(3):
-            page.keyboard.press("ArrowRight")
-        assert page.evaluate(READ, picture.id)["said"] != before
 
 
 @OF_NUMBERS

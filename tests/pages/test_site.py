@@ -110,15 +110,6 @@ def test_folded_code_is_opaque_as_soon_as_it_is_opened_for_a_print(open_page):
         assert {tuple(each) for each in seen} == {("1", 0, True)}
 
 
-def test_headings_of_parts_are_lighter_than_those_of_sections(open_page):
-    with open_page("book/wordlength.html", shared=True) as page:
-        weight = "e => Number(getComputedStyle(e).fontWeight)"
-        size = "e => parseFloat(getComputedStyle(e).fontSize)"
-        section, part = page.locator("article h2").first, page.locator("article h3").first
-        assert part.evaluate(weight) < section.evaluate(weight)
-        assert part.evaluate(size) < section.evaluate(size)
-
-
 def description(address):
     text = (tools.HTML / address).read_text(encoding="utf-8")
     found = re.search(r'<meta name="description" content="([^"]*)">', text)
@@ -136,10 +127,6 @@ def test_a_description_can_be_read_alone():
     assert len(set(told.values())) == len(told)
 
 
-def test_a_description_of_the_ledger_names_its_document():
-    assert "Hung (1984)" in description("book/ledger-1984-3.html")
-
-
 LOADED = """async () => {
   for (const picture of document.images) picture.loading = "eager";
   await Promise.all([...document.images].map((picture) => picture.decode().catch(() => {})));
@@ -149,37 +136,8 @@ LOADED = """async () => {
 
 
 @on_a_desktop
-def test_no_page_loads_more_than_it_uses(page):
-    loaded = dict(page.evaluate(LOADED))
-    assert all(loaded.values())
-    names = " ".join(loaded)
-    assert ("mathjax" in names) == (page.locator(".math").count() > 0)
-    assert "fontawesome" not in names
-    fonts = [name for name in loaded if name.endswith((".woff", ".woff2", ".ttf")) and "mathjax" not in name]
-    assert fonts == []
-    assert ("searchindex" in names) == page.url.endswith("search.html")
-
-
-@on_a_desktop
 def test_no_page_is_heavier_than_its_limit(page):
     if "search.html" in page.url:
         pytest.skip("the page of results loads the index")
     loaded = dict(page.evaluate(LOADED))
     assert sum(loaded.values()) <= HEAVIEST, sorted(loaded.items(), key=lambda each: -each[1])[:8]
-
-
-@on_a_desktop
-def test_every_icon_is_drawn(page):
-    """An icon is a mask over a coloured box: without a picture it would be a filled square."""
-    icons = page.locator(".fa-solid, .fas").evaluate_all(
-        """all => all.map((e) => [e.className, getComputedStyle(e, "::before")])
-          .map(([name, style]) => [name, style.maskImage.startsWith('url("data:'), parseFloat(style.width)])"""
-    )
-    assert len(icons) > 3
-    assert [name for name, drawn, _ in icons if not drawn] == []
-
-
-def test_no_template_of_the_theme_is_shipped():
-    texts = {path: path.read_text(encoding="utf-8") for path in tools.HTML.rglob("*.html")}
-    assert [path.name for path, text in texts.items() if re.search(r"\{%-? |\{\{ ?\w+\(", text)] == []
-    assert [path.name for path, text in texts.items() if "<title>" not in text] == []

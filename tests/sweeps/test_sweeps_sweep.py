@@ -14,7 +14,6 @@ from distributed import KilledWorker
 from executors import Failing
 
 from gpbnb.report.guarantees import survey
-from gpbnb.report.stored import SWEEPS
 from gpbnb.sweeps import Column, DamagedFileError, Sweep, read, write
 from gpbnb.sweeps import command as sweep_command
 from gpbnb.sweeps.command import INTERRUPTED, verify
@@ -133,23 +132,6 @@ def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(s
     assert len(stored("other")) == 3 * 2
 
 
-def test_words_choose_cells_and_the_other_stored_rows_stay(sweep, tmp_path, capsys):
-    sweep.store(EXPECTED)
-    higher = dataclasses.replace(sweep, compute=lambda cell, directory: [value + 1 for value in compute(cell, None)])
-    given = ["recompute", sweep.name, "--output", str(tmp_path / "new"), "--only", "second", "seed=4"]
-    assert run([higher], given) == 0
-    before, after = sweep.load().rows, sweep.load(tmp_path / "new" / "tests" / "normal.csv").rows
-    assert [row[: sweep.key] for row in before] == [row[: sweep.key] for row in after]
-    changed = {row[:2] for row, other in zip(before, after, strict=True) if row != other}
-    assert changed == {cell.key for cell in CELLS if cell.name == "second" or cell.seed == 4}
-    capsys.readouterr()
-    assert run([higher], [*given[:-2], "third"]) == 1
-    assert "tests/normal: got no cell with third; needed words of Cell(name='first', seed=0)" in capsys.readouterr().err
-    summed = dataclasses.replace(sweep, summary=lambda results: [])
-    assert run([summed], given) == 1
-    assert "needed all cells, because the table has their sums" in capsys.readouterr().err
-
-
 def test_the_command_fails_where_a_result_must_not_occur(sweep, tmp_path, capsys):
     for faults, status in (([], 0), (["first 0 is wrong"], 1)):
         one = dataclasses.replace(sweep, faults=lambda file, faults=faults: faults if file.exists() else ["no file"])
@@ -190,28 +172,6 @@ def test_what_is_stored_has_its_provenance(sweep):
     assert {"machine", "commit"} < set(table.provenance)
 
 
-@pytest.mark.parametrize("stored", SWEEPS, ids=lambda each: each.name)
-def test_columns_refuse_numbers_that_cannot_be(stored):
-    accepted = {"base": ("2", "16"), "precision": ("1", "53"), "record": ("0", "9999"), "step": ("1", "3153600")}
-    others = {
-        "gravity_probe_b/year": {"precision": ("0", "53")},  # 0 marks the reference run
-        "gravity_probe_b/horizon": {"precision": ("2", "53"), "steps": ("1", None)},
-        "guarantees/certificates": {"size": ("1", None)},
-        "guarantees/filters": {"precision": ("3", "30"), "n": ("1", "4"), "m": ("1", "2")},
-        "guarantees/scalar": {"precision": ("3", "6"), "subnormal": ("0", "1")},
-        "guarantees/survey": {"base": ("2", "10"), "precision": ("3", "30"), "n": ("1", "4"), "m": ("1", "2")},
-    }
-    accepted |= others.get(stored.name, {})
-    for column in stored.columns:
-        if column.kind == "integer":
-            least, largest = accepted.get(column.name, ("0", None))
-            assert column.fault(least) is None
-            assert column.fault(str(int(least) - 1))
-            if largest:
-                assert column.fault(largest) is None
-                assert column.fault(str(int(largest) + 1))
-
-
 def test_a_sample_of_what_is_stored_is_verified(sweep):
     sweep.store(EXPECTED)
     assert sweep.verify(4, seed=1) == []
@@ -229,16 +189,6 @@ def test_a_sample_of_what_is_stored_is_verified(sweep):
         assert True in found
         assert False in found  # not all cells are computed
         assert len(verify([sweep, sweep], 10, 1)) == 2
-
-
-def test_a_part_of_the_cells_may_be_stored(sweep):
-    sweep.store(EXPECTED[3:5])
-    assert sweep.load().provenance["cells"] == "2 of 10"
-    assert sweep.verify(10, seed=1) == []
-    with pytest.raises(ValueError, match="needed a key that identifies each row"):
-        dataclasses.replace(sweep, key=2).verify(1, seed=1)
-    with pytest.raises(ValueError, match="got no rows"):
-        dataclasses.replace(sweep, sample=lambda cell, rng: []).verify(1, seed=1)
 
 
 def test_the_command_reports(sweep, capsys):

@@ -25,7 +25,6 @@ from gpbnb import (
     WordFormats,
     guarantee,
     limits,
-    required_precision,
     write_code,
 )
 from gpbnb.bounds.system import output_errors
@@ -33,13 +32,11 @@ from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
-from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.c_files import FLAGS
 from gpbnb.wordlength.c_integers import Integers, Needs
 from gpbnb.wordlength.c_source import places
 from gpbnb.wordlength.code import prepared
-from gpbnb.wordlength.models import read_model
 from tests.corpus import conformance
 
 needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang")
@@ -247,18 +244,6 @@ def test_a_header_states_the_bound(tmp_path):
     assert "No bound: the system as given is not stable" in header(path)
 
 
-def test_a_header_names_the_order_and_the_format(tmp_path):
-    words = WordFormats(FixedFormat(0, 15, "down", "wrap"), FixedFormat(1, 14), FixedFormat(2, 29))
-    text = header(write_code(BIQUAD, words, tmp_path)[0])
-    assert (
-        "data of 16 bits with 15 after the point (rounded down, wrapped around); a number n stands for n / 2**15"
-        in text
-    )
-    assert "in the order in which gpbnb emulates the filter and bounds its errors" in text
-    assert "-ffast-math" not in text
-    assert "never with -ffast-math" in header(write_code(BIQUAD, BINARY64, tmp_path)[0])
-
-
 def test_a_name_cannot_end_a_comment(tmp_path):
     named = FilterDesign([1], [1, "0.5"], name="x */ int y; /* \\\n ??/ ü")
     text = write_code(named, BINARY32, tmp_path)[0].read_text()
@@ -310,13 +295,6 @@ def test_what_has_no_code_is_refused(given, fmt, form, message, tmp_path):
 def test_a_name_that_c_does_not_take_is_refused(name, tmp_path):
     with pytest.raises(ValueError, match="got name"):
         write_code(BIQUAD, BINARY32, tmp_path, name=name)
-
-
-def test_other_objects_are_refused(tmp_path):
-    with pytest.raises(TypeError, match="got a int; needed the path of a TOML file"):
-        write_code(3, BINARY32, tmp_path)
-    with pytest.raises(TypeError, match="got the format 32"):
-        write_code(BIQUAD, 32, tmp_path)
 
 
 def test_names_that_are_none_in_c_are_numbered():
@@ -374,103 +352,3 @@ def test_the_command_writes_code_in_the_format_that_meets_the_tolerance(options,
     assert main([*arguments, *options]) == 0
     assert f"low-pass, direct form I, in {fmt}" in header(folder / "filter.h").replace("fixed point, ", "")
     assert str(folder / "filter.c") in capsys.readouterr().out
-
-
-@needs_compiler
-@pytest.mark.parametrize(
-    ("options", "fmt"),
-    [
-        ([], "ties away from zero, which must not overflow"),
-        (["--mixed", "--rounding", "floor"], "sums of"),
-        (["--basis", "guarantee", "--rounding", "even"], "ties to even"),
-    ],
-)
-def test_the_command_writes_code_in_the_fixed_point_that_it_finds(options, fmt, asked, capsys):
-    arguments, folder = asked
-    arguments = [each for each in arguments if each not in ("--basis", "emulation")]
-    assert main([*arguments, "--tolerance", "0.005", "--fixed", *options]) == 0
-    assert fmt in header(folder / "filter.h")
-    assert re.search("each output stays within|No bound: ", header(folder / "filter.h"))
-    assert built(folder)[0] == 0
-    word, fraction = re.search(r"data of (\d+) bits with (\d+) after", header(folder / "filter.h")).groups()
-    said = capsys.readouterr().out
-    assert (
-        f"{fraction} fraction bits in a word of {word} bits" in said or f"data of {word} bits with {fraction}" in said
-    )
-
-
-def test_the_command_writes_no_code_if_the_tolerance_is_missed(asked, capsys):
-    arguments, folder = asked
-    assert main([*arguments, "--tolerance", "1e-6", "--format", "BINARY16"]) == 1
-    assert "no code, since no format is known to meet the tolerance" in capsys.readouterr().err
-    assert not folder.exists()
-
-
-TRACKER = """
-states = ["position (m)", "speed (m/s)"]
-measurements = ["range (m)"]
-Phi = [[1, 0.1], [0, 1]]
-H = [[1, 0]]
-Q = [[1e-4, 0], [0, 1e-2]]
-R = [[4]]
-x0 = [0, 0]
-P0 = [[100, 0], [0, 100]]
-"""
-
-
-@pytest.fixture
-def tracker(tmp_path):
-    """A command line for a Kalman filter with constant gain, and the folder for its code."""
-    model = tmp_path / "tracker.toml"
-    model.write_text(TRACKER, encoding="utf-8")
-    given = [str(model), "--form", "Constant gain", "--steps", "50", "--tolerance", "0.01"]
-    return [*given, "--code", str(tmp_path / "code")], tmp_path / "code"
-
-
-@needs_compiler
-@pytest.mark.parametrize(
-    ("options", "texts"),
-    [
-        ([], ["in BINARY32", "never with -ffast-math"]),
-        (["--basis", "guarantee", "--measurement", "100"], ["For inputs of at most 100 in size, each output stays"]),
-        (["--fixed", "--basis", "emulation"], ["fixed point, data of ", "coefficients of "]),
-        (["--format", "fixed 7.24"], ["data of 32 bits with 24 after the point"]),
-    ],
-)
-def test_the_command_writes_a_kalman_filter_with_constant_gain(options, texts, tracker, capsys):
-    arguments, folder = tracker
-    assert main([*arguments, *options]) == 0
-    text = header(folder / "filter.h")
-    assert text.startswith("/* tracker, constant gain, in ")
-    assert all(each in text for each in texts)
-    assert "constant gain, emulation: " in capsys.readouterr().err or "guarantee" in options
-    assert built(folder)[0] == 0
-
-
-def test_a_constant_gain_is_answered_as_its_linear_system(tracker, capsys):
-    arguments, folder = tracker
-    model = read_model(arguments[0])
-    z = simulated_measurements(model, 50)
-    assert main([*arguments[:-2], "--basis", "emulation", "--report", str(folder) + ".html"]) == 0
-    expected = required_precision(settled_filter(model), z, 0.01, basis="emulation")
-    assert capsys.readouterr().out.strip() == str(expected)
-    page = folder.with_name("code.html").read_text(encoding="utf-8")
-    assert "simulated by the model, seed 0" in page
-    assert "position (m)" in page
-
-
-@pytest.mark.parametrize(
-    ("text", "options", "message"),
-    [
-        (TRACKER, ["--simulate", "step"], "its model simulates its measurements"),
-        (TRACKER, ["--mixed"], "needed --fixed with it"),
-        ('b = ["0.1"]\na = [1, "-0.5"]\n', [], "got --form constant gain for a linear system; needed none"),
-        (TRACKER.replace("R = [[4]]", "R = [[[4]], [[5]]]"), [], "changes from step to step"),
-    ],
-)
-def test_the_command_refuses_what_a_constant_gain_does_not_have(text, options, message, tracker, capsys):
-    arguments, folder = tracker
-    (folder.parent / "tracker.toml").write_text(text, encoding="utf-8")
-    assert main([*arguments, *options]) == 2
-    assert message in capsys.readouterr().err
-    assert not folder.exists()

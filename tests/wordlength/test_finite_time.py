@@ -10,11 +10,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, WordFormats, limits, required_precision
+from gpbnb import FloatFormat, LinearModel, LinearSystem, limits, required_precision
 from gpbnb.bounds.system import output_errors
-from gpbnb.bounds.words import WordGuarantee
 from gpbnb.wordlength.required import judge
-from tests.plain_structures import fixed, floating
+from tests.plain_structures import floating
 
 TENTH = Fraction(1, 10)
 CLOCK = LinearSystem.sum(running=True, name="clock")
@@ -126,30 +125,6 @@ def test_a_stable_system_is_bounded_for_ever_and_another_only_for_its_steps():
 # -- sums ------------------------------------------------------------------------------------------------------------
 
 
-def added(order, terms, round_, block=32):
-    """Sum in some order with every addition rounded; written without the package."""
-
-    def row(values):
-        total = values[0]
-        for each in values[1:]:
-            total = round_(total + each)
-        return total
-
-    if order == "left":
-        return row(terms)
-    if order == "blocked":
-        return row([row(terms[i : i + block]) for i in range(0, len(terms), block)])
-    if order == "pairwise":
-        if len(terms) == 1:
-            return terms[0]
-        half = len(terms) // 2
-        return round_(added(order, terms[:half], round_) + added(order, terms[half:], round_))
-    while len(terms) > 1:
-        rest = terms[len(terms) // 2 * 2 :]
-        terms = [round_(terms[i] + terms[i + 1]) for i in range(0, len(terms) - 1, 2)] + rest
-    return terms[0]
-
-
 def test_a_tree_of_1024_numbers_stays_below_the_published_bound():
     """SATIRE prints 11 · 1024 · 2**-53 for numbers within 1: ten levels, and storing as if a number lost a whole unit.
 
@@ -163,49 +138,7 @@ def test_a_tree_of_1024_numbers_stays_below_the_published_bound():
     assert output_errors(LinearSystem.sum(1024, "pairwise"), FloatFormat(2, 53), 1.0)[0] == pytest.approx(bound)
 
 
-def test_blocks_of_running_sums_add_up():
-    system, round_ = LinearSystem.sum(4, "pairwise", running=True), floating(2, 9, "chop")
-    rows, total, true, worst = np.random.default_rng(2).uniform(0, 1, (50, 4)), Fraction(0), Fraction(0), Fraction(0)
-    for row in rows:
-        terms = [Fraction(float(each)) for each in row]
-        total = round_(total + added("pairwise", [round_(each) for each in terms], round_))
-        true += sum(terms)
-        worst = max(worst, abs(total - true))
-    found = system.outputs(rows, FloatFormat(2, 9, "chop"))
-    assert Fraction(float(found[-1, 0, 0])) == total
-    assert float(worst) <= output_errors(system, FloatFormat(2, 9, "chop"), 1.0, 50)[0] < 8 * float(worst)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"count": 1}, "got the sum of one input; needed at least two, or running=True"),
-        ({"count": 0}, "count"),
-        ({"count": 4, "order": "random"}, "needed one of 'left', 'pairwise', 'blocked', 'tree'"),
-        ({"count": 4, "block": 0}, "block"),
-    ],
-)
-def test_sums_that_are_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        LinearSystem.sum(**arguments)
-
-
 # -- fixed point, and Kalman filters ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("system", "emulated"), [(CLOCK, clock), (TWICE, twice)])
-@pytest.mark.parametrize("mode", ["nearest", "down"])
-def test_words_have_a_bound_over_their_steps(system, emulated, mode):
-    inputs = [Fraction(9, 10)] * 40
-    words = WordFormats(FixedFormat(12, 10, mode))
-    bound = WordGuarantee(system, 1.0, 40).errors(words)[0]
-    observed = float(emulated(fixed(10, mode), inputs))
-    assert observed <= bound < 12 * observed
-    found = required_precision(system, np.full((40, 1), 0.9), 0.05, kind="fixed", basis="guarantee", rounding=mode)
-    assert found.format is not None
-    assert found.steps == 40
-    assert "guaranteed for 40 steps" in str(found)
-    assert float(emulated(fixed(found.digits, mode), inputs)) <= 0.05
 
 
 def test_a_kalman_filter_that_never_settles_has_a_guarantee_over_its_steps():

@@ -8,34 +8,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import BINARY64, FloatFormat, LinearSystem, WordFormats, emulate, guarantee, limits, required_precision
+from gpbnb import BINARY64, LinearSystem, WordFormats, emulate, guarantee, limits, required_precision
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.words import bounded_rounding
-from gpbnb.filters.settled import settled_filter
-from gpbnb.filters.simulation import Simulation
 from gpbnb.filters.system import controller, state_space
 from gpbnb.filters.words import run_words
-from gpbnb.wordlength import examples
-from tests.plain_program import steps_in_python
-
-MODES = [mode for mode in Rounding if mode is not Rounding.STOCHASTIC]
-
-
-@pytest.mark.parametrize("mode", MODES)
-def test_every_step_of_a_constant_gain_is_that_of_the_fixed_point_format(mode: Rounding) -> None:
-    """The integers against the correctly rounded scalar operations of the format."""
-    model = examples.tracker()
-    settled = settled_filter(model)
-    z = Simulation(model, (5.0, 1.0), 0, resolution=2.0**-12).measurements(40)
-    fmt = FixedFormat(9, 12, mode)
-    coefficients = FloatFormat(2, 9).array(settled.as_filter().coefficients).to_fractions()
-    run = run_words(settled, z, WordFormats(fmt, 9))
-    state = [Fraction(0)] * settled.as_filter().program.n
-    for found, row in zip(run.states, z, strict=True):
-        state = steps_in_python(settled.as_filter().program, fmt.round, coefficients, state, [fmt.round(row[0])])
-        assert [int(each) * fmt.unit for each in found] == state
-    assert any(state)
 
 
 def test_the_bound_of_one_state_is_its_geometric_series() -> None:

@@ -10,11 +10,8 @@ import pytest
 from independent_filter import Arithmetic, transposed
 
 from gpbnb import FloatFormat, emulate
-from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.run import Run
-from gpbnb.report.display import style
-from gpbnb.report.wordlengths import figures, study
 from gpbnb.wordlength import nonlinear_examples as examples
 from gpbnb.wordlength.examples import turns
 
@@ -75,28 +72,6 @@ def test_the_collapse_is_that_of_plain_integers(bits, collapse):
             assert P[step] == fmt.values(plain)
         lost = lost or (None if positive else step)
     assert lost == collapse
-
-
-def test_a_curve_of_variances_ends_where_the_run_does():
-    curve, lost = study.variances(examples.height_channel(), FloatFormat(2, 24), 4, 1800)
-    assert lost == COLLAPSE
-    assert [k for k, _ in curve] == list(range(18, 1801, 18))
-    plain = {k: P[4][4] for k, (P, _) in enumerate(covariances(Arithmetic(2, 24), 180), start=1)}
-    assert [value for k, value in curve[:10]] == [math.ldexp(*plain[k]) for k, _ in curve[:10]]
-    blocks = BlockFormats.uniform(FloatFormat(2, 24)).with_block("covariance", FloatFormat(2, 53))
-    assert study.variances(examples.height_channel(), blocks, 4, 1800)[1] is None
-
-
-def test_the_figure_of_variances_shows_each_curve():
-    curves = {"binary32": [(10, 2.0), (20, 1.0), (30, -1.0)], "binary64": [(10, 2.0), (20, 1.5), (30, 1.25)]}
-    _, (ax,) = style.figure()
-    artists = figures.variances(curves, 2, ax)
-    lines = {tuple(map(tuple, each.get_xydata())) for each in ax.get_lines() if len(each.get_xdata()) == 3}
-    assert lines == {tuple((k / 2, value) for k, value in curve) for curve in curves.values()}
-    assert len({each.get_color() for each in ax.get_lines() if len(each.get_xdata()) == 3}) == 2
-    assert {each.get_text() for each in ax.texts} >= set(curves)
-    assert set(ax.get_lines()) <= set(artists)
-    assert ax.get_xlabel() == "time (s)"
 
 
 # -- the examples ---------------------------------------------------------------------------------------------------

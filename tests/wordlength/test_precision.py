@@ -12,16 +12,14 @@ import pytest
 
 from gpbnb import required_precision
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
-from gpbnb.bounds.guarantee import guarantee, limits
-from gpbnb.bounds.probable import probable_error
+from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_named
 from gpbnb.filters.run import reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
 from gpbnb.filters.system import LinearSystem, unobserved
@@ -75,18 +73,6 @@ def test_the_bound_asks_for_more_digits_and_holds():
     assert str(by_bound).endswith("proved for this run of 60 steps")
 
 
-def test_a_tolerance_for_each_state():
-    first = required_precision(MODEL, Z, (1e-6, math.inf), base=2).format
-    second = required_precision(MODEL, Z, (math.inf, 1e-2), base=2).format
-    assert second.precision < first.precision
-    assert np.abs(error(first))[:, 0].max() < 3e-6
-    assert required_precision(MODEL, Z, (1e-6, 1e-2), base=2).format == first
-    # An infinite bound of a state that does not matter is no number of any kind.
-    tried = survey(MODEL, Z, (1e-6, math.inf), range(2, 30), basis="bound")
-    assert math.isinf(tried[0][1])
-    assert not any(math.isnan(ratio) for _, ratio in tried)
-
-
 def test_a_survey_is_what_the_search_sees():
     for basis in ("emulation", "bound"):
         found = required_precision(MODEL, Z, (1e-4, math.inf), basis=basis)
@@ -117,23 +103,6 @@ def test_no_precision_may_be_enough(model, base, most):
     assert "function" not in str(required_precision(model, Z[:3], 1e-30, base=base, basis="bound"))
 
 
-def test_a_function_runs_in_more_digits_than_its_model():
-    """The precision that the answer for a model without one suggests."""
-
-    def smoother(fmt, z):
-        keep, take, x, estimates = fmt.array("0.9"), fmt.array("0.1"), fmt.array(0), []
-        for value in z:
-            x = keep * x + take * value
-            estimates.append(x)
-        return estimates
-
-    system, z = LinearSystem([["0.9"]], [["0.1"]]), np.sin(np.arange(20))
-    assert not required_precision(system, z.reshape(-1, 1), 1e-18).met
-    found = required_precision(smoother, z, 1e-18, highest=113)
-    assert 53 < found.digits < 113
-    assert "highest=" not in str(found)
-
-
 def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
     """One state, R far below P: with few digits a variance comes out as zero, whatever the error of the state."""
     given = LinearModel([[1]], [[1]], [[0]], [["1e-6"]], [1], [[1]])
@@ -157,31 +126,6 @@ def test_an_answer_holds_in_every_step(form, steps):
         history = emulate(given, z, FloatFormat(2, digits), form, every, true)
         if not history.indefinite and not history.stopped:
             assert (np.abs(history.state) / tolerance).max() == pytest.approx(ratio, rel=1e-12, abs=0)
-
-
-@pytest.mark.parametrize("basis", ["guarantee", "probable"])
-def test_a_bound_for_ever_of_a_kalman_filter_names_the_processor_format_that_is_enough(basis):
-    """Above an answer of few bits, the search itself tries no format of a processor."""
-    walk = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-    within = limits(state=10, innovation=3)
-    for tolerance, fmt, name in ((0.01, BINARY32, "binary32"), (1e-9, BINARY64, "binary64")):
-        found = required_precision(walk, 50, tolerance, basis=basis, within=within)
-        assert fmt.precision not in dict(found.tried)
-        assert found.digits < fmt.precision - 1
-        bound = guarantee(walk, fmt, within, horizon=1)
-        error = bound.bound if basis == "guarantee" else 3 * probable_error(bound)
-        assert found.processor_format == name
-        assert float(error[0]) <= tolerance
-        assert f"{name} is enough): " in str(found)
-    assert required_precision(walk, 50, 0.01, basis=basis, within=within, highest=20).processor_format == ""
-    assert required_precision(walk, 50, 0.01, rounding="chop", basis=basis, within=within).processor_format == ""
-
-
-def test_masked_inputs_are_refused():
-    system = LinearSystem([["0.9"]], [["0.1"]])
-    masked = np.ma.masked_array(np.ones((5, 1)), mask=np.eye(5, 1))
-    with pytest.raises(ValueError, match="some are masked; needed a number for each"):
-        required_precision(system, masked, 1e-3)
 
 
 def test_stochastic_rounding_is_searched_as_far_as_it_has_loops():
@@ -278,13 +222,6 @@ def test_an_answer_says_why_fewer_digits_were_refused():
 
 
 ALMOST_KNOWN = LinearModel([[1]], [["0.59"]], [[0]], [["1e-18"]], [0], [[10**4]], "a sensor far better than the prior")
-
-
-@pytest.mark.parametrize("form", ["innovation", "symmetrized", "compensated"])
-def test_one_variance_of_zero_is_not_definite(form):
-    """The gain of a precise sensor is rounded to 1, which leaves its state no variance; the other keeps its own."""
-    model = LinearModel(np.eye(2), [[1, 0]], np.zeros((2, 2)), [["1e-18"]], [0, 0], [[10**4, 0], [0, 1]])
-    assert emulate(model, np.ones((3, 1)), FloatFormat(2, 11), form_named(form)).indefinite == 1
 
 
 def test_an_answer_that_higher_precisions_miss_is_refused():

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import io, signal
 
-from gpbnb import LinearModel, LinearSystem, emulate, read_model, required_precision
+from gpbnb import LinearModel, emulate, read_model, required_precision
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_measurements
 
@@ -48,14 +47,6 @@ def test_a_kalman_filter_from_arrays_in_a_file(tmp_path):
         assert [getattr(found, key).ravel().tolist() for key in given] == [
             np.ravel(each).tolist() for each in given.values()
         ]
-
-
-def test_a_controller_is_read(tmp_path):
-    (tmp_path / "pi.toml").write_text('Kp = "0.8"\nKi = 0.05\nlimits = [-1, 1]\n')
-    e = np.linspace(-3, 3, 20)[:, None]
-    found, expected = read_model(tmp_path / "pi.toml"), LinearSystem.pid("0.8", "0.05", limits=(-1, 1))
-    assert np.array_equal(found.outputs(e), expected.outputs(e))
-    assert found.name == "pi"
 
 
 @pytest.mark.parametrize(
@@ -119,12 +110,3 @@ def test_the_command_writes_a_run_and_keeps_quiet(tmp_path, monkeypatch, capsys)
     assert main(asked) == 2
     assert "got --csv run.csv, which gpbnb has not written; needed another name" in capsys.readouterr().err
     assert (tmp_path / "run.csv").read_text() == "1\n"
-
-
-def test_known_inputs_set_the_number_of_steps(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "walk.toml").write_text(f"{WALK}B = [[1]]\n")
-    (tmp_path / "u.csv").write_text("0.5\n" * 20)
-    assert main(["walk.toml", "--tolerance", "0.01", "--basis", "emulation", "--inputs", "u.csv"]) == 0
-    assert "observed in 20 steps" in capsys.readouterr().out
-    assert "statsmodels" not in sys.modules

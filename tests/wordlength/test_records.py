@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, LinearModel, Rounding
+from gpbnb import FloatFormat, Rounding
 from gpbnb.wordlength import examples
 from gpbnb.wordlength import records as module
 from gpbnb.wordlength.records import RecordSurvey, survey_records
@@ -90,31 +90,3 @@ def test_shares_and_what_is_enough():
     assert found.enough() == (formats[2],)
     irregular = RecordSurvey(formats, np.array([[0.5, 0.5, 0.5, np.inf]]), (("",) * 4,))
     assert irregular.enough() == ()
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"records": []}, "got no records"),
-        ({"records": 3}, "got 3 records to simulate without steps"),
-        ({"records": data(1), "steps": 4}, "got steps with records"),
-        ({"records": [[[1, 2]]]}, r"got record 0 of shape \(1, 2\); needed \(steps, 1\)"),
-        ({"records": 0, "steps": 5}, "got 0 records"),
-        ({"formats": []}, "got 0 formats"),
-        ({"formats": [FORMATS[0]] * 2}, "got 2 formats, 1 different"),
-        ({"formats": [FloatFormat(2, 113)]}, "got 113 bits; needed at most 53 for compiled loops"),
-        ({"basis": "guarantee"}, 'got basis "guarantee"; needed "emulation" or "bound"'),
-        ({"tolerance": 0}, "got tolerance 0"),
-        ({"chunk": 0}, "got 0 chunk; needed a whole number"),
-    ],
-)
-def test_bad_questions_are_refused(given, message):
-    asked = {"model": TRACKER, "records": data(1), "tolerance": 0.1, "formats": FORMATS[:1]} | given
-    with pytest.raises(ValueError, match=message):
-        survey_records(**asked)
-
-
-def test_other_models_are_refused():
-    with pytest.raises(TypeError, match="got a int; needed the path"):
-        survey_records(1, data(1), 0.1, FORMATS)
-    assert isinstance(TRACKER, LinearModel)

@@ -3,44 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gpbnb import (
-    BlockFormats,
-    FixedFormat,
     FloatFormat,
     LinearModel,
     LinearSystem,
-    Requirement,
-    WordFormats,
     limits,
     required_precision,
 )
-from gpbnb.wordlength.answer import judgement, listed
+from gpbnb.wordlength.answer import judgement
 
 WALK = LinearModel([["0.9"]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-TEN = Requirement(FloatFormat(2, 10), 0.5, "emulation", 5, ((9, 2.0), (10, 0.5)), "10 bits")
-
-
-@pytest.mark.parametrize(
-    ("fmt", "digits"),
-    [(None, None), (FloatFormat(10, 7), 7), (FixedFormat(3, 12), 12), (WordFormats(FixedFormat(3, 12), 15), 12)],
-)
-def test_digits_are_those_of_the_format(fmt, digits):
-    found = replace(TEN, format=fmt)
-    assert found.digits == digits
-    assert bool(found) is found.met is (fmt is not None)
-    assert not replace(found, ratio=1.5).met
-
-
-def test_the_digits_of_blocks_are_the_most():
-    fmt = BlockFormats.uniform(FloatFormat(2, 9)).with_block("gain", FloatFormat(2, 12))
-    alone = {"state": 5, "gain": 12, "covariance": 12, "innovation": 3}
-    found = replace(TEN, format=fmt, alone=alone)
-    assert (found.digits, found.limiting) == (12, ("gain", "covariance"))
 
 
 @pytest.mark.parametrize(
@@ -73,7 +49,3 @@ def test_a_guarantee_says_that_the_given_run_leaves_its_limits(z, leaves):
     system = LinearSystem([["0.9"]], [["0.1"]])
     proved = required_precision(system, np.array(z), 0.05, basis="guarantee", within=limits(measurement=5))
     assert ("input 0 reaches 7, above 5" in str(proved)) is bool(leaves)
-
-
-def test_numbers_in_a_row_are_a_range():
-    assert listed([2, 5, 6, 7, 8, 10, 11]) == "2, 5–8, 10, 11"

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from gpbnb import FixedFormat, LinearSystem, WordFormats, required_precision
-from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS
 from gpbnb.wordlength.strategies import strategy_for
 from gpbnb.wordlength.strategy import Data
@@ -84,24 +83,3 @@ def test_no_format_of_a_biquad_can_be_lowered(basis):
         ).ratio
         > 1
     )
-
-
-def test_the_command_answers_in_fraction_bits(tmp_path, capsys):
-    model = tmp_path / "biquad.toml"
-    model.write_text("b = [0.01, 0.02, 0.01]\na = [1, -1.6, 0.7]\nstructure = 'direct form I'\n")
-    asked = [str(model), "--tolerance", "0.01", "--simulate", "step", "--steps", "80", "--fixed"]
-    assert main([*asked, "--basis", "emulation", "--mixed"]) == 0
-    printed = capsys.readouterr().out
-    system = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"], "direct form I")
-    z = np.ones((80, 1))
-    assert printed.startswith(f"direct form I: {required_precision(system, z, 0.01, kind='fixed')}\n")
-    assert str(required_precision(system, z, 0.01, kind="words")) in printed
-    for more, message in (
-        (["--digits", "9"], "got --fixed and --digits; needed --fixed alone, which searches the fraction bits; to jud"),
-        (["--emin", "0", "--emax", "9"], "got --fixed and --emin, --emax; needed --fixed alone"),
-        (["--basis", "bound"], "got --fixed and --basis bound; needed --basis emulation or guarantee"),
-        (["--certificate", "x.json"], "got --fixed and --certificate; needed floating point for a certificate"),
-        (["--basis", "guarantee", "--measurement", "1"], "got --fixed and --measurement"),
-    ):
-        assert main([*asked, *more]) == 2
-        assert message in capsys.readouterr().err

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import html
-import inspect
 import json
 import math
-import shlex
-import sys
 from fractions import Fraction
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,11 +14,9 @@ from gpbnb import required_precision
 from gpbnb.bounds.check import prove
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength import running as command
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.models import read_filter, read_measurements, read_model
-from gpbnb.wordlength.report import study
+from gpbnb.wordlength.models import read_filter, read_model
 
 MODEL = """
 name = "tracker <1>"
@@ -34,9 +27,6 @@ R = [[4]]
 x0 = [0, 0]
 P0 = [[100, 0], [0, 100]]
 """
-MATRICES = {"A": [["0.5", 0], [0, "0.25"]], "B": [[1], [1]]}
-
-ANSWERED = SimpleNamespace(text="21 digits", mixed="", shortest="", digits=21, met=True)
 
 
 @pytest.fixture
@@ -80,58 +70,6 @@ def test_the_command_answers_and_writes_page_and_json(files, capsys):
     written = [f"2{''.join('⁻⁰¹²³⁴⁵⁶⁷⁸⁹'['-0123456789'.index(sign)] for sign in str(k))}" for k in (low, high)]
     assert f"<td>{name}</td><td>{written[0]}</td><td>{written[1]}</td>" in text
     Elements(text)
-
-
-def test_a_report_shows_the_arguments_of_the_process(files, monkeypatch, capsys):
-    folder, _ = files
-    given = [str(folder / "model.toml"), "--tolerance", "0.01,inf", "--steps", "20"]
-    given += ["--report", str(folder / "out.html")]
-    monkeypatch.setattr(sys, "argv", ["program", *given])
-    assert main() == 0
-    shown = f"python -m gpbnb.wordlength {shlex.join(given)}"
-    assert html.escape(shown) in (folder / "out.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("options", "name", "value"),
-    [
-        ([], "tolerance", [0.01, math.inf]),
-        ([], "steps", None),
-        ([], "z", None),
-        ([], "bases", ("emulation", "bound")),
-        ([], "base", 2),
-        ([], "rounding", "nearest"),
-        ([], "form", "innovation"),
-        ([], "source", ""),
-        ([], "within", None),
-        (["--steps", "70"], "steps", 70),
-        (["--base", "10"], "base", 10),
-        (["--rounding", "chop"], "rounding", "chop"),
-        (["--form", "UD"], "form", "UD"),
-        (["--basis", "bound", "--basis", "emulation"], "bases", ["bound", "emulation"]),
-        (["--basis", "probable", "--measurement", "9"], "within", limits(measurement=9)),
-    ],
-)
-def test_each_option_is_the_part_of_the_question_that_it_names(files, monkeypatch, options, name, value):
-    asked = []
-    monkeypatch.setattr(command, "study", lambda *given, **named: asked.append((given, named)) or ANSWERED)
-    assert main([str(files[0] / "model.toml"), "--tolerance", "0.01,inf", *options]) == 0
-    ((given, named),) = asked
-    found = inspect.signature(study).bind(*given, **named).arguments
-    found |= vars(found["asked"])
-    assert repr(found[name]) == repr(value)
-
-
-def test_measurements_are_the_source_of_the_answer(files, monkeypatch):
-    folder, z = files
-    asked = []
-    monkeypatch.setattr(command, "study", lambda *given, **named: asked.append(given) or ANSWERED)
-    given = [str(folder / "model.toml"), "--tolerance", "1", "--measurements", str(folder / "z.csv")]
-    assert main(given) == 0
-    ((question, source, shown, _),) = asked
-    assert np.array_equal(question.z, z, equal_nan=True)
-    assert source == str(folder / "z.csv")
-    assert shown == f"python -m gpbnb.wordlength {shlex.join(given)}"
 
 
 def test_no_answer_has_an_exit_status_of_its_own(files, capsys):
@@ -188,21 +126,6 @@ def test_a_guarantee_comes_with_a_certificate(files, tmp_path, form, capsys):
     assert capsys.readouterr().out.startswith(f"{content['format']['precision']} bits")
     assert content["limits"] == {"state": ["10000", "50"], "innovation": ["30"], "measurement": [None]}
     assert Fraction(content["bound"][0]) <= Fraction("0.01")
-
-
-def test_a_certificate_that_cannot_be_written_is_refused(files, tmp_path, capsys):
-    folder = files[0]
-    (folder / "model.toml").write_text(MODEL.replace("R = [[4]]", "R = [[0.01]]"), encoding="utf-8")
-
-    def refused(tolerance, certificate, *more):
-        given = [str(folder / "model.toml"), "--tolerance", tolerance, "--certificate", str(certificate)]
-        assert main([*given, *more]) == 2
-        return capsys.readouterr().err
-
-    path, basis = tmp_path / "certificate.json", ["--basis", "guarantee", "--state", "1e4,50", "--innovation", "30"]
-    assert "needed --basis guarantee" in refused("0.01,inf", path)
-    assert "got no precision with a guarantee" in refused("1e-30", path, *basis)
-    assert "which are one file" in refused("0.01,inf", folder / "model.toml", *basis)
 
 
 def test_a_digital_filter_comes_with_a_certificate_and_code_of_the_file_as_it_was_read(tmp_path, capsys, monkeypatch):
@@ -288,13 +211,6 @@ def test_limits_that_are_missing_or_of_no_use_are_refused(files, capsys, options
     assert message in capsys.readouterr().err
 
 
-def test_a_header_and_gaps_in_measurements(files):
-    found = read_measurements(files[0] / "z.csv")
-    assert found.shape == (60, 1)
-    assert np.isnan(found[7, 0])
-    assert np.array_equal(found, files[1], equal_nan=True)
-
-
 def test_the_command_takes_known_inputs(files, capsys):
     folder, z = files[0], files[1][:9]
     (folder / "z.csv").write_text("\n".join((folder / "z.csv").read_text(encoding="utf-8").split("\n")[:10]))
@@ -310,11 +226,3 @@ def test_the_command_takes_known_inputs(files, capsys):
     assert "Carlson, emulation: " in shown.err
     assert main(given) == 2
     assert "got B without u" in capsys.readouterr().err
-
-
-def test_inputs_without_a_place_for_them_are_refused():
-    system = LinearSystem([["0.5"]], [[1]])
-    with pytest.raises(ValueError, match="got inputs for a LinearSystem"):
-        read_model(system, [[1]])
-    with pytest.raises(ValueError, match="the mapping: got known inputs for a linear system; needed none"):
-        read_model(MATRICES, [[1]])

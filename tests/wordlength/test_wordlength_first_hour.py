@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from functools import partial
 
 import numpy as np
@@ -26,9 +24,7 @@ from gpbnb import (
     survey_records,
     write_code,
 )
-from gpbnb.names import format_parts
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.fixed import _WIDER
 from gpbnb.wordlength.models import read_measurements
 from gpbnb.wordlength.required import judge
 
@@ -88,20 +84,6 @@ def test_a_command_is_refused(arguments, message, folder, capsys):
 
 
 @pytest.mark.parametrize(
-    ("name", "fmt"),
-    [
-        ("float32", "BINARY32"),
-        ("double", "BINARY64"),
-        ("half", "BINARY16"),
-        ("single", "BINARY32"),
-        ("Float64", "BINARY64"),
-    ],
-)
-def test_formats_have_the_names_of_c_and_numpy(name, fmt):
-    assert format_parts(name) == fmt
-
-
-@pytest.mark.parametrize(
     ("given", "message"),
     [
         (
@@ -119,16 +101,6 @@ def test_a_model_is_refused(given, message):
     entries = {"Phi": [[1, 1], [0, 1]], "H": [[1, 0]], "Q": np.eye(2), "R": [[1]], "x0": [0, 0], "P0": np.eye(2)}
     with pytest.raises((ValueError, TypeError), match=message):
         read_model({name: each for name, each in {**entries, **given}.items() if each is not None})
-
-
-def test_a_digital_filter_has_named_inputs_and_outputs():
-    given = {"b": [1], "a": [1, "-0.5"], "inputs": ["gyro (°/s)"], "outputs": ["rate (°/s)"]}
-    system = read_model(given)
-    assert (system.input_names, system.output_names) == (("gyro (°/s)",), ("rate (°/s)",))
-    with pytest.raises(ValueError, match='input "gyro"'):
-        required_precision(system, [[math.nan]], 1)
-    with pytest.raises(ValueError, match="states unknown; needed b and a, or sos, and perhaps structure, pairing, "):
-        read_model({**given, "states": ["x"]})
 
 
 @pytest.mark.parametrize(
@@ -236,16 +208,6 @@ def test_written_code_replaces_only_files_that_gpbnb_has_written(name, tmp_path)
     assert (tmp_path / name).read_text() != "my own\n"
 
 
-@pytest.mark.parametrize("command", ["gpbnb.wordlength", "gpbnb wordlength"])
-def test_an_interrupted_command_ends_in_a_line(command, folder, monkeypatch):
-    program = "import runpy, sys; from gpbnb.wordlength import options\n"
-    program += "def read(arguments): raise KeyboardInterrupt\noptions.read = read\n"
-    program += "sys.argv[1:] = sys.argv[1].split()\nrunpy.run_module(sys.argv.pop(1), run_name='__main__')"
-    found = subprocess.run([sys.executable, "-c", program, command], capture_output=True, text=True, check=False)
-    assert (found.returncode, found.stdout) == (130, "")
-    assert found.stderr == "python -m gpbnb.wordlength: interrupted\n"
-
-
 def test_an_overflow_names_the_numbers_that_are_too_large():
     with pytest.raises(OverflowError, match=r"^measurements: entry \[1, 0\]: got a result of about 2\*\*"):
         emulate(WALK, [[1], [1e6]], BINARY16)
@@ -255,28 +217,3 @@ def test_an_overflow_names_the_numbers_that_are_too_large():
     assert "got C1_1 = 3, beyond the range" in str(judge(large, FixedFormat(0, 15), [[0], [0]], 1))
     sections = LinearSystem.from_coefficients([1, 2, 1], [1, "-1.5", "0.75"])
     assert "got b1 = 2, beyond the range" in str(judge(sections, FixedFormat(0, 15), [[0], [0]], 1))
-
-
-def test_fraction_bits_of_a_kalman_filter_end_with_the_compiled_loops():
-    """So that the answer says what is wrong with the integer bits, and not that there are no more loops."""
-    tracker = LinearModel(
-        [[1, "0.1"], [0, 1]], [[1, 0]], [["1e-4", 0], [0, "0.01"]], [["0.01"]], [0, 0], np.eye(2) * 99
-    )
-    z = np.arange(20).reshape(-1, 1) / 100
-    found = required_precision(tracker, z, 1e-2, kind="fixed", like=FixedFormat(8, 8), form="UD")
-    assert not found.met
-    assert max(digits for digits, _ in found.tried) == 43
-    reason = emulate(tracker, z, FixedFormat(8, 20), form="UD").reason
-    assert "use more integer bits" in reason
-    most = "43 fraction bits are the most with compiled loops"
-    assert found.why == f"43 fraction bits fail: the run is refused: {reason}{_WIDER}; {most}"
-    assert required_precision(tracker, z, 1e-2, kind="fixed", like=FixedFormat(30, 8), form="UD").met
-    with pytest.raises(ValueError, match="got 60 bits in fixed point; needed at most 51 for compiled loops"):
-        required_precision(tracker, z, 1e-2, kind="fixed", like=FixedFormat(60, 8), form="UD")
-
-
-def test_a_format_too_small_for_the_model_misses_by_a_guarantee_as_by_emulation():
-    wide = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [["1e6"]])
-    found = judge(wide, BINARY16, 2, 1, basis="guarantee", within=limits(state=10, innovation=10))
-    assert not found.met
-    assert found.why.startswith("overflow: P0: entry [0, 0]: got a result of about 2**19; needed at most 65504")

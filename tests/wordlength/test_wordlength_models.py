@@ -97,18 +97,6 @@ def test_what_changes_the_estimates_is_refused_by_name(name, value, message):
         read_model(given)
 
 
-def test_a_correlation_of_the_noises_is_refused():
-    given, plain = tracker(), tracker()
-    given.M = np.full((3, 2), 0.1)
-    for each in (given, plain):
-        each.predict()
-    given.update_correlated(Z[0].reshape(-1, 1))
-    plain.update(Z[0].reshape(-1, 1))
-    assert not np.allclose(given.x, plain.x, rtol=1e-3)
-    with pytest.raises(ValueError, match="with a correlation M of process and measurement noise; needed M = 0"):
-        read_model(given)
-
-
 def test_inputs_are_used_or_refused():
     given = tracker(inputs=True)
     with pytest.raises(ValueError, match=r"with inputs B; needed u=, of shape \(steps, p\)"):
@@ -122,14 +110,6 @@ def test_inputs_are_used_or_refused():
     given.B = np.ones(3)
     with pytest.raises(ValueError, match=r"B of shape \(3,\); needed \(3, p\)"):
         read_model(given, U)
-
-
-@pytest.mark.filterwarnings("ignore:Use KalmanFilter class instead:DeprecationWarning")
-def test_a_fading_filter_that_fades_is_refused():
-    with pytest.raises(
-        ValueError, match=r"got a FadingKalmanFilter with a fading memory, alpha = 1\.5; needed alpha = 1"
-    ):
-        read_model(FadingKalmanFilter(1.5, 2, 1))
 
 
 class Gated(KalmanFilter):

@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 from scipy.signal import dlti
 
-from gpbnb import BINARY16, BINARY32, FloatFormat, LinearModel, LinearSystem, limits, read_model, required_precision
-from gpbnb.filters.system import unobserved
-from gpbnb.wordlength.examples import TILT_STATES, tilt
-from gpbnb.wordlength.records import survey_records
+from gpbnb import LinearModel, LinearSystem, limits, read_model, required_precision
+from gpbnb.wordlength.examples import tilt
 
-NAMES = [f"{name} ({unit})" for name, unit in TILT_STATES]
 CART = LinearModel(
     Phi=[[1, "0.1"], [0, 1]],
     H=[[1, 0]],
@@ -54,33 +51,6 @@ def test_a_system_is_shown_in_three_lines():
     ]
 
 
-def test_a_survey_is_shown_as_a_table():
-    walk = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-    found = survey_records(walk, 3, 0.01, [FloatFormat(2, 4), BINARY16, BINARY32, FloatFormat(10, 7, "chop")], steps=20)
-    header, columns, *rows = repr(found).splitlines()
-    assert header == "3 records in each format"
-    assert " ".join(columns.split()) == "format within the tolerance largest error / tolerance"
-    assert {len(row) for row in rows} == {len(columns)}
-    names = ("4 bits", "BINARY16", "BINARY32", "7 decimal digits, chopped")
-    for i, (row, name) in enumerate(zip(rows, names, strict=True)):
-        share, worst = f"{100 * found.shares[i]:.0f}%", f"{found.ratios[:, i].max():.3g}"
-        assert row.split() == [*name.split(), share, worst]
-    assert len(repr(replace_ratios(found))) < 600
-
-
-def replace_ratios(found):
-    return found._replace(ratios=np.tile(found.ratios, (1000, 1)))
-
-
-def test_names_stay_with_a_model_that_is_changed():
-    z = np.array([[1.0], [math.nan], [2.0]])
-    for changed in (CART.rounded(BINARY32), CART.without_missing(z)[0], replace(CART, steps=2, u=CART.u[:2])):
-        assert (changed.state_names, changed.measurement_names) == (CART.state_names, CART.measurement_names)
-        assert changed.input_names == CART.input_names
-    assert CART.without_inputs().input_names == ()
-    assert CART.without_inputs().state_names == CART.state_names
-
-
 @pytest.mark.parametrize(
     ("names", "error", "message"),
     [
@@ -95,22 +65,6 @@ def test_names_stay_with_a_model_that_is_changed():
 def test_names_that_do_not_fit_are_refused(names, error, message):
     with pytest.raises(error, match=message):
         replace(tilt(), state_names=names)
-
-
-def test_messages_name_the_state():
-    grown = LinearSystem([["0.5", 0], [0, "1.5"]], [[1], [1]], state_names=["current (A)", "speed [m/s]"])
-    assert grown.unstable().endswith('an eigenvalue of size 1.5, mostly in state "speed"')
-    assert replace(grown, state_names=()).unstable().endswith("an eigenvalue of size 1.5, mostly in state 1")
-    lost = unobserved(np.asarray(grown.A), np.asarray([grown.A[0]]), grown.state_names)
-    assert lost.endswith('with an eigenvalue of size 1.5, mostly in state "speed"')
-    with pytest.raises(OverflowError, match='state "speed" at step 1: got a number beyond the range of float64'):
-        replace(grown, x0=[0, "1e200"], A=[[0, 0], [0, "1e200"]]).outputs([[0]] * 3)
-    with pytest.raises(OverflowError, match=r'output "speed" at step \d: got'):
-        replace(
-            grown, x0=[0, "1e200"], A=[[0, 0], [0, "0.5"]], C=[[0, "1e160"]], D=[[0]], output_names=["speed (m/s)"]
-        ).outputs([[0]] * 3)
-    with pytest.raises(ValueError, match='got inf for measurement "range" of step 2'):
-        required_precision(CART, [[1], [math.inf], [2]], 0.1)
 
 
 def test_a_process_that_never_settles_is_told_what_to_ask_instead():

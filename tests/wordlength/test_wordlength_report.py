@@ -95,22 +95,6 @@ def test_each_table_holds_what_its_heading_says():
     }
 
 
-@pytest.mark.parametrize(
-    ("basis", "meaning"),
-    [
-        ("emulation", "An emulation holds for these measurements."),
-        ("bound", "A bound holds for the arithmetic of this run, whatever its roundings."),
-        ("guarantee", "A guarantee holds for ever, for all measurements within the limits."),
-        ("probable", "A probable error is three standard deviations, if roundings are independent of each other"),
-    ],
-)
-def test_each_basis_is_explained_and_no_other(basis, meaning):
-    alone = replace(REPORT, answers=(Answer("UD", basis, 21, "", ()),))
-    shown = text_of(alone.to_html()).partition("rounding nearest ")[2]
-    assert shown.startswith(meaning)
-    assert shown.partition(" These runs have unlimited exponents")[0].count(".") == 1
-
-
 def test_the_report_ends_with_how_to_reproduce_it():
     end = "How to reproduce this report python -m gpbnb.wordlength model.toml numpy: 2.0 machine: x86"
     assert text_of(REPORT.to_html()).endswith(end)
@@ -132,25 +116,3 @@ def test_a_study_says_where_its_measurements_come_from(given, source):
     assert (found.kind, found.source, found.steps) == ("Kalman filter", source, given.get("steps", 2))
     assert [each.label for each in found.answers] == ["innovation, emulation", "Joseph, emulation", "UD, emulation"]
     assert told[:2] == ["innovation, emulation …", f"innovation, emulation: {found.text}"]
-
-
-def test_a_report_on_a_linear_system_speaks_of_inputs():
-    system = replace(REPORT, kind="linear system", ranges=(), errors=(), limits={})
-    shown = text_of(system.to_html())
-    assert dict(tables_of(system.to_html())["Basis of the answer"][1:])["inputs"] == "z.csv"
-    assert "An emulation holds for these inputs." in shown
-    assert "Structures and bases compared" in shown
-    assert "measurements" not in shown
-    assert "the ranges below" not in shown  # there are none
-
-
-def test_a_judged_format_is_named_in_the_answer():
-    kept = replace(REPORT, format="BFLOAT16", exponents="-126 to 127")
-    assert "This Kalman filter keeps rounding errors within the tolerance in BFLOAT16 ." in text_of(kept.to_html())
-    missed = text_of(replace(kept, met=False, digits=None).to_html())
-    assert "This Kalman filter does not keep rounding errors within the tolerance in BFLOAT16 ." in missed
-    bounded = replace(kept, met=False, digits=None, answers=(replace(REPORT.answers[0], basis="guarantee"),))
-    unproved = "This Kalman filter is not proved to keep rounding errors within the tolerance in BFLOAT16 ."
-    assert unproved in text_of(bounded.to_html())
-    assert "exponents -126 to 127" in missed
-    assert "These runs have unlimited exponents" not in missed

@@ -12,11 +12,10 @@ from scipy import signal
 from gpbnb import FixedFormat, LinearSystem, required_precision
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.design import SIDE_BY_SIDE, FilterDesign
-from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, run_words
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.fixed import with_fraction_bits
-from gpbnb.wordlength.models import read_filter, read_model
+from gpbnb.wordlength.models import read_model
 
 SOS = signal.butter(4, 0.1, output="sos")
 B, A = signal.butter(4, 0.1)
@@ -60,79 +59,6 @@ def test_of_all_structures_the_one_with_the_fewest_digits_answers_and_is_written
     assert best in next(code.glob("*.h")).read_text(encoding="utf-8")
     guaranteed = next(each["digits"] for each in found["answers"] if each["label"] == f"{best}, guarantee")
     assert json.loads(proof.read_text(encoding="utf-8"))["format"]["precision"] == guaranteed
-
-
-def test_the_last_line_names_a_structure_that_needs_fewer_digits_or_alone_meets_the_tolerance(filters, capsys):
-    path, report = filters / "direct.toml", filters / "report.html"
-    path.write_text(f"b = {B.tolist()}\na = {A.tolist()}\n", encoding="utf-8")
-    given = [str(path), "--tolerance", "0.001", "--measurements", str(filters / "u.csv"), "--basis", "emulation"]
-
-    def last(*options):
-        status = main([*given, *options, "--report", str(report)])
-        shown, found = capsys.readouterr().out.splitlines(), json.loads(report.with_suffix(".json").read_text())
-        assert (found["shortest"] or found["text"]) == shown[-1]
-        digits = {each["label"].removesuffix(", emulation"): each["digits"] for each in found["answers"]}
-        return status, shown[-1], digits
-
-    status, line, digits = last()
-    fewest = min(digits, key=digits.get)
-    assert status == 0
-    assert digits[fewest] < digits["direct form II transposed"]
-    assert line == f'fewest digits: {fewest}, {digits[fewest]} bits (structure = "{fewest}", or "all")'
-    assert f"<p>Fewest digits: {fewest}, " in report.read_text(encoding="utf-8")
-    status, line, digits = last("--format", "BINARY16")
-    assert status == 1
-    assert digits["direct form II transposed"] is None
-    assert line.endswith('", or "all")')
-    assert ", which meets the tolerance in BINARY16 (structure = " in line
-    status, line, digits = last("--fixed", "--coefficients", "10")
-    assert status == 1
-    assert digits["direct form II transposed"] is None
-    assert line.startswith("shortest: balanced state space, word of ")
-    path.write_text(f'structure = "{fewest}"\n' + path.read_text(encoding="utf-8"), encoding="utf-8")
-    assert last()[1].startswith(f"{fewest}: ")
-
-
-@pytest.mark.parametrize(
-    ("options", "stored"),
-    [
-        (["--fixed", "--coefficients", "9"], "9 significant bits"),
-        (["--digits", "12"], "12 bits"),
-        (["--format", "BINARY16"], "BINARY16"),
-        (["--format", "fixed 3.12"], "16-bit fixed point (12 fraction bits)"),
-    ],
-)
-def test_the_answer_names_only_the_format_of_the_coefficients_that_move_the_largest_pole(
-    options, stored, tmp_path, capsys
-):
-    path = tmp_path / "pole.toml"
-    path.write_text('b = ["0.1"]\na = [1, "-0.9"]\n', encoding="utf-8")
-    assert main([str(path), "--tolerance", "1", "--simulate", "step", "--basis", "emulation", *options]) == 0
-    assert f": coefficients stored in {stored} move the largest pole from size 0.9 to " in capsys.readouterr().err
-
-
-def test_structures_that_a_filter_lacks_are_named_with_the_reason(filters, capsys):
-    path, report = filters / "oscillator.toml", filters / "report.html"
-    path.write_text("b = [1]\na = [1, 0, 1]\n", encoding="utf-8")
-    main([str(path), "--tolerance", "0.01", "--simulate", "step", "--basis", "emulation", "--report", str(report)])
-    told = capsys.readouterr().err
-    assert "lattice, left out: got a filter with the reflection coefficient k2 = 1; needed sizes below 1" in told
-    assert "balanced state space, left out: " in told
-    assert [*json.loads(report.with_suffix(".json").read_text())["lacking"]] == ["lattice", "balanced state space"]
-    assert "Left out: lattice: got a filter with the reflection coefficient" in report.read_text(encoding="utf-8")
-
-
-def test_a_file_names_its_structure_or_all(filters):
-    text = (filters / "sections.toml").read_text(encoding="utf-8")
-    path = filters / "lattice.toml"
-    path.write_text('structure = "lattice"\n' + text, encoding="utf-8")
-    assert next(iter(read_filter(path).structures)) == "lattice"
-    lattice = read_model(path)
-    assert lattice.as_filter().program.coefficient_names[:2] == ("k1", "k2")
-    assert read_model(path, structure="direct form I").as_filter().program.coefficient_names[:2] == ("b0", "b1")
-    path.write_text('structure = "all"\n' + text, encoding="utf-8")
-    assert list(read_filter(path).structures) == list(STRUCTURES)
-    assert read_filter({"A": [[0.5]], "B": [[1]]}).structures == {}
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from tests.surveying import survey
 
 TILT = examples.tilt()
 Z = examples.tilt_measurements(300)
-TOLERANCE = (0.01, math.inf, math.inf)
 
 
 # -- examples -----------------------------------------------------------------------------------------
@@ -44,13 +43,6 @@ def test_the_models_are_what_their_docstrings_say():
     assert (more - Q == np.diag([Fraction("1e-12")] * 3)).all()
 
 
-def test_measurements_begin_alike_and_are_multiples_of_their_resolution():
-    longer = examples.tilt_measurements(5000)
-    assert np.array_equal(longer[:300], Z)
-    assert np.array_equal(np.rint(longer * 4096), longer * 4096)
-    assert not np.array_equal(examples.tilt_measurements(300, seed=1), Z)
-
-
 def test_normal_numbers_are_those_of_numpy():
     for name, kind in (("binary16", np.float16), ("binary32", np.float32), ("binary64", np.float64)):
         low, high = examples.NORMAL_RANGE[name]
@@ -58,15 +50,6 @@ def test_normal_numbers_are_those_of_numpy():
         assert 2.0**low == float(info.smallest_normal)
         assert 2.0**high <= float(info.max) < 2 * 2.0**high
         assert examples.STANDARD[name].precision == info.nmant + 1
-
-
-def test_normal_matrix():
-    found = examples.normal_matrix(2, [1, 2, 4])
-    assert found.tolist() == [[3, 7, 21], [7, 21, 73], [21, 73, 273]]
-    with pytest.raises(ValueError, match="got degree 2 and 2 different times; needed at least 3"):
-        examples.normal_matrix(2, [1, 1, 2])
-    with pytest.raises(ValueError, match="degree of 0 or more"):
-        examples.normal_matrix(-1, [1, 2])
 
 
 # -- study --------------------------------------------------------------------------------------------
@@ -83,13 +66,6 @@ def test_growth_knows_nothing_of_what_comes_later():
         alone = [required_precision(model, z[:k], 1e-4, basis=basis) for k in (2, 6)]
         assert study.required_precision_by_steps(later, z, 1e-4, (2, 6), basis=basis) == tuple(alone)
         assert study.required_precision_by_steps(later, z, 1e-4, (7,), basis=basis)[0].tried != alone[1].tried
-
-
-def test_growth_grows():
-    found = study.required_precision_by_steps(TILT, Z, TOLERANCE, (10, 300), basis="bound")
-    assert [each.steps for each in found] == [10, 300]
-    assert found[0].digits < found[1].digits
-    assert {each.basis for each in found} == {"bound"}
 
 
 def test_spans_hold_every_number():
@@ -122,17 +98,6 @@ def test_update_stagnation_is_that_of_the_runs():
     for last in (next(k for k in range(1, 300) if steady[-k]), 299):
         (found,) = study.update_stagnation(TILT, Z, 2, [fmt], last=last)
         assert found.unchanged == sum(steady[-last:]) / last
-
-
-def test_what_the_watch_of_a_state_refuses():
-    for state in (-1, 3):
-        with pytest.raises(ValueError, match="needed an index from 0 to 2"):
-            study.update_stagnation(TILT, Z, state, [FloatFormat(2, 12)])
-    for last in (0, 300):
-        with pytest.raises(ValueError, match=f"got {last} steps to watch of 300"):
-            study.update_stagnation(TILT, Z, 2, [FloatFormat(2, 12)], last=last)
-    with pytest.raises(ValueError, match="NaN or infinity"):
-        ranges.binary_ranges(TILT, Z * math.nan)
 
 
 def test_a_companion_where_the_running_bound_says_nothing():
@@ -174,19 +139,6 @@ def test_units_of_powers_of_two_change_nothing():
         assert np.array_equal(other / np.array(sizes, dtype=float), plain)
     tens = emulate(study.rescaled(TILT, (1, 1, 1000)), Z, fmt, Form.INNOVATION).state / (1, 1, 1000)
     assert not np.array_equal(tens, emulate(TILT, Z, fmt, Form.INNOVATION).state)
-
-
-def test_units_change_the_estimates_and_nothing_else():
-    sizes = (3, Fraction(1, 7), 10)
-    plain, other = (reference(model, Z, (300,)) for model in (TILT, study.rescaled(TILT, sizes)))
-    assert (other.x[0] / sizes).astype(float) == pytest.approx(plain.x[0].astype(float), rel=1e-25, abs=0)
-    with pytest.raises(ValueError, match="needed 3 positive numbers"):
-        study.rescaled(TILT, (1, 2))
-    with pytest.raises(ValueError, match="needed 3 positive numbers"):
-        study.rescaled(TILT, (1, 2, 0))
-
-
-# -- tables -------------------------------------------------------------------------------------------
 
 
 # -- figures ------------------------------------------------------------------------------------------

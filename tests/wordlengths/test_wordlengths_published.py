@@ -156,12 +156,3 @@ def test_the_jacobian_of_directions_is_that_of_ahrs():
     assert np.abs(directions.to_float() - judge.h(q)).max() < 1e-15
     assert np.abs(H.to_float()[:, :4] - judge.dhdq(q)).max() < 1e-15
     assert not H.to_float()[:, 4:].any()
-
-
-def test_the_record_has_its_origin_and_its_licence():
-    licence = (published.RECORD.parent / "ngimu_licence.txt").read_text(encoding="utf-8")
-    assert "scikit-kinematics 0.10.4" in licence
-    assert "Copyright (C) 2016 Thomas Haslwanter." in licence
-    record = np.loadtxt(published.RECORD, delimiter=",", skiprows=1)
-    assert record.shape == (101, 10)
-    assert np.all(np.diff(record[:, 0]) > 0)

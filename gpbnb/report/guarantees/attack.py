@@ -153,10 +153,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--filters", type=int, default=1_500, help="number of Kalman filters")
     parser.add_argument("--systems", type=int, default=1_500, help="number of linear systems")
     parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--slice", default="0/1", metavar="I/K", help="the I-th of K parts, from 0")
     given = parser.parse_args(arguments)
-    found = [kalman(given.first + seed) for seed in range(given.filters)]
-    found += [linear(given.first + seed) for seed in range(given.systems)]
-    print(table(found))
+    part, parts = map(int, given.slice.split("/"))
+    filters, systems = (
+        range(given.first + part * count // parts, given.first + (part + 1) * count // parts)
+        for count in (given.filters, given.systems)
+    )
+    print(table([*map(kalman, filters), *map(linear, systems)]))
     return 0
 
 

@@ -61,6 +61,7 @@ def lead_lag() -> LinearSystem:
     return LinearSystem.from_filter(LinearFilter(program, exact(["0.499", "-0.05", 1, "0.010", 1, 0]), "lead-lag"))
 
 
+@cache
 def _reduction() -> float:
     return float(output_errors(LinearSystem.sum(1024, "tree"), DOUBLE, 1.0)[0])
 
@@ -71,7 +72,7 @@ def _range() -> float:
 
 
 def _of_output(make: Callable[[], LinearSystem], fmt: FloatFormat) -> Callable[[], float]:
-    return lambda: float(output_errors(make(), fmt, 1.0)[0])
+    return cache(lambda: float(output_errors(make(), fmt, 1.0)[0]))
 
 
 def _coefficient(j: int) -> Callable[[], float]:

@@ -114,12 +114,6 @@ def test_what_changed_is_compiled_again(copy):
     assert len(copy.kept) == 4  # new files take the place of old ones
 
 
-def test_processes_that_compile_at_once_do_not_mix_functions_up(copy):
-    for process in [copy.start() for _ in range(2)]:
-        assert ended(process)[0] == VALUES
-    assert copy.run() == (VALUES, [])
-
-
 @pytest.mark.parametrize("damage", [b"", b"no pickle", b"cgpbnb.nowhere\nNothing\n.", None])
 def test_a_damaged_file_is_compiled_again(copy, damage):
     """Without damage, one is cut by a byte."""
@@ -128,16 +122,6 @@ def test_a_damaged_file_is_compiled_again(copy, damage):
         path.write_bytes(path.read_bytes()[:-1] if damage is None else damage)
     assert copy.run() == (VALUES, ALL)
     assert copy.run() == (VALUES, [])
-
-
-def test_without_a_folder_to_write_to_functions_are_compiled_each_time(copy):
-    """numba writes to ``__pycache__``, or else to the user's cache folder."""
-    blocked = copy.folder / "blocked"
-    blocked.touch()
-    for path in copy.folder.rglob("*.py"):
-        (path.parent / "__pycache__").touch()
-    copy.environment |= dict.fromkeys(("XDG_CACHE_HOME", "HOME"), str(blocked))
-    assert copy.run() == copy.run() == (VALUES, ALL)
 
 
 def test_a_change_is_noticed_of_every_function_that_is_compiled_in():
@@ -160,11 +144,6 @@ def test_a_change_is_noticed_of_every_function_that_is_compiled_in():
             waiting += [function.__globals__.get(name) for name in function.__code__.co_names]
             waiting += [cell.cell_contents for cell in function.__closure__ or ()]
     assert checked > 50
-
-
-def test_every_cache_has_this_key():
-    for path in PACKAGE.rglob("*.py"):
-        assert "cache=True" not in path.read_text(encoding="utf-8"), f"{path.name}: use `compiled` for a cache"
 
 
 @pytest.mark.parametrize(

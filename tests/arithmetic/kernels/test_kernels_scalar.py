@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import threading
-import time
 from fractions import Fraction
 from typing import Any
 
@@ -14,7 +12,6 @@ import pytest
 from numba import njit
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
@@ -81,22 +78,6 @@ def test_the_recursion_in_the_reference_and_in_float64() -> None:
 
 
 @njit
-def opposite(fmt: Any, a: Any) -> Any:
-    return negative(fmt, a)
-
-
-def test_only_the_lowest_fixed_point_number_has_no_opposite() -> None:
-    """NaN marks an overflow."""
-    for overflow, beyond in (("raise", np.nan), ("saturate", 0.875)):
-        tag = FixedFormat(0, 3, overflow=overflow).run_tag()
-        found = [opposite(tag, k / 8) for k in range(-8, 8)]
-        assert np.array_equal(found, [beyond, *(-k / 8 for k in range(-7, 8))], equal_nan=True)
-    tag = FloatFormat(2, 4, emin=-3, emax=3).run_tag()
-    for x in (15.0, -15.0, 0.0, 2.0**-6):
-        assert opposite(tag, x) == -x
-
-
-@njit
 def powers(fmt: Any, x: Any, y: Any) -> None:
     a = load(fmt, x, 0)
     s = one(fmt)
@@ -127,48 +108,12 @@ def test_float64_out_of_range_raises(tag: Any, factor: float) -> None:
         product(tag, square, square, np.empty((2, 2)))
 
 
-def test_the_reference_out_of_range_raises() -> None:
-    for factor in (2.0**100, 2.0**-100):
-        with pytest.raises(OverflowError, match="scale the numbers"):
-            powers(DoubleDouble(), np.array([[factor, 0.0]]), np.zeros((20, 2)))
-
-
-def test_plain_float64_overflow_raises() -> None:
-    with pytest.raises(OverflowError, match="scale the numbers"):
-        powers(Double(), np.array([2.0**100]), np.zeros(20))
-
-
 def test_a_decimal_exponent_beyond_int64_raises() -> None:
     big = np.array([[10, 2**58]])
     with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
         powers(Decimal(2, True), big, np.zeros((20, 2), np.int64))
     with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
         powers(Decimal(2, True), big * [1, -1], np.zeros((20, 2), np.int64))
-
-
-def test_the_gil_is_released() -> None:
-    fmt = FloatFormat(2, 24)
-    backend, x = fmt.backend, fmt.array(["0.7310586", "2.7182818284590452"]).components
-    recursion(backend.tag, backend.pack(x), np.empty(1))
-    running = threading.Event()
-    seconds = []
-
-    def work() -> None:
-        running.set()
-        start = time.perf_counter()
-        recursion(backend.tag, backend.pack(x), np.empty(6_000_000))
-        seconds.append(time.perf_counter() - start)
-
-    thread = threading.Thread(target=work)
-    thread.start()
-    running.wait()
-    turns = 0  # of Python, while the loop runs: were the GIL held, none or a few
-    while thread.is_alive():
-        time.sleep(0.001)
-        turns += 1
-    thread.join()
-    assert seconds[0] > 0.05
-    assert turns > 10
 
 
 def test_importing_gpbnb_is_light() -> None:

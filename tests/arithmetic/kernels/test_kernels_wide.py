@@ -11,9 +11,7 @@ import pytest
 from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import TwoWords, backend
-from gpbnb.arithmetic.kernels.selection import wide_tag
-from gpbnb.arithmetic.rounding import Rounding, Rules
+from gpbnb.arithmetic.kernels.backends import TwoWords
 
 FORMATS = {
     "binary128": named.BINARY128,
@@ -32,21 +30,6 @@ FORMATS = {
 @pytest.mark.parametrize("name", FORMATS)
 def test_the_format_is_stored_in_two_words(name: str) -> None:
     assert isinstance(FORMATS[name].backend, TwoWords)
-
-
-OTHERS = (
-    Rules(2, 114, Rounding.EVEN),
-    Rules(10, 35, Rounding.EVEN),
-    Rules(16, 29, Rounding.UP),
-    Rules(3, 40, Rounding.EVEN),
-    Rules(2, 60, Rounding.STOCHASTIC),
-)
-
-
-@pytest.mark.parametrize("rules", OTHERS)
-def test_longer_significands_other_bases_and_random_roundings_are_not(rules: Rules) -> None:
-    assert wide_tag(rules) is None
-    assert not isinstance(backend(rules), TwoWords)
 
 
 def values(seed: int) -> np.ndarray:
@@ -68,24 +51,6 @@ def test_float64_is_rounded_like_its_fraction(name: str) -> None:
     assert np.all(fmt.array(x) == expected)
     whole = np.array([0, 1, -1, 2**62 + 1, -(2**63) + 1]) if not isinstance(fmt, FixedFormat) else np.array([0])
     assert np.all(fmt.array(whole) == fmt.array(whole.tolist()))
-
-
-@pytest.mark.parametrize("name", ["decimal128", "19 digits, odd", "24 bits, far"])
-def test_only_exact_operands_are_taken(name: str) -> None:
-    one: Any = FORMATS[name].array(1)
-    assert float(one + np.array([0.5, 2.0**-19, 123.0])[0]) == 1.5
-    with pytest.raises(ValueError, match="holds exactly"):
-        one + np.array([0.5, 0.1 if name != "decimal128" else 2.0**-60])
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_to_float64_is_nearest_with_ties_to_even(name: str) -> None:
-    fmt: Any = FORMATS[name]
-    x = fmt.array([Fraction(n, d) / 8 for n in range(-5, 6) for d in (1, 3, 7, 10)])
-    near = [fmt.array(Fraction(1, 2) + Fraction(k, 2**54)) for k in range(-3, 4)]
-    for array in (x, *near):
-        fractions = np.atleast_1d(array.to_fractions())
-        assert np.atleast_1d(array.to_float()).tolist() == [float(value) for value in fractions]
 
 
 NARROW = {
