@@ -126,7 +126,6 @@ class Draw:
             return fmt
         if fmt.base == 2 and fmt.precision == 53 and fmt.rounding == "nearest":
             return fmt  # has no loops with a range
-        # Compiled loops in base 10 have no subnormal numbers.
         reach = self.between(8, 40) if fmt.base < 10 else self.between(3, 12) + 40 * (fmt.base == 10)
         return fmt._replace(emin=-reach, emax=reach + self.below(9), subnormal=self.chance(0.6))
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, LinearModel, required_precision
+from gpbnb import FloatFormat, LinearModel, LinearSystem, emulate, required_precision
 from gpbnb.filters.run import Run
 
 MODEL = LinearModel([["0.9"]], [["1"]], [["0.01"]], [["1"]], ["0"], [["1"]])
@@ -59,3 +59,25 @@ def test_two_estimates_decay_at_their_own_time_and_a_late_measurement_counts():
     checkpoints = Run(model, FloatFormat(2, 20), "innovation", (first, STEPS))
     checkpoints.take(z)
     assert (checkpoints.checkpoints().to_float("x") == late[[first - 1, -1], :, 0]).all()
+
+
+@pytest.mark.parametrize("subnormal", [True, False])
+def test_a_decimal_estimate_decays_through_subnormal_numbers_to_zero(subnormal):
+    fmt = FloatFormat(10, 7, emin=-95, emax=96, subnormal=subnormal)
+    run = emulate(MODEL, impulse(3000), fmt)
+    x = run.x.to_fractions().ravel().tolist()
+    assert not run.reason
+    assert len(x) == 3000
+    assert x[-1] < 10 * fmt.smallest  # times 0.82, five units are five again
+    assert any(0 < v < fmt.smallest_normal for v in x) == subnormal
+    assert required_precision(MODEL, impulse(3000), 1e-3, base=10, range=(-95, 96)).met
+
+
+def test_an_output_of_a_system_decays_into_subnormal_decimals():
+    fmt, x, y = FloatFormat(10, 4, "even", emin=-6, emax=6), Fraction(1), []
+    for _ in range(40):
+        y.append(x)
+        x = fmt.round(Fraction(9, 16) * x)
+    found = LinearSystem([["9/16"]], [[1]], x0=[1]).outputs(np.zeros((40, 1)), fmt)[:, 0]
+    assert [fmt.round(Fraction(high) + Fraction(low)) for high, low in found] == y
+    assert y[-1] == fmt.smallest

@@ -16,7 +16,18 @@ from numba.extending import overload
 from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros
 from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.integers import divided_by_word
-from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, EVEN, HALF_UP, ODD, UP, LimitedDecimal, Wide
+from gpbnb.arithmetic.kernels.tags import (
+    ABRUPT,
+    AWAY,
+    DOWN,
+    EVEN,
+    GRADUAL,
+    HALF_UP,
+    ODD,
+    UP,
+    LimitedDecimal,
+    Wide,
+)
 
 NARROW = 9  # precision up to which the dividend fits into 64 bits
 LARGEST_EXPONENT = 2**60
@@ -128,40 +139,65 @@ def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, neg
     return by_mode if getattr(fmt, "instance_class", None) in (LimitedDecimal, Wide) else to_nearest_or_chopped
 
 
-def _within_range(fmt: Any, m: Any, e: Any) -> Any:
-    """Return the pair; raises OverflowError if the backend or the format cannot hold its exponent."""
-    raise TypeError("got a call of _within_range from Python; needed one from a function compiled by numba")
+@inner(forceinline=True)
+def _shortened(fmt: Any, m: Any, e: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+    """Round a number with t digits, below the normal numbers of a format, to the spacing of its subnormal numbers."""
+    k = fmt.least - e
+    if k > fmt.precision:
+        m, up, tie, inexact = _U0, False, False, True
+    else:
+        unit = _power(k)
+        whole = m // unit
+        rest = m - whole * unit
+        up, tie, inexact = rest + rest >= unit, (rest + rest == unit) & (not inexact), inexact | (rest != _U0)
+        m = whole
+    m += increment(fmt, m, up, tie, inexact, negative)
+    if m == _U0:
+        return np.int64(0), np.int64(0)
+    k = fmt.precision - _digits(m)
+    m = np.int64(m * _power(k))
+    return -m if negative else m, fmt.least - k
 
 
-@overload(_within_range, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
-def _overloaded_within_range(fmt: Any, m: Any, e: Any) -> Any:
-    def anywhere(fmt: Any, m: Any, e: Any) -> Any:
+def number(fmt: Any, m: Any, e: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+    """Make the pair of a magnitude with t digits, and what is cut off below them; see :func:`increment`.
+
+    Raises OverflowError if the backend or the format cannot hold its exponent.
+    """
+    raise TypeError("got a call of number from Python; needed one from a function compiled by numba")
+
+
+@overload(number, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
+def _overloaded_number(fmt: Any, m: Any, e: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+    def anywhere(fmt: Any, m: Any, e: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+        m += increment(fmt, m, up, tie, inexact, negative)
+        carried = m == _power(fmt.precision)
+        m = np.int64(_power(fmt.precision - 1) if carried else m)
+        e += np.int64(carried)
         check(e)
-        return m, e
+        return -m if negative else m, e
 
-    def within(fmt: Any, m: Any, e: Any) -> Any:
-        if e > fmt.largest or (e < fmt.least and not fmt.flush):
-            raise OverflowError("got a result beyond the normal numbers of the format; needed one within")
-        return (m, e) if e >= fmt.least else (np.int64(0), np.int64(0))
+    def within(fmt: Any, m: Any, e: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+        if e < fmt.least and fmt.small == GRADUAL:
+            return _shortened(fmt, m, e, up, tie, inexact, negative)
+        m += increment(fmt, m, up, tie, inexact, negative)
+        carried = m == _power(fmt.precision)
+        m = np.int64(_power(fmt.precision - 1) if carried else m)
+        e += np.int64(carried)
+        if e > fmt.largest or (e < fmt.least and fmt.small != ABRUPT):
+            raise OverflowError("got a result beyond the largest number of the format; needed one within")
+        return (-m if negative else m, e) if e >= fmt.least else (np.int64(0), np.int64(0))
 
     return within if getattr(fmt, "instance_class", None) is LimitedDecimal else anywhere
 
 
 @inner(forceinline=True)
-def number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
-    """Make the pair of a magnitude with t digits, or with t + 1 after a carry."""
-    carried = m == _power(fmt.precision)
-    m = _power(fmt.precision - 1) if carried else m
-    return _within_range(fmt, (-np.int64(m) if negative else np.int64(m)), e + np.int64(carried))
-
-
-@inner(forceinline=True)
 def _filled(fmt: Any, n: Any, e: Any, negative: Any) -> Any:
-    """Make the pair of an exact n with fewer than t digits."""
+    """Round an n with at most t digits, which only a limited range makes inexact."""
     if n == _U0:
         return np.int64(0), np.int64(0)
     k = fmt.precision - _digits(n)
-    return number(fmt, n * _power(k), e - k, negative)
+    return number(fmt, n * _power(k), e - k, False, False, False, negative)
 
 
 @inner(forceinline=True)
@@ -231,8 +267,7 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
     else:
         m = n
         up = beyond_half
-    m += increment(fmt, m, up, halfway, more, negative)
-    return number(fmt, m, e, negative)
+    return number(fmt, m, e, up, halfway, more, negative)
 
 
 @inner(forceinline=True)
@@ -258,8 +293,7 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
         up, tie, inexact = last >= _U5, (last == _U5) & (not inexact), inexact | (last != _U0)
         k = t
     negative = (m1 < 0) != (m2 < 0)
-    m += increment(fmt, m, up, tie, inexact, negative)
-    return number(fmt, m, e1 + e2 + k, negative)
+    return number(fmt, m, e1 + e2 + k, up, tie, inexact, negative)
 
 
 @inner
@@ -280,8 +314,7 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
     else:
         m, rest = divided_by_word(high_product(x, _power(k)), x * _power(k), y)
     negative = (m1 < 0) != (m2 < 0)
-    m += increment(fmt, m, rest + rest >= y, rest + rest == y, rest != _U0, negative)
-    return number(fmt, m, e1 - e2 - k, negative)
+    return number(fmt, m, e1 - e2 - k, rest + rest >= y, rest + rest == y, rest != _U0, negative)
 
 
 @inner
@@ -310,7 +343,7 @@ def sqrt(fmt: Any, a: Any) -> Any:
         root += 1
     # Neither a tie nor a carry can occur, as the exact kernel explains.
     whole = np.uint64(root)
-    return number(fmt, whole + increment(fmt, whole, rest > root, False, rest > 0, False), (e - k) // 2, False)
+    return number(fmt, whole, (e - k) // 2, rest > root, False, rest > 0, False)
 
 
 @inner
@@ -322,12 +355,11 @@ def round_(fmt: Any, x: Any) -> Any:
     n = np.uint64(abs(m))
     drop = _digits(n) - fmt.precision
     if drop <= 0:
-        return number(fmt, n * _power(-drop), e + drop, m < 0)
+        return _filled(fmt, n, e, m < 0)
     unit = _power(drop)
     q = n // unit
     rest = n - q * unit
-    q += increment(fmt, q, rest + rest >= unit, rest + rest == unit, rest != _U0, m < 0)
-    return number(fmt, q, e + drop, m < 0)
+    return number(fmt, q, e + drop, rest + rest >= unit, rest + rest == unit, rest != _U0, m < 0)
 
 
 @inner

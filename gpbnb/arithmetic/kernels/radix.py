@@ -84,7 +84,8 @@ def from_floats(fmt: Any, n: int, x: Any, out: Any, states: Any) -> None:
             digits = np.int64(short * _FIVE[places])
             pair = decimal.round_(fmt, ((-digits if u < 0 else digits), -places))
             drop = pair[1] + places
-            kept = drop <= 0 or (drop < 19 and abs(pair[0]) * np.int64(decimal.POWER[drop]) == digits)
+            power = np.int64(decimal.POWER[abs(drop)]) if abs(drop) < 19 else np.int64(0)
+            kept = digits * power == abs(pair[0]) if drop < 0 else abs(pair[0]) * power == digits
             out[0][i], out[1][i], states[i] = pair[0], pair[1], (0 if kept else 1)
             continue
         # floor((k + 52) log10 2): the decimal exponent, or one less
@@ -101,8 +102,7 @@ def from_floats(fmt: Any, n: int, x: Any, out: Any, states: Any) -> None:
         if _uncertain(rest):
             out[0][i], out[1][i], states[i] = 0, 0, 2
         else:
-            whole += decimal.increment(fmt, whole, rest > _HALF_RANGE, False, True, u < 0)
-            pair = decimal.number(fmt, whole, -q, u < 0)
+            pair = decimal.number(fmt, whole, -q, rest > _HALF_RANGE, False, True, u < 0)
             out[0][i], out[1][i], states[i] = pair[0], pair[1], 1
 
 
