@@ -22,6 +22,7 @@ from gpbnb.arithmetic.kernels.backends import Looped
 from gpbnb.arithmetic.kernels.selection import check_order
 from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.rounding import Order, Rounding, digit_unit
+from gpbnb.interrupts import slices
 
 _MOST_PRODUCTS = 1_000_000  # that pairwise and blocked sums form at once
 
@@ -448,11 +449,12 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
         return None
     factors, order = backend.pack(a.components, backend.matrix_tag), np.arange(len(a))
     try:
-        column = _loops().lu(backend.matrix_tag, factors, order, pivot)
+        for part in slices(len(a), a.size):
+            column = _loops().lu(backend.matrix_tag, factors, order, pivot, part.start, part.stop)
+            if column >= 0:
+                raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot, a.format.base))
     except OverflowError:
         return None
-    if column >= 0:
-        raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot, a.format.base))
     return type(a).from_packed(factors, a.format), order
 
 
@@ -466,8 +468,11 @@ def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
     tag, order = backend.matrix_tag, compiled[1]
     factors, columns = backend.pack(compiled[0].components, tag), backend.pack(b[order].components, tag)
     try:
-        _loops().reduce(tag, factors, columns)
-        _loops().substitute(tag, factors, columns)
+        for part in slices(b.shape[1], a.size):
+            some = np.ascontiguousarray(columns[:, part])
+            _loops().reduce(tag, factors, some)
+            _loops().substitute(tag, factors, some)
+            columns[:, part] = some
     except OverflowError:
         return None
     return type(a).from_packed(columns, a.format)

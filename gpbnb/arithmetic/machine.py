@@ -43,24 +43,28 @@ def operands_of(name: str, a: int, b: int, c: int) -> tuple[tuple[int, ...], tup
 _RANDOM = 6
 
 
-def tables(formats: Sequence[Any]) -> tuple[Any, Any]:
-    """Return the kind of numbers of some formats of one base, None being double-double, and their columns."""
+def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
+    """Return the kind of numbers of some formats of one base, None being double-double, and their columns.
+
+    Parameters
+    ----------
+    tag : the arithmetic of a run, from which all its parts draw random numbers.
+    """
     from gpbnb.arithmetic.kernels import machine
 
     whole, numbers = np.zeros((len(formats), 16), np.int64), np.zeros((len(formats), 7))
-    random = np.zeros((len(formats), 2), np.uint64)
+    state = tags.random_state(tag)
+    random = np.zeros(2, np.uint64) if state is None else state
     if formats[0] is None:
         return tags.DoubleDouble(), machine.Formats(whole, numbers, random)
     kinds = set()
     for i, fmt in enumerate(formats):
-        tag = selection.tag_of(fmt.rules)
-        if tag is None:
-            tag = selection.wide_tag(fmt.rules)
-        if tag is None:
+        found = selection.tag_of(fmt.rules)
+        if found is None:
+            found = selection.wide_tag(fmt.rules)
+        if found is None:
             raise ValueError("no loops")
-        if isinstance(tag, tags.Limited) and isinstance(tag.mode, tags.Random):
-            random = tag.mode.state.reshape(1, 2)
-        kinds.add(_row(fmt, tag, whole[i], numbers[i]))
+        kinds.add(_row(fmt, found, whole[i], numbers[i]))
     (kind,) = kinds
     made = {"masks": machine.Masks, "pairs": machine.InPairs, "words": machine.InTwoWords}[kind]()
     return made, machine.Formats(whole, numbers, random)
@@ -74,10 +78,10 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
         return "words"
     if isinstance(tag, tags.PAIRS):
         if isinstance(tag, tags.LimitedDecimal):
-            whole[:6] = tag.precision, tag.mode, tag.least, tag.largest, tag.flush, 0
+            whole[:6] = tag.precision, tag.mode, tag.least, tag.largest, tag.small, 0
         else:
             mode = AWAY if tag.nearest else ZERO
-            whole[:6] = tag.precision, mode, -(2**60), 2**60, 0, isinstance(tag, tags.ShortDecimal)
+            whole[:6] = tag.precision, mode, -(2**60), 2**60, tags.UNLIMITED, isinstance(tag, tags.ShortDecimal)
         return "pairs"
     if isinstance(tag, tags.Hardware32):
         tag = selection.fusing_tag(fmt.rules)

@@ -202,9 +202,11 @@ class NumPyProtocols:
 
         Raises
         ------
-        TypeError : another dtype.
+        TypeError : another dtype, or a format, whose ``array`` converts.
         OverflowError : as for ``to_float``.
         """
+        if hasattr(dtype, "array"):
+            raise TypeError(f"got a conversion to the format {dtype}; needed a dtype of NumPy; write fmt.array(x)")
         check_exit(self, "astype()")
         dtype = np.dtype(dtype)
         if dtype == np.float64:

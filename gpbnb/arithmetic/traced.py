@@ -294,8 +294,8 @@ class TracedArray(FloatArray):
 
     def called(self, name: str, *arrays: TracedArray) -> TracedArray:
         """Record an elementary function."""
-        function = {"fmod": functions.fmod, "floor_divide": functions.floor_divide}.get(name)
-        return self._called(function or partial(elementary, name), arrays)
+        own = {"fmod": functions.fmod, "remainder": functions.remainder, "floor_divide": functions.floor_divide}
+        return self._called(own.get(name) or partial(elementary, name), arrays)
 
     def _called(self, function: Callable[..., FloatArray], arrays: Sequence[TracedArray]) -> TracedArray:
         made: TracedArray = self.format.made(self.tape.call(function, *(each.components[0] for each in arrays)))

@@ -24,6 +24,7 @@ from gpbnb.bounds.words import bounded_rounding
 from gpbnb.filters.program import ADD, SUBTRACT, Program, matrices
 from gpbnb.filters.system import LinearSystem, is_stable
 from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program, integers_of, run_integers, successors
+from gpbnb.interrupts import slices
 
 MOST_STATES = 2**24
 """Largest number of states that a search tries by default."""
@@ -172,7 +173,9 @@ def _read(program: Program) -> NDArray[np.bool_]:
 def _cycles(following: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Return the numbers of the states on each cycle of a map, -1 where a state leaves it."""
     on_cycle = np.zeros(len(following), np.bool_)
-    _mark(following, np.zeros(len(following), np.int64), on_cycle)
+    visit = np.zeros(len(following), np.int64)
+    for part in slices(len(following)):
+        _mark(following, visit, on_cycle, part.start, part.stop)
     left, found = set(np.flatnonzero(on_cycle).tolist()), list[NDArray[np.int64]]()
     while left:
         at = first = next(iter(left))
@@ -188,9 +191,9 @@ def _cycles(following: NDArray[np.int64]) -> list[NDArray[np.int64]]:
 
 
 @compiled
-def _mark(following: Any, visit: Any, on_cycle: Any) -> None:
+def _mark(following: Any, visit: Any, on_cycle: Any, begin: int, end: int) -> None:
     """Mark the states on cycles; `visit` is zero, and becomes the number of the walk that first met a state."""
-    for start in range(len(following)):
+    for start in range(begin, end):
         at = start
         while at >= 0 and visit[at] == 0:
             visit[at] = start + 1

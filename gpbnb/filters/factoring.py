@@ -67,9 +67,9 @@ class _Recorded:
         result, truth = function(TracedFormat(self._tape).made(1 + np.arange(count).reshape(shape)))
         self._places, self._truth = result.components[0], truth.components[0]
 
-    def run(self, fmt: Any, given: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Run the function on each of some packed arrays."""
-        kind, formats = tables([fmt])
+    def run(self, fmt: Any, tag: Any, given: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Run the function on each of some packed arrays, in a format and its arithmetic."""
+        kind, formats = tables([fmt], tag)
         tape, lanes = self._tape, len(given)
         rows = tape.instructions.astype(np.int64)
         parts = given.shape[1:][len(self._shape) :]
@@ -93,19 +93,19 @@ def _recorded(function: Callable[[Matrix], tuple[Matrix, Any]], n: int) -> _Reco
     return _Recorded(function, (n, n))
 
 
-def factors_of_each(fmt: Any, matrices: NDArray[Any], found: NDArray[Any]) -> bool:
+def factors_of_each(fmt: Any, tag: Any, matrices: NDArray[Any], found: NDArray[Any]) -> bool:
     """Fill in the factors of packed covariances (p, n, n, ...); return whether all are definite."""
-    return _of_each(factors, fmt, matrices, found)
+    return _of_each(factors, fmt, tag, matrices, found)
 
 
-def inverses_of_each(fmt: Any, matrices: NDArray[Any], found: NDArray[Any]) -> bool:
+def inverses_of_each(fmt: Any, tag: Any, matrices: NDArray[Any], found: NDArray[Any]) -> bool:
     """Fill in the inverses of packed covariances (p, n, n, ...); return whether all are definite."""
-    return _of_each(inverse, fmt, matrices, found)
+    return _of_each(inverse, fmt, tag, matrices, found)
 
 
 def _of_each(
-    function: Callable[[Matrix], tuple[Matrix, Any]], fmt: Any, matrices: NDArray[Any], found: NDArray[Any]
+    function: Callable[[Matrix], tuple[Matrix, Any]], fmt: Any, tag: Any, matrices: NDArray[Any], found: NDArray[Any]
 ) -> bool:
-    results, definite = _recorded(function, matrices.shape[1]).run(fmt, matrices)
+    results, definite = _recorded(function, matrices.shape[1]).run(fmt, tag, matrices)
     found[:] = results
     return bool(definite.all())

@@ -34,7 +34,7 @@ def form_named(form: AnyForm | str) -> AnyForm:
                 return each
     names = ", ".join(repr(each.name.lower()) for each in (*Form, *ArrayForm))
     names += f", {', '.join(repr(each.lower()) for each in ALIASES)}"
-    raise ValueError(f"got form {form!r}; needed one of {names}, or a member of Form or ArrayForm")
+    raise ValueError(f"got form {form!r}; needed one of {names} of gpbnb.Form")
 
 
 def compiled_form(form: AnyForm | str) -> Form:

@@ -428,7 +428,8 @@ def _points(given: Any) -> SigmaPoints:
         for each in points:
             exact(each)
     except (TypeError, ValueError) as error:
-        raise type(error)(f"got points {given!r}; needed SigmaPoints(alpha, beta, kappa): {error}") from None
+        needed = "gpbnb.filters.nonlinear.SigmaPoints(alpha, beta, kappa), three numbers"
+        raise type(error)(f"got points {given!r}; needed {needed}") from None
     return points
 
 

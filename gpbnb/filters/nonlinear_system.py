@@ -26,6 +26,7 @@ from gpbnb.arithmetic.named import format_named
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedFunction
+from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, sized, whole_number
 from gpbnb.filters.program import (
@@ -150,7 +151,7 @@ class NonlinearSystem:
         OverflowError, ZeroDivisionError, NegativeRootError : an operation has no result in the format.
         """
         fmt = format_named(fmt) if type(fmt) is str else fmt  # isinstance would ask a traced format for its class
-        if not callable(getattr(fmt, "array", None)):
+        if type(fmt) is BlockFormats or not callable(getattr(fmt, "array", None)):
             raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or a name")
         found: FloatArray = self._whole_run(fmt, self.inputs_in(fmt, u))
         return found
@@ -234,6 +235,7 @@ _NAMES = {code: name for name, code in CODES.items()}
 _OF_TWO = {"add": ADD, "subtract": SUBTRACT, "multiply": PRODUCT, "divide": DIVIDE}
 _CALLS = {"fmod": MODULO, "floor": FLOOR, "ceil": CEILING, "trunc": TRUNCATE, "rint": NEAREST}
 _LESS, _SAME, _GREATER = 1, 2, 4
+_AND, _OR = 8, 14
 _ALL = _LESS + _SAME + _GREATER
 
 
@@ -299,18 +301,27 @@ class _Listing:
                 self._values[out] = self._of_two(_OF_TWO[name], a, b)
 
     def _call(self, call: Call) -> None:
-        if call.name not in _CALLS:
+        if call.name not in _CALLS and call.name != "remainder":
             raise ValueError(
                 f"got np.{call.name} in the step, for which C has no function with the digits of the emulation; needed "
                 "+ - * /, comparisons, choices, np.sqrt, np.fmod, np.remainder, np.floor, np.ceil, np.trunc, np.rint; "
                 "write a polynomial or a table in its place"
             )
-        code = _CALLS[call.name]
         for *places, out in zip(*(each.tolist() for each in (*call.operands, call.results)), strict=True):
-            if code == MODULO:
-                self._values[out] = self._of_two(code, *places)
+            if call.name == "remainder":
+                self._values[out] = self._remainder(places[0], places[1], -out)
+            elif call.name == "fmod":
+                self._values[out] = self._of_two(MODULO, *places)
             else:
-                self._values[out] = self._build.append(code, 0, self._value(places[0]))
+                self._values[out] = self._build.append(_CALLS[call.name], 0, self._value(places[0]))
+
+    def _remainder(self, x: int, y: int, rest: int) -> int:
+        """Add y to fmod(x, y), to which a place is given, if their signs differ."""
+        self._values[rest] = self._of_two(MODULO, x, y)
+        (below, above), (under, over) = ([self._order(each, 0, k) for k in (_LESS, _GREATER)] for each in (rest, y))
+        opposite = self._combination(self._combination(below, over, _AND), self._combination(above, under, _AND), _OR)
+        added = self._chosen(opposite, self._value(y), self._value(0))
+        return self._build.append(ADD, self._value(rest), added)
 
     # -- numbers -------------------------------------------------------------------------------------------
 

@@ -97,7 +97,7 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
     ----------
     model : the model as given, not as stored, because the UD factors are computed from the variances as given.
     fmt : None for double-double.
-    tag : arithmetic of the compiled loops, which computes factors and inverses.
+    tag : arithmetic of the run, from which factors and inverses take their random numbers, too.
     """
     stored = model if fmt is None else model.definite_in(fmt)
     Phi, H, Q, R, x0, P0 = (each.copy() for each in (_double_doubles(stored) if fmt is None else _packed(stored, fmt)))
@@ -108,7 +108,8 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
         """Compute factors, of raised variances if those stored are indefinite; whether any are definite."""
 
         def sound(given: NDArray[Any]) -> bool:
-            definite, signs = factors_of_each(fmt, given, factors), factors[..., 0] if factors.ndim > 3 else factors
+            definite = factors_of_each(fmt, tag, given, factors)
+            signs = factors[..., 0] if factors.ndim > 3 else factors
             return definite and (letter != "R" or bool(np.all(np.diagonal(signs, axis1=1, axis2=2) > 0)))
 
         if sound(packed):
@@ -129,7 +130,7 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
     lost = ""
     try:
         if form is Form.HUNG_SECOND_GAIN:
-            lost = "" if inverses_of_each(fmt, R, RI) else "R"
+            lost = "" if inverses_of_each(fmt, tag, R, RI) else "R"
         elif form is Form.UD:
             given = ("Q", Q, UQ), ("R", R, UR), ("P0", P0[np.newaxis], U0[np.newaxis])
             lost = next((letter for letter, *arrays in given if not factored(letter, *arrays)), "")

@@ -153,7 +153,7 @@ class Run:
                 "leaves the range would be wrong by more than any rounding"
             )
         if not isinstance(sums, Sums):
-            raise TypeError(f"sums: got {sums!r}; needed Sums(...), such as Sums(fmt=BINARY32)")
+            raise TypeError(f"sums: got {sums!r}; needed gpbnb.filters.run.Sums(...), as Sums(fmt=BINARY32)")
         if sums.fmt is not None and not isinstance(sums.fmt, (FloatFormat, FixedFormat)):
             raise TypeError(f"sums: got {sums.fmt!r}; needed a FloatFormat or a FixedFormat")
         if compensated and self.form not in (Form.INNOVATION, Form.JOSEPH):
@@ -390,8 +390,6 @@ class Run:
             return stop.fault.reason
         if self._limits is None:
             return "a number beyond the range of the compiled loops"
-        if self.x.dtype != np.float64 and self._limits.subnormal:
-            return "an overflow, or a subnormal number, which has no compiled loops in base 10,"
         return OVERFLOW
 
     def _reason(self, stop: Stop, step: int) -> str:
@@ -415,7 +413,7 @@ class Run:
         kind = step_kind(self.form, model, formats[0], blocks, sums, bool(len(each.increment)))
         cycle = int(np.lcm.reduce([len(table) for table in model.values()]))
         repeats = self.fmt is None or self.fmt.rounding is not Rounding.STOCHASTIC
-        return Stepper(recorded_step(kind), formats, model, self.records, cycle if repeats else 0)
+        return Stepper(recorded_step(kind), formats, model, self.records, cycle if repeats else 0, self.tag)
 
     def _formats(self) -> tuple[list[Any], tuple[int, ...], tuple[Any, ...]]:
         """Return all formats; the numbers of those of the blocks and of the model; how sums are computed."""
@@ -564,7 +562,12 @@ def reference_states(model: LinearModel, z: Any) -> NDArray[np.float64]:
     found, done = [np.zeros((0, model.n, 2))], 0
     for x, P in blocks:
         if run.stopped or _loses_digits(model, np.arange(done, done + len(P)), P):
-            return double_doubles(np.array([each for each, *_ in precise_steps(model, z)], dtype=object))
+            try:
+                return double_doubles(np.array([each for each, *_ in precise_steps(model, z)], dtype=object))
+            except OverflowError as error:
+                raise OverflowError(
+                    f"{model.name} without rounding: {error}; a model that is not stable takes fewer steps"
+                ) from None
         found.append(x[1:, :, 0])
         done += len(x) - 1
     return np.concatenate(found)

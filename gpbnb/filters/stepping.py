@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.machine import Fault, code_of, fault_of, first_without_result, packed_constants, tables
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.recording import ProgramPart, RecordedStep
+from gpbnb.interrupts import slices
 
 _LONGEST_BLOCK, _NUMBERS = 1024, 1 << 17
 """Most steps of a block, and numbers that it keeps."""
@@ -50,6 +51,7 @@ class _Repeated:
     Parameters
     ----------
     lanes : lengths of the axes behind the places.
+    loaded : kind and columns of the formats, from :func:`gpbnb.arithmetic.machine.tables`.
     """
 
     def __init__(
@@ -59,11 +61,12 @@ class _Repeated:
         formats: Sequence[Any],
         lanes: tuple[int, ...],
         changes: Sequence[str],
+        loaded: tuple[Any, Any],
     ) -> None:
         from gpbnb.arithmetic.kernels import machine
 
         self._machine, self._step, self.part = machine, step, part
-        self._kind, self._formats = tables(formats)
+        self._kind, self._formats = loaded
         self._code = code_of(part.rows, part.formats)
         size = step.sizes[0] + len(step.shared)
         self.values = np.zeros((size, *lanes), formats[0].backend.dtype if formats[0] is not None else np.float64)
@@ -178,10 +181,17 @@ class Stepper:
     model : matrices of the model by their letters, (p, rows, columns, ...) or (p, rows, ...), packed.
     records : number of records.
     cycle : number of steps after which covariances may repeat; 0 if they are not looked at.
+    tag : the arithmetic of the run, from which both parts of a step draw random numbers.
     """
 
     def __init__(
-        self, step: RecordedStep, formats: Sequence[Any], model: dict[str, NDArray[Any]], records: int, cycle: int
+        self,
+        step: RecordedStep,
+        formats: Sequence[Any],
+        model: dict[str, NDArray[Any]],
+        records: int,
+        cycle: int,
+        tag: Any = None,
     ) -> None:
         self._step, self._records, self._cycle = step, records, cycle
         parts = model["Phi"].shape[3:]
@@ -195,13 +205,16 @@ class Stepper:
         for column, has in ((1, ~np.isin(codes, (7, 9, 13))), (2, codes != 9), (3, np.isin(codes, (7, 11)))):
             rows[has, column] = moved[rows[has, column]]
         late = step._replace(after={**step.after, **{each: moved[step.after[each]] for each in _ESTIMATE}})
-        self._gain = _Repeated(step, step.gain, formats, alone, _GAIN)
-        self._estimate = _Repeated(late, step.estimate._replace(rows=rows), formats, lanes, _ESTIMATE)
+        loaded = tables(formats, tag)
+        self._gain = _Repeated(step, step.gain, formats, alone, _GAIN, loaded)
+        self._estimate = _Repeated(late, step.estimate._replace(rows=rows), formats, lanes, _ESTIMATE, loaded)
         self._kept_at = np.concatenate([step.shared, step.K.ravel(), step.after["P"].ravel(), step.S.ravel()])
         self._ends = np.cumsum([len(step.shared), step.K.size, step.after["P"].size])
         repeats = formats[0] is None or formats[0].rounding is not Rounding.STOCHASTIC
+        most = max(min(_LONGEST_BLOCK, _NUMBERS // max(len(self._kept_at), 1)), 16)
+        work = len(step.gain.rows) + records * len(rows)
         #: Most steps that are taken at once; random numbers are drawn step by step.
-        self.longest = 1 if not repeats else max(min(_LONGEST_BLOCK, _NUMBERS // max(len(self._kept_at), 1)), 16)
+        self.longest = 1 if not repeats else next(slices(most, work)).stop
         self._repeated: tuple[int, NDArray[Any], NDArray[np.bool_]] | None = None
         self._last: NDArray[Any] | None = None
         self._model = dict(model)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -28,7 +29,7 @@ from gpbnb.filters.kernels.linear import advance
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
 from gpbnb.filters.opening import as_packed, packed_array, stored_start, widened_array
-from gpbnb.filters.program import AT_MOST, Program, matrices
+from gpbnb.filters.program import AT_LEAST, AT_MOST, Program, matrices
 from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
 from gpbnb.filters.structures import (
     CASCADES,
@@ -51,6 +52,7 @@ from gpbnb.filters.structures import (
     sum_structure,
     transfer_function,
 )
+from gpbnb.interrupts import slices
 
 _WORDS = (
     "; coefficients may have a format of their own: WordFormats(data, coefficients), or --fixed --mixed in the command"
@@ -91,25 +93,39 @@ class LinearFilter:
     def stored(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
         """Return the coefficients as a run in a format stores them, exact, (c,).
 
-        Stochastic rounding begins with its first random number, as in a run.
+        In fixed point, nothing is multiplied by 1 or -1, which need not be numbers of the format. Stochastic rounding
+        begins with its first random number, as in a run.
         """
         fmt.restart()
+        unit, rounded = self._stored(fmt)
+        return np.where(unit, self.coefficients, np.asarray(rounded.to_fractions(), dtype=object))
+
+    def _stored(self, fmt: FloatFormat | FixedFormat) -> tuple[NDArray[np.bool_], FloatArray]:
+        """Return which coefficients are exact, and all others in the format."""
+        unit = np.zeros(len(self.coefficients), np.bool_)
+        if isinstance(fmt, FixedFormat):
+            operations = self.program.operations
+            unit = abs(self.coefficients) == 1
+            unit[operations[operations[:, 0] >= AT_LEAST, 1]] = False  # limits are data
+        others = self.coefficients.copy()
+        others[unit] = Fraction(0)
         try:
-            return np.asarray(fmt.store(self.coefficients).to_fractions(), dtype=object)
+            return unit, fmt.store(others)
         except OverflowError:
-            raise self._beyond(fmt) from None
+            raise self._beyond(fmt, others) from None
 
     def packed(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
         """Return the coefficients, rounded into a format, as the compiled loops expect them."""
-        try:
-            return packed_array(fmt.store(self.coefficients))
-        except OverflowError:
-            raise self._beyond(fmt) from None
+        unit, rounded = self._stored(fmt)
+        found = packed_array(rounded)
+        if unit.any():  # fixed point has loops for float64 only
+            found[unit] = self.coefficients[unit].astype(np.float64)
+        return found
 
-    def _beyond(self, fmt: FloatFormat | FixedFormat) -> OverflowError:
+    def _beyond(self, fmt: FloatFormat | FixedFormat, coefficients: NDArray[Any]) -> OverflowError:
         """Return the error that names the first coefficient beyond the range of a format."""
         names = self.program.coefficient_names or [str(i) for i in range(len(self.coefficients))]
-        for name, value in zip(names, self.coefficients, strict=True):
+        for name, value in zip(names, coefficients, strict=True):
             try:
                 fmt.strict.round(value)
             except OverflowError as error:
@@ -585,7 +601,7 @@ class LinearSystem:
         out = _advanced(tag, program, coefficients, z, x)
         if out is None:
             place = self._overflow(tag, program, coefficients, z, first)
-            raise OverflowError(f"{place}: {self._beyond(fmt)}")
+            raise OverflowError(f"{place}: {self.beyond(fmt)}")
         return out
 
     def stored(self, fmt: FloatFormat | FixedFormat) -> tuple[NDArray[Any], ...]:
@@ -606,8 +622,8 @@ class LinearSystem:
             return f"the system is stable, but as stored in {arithmetic(fmt)} it is not, since A has {growing}"
         return ""
 
-    def _beyond(self, fmt: FloatFormat | FixedFormat | None) -> str:
-        """Return why a number cannot be stored, and what to do about it."""
+    def beyond(self, fmt: FloatFormat | FixedFormat | None = None) -> str:
+        """Return why a number of a run cannot be stored, and what to do about it; without a format, in float64."""
         what = "a number beyond the range of float64"
         if fmt is not None and (fmt.limits is not None or fmt.base == 10):
             what = f"a number beyond the range of {arithmetic(fmt)}"
@@ -658,7 +674,7 @@ class LinearSystem:
                     widened_array(outputs[k : k + 1, i : i + 1])
                 except OverflowError:
                     place = self._value((self.n if first is None else first) + i)
-                    raise OverflowError(f"{place} at step {k + 1}: {self._beyond(None)}") from None
+                    raise OverflowError(f"{place} at step {k + 1}: {self.beyond(None)}") from None
             raise
 
 
@@ -670,23 +686,25 @@ def _advanced(tag: Any, program: Program, coefficients: Any, z: Any, x: Any) -> 
     out = np.zeros((len(z), *x.shape), x.dtype)
     if x.dtype == np.float64:
         out[:] = np.nan
-    done = 0
-    while True:
-        start = x.copy()
+    done, most = 0, next(slices(len(z), len(program.operations))).stop
+    while done < len(z):
+        start, end = x.copy(), min(done + most, len(z))
         try:
-            advance(tag, program.operations, program.outputs, coefficients[None], 0, z[done:], x, out[done:])
-            return out
+            advance(tag, program.operations, program.outputs, coefficients[None], 0, z[done:end], x, out[done:end])
+            done = end
+            continue
         except OverflowError:
             if x.dtype != np.float64:  # in base 10, nothing decays that far
                 return None
-        lost = np.isnan(out.reshape(len(out), -1)).any(axis=1)
-        at = int(np.argmax(lost))
+        lost = np.isnan(out[done:end].reshape(end - done, -1)).any(axis=1)
+        at = done + int(np.argmax(lost))
         x = out[at - 1].copy() if at > done else start
         sizes = np.abs(x.reshape(len(x), -1)).max(axis=1)
         tiny = (sizes > 0) & (sizes < _TINY)
         if not tiny.any():
             return None
         x[tiny], done = 0.0, at
+    return out
 
 
 def _ascending(name: str, given: Any) -> tuple[Fraction, Fraction] | None:

@@ -44,6 +44,7 @@ from gpbnb.filters.program import (
     Program,
 )
 from gpbnb.filters.system import LinearFilter, LinearSystem, system_inputs
+from gpbnb.interrupts import slices
 
 _MODES = {
     Rounding.NEAREST: 0,
@@ -289,7 +290,11 @@ def largest_values(made: LinearFilter, u: NDArray[np.float64], start: Any = None
     program = made.program
     x = np.zeros(program.n) if start is None else np.array(start, dtype=np.float64)
     coefficients = made.coefficients.astype(np.float64)
-    return np.asarray(_sizes(program.operations, program.outputs, coefficients, x, np.ascontiguousarray(u)))
+    sizes = np.zeros(program.n + u.shape[1] + len(program.operations))
+    for part in slices(len(u), len(program.operations)):
+        given = np.ascontiguousarray(u[part])
+        np.maximum(sizes, _sizes(program.operations, program.outputs, coefficients, x, given), out=sizes)
+    return sizes
 
 
 @compiled
@@ -361,8 +366,12 @@ def run_integers(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -> NDAr
     u, x : (steps, m) and (n,), inputs and first state in units of the data.
     """
     if made.is_short and u.dtype != object and x.dtype != object:
-        states = np.zeros((len(u), made.program.n), np.int64)
-        step, operation = _advance(_code(made), x.astype(np.int64), u, states)
+        states, code, state = np.zeros((len(u), made.program.n), np.int64), _code(made), x.astype(np.int64)
+        for part in slices(len(u), len(code.operations)):
+            step, operation = _advance(code, state, u[part], states[part])
+            if step >= 0:
+                step += part.start
+                break
     else:
         states, step, operation = _advance_in_python(made, u, x)
     if step >= 0:
@@ -390,17 +399,18 @@ def successors(
     """
     if not made.is_short:
         raise ValueError(f"got words too long for compiled loops: {made.words}; needed products of up to {_FITS} bits")
-    found = np.empty(int(np.maximum(counts, 1).prod()), np.int64)
-    _follow(_code(made), u.reshape(1, -1), low, counts, found)
+    found, code = np.empty(int(np.maximum(counts, 1).prod()), np.int64), _code(made)
+    for part in slices(len(found), len(code.operations)):
+        _follow(code, u.reshape(1, -1), low, counts, part.start, found[part])
     return found
 
 
 @compiled
-def _follow(code: Any, u: Any, low: Any, counts: Any, found: Any) -> None:
+def _follow(code: Any, u: Any, low: Any, counts: Any, first: int, found: Any) -> None:
     n = low.shape[0]
     x, states = np.empty(n, np.int64), np.empty((1, n), np.int64)
     for number in range(found.shape[0]):
-        rest = number
+        rest = first + number
         for i in range(n - 1, -1, -1):
             size = max(counts[i], 1)
             x[i] = low[i] + rest % size

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -247,9 +248,7 @@ def _integer_bits(asked: Asked) -> int:
     if isinstance(model, LinearSystem):
         if data.z is None:
             return 0 if asked.within is None else bits_for(float(np.max(asked.within.measurement)))
-        start = np.concatenate([model.x0.astype(np.float64), np.zeros(model.p)])
-        inputs = np.ascontiguousarray(np.asarray(data.z, dtype=np.float64))
-        return bits_for(float(largest_values(model.as_filter(), inputs, start).max()))
+        return bits_for(float(_sizes(model, data.z).max()))
     sizes = [0.0]
     if asked.of_filter():
         noise = model.noise if isinstance(model, NonlinearModel) else model
@@ -260,6 +259,15 @@ def _integer_bits(asked: Asked) -> int:
     if data.z is not None and not hasattr(data.z, "to_fractions"):
         sizes.append(float(np.abs(np.asarray(data.z, dtype=np.float64)).max()))
     return bits_for(max(sizes))
+
+
+def _sizes(system: LinearSystem, z: Any) -> NDArray[np.float64]:
+    """Return the largest size of each value of a linear system without rounding."""
+    start = np.concatenate([system.x0.astype(np.float64), np.zeros(system.p)])
+    try:
+        return largest_values(system.as_filter(), np.ascontiguousarray(np.asarray(z, dtype=np.float64)), start)
+    except OverflowError:
+        raise OverflowError(f"the run without rounding: {system.beyond()}") from None
 
 
 def bits_for(largest: float) -> int:
@@ -345,7 +353,6 @@ def _stored_integer_bits(asked: Asked) -> int:
     model = asked.model
     if asked.data.z is None:
         return _integer_bits(asked)
-    program, start = model.as_filter().program, np.concatenate([model.x0.astype(np.float64), np.zeros(model.p)])
-    sizes = largest_values(model.as_filter(), np.ascontiguousarray(np.asarray(asked.data.z, dtype=np.float64)), start)
+    program, sizes = model.as_filter().program, _sizes(model, asked.data.z)
     kept = np.concatenate([np.ones(program.n + program.m, np.bool_), ~program.wide])
     return bits_for(float(sizes[kept].max()))

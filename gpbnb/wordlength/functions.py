@@ -16,6 +16,7 @@ from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import kept_in, lifted
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import Outcome, largest_by_default
 from gpbnb.arithmetic.traced import TracedFunction
@@ -100,6 +101,13 @@ def _reference(
     except STOPS as fault:
         raise type(fault)(
             f"the function stops in its reference of {digits_text(fmt.precision, fmt.base)}: {fault}"
+        ) from None
+    except AttributeError as fault:
+        if not isinstance(fault.obj, FloatFormat):
+            raise
+        raise TypeError(
+            f"got a function that asks for fmt.{fault.name}; needed one of any format, with fmt.array(...) and without "
+            f"a second format, since its reference runs in {arithmetic(fmt)} of floating point"
         ) from None
 
 

@@ -349,3 +349,13 @@ def test_the_search_says_whether_it_was_traced():
     assert "; the function ran operation by operation: it branches on a comparison" in str(found)
     bits = required_precision(pi_controller, Z, 1e-3, kind="fixed", like=FixedFormat(4, 1))
     assert bits.digits > 5
+
+
+@pytest.mark.parametrize("function", [lambda _, x, y: np.remainder(x, y), TracedFunction(lambda _, x, y: x % y)])
+def test_a_remainder_that_is_flushed_on_its_way_is_rounded_once(function):
+    """The remainder with the sign of x is below the least number; with the sign of y, it is a number."""
+    unit, fmt = Fraction(1, 1024), FloatFormat(2, 5, "nearest", -6, 10, subnormal=False)
+    x, y = fmt.array([-25 * unit, 25 * unit]), fmt.array([24 * unit, -24 * unit])
+    assert np.fmod(x, y).tolist() == [0, 0]
+    assert function(fmt, x, y).tolist() == [23 * unit, -23 * unit]
+    assert not getattr(function, "reason", "")

@@ -280,9 +280,7 @@ WHOLE_NUMBERS = (*WHOLE, "square", "cube")
 def elements(draw: Draw, i: int) -> Questions:
     fmt, found = ANY[i % len(ANY)], []
     r = rounds(fmt)
-    # Without subnormal numbers, np.remainder rounds twice where np.fmod underflows.
-    rounded_once = [each for each in WHOLE_NUMBERS if each != "remainder" or getattr(fmt, "subnormal", True)]
-    for operation in (*ARITHMETIC, *rounded_once):
+    for operation in (*ARITHMETIC, *WHOLE_NUMBERS):
         batches = 4 if operation in ARITHMETIC else 1
         for _ in range(batches):
             given = draw.operands(fmt, operation, 12, r)

@@ -132,3 +132,12 @@ def test_the_range_is_proved_where_the_worst_input_just_fits():
     assert 1 / 32 <= bound[0] <= (1 / 32) * (1 + 2.0**-19)
     with pytest.raises(OverflowError, match=r"a sum, operation 3 of 3, may reach 2.03125, beyond the 1 integer bits"):
         WordGuarantee(system, 1.0).errors(WordFormats(FixedFormat(1, 6), FixedFormat(2, 8)))
+
+
+@pytest.mark.parametrize("fmt", [FixedFormat(0, 15), FixedFormat(3, -1), FixedFormat(0, 15, "chop", "saturate")])
+def test_one_format_for_all_numbers_runs_as_words_do(fmt: FixedFormat) -> None:
+    """Nothing is multiplied by a coefficient of 1, which need not be a number of the format; a limit must be one."""
+    made, u = LinearSystem([["0.9"]], [["0.1"]]), np.full((9, 1), 0.5)
+    assert (made.outputs(u, fmt) == run_words(made, u, WordFormats(fmt)).outputs(1)).all()
+    with pytest.raises(OverflowError, match=r"from -1 to 0\.9999695"):
+        LinearSystem.pid("0.5", "0.1", limits=(-1, 1)).outputs(u, FixedFormat(0, 15))

@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.exact import kernel, one_per_format
+from gpbnb.arithmetic.kernels.exact import kernel, one_per_format, size_text
 from gpbnb.arithmetic.kernels.selection import fusing_tag, tag_of, wide_tag
 from gpbnb.arithmetic.kernels.tags import (
     FARTHEST,
@@ -36,6 +36,7 @@ from gpbnb.arithmetic.kernels.tags import (
     extents_of_sums,
 )
 from gpbnb.arithmetic.rounding import Rounding, Rules
+from gpbnb.interrupts import slices
 
 Array = NDArray[Any]
 Components = tuple[Array, ...]
@@ -184,7 +185,7 @@ class Looped(Backend):
         out = self._empty(size)
         inputs = [self._seen(tuple([_flat(part, shape) for part in components])) for components in operands]
         try:
-            gone = _loops().ENTRIES[name](tag, size, *inputs, self._seen(out))
+            gone = _along(_loops().ENTRIES[name], (tag,), size, *inputs, self._seen(out))
         except OverflowError:
             return None
         return None if gone else tuple(part.reshape(shape) for part in out)
@@ -202,13 +203,19 @@ class Looped(Backend):
 
     def fold(self, name: str, components: Components) -> Components | None:
         shape = components[0].shape
-        out = self._empty(math.prod(shape[1:]))
-        lines = self._seen(tuple(_flat(part, shape) for part in components))
-        try:
-            gone = _loops().FOLDS[name](self.tag, shape[0], math.prod(shape[1:]), lines, self._seen(out))
-        except OverflowError:
-            return None
-        return None if gone else tuple(part.reshape(shape[1:]) for part in out)
+        width, lines = math.prod(shape[1:]), tuple(_flat(part, shape) for part in components)
+        out = tuple(part[:width] for part in lines)
+        for rows in slices(shape[0] - 1, width):
+            found = self._empty(width)
+            given = _below(out, lines, rows, width)
+            try:
+                count = len(given[0]) // max(width, 1)
+                if _loops().FOLDS[name](self.tag, count, width, self._seen(given), self._seen(found)):
+                    return None
+            except OverflowError:
+                return None
+            out = found
+        return tuple(np.array(part).reshape(shape[1:]) for part in out)
 
     def from_backend(self, other: Backend, components: Components) -> Components | None:
         """Round numbers of a backend with significands of one or two words."""
@@ -218,7 +225,7 @@ class Looped(Backend):
         triples = tuple(_flat(part, shape) for part in other.in_two_words(components))
         out, states = tuple(np.empty(triples[0].size, np.int64) for _ in triples), np.empty(triples[0].size, np.int8)
         try:
-            _wide().converted(other.wide, self.wide, out[0].size, triples, out, states)
+            _along(_wide().converted, (other.wide, self.wide), out[0].size, triples, out, states)
         except OverflowError:
             return None
         hard = np.flatnonzero(states == 2)
@@ -253,19 +260,28 @@ class Looped(Backend):
 
     def scan(self, components: Components) -> Components | None:
         shape = components[0].shape
+        width, lines = math.prod(shape[1:]), tuple(_flat(part, shape) for part in components)
         out = self._empty(math.prod(shape))
-        lines = self._seen(tuple(_flat(part, shape) for part in components))
-        try:
-            gone = _loops().partial_sums(self.tag, shape[0], math.prod(shape[1:]), lines, self._seen(out))
-        except OverflowError:
-            return None
-        return None if gone else tuple(part.reshape(shape) for part in out)
+        for part, first in zip(out, lines, strict=True):
+            part[:width] = first[:width]
+        for rows in slices(shape[0] - 1, width):
+            given = _below(tuple(part[rows.start * width :] for part in out), lines, rows, width)
+            found = self._empty(len(given[0]))
+            try:
+                count = len(given[0]) // max(width, 1)
+                if _loops().partial_sums(self.tag, count, width, self._seen(given), self._seen(found)):
+                    return None
+            except OverflowError:
+                return None
+            for part, each in zip(out, found, strict=True):
+                part[rows.start * width :][: len(each)] = each
+        return tuple(part.reshape(shape) for part in out)
 
     def compare(self, a: Components, b: Components) -> Array:
         shape = _shape(a, b)
         order = np.empty(math.prod(shape), np.int8)
         x, y = (tuple(_flat(part, shape) for part in components) for components in (a, b))
-        _loops().compared(self.tag, order.size, x, y, order)
+        _along(_loops().compared, (self.tag,), order.size, x, y, order)
         return order.reshape(shape)
 
     def matmul(self, a: Components, b: Components) -> Components | None:
@@ -274,8 +290,10 @@ class Looped(Backend):
     def _product(self, tag: Tag, a: Components, b: Components) -> Components | None:
         x, y = (self.pack(each, tag, copy=None) for each in (a, b))
         c = np.empty((a[0].shape[0], b[0].shape[1], *x.shape[2:]), x.dtype)
+        x, y = _read_only(x), _read_only(y)
         try:
-            _loops().product(tag, _read_only(x), _read_only(y), c)
+            for rows in slices(len(x), y.shape[0] * y.shape[1]):
+                _loops().product(tag, x[rows], y, c[rows])
         except OverflowError:
             return None
         return self.unpack(c)
@@ -460,7 +478,7 @@ class Pairs(Compiled):
     def _from_floats(self, x: Array, exactly: bool) -> Components | None:
         out, states = self._empty(x.size), np.empty(x.size, np.int8)
         try:
-            _radix().from_floats(self.tag, x.size, _flat(x, x.shape), out, states)
+            _along(_radix().from_floats, (self.tag,), x.size, _flat(x, x.shape), out, states)
         except OverflowError:
             return None
         if exactly and states.any():
@@ -503,7 +521,7 @@ class Pairs(Compiled):
     def to_float(self, components: Components) -> Array:
         m, e = (_flat(part, components[0].shape) for part in components)
         x, states = np.empty(m.size), np.empty(m.size, np.int8)
-        _radix().to_floats(m.size, m, e, x, states)
+        _along(_radix().to_floats, (), m.size, m, e, x, states)
         if (hard := states == 2).any():
             x[hard] = self.exact.to_float((m[hard].astype(object), e[hard].astype(object)))
         return x.reshape(components[0].shape)
@@ -544,7 +562,7 @@ class TwoWords(Looped):
     def _from_integers(self, m: Array, e: Array, twos: bool, exactly: bool) -> Components | None:
         out, states = self._empty(m.size), np.empty(m.size, np.int8)
         try:
-            _wide().from_integers(self.tag, m.size, _flat(m, m.shape), _flat(e, m.shape), twos, out, states)
+            _along(_wide().from_integers, (self.tag,), m.size, _flat(m, m.shape), _flat(e, m.shape), twos, out, states)
         except OverflowError:
             return None
         if (exactly and states.any()) or (hard := np.flatnonzero(states == 2)).size > m.size // 2:
@@ -584,7 +602,8 @@ class TwoWords(Looped):
     def to_float(self, components: Components) -> Array:
         shape = components[0].shape
         x, states = np.empty(math.prod(shape)), np.empty(math.prod(shape), np.int8)
-        _wide().to_floats(self.tag, x.size, parts := tuple(_flat(part, shape) for part in components), x, states)
+        parts = tuple(_flat(part, shape) for part in components)
+        _along(_wide().to_floats, (self.tag,), x.size, parts, x, states)
         if (hard := states == 2).any():
             x[hard] = self.exact.to_float(self.to_exact(tuple(part[hard] for part in parts)))
         return x.reshape(shape)
@@ -610,11 +629,39 @@ def double_doubles(values: NDArray[Any]) -> NDArray[np.float64]:
     pairs = []
     for value in values.ravel().tolist():
         n, d = value.numerator, value.denominator
-        high = n / d
+        try:
+            high = n / d
+        except OverflowError:
+            raise OverflowError(f"got a number of about {size_text(value)}, beyond the range of float64") from None
         # Most values are exact in float64, and testing for that is many times faster than subtracting two Fractions.
         exact = n.bit_length() <= 53 and d & (d - 1) == 0 and d.bit_length() <= 960
         pairs.append((high, 0.0 if exact else float(value - Fraction(high))))
     return np.array(pairs, dtype=np.float64).reshape(*values.shape, 2)
+
+
+def _along(loop: Any, first: tuple[Any, ...], size: int, *given: Any) -> bool:
+    """Run a loop over the entries of flat arrays; return whether a result is lost."""
+    gone = False
+    for part in slices(size):
+        gone |= bool(loop(*first, part.stop - part.start, *(_cut(each, part) for each in given)))
+    return gone
+
+
+def _cut(given: Any, part: slice) -> Any:
+    if isinstance(given, tuple):
+        return tuple(each[part] for each in given)
+    return given[part] if isinstance(given, np.ndarray) else given
+
+
+def _below(first: Components, lines: Components, rows: slice, width: int) -> Components:
+    """Return a row, and below it those of lines after the first one that a slice counts."""
+    if rows.start == 0:  # the row is the first of the lines
+        return tuple(part[: (rows.stop + 1) * width] for part in lines)
+    found = []
+    for top, part in zip(first, lines, strict=True):
+        more = part[(rows.start + 1) * width : (rows.stop + 1) * width]
+        found.append(_flat(joined := np.concatenate([top[:width], more]), joined.shape))
+    return tuple(found)
 
 
 def _read_only(a: Array) -> Array:

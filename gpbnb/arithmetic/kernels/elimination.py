@@ -32,13 +32,14 @@ def _minus_size(fmt: Any, x: Any) -> Any:
 
 
 @compiled
-def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
+def lu(fmt: Any, a: Any, order: Any, pivot: bool, begin: int, end: int) -> int:
     """Factor a (n, n): the upper factor on and above the diagonal, the multipliers of the lower factor below it.
 
-    `order` (n,) is permuted like the rows. Returns the column of the first zero pivot, or -1 if there is none.
+    A call eliminates the columns from `begin` to before `end`. `order` (n,) is permuted like the rows. Returns the
+    column of the first zero pivot, or -1 if there is none.
     """
     n = a.shape[0]
-    for k in range(n):
+    for k in range(begin, end):
         if pivot:
             largest = k
             for i in range(k + 1, n):
@@ -62,7 +63,8 @@ def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
             row = a[i, k + 1 :]
             for j in range(row.shape[0]):  # counting from zero, which numba vectorizes
                 put(fmt, row, j, add(fmt, load(fmt, row, j), multiply(fmt, m, load(fmt, upper, j))))
-    check(fmt, a)
+    if end == n:
+        check(fmt, a)
     return -1
 
 

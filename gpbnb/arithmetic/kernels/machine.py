@@ -73,7 +73,7 @@ class Formats(NamedTuple):
     whole: NDArray[np.int64]
     #: (formats, 7).
     numbers: NDArray[np.float64]
-    #: (formats, 2), seed and count of random numbers.
+    #: (2,), seed and count of random numbers, of all formats together.
     random: NDArray[np.uint64]
 
 
@@ -431,7 +431,7 @@ def quick_scalars(formats: Any, code: Any, values: Any, truths: Any) -> Any:
                 gone |= values[a] == 0.0
             else:
                 z = values[c] if operation == FUSED else 0.0
-                found = _carefully(_masked(formats, f), formats.random[f], operation, values[a], values[b], z)
+                found = _carefully(_masked(formats, f), formats.random, operation, values[a], values[b], z)
                 gone |= found != found
                 values[out] = found
     return gone
@@ -443,7 +443,7 @@ def careful_scalars(formats: Any, code: Any, values: Any, truths: Any) -> Any:
     o: Any = -1
     for s in range(code.segments.shape[0]):
         f = code.segments[s, 2]
-        fmt, random = _masked(formats, f), formats.random[f]
+        fmt, random = _masked(formats, f), formats.random
         while o + 1 < code.segments[s, 1]:
             o += 1
             operation = code.rows[o, 0]
@@ -505,7 +505,7 @@ def quick_lanes(formats: Any, code: Any, values: Any, truths: Any) -> Any:
                 fmt = _masked(formats, f)
                 for i in range(lanes):
                     z = values[c, i] if operation == FUSED else 0.0
-                    found = _carefully(fmt, formats.random[f], operation, values[a, i], values[b, i], z)
+                    found = _carefully(fmt, formats.random, operation, values[a, i], values[b, i], z)
                     gone |= np.int64(found != found)
                     values[out, i] = found
     return gone != 0
@@ -672,7 +672,7 @@ def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths:
             if given[5] != 0:
                 done = _run_segment(ShortDecimal(given[0], given[1] == AWAY), code, done, end, values, truths)
             else:
-                fmt = LimitedDecimal(given[1], given[0], given[2], given[3], given[4] != 0)
+                fmt = LimitedDecimal(given[1], given[0], given[2], given[3], given[4])
                 done = _run_segment(fmt, code, done, end, values, truths)
             if done < 0:
                 return ~done

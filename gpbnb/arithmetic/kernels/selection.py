@@ -27,6 +27,7 @@ _CODES = {
 _REACH = 320  # largest binary exponent for which products, quotients and their residuals are normal float64
 _HARDWARE = {(24, -126, 127): tags.Hardware32(), (53, -1022, 1023): tags.Hardware64()}
 _UNLIMITED = 2**60  # stands for an unlimited exponent in base 10
+_HALFWAY = 2**63  # of the random numbers of a seed
 
 
 class Accumulator(Protocol):
@@ -59,12 +60,11 @@ def _decimal_tag(rules: Rules) -> tags.LimitedDecimal | None:
     if rules.rounding not in _CODES:
         return None
     if limits is None:
-        return tags.LimitedDecimal(_CODES[rules.rounding], rules.precision, -_UNLIMITED, _UNLIMITED, False)
+        return tags.LimitedDecimal(_CODES[rules.rounding], rules.precision, -_UNLIMITED, _UNLIMITED, tags.UNLIMITED)
     if limits.fixed or not _ends_in_nines(rules) or limits.overflow != "raise":
         return None
-    return tags.LimitedDecimal(
-        _CODES[rules.rounding], rules.precision, limits.emin - last, _emax(rules) - last, not limits.subnormal
-    )
+    small = tags.GRADUAL if limits.subnormal else tags.ABRUPT
+    return tags.LimitedDecimal(_CODES[rules.rounding], rules.precision, limits.emin - last, _emax(rules) - last, small)
 
 
 def wide_tag(rules: Rules) -> tags.Wide | None:
@@ -194,8 +194,13 @@ def check_order(order: Order, fused: bool, block: int) -> None:
 
 
 def compiled_tag(rules: Rules) -> tags.Tag:
-    """Return the tag of a format's arithmetic, as :func:`tag_of`; reject a format without compiled loops."""
+    """Return the tag of a format's arithmetic, as :func:`tag_of`; reject a format without compiled loops.
+
+    Random roundings start halfway through the numbers of the seed, so that a loop draws none that an array draws.
+    """
     if (tag := tag_of(rules)) is not None:
+        if (state := tags.random_state(tag)) is not None:
+            state[1] = _HALFWAY
         return cast(tags.Tag, tag)
     base, precision, rounding, limits, _ = rules
     if base not in LARGEST_PRECISION:

@@ -15,8 +15,8 @@ LEAST, LIMIT = 2.0**-960, 2.0**1023  # magnitudes of Binary and Hexadecimal, fro
 # toward plus infinity. ZERO, UP and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to
 # neighbours with an odd last digit.
 AWAY, EVEN, ZERO, UP, DOWN, ODD, HALF_UP = range(7)
-# What happens below the smallest normal number of a Wide format: there is none; its spacing is kept; numbers become
-# zero; or all numbers have one spacing.
+# What happens below the smallest normal number of a Wide or LimitedDecimal format: there is none; its spacing is kept;
+# numbers become zero; or all numbers have one spacing.
 UNLIMITED, GRADUAL, ABRUPT, FIXED = range(4)
 FARTHEST = 2**60  # exponent of a Wide number
 
@@ -164,7 +164,7 @@ class LimitedDecimal(NamedTuple):
     precision: int
     least: int  # exponent of the last digit of the smallest normal number
     largest: int  # exponent of the last digit of the largest number
-    flush: bool  # whether smaller numbers become zero; otherwise they are out of range
+    small: int  # UNLIMITED, GRADUAL or ABRUPT
 
 
 class Wide(NamedTuple):
@@ -195,6 +195,14 @@ def extents_of_sums(n: int, base: int, precision: int, gradual: float, low: floa
     unit = float(base) ** (1 - precision)
     growth = min(n * math.exp(min((n + 1) * unit, 700.0)), base**2 * (base / unit))
     return low * unit / (4 * base), high * growth + n * gradual
+
+
+def random_state(tag: Any) -> Any:
+    """Return the seed and the count of random numbers of an arithmetic, which its operations update; None if none."""
+    if isinstance(tag, Mixed):
+        found = random_state(tag.stored)
+        return random_state(tag.sums) if found is None else found
+    return tag.mode.state if isinstance(tag, Limited) and isinstance(tag.mode, Random) else None
 
 
 FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64, Free, Mixed)  # numbers are single float64

@@ -1,0 +1,78 @@
+"""Compiled loops run in slices, between which Ctrl-C acts; no slice changes a digit."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+import pytest
+
+from gpbnb import (
+    BINARY32,
+    FixedFormat,
+    FloatFormat,
+    LinearModel,
+    LinearSystem,
+    WordFormats,
+    emulate,
+    limit_cycles,
+    linalg,
+)
+
+FORMATS = [BINARY32, FloatFormat(2, 20, "chop"), FloatFormat(10, 12, "up"), FloatFormat(10, 25), FixedFormat(9, 20)]
+SYSTEM = LinearSystem.from_coefficients(["0.2", "0.1"], [1, "-1.2", "0.5"])
+RNG = np.random.default_rng(4)
+A, B = RNG.uniform(1, 2, (7, 7)) + 9 * np.eye(7), RNG.uniform(1, 2, (7, 5))
+ARRAYS = {
+    "entries": lambda a, b: a * a[0] / a,
+    "sum": lambda a, b: np.sum(b),
+    "columns": lambda a, b: np.sum(b, axis=0),
+    "partial sums": lambda a, b: np.cumsum(b, axis=0),
+    "product": lambda a, b: a @ b,
+    "comparison": lambda a, b: (a > a.T).astype(int),
+    "conversion": lambda a, b: a.format.array(FloatFormat(10, 9).array(b)),
+    "solution": lambda a, b: linalg.solve(a, b, pivot=True),
+}
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+@pytest.mark.parametrize("name", ARRAYS)
+def test_an_array_in_slices_has_the_same_digits(fmt, name, monkeypatch):
+    a, b = fmt.array(A), fmt.array(B)
+    whole = ARRAYS[name](a, b).tolist()
+    monkeypatch.setattr("gpbnb.interrupts.SLICE", 11)
+    assert ARRAYS[name](a, b).tolist() == whole
+
+
+@pytest.mark.parametrize("fmt", [BINARY32, FloatFormat(2, 20), FloatFormat(10, 7), "Q3.20"], ids=str)
+def test_a_run_in_slices_has_the_same_digits(fmt, monkeypatch):
+    z = np.concatenate([RNG.uniform(-1, 1, 9), np.zeros(3000)])  # decays beyond the range of float64
+    model = LinearModel([["0.9"]], [["1"]], [["0.01"]], [["1"]], ["0"], [["1"]])
+    whole = [emulate(each, z, fmt) for each in (SYSTEM, model)]
+    monkeypatch.setattr("gpbnb.interrupts.SLICE", 100)
+    for each, run in zip((SYSTEM, model), whole, strict=True):
+        found = emulate(each, z, fmt)
+        assert found.steps == len(z)
+        assert found.x.tolist() == run.x.tolist()
+
+
+def test_limit_cycles_in_slices_are_the_same(monkeypatch):
+    words = WordFormats(FixedFormat(2, 5), 8)
+    whole = limit_cycles(SYSTEM, words)
+    monkeypatch.setattr("gpbnb.interrupts.SLICE", 100)
+    found = limit_cycles(SYSTEM, words)
+    assert [each.outputs.tolist() for each in found.cycles] == [each.outputs.tolist() for each in whole.cycles]
+
+
+def test_an_interrupt_acts_before_a_long_product_ends(monkeypatch):
+    calls = []
+
+    def interrupted(tag, a, b, c):
+        calls.append(len(a))
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("gpbnb.arithmetic.kernels.elementwise.product", interrupted)
+    x = FloatFormat(10, 12).array(np.ones((3000, 40)))
+    with pytest.raises(KeyboardInterrupt):
+        x @ np.ones((40, 1000))
+    assert calls == [(1 << 22) // 40_000]
