@@ -40,9 +40,6 @@ def operands_of(name: str, a: int, b: int, c: int) -> tuple[tuple[int, ...], tup
     return ((), (a,)) if name == "skip" else ((a,), ())
 
 
-_RANDOM = 6
-
-
 def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
     """Return the kind of numbers of some formats of one base, None being double-double, and their columns.
 
@@ -120,7 +117,7 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
 
 def _code(mode: Any) -> int:
     if isinstance(mode, tags.Random):
-        return _RANDOM
+        return tags.RANDOM
     return mode.code if isinstance(mode, tags.Mode) else EVEN
 
 

@@ -25,6 +25,7 @@ from gpbnb.arithmetic.kernels.tags import (
     EVEN,
     HALF_UP,
     ODD,
+    RANDOM,
     UP,
     DoubleDouble,
     LimitedDecimal,
@@ -44,9 +45,6 @@ or false. COMPARE compares two numbers; its third operand has bit 0, 1 or 2 set 
 greater. COMBINE combines two truth values by a table, the bits of its third operand. ROUND brings a number of another
 format into that of the segment, FUSED adds its third operand to a product, NONZERO stops where a number is zero,
 and SKIP leaves out as many rows as its second operand says if its truth value is false."""
-
-RANDOM = 6
-"""Code of stochastic rounding, after those of :mod:`gpbnb.arithmetic.kernels.tags`."""
 
 
 class Masks(NamedTuple):

@@ -13,8 +13,8 @@ SAFE_TWICE = 25  # bits; results rounded to float64 first and then to nearest wi
 LEAST, LIMIT = 2.0**-960, 2.0**1023  # magnitudes of Binary and Hexadecimal, from LEAST to below LIMIT
 # Codes of rounding modes. AWAY, EVEN and HALF_UP round to nearest, with ties away from zero, to the even last digit or
 # toward plus infinity. ZERO, UP and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to
-# neighbours with an odd last digit.
-AWAY, EVEN, ZERO, UP, DOWN, ODD, HALF_UP = range(7)
+# neighbours with an odd last digit. RANDOM rounds stochastically.
+AWAY, EVEN, ZERO, UP, DOWN, ODD, HALF_UP, RANDOM = range(8)
 # What happens below the smallest normal number of a Wide or LimitedDecimal format: there is none; its spacing is kept;
 # numbers become zero; or all numbers have one spacing.
 UNLIMITED, GRADUAL, ABRUPT, FIXED = range(4)
