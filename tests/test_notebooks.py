@@ -16,7 +16,7 @@ MOST_LINES = 30
 MOST_LINES_OF_A_FUNCTION = 17
 OPEN = ("integration", "inversion", "kalman", "rolling", "rounding")
 """Chapters whose cells do the work in sight."""
-SHOWN = (*OPEN, "arithmetic", "index", "nonlinear", "principles", "processors", "trust", "wordlength")
+SHOWN = (*OPEN, "arithmetic", "budget", "index", "nonlinear", "principles", "processors", "trust", "wordlength")
 """Pages that show at least half of their code, and everything it uses."""
 ABSOLUTE = re.compile(r"(?<![\w.:/<])/(home|root|Users|work|tmp|usr|opt|var|private|mnt|srv)/|\b[A-Z]:\\\\")
 MOST_DIGITS = 6
