@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faults
 import pytest
 
 from gpbnb.report.ledger import TOPICS, Row, examine, load_statements, rows
@@ -20,6 +21,10 @@ def test_the_checks_of_a_topic_find_what_is_stored(topic):
 
 def test_every_statement_has_a_stored_finding_and_nothing_else_is_stored():
     assert to_table(rows()) == FILE.read_text(encoding="utf-8")
+
+
+def test_differences_have_notes():
+    faults.check_texts(rows())
 
 
 def test_a_part_of_the_ledger_has_the_rows_of_that_part():

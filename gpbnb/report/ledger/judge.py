@@ -10,7 +10,7 @@ A row of ``checks/<topic>.csv`` judges some statements. Its columns:
 - *also*: an expression that must be true besides; without a domain, it judges the statement alone.
 - *verdict*: what a mismatch is called, or else what the statement is, such as ``given``; *root*: its root error.
 - *recomputed*, *note*, *otherwise*: what the ledger says; *otherwise* replaces the note of a mismatch. Expressions in
-  braces are filled in. ``found`` is the outcome, and ``printed`` the statement.
+  braces are filled in. ``found`` is the outcome, ``printed`` the statement, and ``document`` where it is printed.
 
 The functions of the topic give the names of these expressions their values, as do the values of a single mapping.
 """
@@ -289,7 +289,7 @@ class CheckRow:
 
     def __call__(self, printed: Statement) -> Finding:
         """Judge a statement."""
-        names = {**_NAMES, "printed": printed, **self.topic}
+        names = {**_NAMES, "printed": printed, "document": printed.document, **self.topic}
         verdict = Verdict(self.verdict or "wrong")
         agrees: bool | None = None
         if self.domain:

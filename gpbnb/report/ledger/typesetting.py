@@ -19,6 +19,20 @@ _SIGNS: dict[type[ast.cmpop], str] = {
 
 _GREEK = {name: name for small in greeks for name in (small, small.capitalize())} | {"lamda": "lambda"}
 _ACCENTS = ("hat", "tilde", "bar", "dot", "ddot", "underline", "overline")
+_TEMPLATES = {
+    ("Sum", 1): r"\sum %s",
+    ("Max", 1): r"\max %s",
+    ("pm", 1): r"\left(\pm %s\right)",
+    ("norm", 1): r"\left\|%s\right\|",
+    ("abs", 1): r"\left|%s\right|",
+    ("group", 1): r"\left(%s\right)",
+    ("bracket", 1): r"\left[%s\right]",
+    ("mark", 2): r"\underbrace{%s}_{\text{(%s)}}",
+    ("op", 2): "%s*%s",
+    ("sqrt", 1): r"\sqrt{%s}",
+    ("exp", 1): "e^{%s}",
+}
+"""How calls with so many arguments are typeset."""
 _NAMED = ("sin", "cos", "tan", "exp", "log", "ln", "max", "min", "dim")
 
 
@@ -151,33 +165,12 @@ def _call(function: ast.expr, arguments: list[ast.expr]) -> str:
             return rf"\int_{{{bounds[1]}}}^{{{bounds[2]}}}{term}\,d{bounds[0]}"
         return rf"\{'sum' if name == 'Sum' else 'prod'}_{{{bounds[0]}={bounds[1]}}}^{{{bounds[2]}}}{term}"
     inside = [typeset(argument, 0) for argument in arguments]
-    match name, inside:
-        case "Sum", [x]:
-            return rf"\sum {x}"
-        case "Max", [x]:
-            return rf"\max {x}"
-        case "pm", [x]:
-            return rf"\left(\pm {x}\right)"
-        case "digits", _:
-            return f".{''.join(inside)}"
-        case "norm", [x]:
-            return rf"\left\|{x}\right\|"
-        case "abs", [x]:
-            return rf"\left|{x}\right|"
-        case "group", [x]:
-            return rf"\left({x}\right)"
-        case "bracket", [x]:
-            return rf"\left[{x}\right]"
-        case "mark", [x, label]:
-            return rf"\underbrace{{{x}}}_{{\text{{({label})}}}}"
-        case "op", [x, y]:
-            return f"{x}*{y}"
-        case "sqrt", [x]:
-            return rf"\sqrt{{{x}}}"
-        case "diff", [f, x]:
-            return rf"\frac{{d}}{{d{x}}}{f}"
-        case "exp", [x]:
-            return f"e^{{{x}}}"
+    if (name, len(inside)) in _TEMPLATES:
+        return _TEMPLATES[name, len(inside)] % tuple(inside)
+    if name == "diff" and len(inside) == 2:
+        return rf"\frac{{d}}{{d{inside[1]}}}{inside[0]}"
+    if name == "digits":
+        return f".{''.join(inside)}"
     if name in _NAMED:
         return rf"\{name}\left({', '.join(inside)}\right)"
     return rf"{typeset(function, 4)}\left({', '.join(inside)}\right)"

@@ -35,54 +35,6 @@ CACHING = (checks, experiment)
 # -- the present state ----------------------------------------------------------------------------
 
 
-def test_every_entry_of_the_sections_has_a_check_here_and_none_is_elsewhere():
-    assert set(checks.CHECKS) == set(PRINTED)
-    assert len(PRINTED) == 180
-    later = [entry for entry in INVENTORY if entry.id.startswith(("hung1984.II.", "hung1982.III."))]
-    assert all(int(entry.section.split(".")[0]) > 9 for entry in later if entry.id not in PRINTED)
-
-
-def test_which_are_not_right_as_printed(rows):
-    found = {verdict: {row.statement.id for row in rows if row.finding.verdict is verdict} for verdict in Verdict}
-    implied = {"s9-2.claim-28-implies", "s9-2.p-2-line", "s9-2.p-3-line"}
-    chain = {*implied, "eq30", "eq31"}
-    built_on_it = {"s9-2.example-1", "s9-2.example-2"}
-    assert found[Verdict.WRONG] == {f"hung1984.II.{place}" for place in chain | built_on_it} | {
-        f"hung1982.III.{place}" for place in {"s6.unnumbered-4-term-bound", "eq18"} | chain | built_on_it
-    }
-    assert found[Verdict.INCONSISTENT] == {"hung1984.II.eq20"}
-    assert found[Verdict.OCR] == {
-        "hung1984.II.s8.text-after-24",
-        "hung1982.III.s2.example-2b",
-        "hung1982.III.s7.norm-property-v",
-    }
-    assert found[Verdict.UNVERIFIABLE] == {
-        "hung1984.II.s1.claim-background",
-        "hung1984.II.s1.claim-main-activity",
-        "hung1984.II.s1.claim-only-rounding",
-        "hung1982.III.s1.claim-only-rounding",
-        "hung1982.III.s1.claim-background",
-        "hung1982.III.s1.claim-main-activity",
-        "hung1984.II.eq27",
-    }
-    assert found[Verdict.OPEN] == set()
-
-
-def test_no_finding_is_without_a_note_where_it_differs(rows):
-    faults.check_texts(rows)
-
-
-def test_each_statement_with_a_verdict_of_its_own_has_a_form(rows):
-    without = {row.statement.id for row in rows if not row.statement.form}
-    excused = {Verdict.UNVERIFIABLE, Verdict.ANSWERED, Verdict.GIVEN}
-    assert {row.finding.verdict for row in rows if row.statement.id in without} == excused
-
-
-def test_each_wrong_statement_names_its_root_error(rows):
-    roots = Counter(row.finding.root for row in rows if row.finding.verdict is Verdict.WRONG)
-    assert roots == {"product-error-relative-to-product": 14, "sum-bound-ignores-cancellation": 2}
-
-
 def test_findings_are_the_same_again(rows):
     faults.forget(*CACHING)
     for key in ("hung1984.II.eq18", "hung1982.III.eq27", "hung1984.II.s3.example-8-x"):

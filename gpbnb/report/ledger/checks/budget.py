@@ -211,18 +211,10 @@ def noise() -> Names:
 # -- Table II-1 and Figure II-2 -------------------------------------------------------------------
 
 
-def total() -> float:
-    """Return the printed total of Table II-1, in milliarcseconds."""
-    return float(statement("hung1982.II.rss-total").number("total").value)
-
-
-def sources() -> int:
-    return int(statement("hung1982.II.44-sources").number("sources").value)
-
-
-def each() -> float:
-    """Return the printed error of each of the equal sources, in milliarcseconds."""
-    return float(statement("hung1982.II.44-sources").number("each").value)
+TOTAL = float(statement("hung1982.II.rss-total").number("total").value)
+"""The printed total of Table II-1, in milliarcseconds."""
+SOURCES, EACH = (float(statement("hung1982.II.44-sources").number(name).value) for name in ("sources", "each"))
+"""The printed number of equal sources, and the error of each in milliarcseconds."""
 
 
 def equal_sources(printed: Statement) -> Names:

@@ -29,14 +29,6 @@ N = sp.Symbol("n")
 
 # -- cases: one cycle with given numbers ----------------------------------------------------------
 
-_VALUES = (("3/2", "5/4", "7/3", "2"), ("2/5", "7/2", "5/3", "3"))
-"""Bandwidth, cycle time, steady variance and the index of a cycle, for each case."""
-_BEFORE = (
-    (("2", "1/3", "3/5"), ("5/7", "-3/4")),
-    (("-3/2", "7/5", "4/3"), ("-2/9", "6/5")),
-)
-"""States before a cycle and noises in it."""
-
 
 @dataclass(frozen=True)
 class Case:
@@ -70,12 +62,15 @@ class Case:
 @cache
 def cases() -> tuple[Case, ...]:
     """Return two cases with different numbers, none of them 0 or 1."""
+    given = (
+        (("3/2", "5/4", "7/3"), 2, ("2", "1/3", "3/5"), ("5/7", "-3/4")),
+        (("2/5", "7/2", "5/3"), 3, ("-3/2", "7/5", "4/3"), ("-2/9", "6/5")),
+    )
     found = []
-    for values, (states_before, noises) in zip(_VALUES, _BEFORE, strict=True):
-        omega, period, variance = (sp.Rational(v) for v in values[:3])
-        before = tuple(sp.Rational(v) for v in states_before)
-        drawn = tuple(sp.Rational(v) for v in noises)
-        found.append(Case(omega, period, variance, int(values[3]), before, drawn))
+    for numbers, cycle, *states in given:
+        omega, period, steady = map(sp.Rational, numbers)
+        before, drawn = (tuple(map(sp.Rational, each)) for each in states)
+        found.append(Case(omega, period, steady, cycle, before, drawn))
     return tuple(found)
 
 
@@ -96,35 +91,22 @@ def constants(case: Case) -> Names:
     """Return the letters that every equation may use."""
     phi = case.phi
     return {
-        "numbers": sp.Rational,
-        "omega_bw": case.omega,
-        "T": case.period,
-        "P_11_inf": case.steady,
-        "n": N,
-        "f_c": 1 / case.period,
-        "mu": case.omega * case.period,
-        "sigma_x": sp.sqrt(case.steady),
+        "numbers": sp.Rational, "omega_bw": case.omega, "T": case.period, "P_11_inf": case.steady, "n": N,
+        "f_c": 1 / case.period, "mu": case.omega * case.period, "sigma_x": sp.sqrt(case.steady),
         "t": at(case.cycle * case.period, (case.cycle - 1) * case.period),
-        **{f"phi_{i + 1}{j + 1}": at(phi[i, j], None) for i in range(2) for j in range(2)},
-    }
+        **{f"phi_{i + 1}{j + 1}": at(phi[i, j], None) for i, j in product(range(2), repeat=2)},
+    }  # fmt: skip
 
 
 @cache
 def states(case: Case) -> Names:
     """Return the states of (10) before and after a cycle, with the true integral and the trapezoidal rule."""
-    x1, x2, x3 = case.before
-    q1, q2 = case.drawn
-    phi = case.phi
+    (x1, x2, x3), (q1, q2), phi = case.before, case.drawn, case.phi
     new1 = phi[0, 0] * x1 + q1
     new2 = phi[1, 0] * x1 + x2 + q2
-    new3 = x3 + (x1 + new1) / 2 * case.period
-    after = (new1, new2, new3)
-    return {
-        **constants(case),
-        **{f"x_{i + 1}": at(after[i], case.before[i]) for i in range(3)},
-        "q_1": at(q1, None),
-        "q_2": at(q2, None),
-    }
+    after = (new1, new2, x3 + (x1 + new1) / 2 * case.period)
+    of_states = {f"x_{i + 1}": at(after[i], case.before[i]) for i in range(3)}
+    return constants(case) | of_states | {"q_1": at(q1, None), "q_2": at(q2, None)}
 
 
 def extended(case: Case) -> tuple[sp.Matrix, sp.Matrix]:
@@ -141,15 +123,16 @@ def covariances(case: Case, before: sp.Matrix) -> Names:
     step, added = extended(case)
     after = step * before * step.T + added
     names = constants(case)
-    for i in range(3):
-        for j in range(3):
-            names[f"P_{i + 1}{j + 1}"] = at(after[i, j], before[i, j])
-            names[f"DeltaP_{i + 1}{j + 1}"] = at(after[i, j] - before[i, j], None)
-    grown = after - before
-    names["P_ee"] = at(*(p[2, 2] + p[1, 1] - 2 * p[2, 1] for p in (after, before)))
-    names["DeltaP_ee"] = at(grown[2, 2] + grown[1, 1] - 2 * grown[2, 1], None)
-    names["P_dot_ee"] = at(names["DeltaP_ee"](sp.Symbol("n")) / case.period, None)
-    return names
+    for i, j in product(range(3), repeat=2):
+        names[f"P_{i + 1}{j + 1}"] = at(after[i, j], before[i, j])
+        names[f"DeltaP_{i + 1}{j + 1}"] = at(after[i, j] - before[i, j], None)
+    now, past = (p[2, 2] + p[1, 1] - 2 * p[2, 1] for p in (after, before))
+    of_error = {
+        "P_ee": at(now, past),
+        "DeltaP_ee": at(now - past, None),
+        "P_dot_ee": at((now - past) / case.period, None),
+    }
+    return names | of_error
 
 
 @cache
@@ -458,14 +441,9 @@ def _in_time(case: Case, entries: tuple[sp.Rational, ...]) -> Names:
     now, slope = (m.subs(T, sp.Rational(6, 5)) for m in (matrix, matrix.diff(T)))
     density = 2 * case.omega * case.steady  # keeps P_11 at its steady value
     names: Names = {
-        **constants(case),
-        "t": sp.Rational(6, 5),
-        "P": now,
-        "P_dot": slope,
-        "A": sp.Matrix([[-case.omega, 0], [1, 0]]),
-        "N_p": sp.Matrix([[density, 0], [0, 0]]),
-        "N_P11": density,
-    }
+        **constants(case), "t": sp.Rational(6, 5), "P": now, "P_dot": slope, "N_P11": density,
+        "A": sp.Matrix([[-case.omega, 0], [1, 0]]), "N_p": sp.Matrix([[density, 0], [0, 0]]),
+    }  # fmt: skip
     del names["T"]  # a symmetric matrix would hide the transpose
     for i, j in product(range(2), repeat=2):
         names[f"P_{i + 1}{j + 1}"], names[f"P_dot_{i + 1}{j + 1}"] = now[i, j], slope[i, j]

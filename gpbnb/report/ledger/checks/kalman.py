@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -16,16 +17,14 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, max_norm, row_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters import contraction, emulation, forms
-from gpbnb.filters.kalman_step import StepModel
+from gpbnb.filters import emulation, forms
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.kalman import derivation as d
-from gpbnb.report.kalman import exact_step, report_bounds, smallest
+from gpbnb.report.kalman import ensembles, exact_step, report_bounds, smallest
 from gpbnb.report.ledger.checks import kalman_errors
 from gpbnb.report.ledger.checks.kalman_errors import FOUR
 from gpbnb.report.ledger.first_order import FirstOrder
@@ -41,6 +40,15 @@ Names = dict[str, Any]
 STATES, MEASUREMENTS, STEPS = 3, 2, 5
 
 
+def _numbers(rng: np.random.Generator, rows: int, columns: int) -> sp.Matrix:
+    return sp.Matrix(rows, columns, lambda i, j: sp.Integer(int(rng.integers(-9, 10))))
+
+
+def _covariance(rng: np.random.Generator, size: int) -> sp.Matrix:
+    half = _numbers(rng, size, size)
+    return half * half.T + sp.eye(size)
+
+
 @cache
 def least_squares_run() -> dict[str, dict[int, sp.Matrix]]:
     """Return five steps of a random filter, with each matrix by letter and index.
@@ -48,30 +56,20 @@ def least_squares_run() -> dict[str, dict[int, sp.Matrix]]:
     Estimates, covariances, gains and closed loops come from the weighted least squares of prediction and measurement,
     solved through the information matrix, and not from the filter's equations. All matrices change from step to step.
     """
-    rng = np.random.default_rng(98)
-    n, m = STATES, MEASUREMENTS
-
-    def numbers(rows: int, columns: int) -> sp.Matrix:
-        return sp.Matrix(rows, columns, lambda i, j: sp.Integer(int(rng.integers(-9, 10))))
-
-    def covariance(size: int) -> sp.Matrix:
-        half = numbers(size, size)
-        return half * half.T + sp.eye(size)
-
-    letters: dict[str, dict[int, sp.Matrix]] = {
-        letter: {} for letter in ["Phi", "H", "Q", "R", "z", "x", "P", "prior", "K", "F", "u"]
-    }
-    letters["x"][0], letters["P"][0] = numbers(n, 1), covariance(n)
+    rng, n, m = np.random.default_rng(98), STATES, MEASUREMENTS
+    found: dict[str, dict[int, sp.Matrix]] = defaultdict(dict)
+    found["x"][0], found["P"][0] = _numbers(rng, n, 1), _covariance(rng, n)
     for k in range(1, STEPS + 1):
-        Phi, H, Q, R, z = numbers(n, n) / 10, numbers(m, n), covariance(n), covariance(m), numbers(m, 1)
-        prior = Phi * letters["P"][k - 1] * Phi.T + Q
+        Phi, H, Q = _numbers(rng, n, n) / 10, _numbers(rng, m, n), _covariance(rng, n)
+        R, z = _covariance(rng, m), _numbers(rng, m, 1)
+        prior = Phi * found["P"][k - 1] * Phi.T + Q
         P = (prior.inv() + H.T * R.inv() * H).inv()
-        F, K = P * prior.inv() * Phi, P * H.T * R.inv()
-        letters["Phi"][k - 1], letters["H"][k], letters["Q"][k - 1], letters["R"][k] = Phi, H, Q, R
-        letters["z"][k], letters["prior"][k], letters["P"][k], letters["K"][k] = z, prior, P, K
-        letters["F"][k], letters["u"][k] = F, K * z
-        letters["x"][k] = F * letters["x"][k - 1] + letters["u"][k]
-    return letters
+        F, u = P * prior.inv() * Phi, P * H.T * R.inv() * z
+        now = {"H": H, "R": R, "z": z, "prior": prior, "P": P, "K": P * H.T * R.inv(), "F": F, "u": u}
+        for letter, value in (now | {"x": F * found["x"][k - 1] + u}).items():
+            found[letter][k] = value
+        found["Phi"][k - 1], found["Q"][k - 1] = Phi, Q
+    return found
 
 
 def filter_steps() -> list[Names]:
@@ -432,40 +430,10 @@ def smallest_changes() -> list[Names]:
 # -- the remarks of section 13 --------------------------------------------------------------------
 
 
-@cache
-def refined() -> tuple[int, int, float]:
-    """Compare small filters in four and eight digits with exact ones: bounds, violations, median of bound / error."""
-    rng = np.random.default_rng(125)
-    tried, violations, factors = 0, 0, []
-    for fmt, second in ((FOUR, False), (FloatFormat(10, 8), True)):
-        for _ in range(4):
-            Phi, H = exact(rng.integers(-9, 10, (2, 2))) / 20, exact(rng.integers(1, 10, (1, 2)))
-            Q, R, P = (exact(np.diag(rng.integers(1, 10, size))) / 8 for size in (2, 1, 2))
-            run = truth = smallest.FilterCase(Phi, H, Q, R, exact(rng.integers(-9, 10, 2)), P, exact([0]))
-            model = StepModel(*map(as_float, (Phi, H, Q, R)))
-            bound = contraction.contraction_start(as_float(P), np.zeros(2), np.zeros((2, 2)))
-            for _ in range(5):
-                z = exact(rng.integers(-9, 10, 1))
-                run, truth = run._replace(z=z), truth._replace(z=z)
-                here, true = exact_step.exact_step(*run), exact_step.exact_step(*truth)
-                x, _, P = smallest.rounded_step(fmt, run, second)
-                P = (P + P.T) / 2
-                before, K, S = as_float(run.P), as_float(here.gain), as_float(here.innovation_covariance)
-                off = contraction.evaluation_errors(model, as_float(run.x), before, as_float(z), K, S, 2.0**-102)
-                residuals = as_float(here.innovation), as_float(x - here.x), as_float(P - here.P)
-                bound = contraction.contraction_step(bound, model, contraction.Repeated(K, S, *residuals), off)
-                run, truth = run._replace(x=x, P=P), truth._replace(x=true.x, P=true.P)
-                errors = np.abs(np.append(as_float(x - true.x), as_float(P - true.P)))
-                bounds = np.append(contraction.state_error_bound(bound), contraction.covariance_error_bound(bound))
-                tried += len(errors)
-                violations += int((errors > bounds).sum())
-                factors += (bounds[errors > 0] / errors[errors > 0]).tolist()
-    return tried, violations, float(np.median(factors))
-
-
-def as_float(entries: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the nearest float64 of Fractions."""
-    return np.asarray(entries, dtype=object).astype(np.float64)
+def refined() -> ensembles.Summary:
+    """Summarize the stored runs of random filters with their contraction bounds."""
+    (found,) = ensembles.merged([each._replace(kind="", form="") for each in ensembles.load()])
+    return found
 
 
 @cache

@@ -116,40 +116,23 @@ _NUMBERS = (
 @cache
 def signals() -> tuple[Names, ...]:
     """Return two instants with different signals, noises and angles, and the model's results for them."""
-    found = []
-    for numbers in _NUMBERS:
-        sx, sy, n1, n2, rate, time, theta = (sp.Rational(v) for v in numbers)
-        off, phase = sp.Rational(2, 11), rate * time
-        rolled = complex_pair(sx, sy, -phase)
-        measured = rolled[0] + n1, rolled[1] + n2
-        back = complex_pair(*measured, phase)
-        carrier, demodulator = sp.cos(phase), sp.cos(phase + theta)
-        s, n = sx, n1
-        found.append(
-            {
-                "matrix": sp.Matrix,
-                "t": time,
-                "omega_r": rate,
-                "theta": theta,
-                "Deltaomega": off,
-                "s": fixed(s),
-                "n": fixed(n),
-                "c": fixed(carrier),
-                "d": fixed(demodulator),
-                "s_1": fixed(s * carrier),
-                "m": fixed(s * carrier + n),
-                "s_x": sx,
-                "s_y": sy,
-                "n_1": fixed(n1),
-                "n_2": fixed(n2),
-                "rolled": rolled,
-                "m_1": fixed(measured[0]),
-                "m_2": fixed(measured[1]),
-                "s_3": fixed(back[0]),
-                "s_4": fixed(back[1]),
-            }
-        )
-    return tuple(found)
+    return tuple(map(_instant, _NUMBERS))
+
+
+def _instant(numbers: tuple[str, ...]) -> Names:
+    s_x, s_y, n_1, n_2, rate, time, theta = map(sp.Rational, numbers)
+    phase = rate * time
+    rolled, carrier = complex_pair(s_x, s_y, -phase), sp.cos(phase)
+    m_1, m_2 = rolled[0] + n_1, rolled[1] + n_2
+    s_3, s_4 = complex_pair(m_1, m_2, phase)
+    in_time = {
+        "s": s_x, "n": n_1, "c": carrier, "d": sp.cos(phase + theta), "s_1": s_x * carrier, "m": s_x * carrier + n_1,
+        "n_1": n_1, "n_2": n_2, "m_1": m_1, "m_2": m_2, "s_3": s_3, "s_4": s_4,
+    }  # fmt: skip
+    return {name: fixed(value) for name, value in in_time.items()} | {
+        "matrix": sp.Matrix, "t": time, "omega_r": rate, "theta": theta, "Deltaomega": sp.Rational(2, 11),
+        "s_x": s_x, "s_y": s_y, "rolled": rolled,
+    }  # fmt: skip
 
 
 def complex_pair(x: sp.Expr, y: sp.Expr, angle: sp.Expr) -> tuple[sp.Expr, sp.Expr]:

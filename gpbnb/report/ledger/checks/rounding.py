@@ -289,18 +289,13 @@ def operations() -> tuple[dict[str, Any], ...]:
     x = [Fraction(int(k), 1000) for k in rng.integers(1000, 9999, 40) * rng.choice([-1, 1], 40)]
     y = [Fraction(int(k), 1000) * Fraction(10) ** int(e) for k, e in rng.integers([1000, -2], [9999, 3], (40, 2))]
     pairs = [*zip(x, y, strict=True), (Fraction(1), Fraction(5, 10**4)), (Fraction("1.5"), Fraction("0.667"))]
-    instances = []
-    for a, b in pairs:
-        left, right = FOUR.array([a]), FOUR.array([b])
-        for op in OPERATIONS.values():
-            true, computed = op(a, b), op(left, right).to_fractions()[0]
-            if true:
-                rounded = {true: computed}
-                instances.append(
-                    {"x": a, "y": b, "op": op, "fl": rounded.__getitem__, "beta": gap(10, 4) / 2,
-                     "epsilon": computed / true - 1}
-                )  # fmt: skip
-    return tuple(instances)
+    return tuple(_operation(a, b, op) for a, b in pairs for op in OPERATIONS.values() if op(a, b))
+
+
+def _operation(x: Fraction, y: Fraction, op: Callable[[Any, Any], Any]) -> dict[str, Any]:
+    true, computed = op(x, y), op(FOUR.array([x]), FOUR.array([y])).to_fractions()[0]
+    names = {"x": x, "y": y, "op": op, "fl": {true: computed}.__getitem__}
+    return names | {"beta": gap(10, 4) / 2, "epsilon": computed / true - 1}
 
 
 @cache
@@ -492,16 +487,16 @@ def rounded_sums() -> tuple[dict[str, Any], ...]:
     pairs = [(random(n, m, k), random(n, m, 0)) for n, m in ((1, 1), (2, 3), (3, 3)) for k in (-3, -1, 0, 2)]
     pairs += [(FOUR.array([["7.654"]]), FOUR.array([["7.653"]])), (FOUR.array([["1"]]), FOUR.array([["0.0005"]]))]
     pairs.append((FOUR.array([["7.654"]]), FOUR.array([["-7.654"]])))
-    instances = []
-    for a, b in pairs:
-        true = a.to_fractions() + b.to_fractions()
-        error = (a + b).to_fractions() - true
-        instances.append(
-            {"A": quantity(a.to_fractions()), "B": quantity(b.to_fractions()), "R": quantity(error), "norm": norm,
-             "beta": gap(10, 4) / 2, "b": Fraction(10), "t": Fraction(4),
-             "epsilon": column_sum_norm(error) / column_sum_norm(true) if np.any(true) else Fraction(0)}
-        )  # fmt: skip
-    return tuple(instances)
+    return tuple(_rounded_sum((a + b).to_fractions(), a.to_fractions(), b.to_fractions()) for a, b in pairs)
+
+
+def _rounded_sum(computed: Any, a: Any, b: Any) -> dict[str, Any]:
+    true, error = a + b, computed - a - b
+    return {
+        "A": quantity(a), "B": quantity(b), "R": quantity(error), "norm": norm, "beta": gap(10, 4) / 2,
+        "b": Fraction(10), "t": Fraction(4),
+        "epsilon": column_sum_norm(error) / column_sum_norm(true) if np.any(true) else Fraction(0),
+    }  # fmt: skip
 
 
 def sums_of_matrices() -> Names:
@@ -611,19 +606,20 @@ def matrix_products() -> tuple[dict[str, Any], ...]:
         cases.append((_dominated((m, n)), _dominated((n, p)), lambda k: [BETA] * k))
         cases.append((0 * cases[0][0], 0 * cases[0][1], lambda k: [BETA] * k))
         cases.append((abs(cases[0][0]), abs(cases[0][1]), lambda k: [BETA] * k))
-        for a, b, errors in cases:
-            error = rounded_product(a, b, errors) - a @ b
-            entry: dict[str, Any] = {
-                name: {(i + 1, j + 1): value for (i, j), value in np.ndenumerate(matrix)}
-                for name, matrix in (("a", a), ("b", b), ("c_tilde", error))
-            }
-            weights = np.diag([n, *range(n, 1, -1)])
-            instances.append(
-                {**entry, "n": Fraction(n), "i": Fraction(m), "j": Fraction(p), "beta": BETA, "norm": norm,
-                 "positive": a is cases[-1][0],
-                 "bracket": abs, "A": quantity(a), "B": quantity(b), "C_tilde": quantity(error), "D": quantity(weights)}
-            )  # fmt: skip
+        instances += [_product_names(*case) | {"positive": case is cases[-1]} for case in cases]
     return tuple(instances)
+
+
+def _product_names(a: Any, b: Any, errors: Any) -> dict[str, Any]:
+    (m, n), p, error = a.shape, b.shape[1], rounded_product(a, b, errors) - a @ b
+    entries = {
+        name: {(i + 1, j + 1): value for (i, j), value in np.ndenumerate(matrix)}
+        for name, matrix in (("a", a), ("b", b), ("c_tilde", error))
+    }
+    matrices = {"A": a, "B": b, "C_tilde": error, "D": np.diag([n, *range(n, 1, -1)])}
+    return entries | {name: quantity(each) for name, each in matrices.items()} | {
+        "n": Fraction(n), "i": Fraction(m), "j": Fraction(p), "beta": BETA, "norm": norm, "bracket": abs,
+    }  # fmt: skip
 
 
 def long_products() -> list[dict[str, Any]]:
