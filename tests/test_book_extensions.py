@@ -14,8 +14,6 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import docutils_namespace
 
 from gpbnb.names import HOMES, NAMED_FORMATS
-from gpbnb.report.ledger import PAGES, load_statements
-from gpbnb.report.ledger.page import address
 
 FOLDER = Path(__file__).resolve().parents[1] / "book" / "_ext"
 
@@ -123,41 +121,12 @@ def test_a_number_is_one_word_of_the_search(text, words):
     assert search.Numbers({}).split(text) == words
 
 
-@pytest.mark.parametrize(("equations", "kept"), [({"book/a": True}, 3), ({"book/b": True}, 1), ({}, 1)])
-def test_mathjax_is_left_out_where_a_page_has_no_formula(equations, kept):
-    """Sphinx asks the pages below a page, too."""
-    domain = SimpleNamespace(data={"has_equations": equations})
-    made = SimpleNamespace(builder=SimpleNamespace(name="html"), env=SimpleNamespace(get_domain=lambda name: domain))
-    scripts = [
-        SimpleNamespace(filename="mathjax/startup.js", attributes={}),
-        SimpleNamespace(filename=None, attributes={"body": "window.MathJax = {}"}),
-        SimpleNamespace(filename="gpbnb.js", attributes={}),
-    ]
-    context = {"script_files": scripts}
-    weight.leave_out_mathjax(made, "book/a", "page.html", context, None)
-    assert len(context["script_files"]) == kept
-    assert scripts[2] in context["script_files"]
-
-
 # -- the ledger's rows as labels, its formulas and links -----------------------------------------------
 
 
 def environment(*pages):
     standard = SimpleNamespace(labels={}, anonlabels={})
     return SimpleNamespace(found_docs=set(pages), get_domain={"std": standard}.__getitem__, standard=standard)
-
-
-def test_each_entry_has_a_label():
-    env = environment(*(f"book/{page.name}" for page in PAGES), "book/index")
-    ledger.add_labels(None, env)
-    statements = load_statements()
-    assert env.standard.labels.keys() == env.standard.anonlabels.keys() == {each.id.lower() for each in statements}
-    for each in statements:
-        place = f"book/{address(each).partition('.html')[0]}", each.id
-        assert env.standard.anonlabels[each.id.lower()] == place
-        assert env.standard.labels[each.id.lower()][:2] == place
-    assert env.standard.labels["hung1984.ii.eq20"][2] == "hung1984, II, eq (20)"
-    assert env.standard.labels["savage2016.main.eq8"][2] == "savage2016, eq (8)"
 
 
 def tree(html):

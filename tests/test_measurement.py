@@ -160,17 +160,6 @@ def test_against_the_exact_chain():
     assert h**2 / 10 < np.abs(linear - exact).max() < 10 * h**2
 
 
-def test_the_ten_states_of_the_filter():
-    assert len(m.GPB_STATES) == 10
-    assert set(m.GPB_STATES) < set(m.STATES)
-    H = m.measurement_matrix(np.zeros(5), nominal_theta=[0, 2.0, 3.0])
-    assert H.shape == (5, 2, 10)
-    assert H[0].tolist() == [
-        [0, -1, 0, 0, 0, -1, 2, 1, 0, -3],
-        [1, 0, 0, 0, 1, 0, 3, 0, 1, 2],
-    ]
-
-
 def test_pointing_and_telescope_misalignment_cancel_in_the_difference():
     H = m.measurement_matrix(np.linspace(0, 6, 5), ("alpha2", "alpha3", "beta2", "beta3"), signal="difference")
     assert np.all(H == 0)

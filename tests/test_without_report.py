@@ -69,24 +69,6 @@ def test_the_library_answers_without_them(folder):
     assert all(5 < int(each) < 30 for each in structures)
 
 
-def test_the_command_writes_its_report_without_them(folder):
-    given = [
-        "wordlength",
-        "nile.toml",
-        "--tolerance",
-        "1",
-        "--steps",
-        "50",
-        "--basis",
-        "emulation",
-        "--report",
-        "a.html",
-    ]
-    done = run(COMMAND.format(given), folder)
-    assert done.returncode == 0, done.stderr
-    assert (folder / "a.html").read_text(encoding="utf-8").count("Nile")
-
-
 @pytest.mark.parametrize("command", ["ledger", "report.stored"])
 def test_a_command_of_the_report_says_in_one_line_what_to_install(command, folder):
     done = run(COMMAND.format([command]), folder)

@@ -148,24 +148,6 @@ def test_a_table_of_pandas_gives_exact_numbers_or_the_reason():
             BINARY64.array(Frame([[value, 1]]))
 
 
-class Priority:
-    """What pandas does before it computes: it leaves the operation to an operand of higher priority."""
-
-    __pandas_priority__ = 4000
-
-    def __add__(self, other):
-        assert other.__pandas_priority__ > self.__pandas_priority__
-        return NotImplemented
-
-    def __array__(self, dtype=None, copy=None):
-        return np.array([1.0, 2.0])
-
-
-def test_pandas_leaves_an_operation_to_an_array_of_a_format():
-    found = Priority() + FloatFormat(10, 3).array(["0.001", "0.002"])
-    assert found.to_fractions().tolist() == [1, 2]
-
-
 NAMES = {"FloatFormat": FloatFormat, "FixedFormat": FixedFormat, "Rounding": Rounding}
 
 

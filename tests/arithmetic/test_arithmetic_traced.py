@@ -43,41 +43,6 @@ def pi_controller(fmt, z):
     return np.stack(found)
 
 
-def pid_with_anti_windup(fmt, z):
-    kp, ki, kd, kb = fmt.array(["0.9", "0.1", "0.3", "0.25"])
-    i, before, y, found = fmt.array(0), fmt.array(0), fmt.array(0), []
-    for r in z:
-        e = r - y
-        wanted = (kp * e + i) + kd * (e - before)
-        u = np.minimum(np.maximum(wanted, -1), 1)
-        i, before = i + (ki * e + kb * (u - wanted)), e
-        y = y + (u - y) / 8
-        found.append(np.stack([u, y]))
-    return found
-
-
-def cascade(fmt, z):
-    sections = fmt.array([["0.2", "0.4", "0.2", "-0.4", "0.2"], ["0.5", "-0.25", "0.1", "0.3", "0.15"]])
-    states, found = [[fmt.array(0), fmt.array(0)] for _ in sections], []
-    for x in z:
-        for section, s in zip(sections, states, strict=True):
-            b0, b1, b2, a1, a2 = section
-            y = b0 * x + s[0]
-            s[0], s[1] = (b1 * x - a1 * y) + s[1], b2 * x - a2 * y
-            x = y
-        found.append(x)
-    return np.stack(found)
-
-
-def fir(fmt, z):
-    taps = fmt.array(["0.1", "0.2", "0.4", "0.2", "0.1"])
-    return np.stack([taps @ z[k : k + 5] for k in range(len(z) - 4)])
-
-
-def rms(fmt, z):
-    return np.stack([np.sqrt(np.mean(z[k : k + 4] / 4 * z[k : k + 4])) for k in range(0, len(z) - 4, 2)])
-
-
 def limiter(fmt, z):
     gain, found = fmt.array(1), []
     for x in z:
@@ -99,20 +64,6 @@ def newton_root(fmt, z):
     for _ in range(6):
         x = (x + a / x) / 2
     return x
-
-
-def state_update(fmt, z):
-    A, B = fmt.array([["0.9", "0.1"], ["-0.2", "0.8"]]), fmt.array([["0.1"], ["0.05"]])
-    x, found = fmt.array([0, 0]), []
-    for u in z:
-        x = A @ x + B @ u.reshape(1)
-        found.append(x)
-    return np.stack(found)
-
-
-def integrator(fmt, z):
-    held = np.cumsum(z / 8)
-    return np.where(held > 1, 1, -np.minimum(-held, abs(z))) + np.sum(held[:5]) / 8
 
 
 def angles(fmt, z):
@@ -148,10 +99,7 @@ def kalman(fmt, z):
     return np.stack([*found, linalg.lu(P).upper[1]])
 
 
-FUNCTIONS = [
-    pi_controller, pid_with_anti_windup, cascade, fir, rms, limiter, goertzel, newton_root, state_update, integrator,
-    angles, many_functions, kalman,
-]  # fmt: skip
+FUNCTIONS = [pi_controller, limiter, goertzel, newton_root, angles, many_functions, kalman]
 
 
 def numbers(found):

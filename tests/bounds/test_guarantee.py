@@ -22,7 +22,6 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.linear import advance
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
-from gpbnb.filters.program import innovation_program, loop_program, sequential_program
 from gpbnb.filters.run import Run
 from gpbnb.filters.system import biquad, state_space
 from gpbnb.report.guarantees.published import fixif_longitudinal, nile_local_level
@@ -76,19 +75,6 @@ def test_the_program_gives_the_digits_of_the_filter(form: Form, fmt: FloatFormat
     program = given.program
     advance(run.tag, program.operations, program.outputs, given.packed, given.first, as_packed(fmt, z), x, X)
     assert np.array_equal(run.exactly(X), run.checkpoints().x)
-
-
-@pytest.mark.parametrize(
-    ("program", "operations"),
-    [
-        # Products and sums of n² + nm terms, less one sum a row, and the last sum: counted by hand.
-        (loop_program(3, 2), 3 * (3 + 2) + 3 * (2 + 1) + 3),
-        (innovation_program(3, 2), (9 + 6) + (6 + 4) + 2 + (6 + 3) + 3),
-        (sequential_program(3, 2), (9 + 6) + 2 + 2 * (6 + 6)),
-    ],
-)
-def test_operations_of_a_step(program: object, operations: int) -> None:
-    assert len(program.operations) == operations == program.roundings.sum()
 
 
 # -- the recursion of the error, in exact fractions -----------------------------------------------------------------
@@ -184,14 +170,6 @@ def test_an_adversary_comes_near_but_not_above(form: Form, rounding: Rounding) -
     assert 0.3 < outcome.ratio <= 1
 
 
-def test_a_periodic_model() -> None:
-    found = guarantee(rolling(), FloatFormat(2, 16), limits(measurement=[100, 50]), form=Form.UD)
-    assert found.for_ever
-    assert found.schedule.period % 3 == 0
-    outcome = attack(found, 300, 60, plans=4)
-    assert 0.05 < outcome.ratio <= 1
-
-
 def test_the_error_of_the_gain_matters() -> None:
     """The first gain of the Nile filter cancels: without its part, an admissible run violates the bound."""
     found = guarantee(nile_local_level(), FloatFormat(2, 24), limits(state=1500, innovation=1200))
@@ -208,15 +186,6 @@ def test_roundings_of_the_stored_loop_matter() -> None:
     assert found.parts[0, LOOP] > 0.05 * found.bound[0]
     other = guarantee(model, fmt, limits(state=100, innovation=100), form=Form.INNOVATION)
     assert other.parts[0, LOOP] == 0
-
-
-def test_limits_on_measurements_bound_state_and_innovation() -> None:
-    found = guarantee(tracker(), FloatFormat(2, 24), limits(measurement=1000))
-    outcome = attack(found, 400, 30)
-    assert outcome.admissible
-    assert (np.abs(outcome.z) <= 1000).all()
-    # A step response overshoots: the peak gain of the position is above 1.
-    assert 1000 < found.limits.state[0] < 2000
 
 
 @pytest.mark.parametrize(

@@ -13,11 +13,9 @@ from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding,
 from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.bounds.probable import probable_error
 from gpbnb.bounds.units import largest_errors, stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, reference_states
-from gpbnb.filters.system import state_space
 from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
 
 FORMAT = FloatFormat(2, 11)
@@ -171,24 +169,6 @@ def test_numbers_beyond_the_range_have_no_bound(fmt: Any) -> None:
 # -- a model of finitely many steps -----------------------------------------------------------------------------------
 
 
-def test_a_model_of_some_steps_has_a_bound_for_these() -> None:
-    within = limits(measurement=10)
-    whole = guarantee(scalar(), FORMAT, within)
-    for steps in (3, 50, 500):
-        found = guarantee(scalar(steps=steps), FORMAT, within)
-        assert found.steps == steps
-        assert not found.for_ever
-        assert "describes no more" in str(found)
-        assert (found.bound <= whole.bound * (1 + 1e-6)).all()
-    falling = scalar(Phi=lambda k: [[1 / (1 + k)]], R=lambda k: [[1 + k / 8]], steps=40)
-    found = guarantee(falling, FORMAT, within)
-    assert found.steps == 40
-    run, z = Run(falling, FORMAT, Form.INNOVATION, ()), FORMAT.array(np.full((40, 1), 9.99))
-    errors = np.abs((run.states(z) - reference_states(falling.rounded(FORMAT), z.to_fractions())).sum(axis=2))
-    assert (errors <= found.bound).all()
-    assert errors.max() > 0.02 * found.bound.max()
-
-
 # -- inputs of a linear system as a format stores them ----------------------------------------------------------------
 
 
@@ -245,15 +225,3 @@ def test_limits_of_measurements_are_for_those_before_storing(rounding: Rounding)
     wide, narrow = (from_schedule(filter_schedule(system, fmt), limits(measurement=size)) for size in (1.0, 0.95))
     if rounding in (Rounding.NEAREST, Rounding.EVEN, Rounding.STOCHASTIC):
         assert np.array_equal(narrow.bound, wide.bound)
-
-
-def test_a_filter_whose_roundings_grow_with_its_error_has_no_bound() -> None:
-    """In two bits, the products and sums of a slow filter add more than it forgets."""
-    filter_ = state_space([["0.75", "0.5"], ["-0.5", "0.5"]], [[1], [1]])
-    found = from_schedule(filter_schedule(filter_, FloatFormat(2, 2, Rounding.CHOP)), limits(measurement=1))
-    assert found.radius < 1
-    assert not found.for_ever
-    assert found.steps == 0
-    assert "as large as itself" in found.why
-    with pytest.raises(ValueError, match="as large as itself"):
-        probable_error(found)

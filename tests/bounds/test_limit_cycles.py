@@ -5,7 +5,6 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import product
 
-import numpy as np
 import plain_structures as plain
 import pytest
 
@@ -87,25 +86,9 @@ def test_overflow_that_wraps_oscillates_at_full_size():
     assert limit_cycles(system, words).largest <= limit_cycles(system, words).bound < 8
 
 
-def test_too_many_states_have_a_bound():
-    system = LinearSystem.from_coefficients([1], [1, "-1.5", "0.75"])
-    found = limit_cycles(system, WordFormats(FixedFormat(9, 4), FixedFormat(2, 8)), most=10)
-    assert (found.cycles, found.searched) == (None, 0)
-    assert (found.largest == found.bound).all()
-    assert "too many states to try each" in str(found)
-
-
 def test_filters_without_rest_are_refused():
     words = WordFormats(FixedFormat(9, 0), FixedFormat(2, 8))
     with pytest.raises(ValueError, match="got a filter that is not stable as stored in data of 10 bits"):
         limit_cycles(LinearSystem.from_coefficients([1], [1, -1]), words)
     with pytest.raises(ValueError, match="which limits its values"):
         limit_cycles(LinearSystem.pid(1, 1, limits=(-1, 1)), words)
-
-
-def test_a_state_of_a_delayed_input_is_known():
-    """Only the two delayed outputs are free: the delayed inputs equal the input."""
-    system = LinearSystem.from_coefficients([1, 1, 1], [1, "-0.5", "0.25"], "direct form I")
-    found = limit_cycles(system, WordFormats(FixedFormat(9, 0), FixedFormat(2, 8)), 7)
-    assert np.all([cycle.states[:, :2] == 7 for cycle in found.cycles])
-    assert found.searched < 100

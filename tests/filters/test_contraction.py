@@ -105,22 +105,6 @@ def scalar_step(bound, q=0.0, T=0.0, d=0.0, P=1.0, R=1.0):
     )
 
 
-def test_the_recursion_of_one_state():
-    # P = 1, R = 1: S = 2, K = A = 1/2, P after = 1/2, in units of the standard deviations sqrt(1) and sqrt(1/2).
-    start = contraction.contraction_start(np.ones((1, 1)), np.full(1, 1e-6), np.full((1, 1), 1e-7))
-    assert (start.eta, start.zeta) == pytest.approx((1e-6, 1e-7), rel=1e-12, abs=0)
-    after = scalar_step(start, q=3e-6, T=5e-7)
-    alpha = 0.5 / 0.5**0.5
-    assert after.L[0, 0] == pytest.approx(0.5**0.5, rel=1e-14)
-    assert after.alpha == pytest.approx(alpha, rel=1e-3)
-    g = y = 0.5
-    assert after.zeta == pytest.approx(5e-7 / 0.5 + after.alpha**2 * 1e-7 / (1 - g * 1e-7), rel=1e-12)
-    assert after.eta == pytest.approx(3e-6 / 0.5**0.5 + after.alpha * (1e-6 + y * 1e-7) / (1 - g * 1e-7), rel=1e-12)
-    assert after.gain[0] == pytest.approx(after.alpha * 1e-7 * 0.5, rel=1e-6, abs=0)
-    assert contraction.state_error_bound(after)[0] == pytest.approx(after.eta * 0.5**0.5, rel=1e-12)
-    assert contraction.covariance_error_bound(after)[0, 0] == pytest.approx(after.zeta * 0.5, rel=1e-12, abs=0)
-
-
 def test_errors_of_the_evaluation_enter():
     start = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.zeros((1, 1)))
     after = scalar_step(start, d=1e-9)
@@ -188,8 +172,3 @@ def test_the_spectral_norm_is_bounded_from_above_and_sharply(n):
             found = contraction._norm2(X)
             # Its square is sharp to a thousandth of its distance from 1, relatively; numpy's own error is below 1e-13.
             assert top * (1 - 1e-13) <= found <= top * (1 + 0.6e-3 * abs(1 - top**2)) + 1e-11
-
-
-def test_a_companion_bounds_by_the_triangle():
-    assert np.all(contraction.companion_bound([-3.0, 0.0], [1.0, 2.0]) >= [4.0, 2.0])
-    assert contraction.companion_bound(np.array([-3.0]), np.array([1.0]))[0] == pytest.approx(4)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
 from gpbnb.arithmetic.definiteness import factor
 from gpbnb.arithmetic.rational import exact
-from gpbnb.filters.covariance import REPAIR_TOLERANCE, in_floats
+from gpbnb.filters.covariance import REPAIR_TOLERANCE
 from gpbnb.filters.model import LinearModel
 
 
@@ -93,21 +91,3 @@ def test_a_repair_is_off_for_exact_input_and_on_demand():
 def test_what_no_rounding_explains_is_refused(Q, message):
     with pytest.raises(ValueError, match=message):
         model(Q)
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [
-        (1, False),
-        ("0.1", False),
-        ([[1, Fraction(1, 3)]], False),
-        ([[1, 0.5]], True),
-        (np.eye(2), True),
-        (np.eye(2, dtype=int), False),
-        (np.array([["1", "2"]]), False),
-        (np.array([[1, 2.5]], dtype=object), True),
-        (np.float32(1), True),
-    ],
-)
-def test_input_in_floats_is_recognized(values, expected):
-    assert in_floats(values) is expected

@@ -58,19 +58,3 @@ def test_a_precise_sensor_has_the_exact_reference(R):
     assert float(max(np.abs(checkpoints.x - np.array([expected[1], expected[4]])).ravel())) < 1e-30
     assert float(np.abs(checkpoints.K[1] - last.gain).max()) < 1e-29
     assert float(np.abs(checkpoints.P[1] - last.P).max()) < 1e-30
-
-
-def test_inputs_and_offsets_are_known_to_it():
-    model = sensor("1e-40", B=[["0.5"], [1]], u=[[1], [2], [-1], [0], [3]], b=["0.1", 0], d=["0.25", "0.5"])
-    assert distance(reference_states(model, Z), states(model, Z)) < 1e-30
-
-
-def test_only_such_models_need_it(monkeypatch):
-    def never(model, z):
-        raise AssertionError("the reference was computed again")
-
-    monkeypatch.setattr("gpbnb.filters.run.precise_steps", never)
-    expected = states(sensor("1e-6"), Z)
-    assert distance(reference_states(sensor("1e-6"), Z), expected) < 1e-18
-    with pytest.raises(AssertionError, match="computed again"):
-        reference(sensor("1e-30"), Z, (3,))

@@ -140,12 +140,6 @@ def test_a_response_decays_to_zero(structure):
     assert required_precision(system, impulse, 0.001).digits < 24
 
 
-def test_a_number_that_grows_is_still_refused():
-    system = LinearSystem.from_coefficients([1], [1, -2, "0.1"])
-    with pytest.raises(OverflowError, match="the system as given is not stable"):
-        system.outputs(np.eye(2000, 1))
-
-
 @pytest.mark.parametrize("order", [2, 3, 6, 8, 12])
 def test_steady_covariance_solves_its_equation(order):
     rng = np.random.default_rng(order)
@@ -155,17 +149,6 @@ def test_steady_covariance_solves_its_equation(order):
     found, known = steady_covariance(A, Q), linalg.solve_discrete_lyapunov(A, Q)
     # Both solve the same system in float64; its condition is below 1e6 here.
     np.testing.assert_allclose(found, known, rtol=1e-9, atol=1e-9 * np.abs(known).max())
-
-
-def test_steady_covariance_of_a_slow_filter_is_its_series():
-    # 1 / (1 - a²) for a within 1e-9 of 1, where the plain sum has 1e10 terms; a² loses half of the digits of 1 - a²
-    assert steady_covariance(np.array([[1 - 2.0**-30]]), np.eye(1))[0, 0] == pytest.approx(2.0**29, rel=1e-6)
-
-
-@pytest.mark.parametrize("pole", [1.0, -1.0, 1.5, 1e200])
-def test_steady_covariance_refuses_an_unstable_filter(pole):
-    with pytest.raises(ValueError, match="does not converge"):
-        steady_covariance(np.array([[pole]]), np.eye(1))
 
 
 def test_a_response_is_that_of_scipy_digit_for_digit():

@@ -104,24 +104,6 @@ def test_each_mean_is_of_what_its_name_says(derivation, name, integrand):
     assert steps.equal(integral.function, steps.written(integrand, step))
 
 
-@pytest.mark.parametrize("sequence", derivation.SEQUENCES)
-def test_the_symbolic_rotation_is_the_numeric_one(sequence):
-    """Rodrigues' formula here, elementary matrices in gpbnb.report.measurement."""
-    values = (0.3, -0.7, 1.1)
-    symbolic = derivation.exact(derivation.ALPHA, sequence).subs(dict(zip(derivation.ALPHA, values, strict=True)))
-    # entries up to one, a few roundings each
-    assert np.allclose(np.array(symbolic.tolist(), dtype=float), m.rotation(values, sequence), atol=1e-15, rtol=0)
-
-
-def test_all_orders_agree_to_first_and_not_to_second_order():
-    assert derivation.orders_agree()
-    seconds = {
-        str(derivation.exact(derivation.ALPHA, s).applyfunc(lambda e: derivation.up_to(2, e, derivation.ALPHA)))
-        for s in derivation.SEQUENCES
-    }
-    assert len(seconds) == 6
-
-
 def test_the_fewest_signs_are_two_and_only_one_pair_does():
     """Checked again by numbers, over all 64 patterns."""
     assert derivation.fewest_signs() == ((2, 5),)

@@ -112,36 +112,6 @@ class TestFamilies:
 
 
 class TestSweeps:
-    def test_a_cell_by_hand(self):
-        # In four digits some of these are regular and some are not, and the second bound is absent for some.
-        cell = experiment.InverseCell("graded", FloatFormat(10, 4), True, (2, 3), 20, (29,))
-        names = ("signed, chart, A", "Higham")
-        trials = [one for one in cell.trials(names) if one]
-        rows = experiment.cell_rows(cell, experiment.cell_sample(cell, names))
-        assert [row["bound"] for row in rows] == list(names)
-        for row, name in zip(rows, names, strict=True):
-            assert (row["family"], row["format"], row["pivot"]) == ("graded", "10:4:nearest", "yes")
-            assert (row["n"], row["failed"], row["exact"]) == ("2-3", str(40 - len(trials)), "0")
-            assert int(row["trials"]) == len(trials)
-            having = [one for one in trials if name in one.bounds]
-            regular = [one.condition * 5e-4 <= 0.01 for one in trials]
-            assert int(row["absent"]) == len(trials) - len(having)
-            assert int(row["regular"]) == sum(regular)
-            assert int(row["violations"]) == sum(one.error > Fraction(one.bounds[name]) for one in having)
-            assert int(row["violations_regular"]) == sum(
-                one.violates(name) for one, good in zip(trials, regular, strict=True) if good and name in one.bounds
-            )
-            ratios = [float(one.bounds[name] / one.error) for one in having]
-            assert row["smallest"] == f"{min(ratios):.4g}"
-            assert row["median"] == f"{np.median(ratios):.4g}"
-            assert row["largest"] == f"{max(ratios):.4g}"
-            of_regular = [one.overestimation(name) for one in having if one.condition <= 20]
-            assert row["smallest_regular"] == (f"{min(of_regular):.4g}" if of_regular else "")
-            assert int(row["tight"]) == sum(ratio <= 1.1 for ratio in ratios)
-        assert 0 < sum(regular) < len(trials)
-        assert int(rows[1]["absent"]) > 0
-        assert int(rows[0]["violations"]) > 0
-
     def test_all_together(self):
         cells = [
             experiment.InverseCell(family, FMT, True, (2, 4), 3, (1, k)) for k, family in enumerate(("random", "Kahan"))

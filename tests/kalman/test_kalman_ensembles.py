@@ -11,10 +11,7 @@ from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.report.kalman import ensembles
-from gpbnb.report.kalman.ensembles import KINDS, Task, TrialOutcome, random_model, summaries, tasks, trial
-
-SINGLE = FloatFormat(2, 24)
-
+from gpbnb.report.kalman.ensembles import KINDS, Task, random_model, tasks, trial
 
 # -- trials ---------------------------------------------------------------------------------------
 
@@ -88,34 +85,3 @@ def test_a_part_of_the_sweep_comes_out_as_it_is_stored(seed):
     for line, row in zip(ensembles.lines(seed, [trial(task) for task in todo]), expected, strict=True):
         few = row[2] in {form.name.lower() for form in without}
         assert [line[at] for at in largest] == [row[at] for at in largest] if few else line == row
-
-
-def outcome(form=Form.UD, **changed):
-    values = dict.fromkeys(("state", "gain", "covariance", "last", "bounded"), 0.5)
-    values |= dict.fromkeys(("printed_covariance", "printed_gain", "printed_state"), 0.25)
-    return TrialOutcome(Task("stable", SINGLE, form, 0, 4), **(values | {"indefinite": False} | changed))
-
-
-def test_a_summary_counts():
-    found = summaries(
-        [
-            outcome(state=1.5, printed_gain=3.0),
-            outcome(gain=np.nan, last=0.0, bounded=0.0),
-            outcome(covariance=np.inf, last=0.02, indefinite=True, printed_covariance=1.01),
-            outcome(Form.INNOVATION, printed_state=7.0),
-            outcome(),
-        ]
-    )
-    assert [each.form for each in found] == ["ud", "innovation"]
-    ud, usual = found
-    assert (ud.trials, usual.trials) == (4, 1)
-    assert ud.contraction_violations == 3  # no number is no bound
-    assert ud.steps_bounded == 0.375
-    assert ud.state == 1.5
-    assert ud.compared == 3
-    assert ud.typical == pytest.approx((0.5 * 0.02 * 0.5) ** (1 / 3))
-    assert (ud.violations_105, ud.worst_105) == (1, 1.01)
-    assert (ud.violations_108, ud.worst_108) == (1, 3.0)
-    assert (ud.violations_125, ud.worst_125) == (0, 0.25)
-    assert (usual.violations_125, usual.worst_125) == (1, 7.0)
-    assert (ud.indefinite, usual.indefinite) == (1, 0)

@@ -30,11 +30,6 @@ ADDRESSES = {
     "step": "book/guarantee.html",
 }
 PICTURES = pytest.mark.parametrize("picture", views.PICTURES, ids=lambda each: each.id)
-OF_NUMBERS = pytest.mark.parametrize(
-    "picture",
-    [each for each in views.PICTURES if not all(given.choices for given in each.inputs)],
-    ids=lambda each: each.id,
-)
 RULES = dict(zip(("to nearest", "chopped"), Rounding.documented(), strict=True))
 READ = """id => {
     const box = document.querySelector(`#calculator-${id} .calculator-drawing`), svg = box.querySelector("svg");
@@ -257,24 +252,6 @@ def said_numbers(text):
         text,
     )
     return re.findall(r"\d+(?:\.\d+)?(?:e-?\d+)?", plain.partition(". ")[2])
-
-
-@OF_NUMBERS
-@pytest.mark.parametrize("typed", ["", "x", "-1", "1e999", "0,5"])
-def test_a_wrong_number_is_refused_and_nothing_old_is_shown(pages, picture, typed):
-    page = pages(picture.id)
-    type_in(page, picture.id, **picture.start)
-    name = next(each.name for each in picture.inputs if not each.choices)
-    found = type_in(page, picture.id, **{name: typed}) if typed else None
-    if not typed:
-        page.locator(f"#calculator-{picture.id}-{name}").fill("")
-        found = page.evaluate(READ, picture.id)
-    assert found["state"] == "waiting"
-    assert found["said"] == f"{picture.title}. No drawing."
-    assert not page.locator(f"#calculator-{picture.id} svg").is_visible()
-    assert page.locator(f"#calculator-{picture.id}-{name}-error").text_content().startswith("Got ")
-    assert type_in(page, picture.id, **picture.start)["state"] == "computed"
-    assert page.faults == []
 
 
 @PICTURES

@@ -71,31 +71,6 @@ def test_the_spectra_of_drift_and_noise():
     assert np.max(abs(found.noise.density / noise - 1) / found.noise.error) < 4.5
 
 
-def test_bands_have_the_mean_of_one_over_f_without_bias():
-    f = np.arange(1, 5000) * 1e-3
-    found = experiment.in_bands(f, 3 / f, 2.0, 1e-3, 4.0, 12)
-    assert found.density == pytest.approx(3 / found.frequency, rel=1e-12)
-    assert np.sum(found.averages) == 2 * np.count_nonzero((f >= 1e-3) & (f < 4.0))
-    assert found.error == pytest.approx(found.averages**-0.5)
-    exact = experiment.fit_slope(
-        experiment.Spectrum(found.frequency, 5 * found.frequency**-1.5, np.full(12, 1e12)), 1e-9
-    )
-    assert exact.value == pytest.approx(-1.5, abs=1e-9)
-
-
-def test_a_slope_is_exact_where_its_corrections_are():
-    """Means of few values have low logarithms, and samples a higher density: both are taken off, band by band."""
-    f, m, interval = np.geomspace(1e-3, 3e-2, 9), np.array([2.0, 30, 4, 7, 100, 3, 11, 2, 50]), 10.0
-    angle = np.pi * f * interval
-    density = 5 * f**-1.5 * np.exp(-1 / (2 * m)) * angle / np.sin(angle)
-    found = experiment.fit_slope(experiment.Spectrum(f, density, m), interval)
-    assert found.value == pytest.approx(-1.5, abs=1e-12)
-    assert found.decades == pytest.approx(math.log10(30), rel=1e-12)
-    # Of the weighted fit, with the variance 1/m of each natural logarithm.
-    x = np.log(f) - np.average(np.log(f), weights=m)
-    assert found.error == pytest.approx(math.sqrt(np.sum((m * x) ** 2 / m)) / np.sum(m * x**2), rel=1e-12)
-
-
 # -- drift rates --------------------------------------------------------------------------------------------
 
 

@@ -104,23 +104,6 @@ def test_the_density_of_samples_is_that_of_the_response():
 # -- sums of noise -----------------------------------------------------------------------------------------
 
 
-def test_the_variance_of_a_sum_is_that_of_the_covariance_matrix():
-    n = 60
-    h = theory.impulse_response(n)
-    root = np.array([[h[m - i] if m >= i else 0.0 for i in range(n)] for m in range(n)])
-    a = np.random.default_rng(1).standard_normal(n)
-    assert theory.variance_of_sum(a, 3.0) == pytest.approx(math.pi * 3 * a @ root @ root.T @ a, rel=1e-12)
-
-
-def test_the_slope_weights_fit_lines():
-    a = theory.slope_weights(101, 10.0)
-    t = np.arange(101) * 10.0
-    assert np.sum(a) == pytest.approx(0, abs=1e-18)
-    assert np.sum(a * t) == pytest.approx(1, rel=1e-13)
-    y = np.random.default_rng(2).standard_normal(101)
-    assert np.sum(a * y) == pytest.approx(np.polyfit(t, y, 1)[0], rel=1e-10)
-
-
 def exact_error(samples, period=None):
     """Standard error of a drift fitted to sampled noise that starts at rest, from the variance of the sum."""
     a = theory.slope_weights(samples)

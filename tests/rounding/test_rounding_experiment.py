@@ -107,14 +107,6 @@ def test_bounds_in_a_sweep(sort):
         assert found[bound].worst.violates(bound)
 
 
-def test_like_signs_obey_18_of_1982():
-    rng = np.random.default_rng(18)
-    for fmt in experiment.SURVEYED:
-        for n in (2, 3, 6):
-            trial = experiment.sum_trial(experiment.random_numbers(rng, fmt, (n,), "like signs"))
-            assert not trial.violates("1982 (18)")
-
-
 # -- ratio and bound statistics ---------------------------------------------------------------------
 
 

@@ -141,28 +141,3 @@ def test_a_first_order_product_bound_is_exceeded_by_twelve_factors_and_n_plus_on
 
 
 # -- chopping -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("fmt", "exponents"), BITS)
-def test_no_chopped_sum_exceeds_the_weights(fmt, exponents):
-    chopped = FloatFormat(fmt.base, fmt.precision, CHOP)
-    for n in (2, 5, 9, 14):
-        trial = experiment.worst_sum(chopped, n, exponents)
-        assert 0.5 < trial.ratio("weights") <= 1
-        assert not trial.violates("weights")
-
-
-def test_no_chopped_inner_product_exceeds_26():
-    for n in (2, 6, 14):
-        trial = experiment.worst_sum(FloatFormat(2, 3, CHOP), n, range(-5, 4), products=True)
-        assert 0.5 < trial.ratio("(26)") <= 1
-        assert not trial.violates("(26)")
-
-
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 4, CHOP), FloatFormat(10, 2, CHOP), FloatFormat(3, 3, CHOP)])
-def test_no_chopped_product_exceeds_its_count(fmt):
-    for n in (2, 5, 12, 40):
-        trial = experiment.worst_product(fmt, n)
-        assert not trial.violates("1982 (20)")
-        assert trial.error <= 1 - (1 - fmt.unit_roundoff) ** (n - 1)
-    assert experiment.worst_product(fmt, 5).ratio("1982 (20)") > 0.3

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
-from gpbnb.sweeps import Column, DamagedFileError, plain_integer, plain_number, read_record, write_record
+from gpbnb.sweeps import Column, DamagedFileError, plain_number, read_record, write_record
 
 VALUES = {"command": "python -m x", "seconds": 1.5, "names": ["é", "b"], "nothing": None}
 
@@ -58,15 +56,3 @@ def test_what_is_no_plain_number(text):
         plain_number(text)
     assert Column("a").fault(text)
     assert Column("a", "integer").fault(text)
-
-
-@pytest.mark.parametrize(("text", "value"), [("1", 1.0), ("-1.5e-3", -0.0015), ("+.5", 0.5), ("-inf", -math.inf)])
-def test_plain_numbers(text, value):
-    assert plain_number(text) == value
-    assert Column("a", low=0, high=1).fault("nan") == "needed 0 to 1"
-
-
-@pytest.mark.parametrize("text", ["1.0", "1_0", "٣", "1e3"])
-def test_what_is_no_plain_integer(text):
-    with pytest.raises(ValueError, match="needed a whole number"):
-        plain_integer(text)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy import io, signal
 
-from gpbnb import LinearModel, emulate, read_model, required_precision
+from gpbnb import emulate, read_model, required_precision
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_measurements
 
@@ -67,29 +66,6 @@ def test_what_cannot_be_read_is_refused_with_what_can(given, message, tmp_path, 
         (tmp_path / name).write_text(text)
     with pytest.raises(ValueError, match=message):
         read_model(given)
-
-
-def of_class(name, library, **attributes):
-    """An object of a class that another library would have."""
-    module = ModuleType(library)
-    return type(name, (SimpleNamespace,), {"__module__": module.__name__})(**attributes)
-
-
-def test_a_filter_of_opencv_is_read_and_others_say_how_to_be():
-    one = np.ones((1, 1), np.float32)
-    given = {"transitionMatrix": one / 2, "measurementMatrix": one, "processNoiseCov": one, "measurementNoiseCov": one}
-    given |= {"errorCovPost": one, "statePost": 3 * one, "controlMatrix": None}
-    found = read_model(of_class("KalmanFilter", "cv2", **given))
-    assert isinstance(found, LinearModel)
-    assert found.x0.tolist() == [3]
-    x, P = 1.5, 0.25 + 1  # predict, then correct
-    assert emulate(found, [2], "float64").x.to_float()[0, 0] == pytest.approx(x + P / (P + 1) * (2 - x))
-    with pytest.raises(ValueError, match="with a controlMatrix; needed none"):
-        read_model(of_class("KalmanFilter", "cv2", **given | {"controlMatrix": one}))
-    with pytest.raises(
-        TypeError, match="of statsmodels, which starts with an update; needed a filter that starts with"
-    ):
-        read_model(of_class("KalmanFilter", "statsmodels"))
 
 
 def test_the_command_writes_a_run_and_keeps_quiet(tmp_path, monkeypatch, capsys):

@@ -70,12 +70,6 @@ def _tracked(fmt, z, model):
     return np.stack(found)
 
 
-def test_the_survey_has_the_ratios_of_the_search():
-    found = required_precision(smoother, Z, 1e-3)
-    precisions = [digits for digits, _ in found.tried]
-    assert survey(smoother, Z, 1e-3, precisions) == found.tried
-
-
 def test_a_function_without_inputs_and_several_outputs():
     def rotation(fmt):
         c, s, one = fmt.array("0.8"), fmt.array("0.6"), fmt.array([1, 0])
@@ -165,13 +159,6 @@ def test_the_answer_names_the_limit_that_ended_the_search():
     met = {digits: muller_error(FloatFormat(10, digits), 46) <= Fraction(1, 1000) for digits in range(58, 66)}
     least = min(digits for digits in range(58, 65) if met[digits] and met[digits + 1])
     assert required_precision(muller(46), 46, 1e-3, base=10, highest=70).digits == least > 60
-
-
-def test_without_digits_for_its_reference_a_function_is_refused_with_the_limit_to_raise():
-    with pytest.raises(ValueError, match=r"in 72 decimal digits .* that in 108; .* try highest=144") as caught:
-        required_precision(muller(50), 50, 1e-3, base=10)
-    assert "If errors only grow" in str(caught.value)
-    assert required_precision(muller(50), 50, 1e-3, base=10, highest=144).digits > 60
 
 
 def running_mean(fmt, values):

@@ -44,14 +44,6 @@ def test_a_bound_and_a_system_that_never_forgets_have_no_such_warning():
     assert "memory" not in str(required_precision(LinearSystem.sum(running=True), u[:100], 1))
 
 
-def test_an_output_within_its_tolerance_says_that_zero_would_do():
-    system = LinearSystem([["0.5"]], [[1]], [[1], [100]], output_names=["low (V)", "high"])
-    found = str(required_precision(system, np.ones((20, 1)), [3, 3]))
-    assert 'output "low" never exceeds 2 in this run, so that zero would be within the tolerance of 3' in found
-    assert "high" not in found
-    assert "never exceeds" not in str(required_precision(system, np.ones((20, 1)), [1, math.inf]))
-
-
 @pytest.mark.parametrize("basis", ["emulation", "guarantee"])
 def test_coefficients_that_limit_a_filter_are_named(basis):
     u = np.ones((3000, 1))
@@ -78,17 +70,6 @@ def test_a_cascade_says_what_scaling_its_sections_saves(basis):
     saved = f"{how}, {best.digits} fraction bits in a word of {word} bits are enough"
     assert str(found).count(f"; with its sections scaled by powers of two {saved}") == 1
     assert not any("scaled" in note for note in best.notes)
-
-
-def test_a_cascade_without_an_answer_says_whether_scaling_gives_one():
-    sos, u = signal.butter(8, 0.01, output="sos"), np.random.default_rng(1).uniform(-1, 1, (2000, 1))
-    found = required_precision(LinearSystem.from_sections(sos), u, 1e-6, kind="fixed", coefficient_bits=40)
-    assert found.format is None
-    best = required_precision(LinearSystem.from_sections(sos, scale=True), u, 1e-6, kind="fixed", coefficient_bits=40)
-    assert f"(scale=True; in a TOML file, scale = true beside sos), {best.digits} fraction bits in a word of" in str(
-        found
-    )
-    assert "scale" not in str(required_precision(LOW_PASS, np.ones((50, 1)), 1e-30, kind="fixed"))
 
 
 def test_the_command_takes_the_bits_of_coefficients(tmp_path, capsys):
@@ -129,12 +110,6 @@ def test_a_direct_form_that_no_precision_suits_says_by_how_much_it_misses():
     assert f"; 53 bits give {found.tried[-1][1]:.3g} times the tolerance; second-order sections usually" in str(found)
     lasting = required_precision(long, np.ones((500, 1)), 1e-4, basis="bound")
     assert f"; 53 bits give {lasting.tried[-1][1]:.3g} times the tolerance; second-order" in str(lasting)
-
-
-def test_a_slow_system_that_no_precision_suits_names_its_slowness():
-    slow = LinearSystem([["0.9999999"]], [[1]])
-    found = str(required_precision(slow, np.ones((20, 1)), 1e-3, basis="bound"))
-    assert found.endswith("because the system is slow: its slowest response takes 47000000 steps to decay to 1 %")
 
 
 def test_a_bound_that_is_too_large_proves_no_miss():

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import control
 import numpy as np
 import pytest
 from filterpy.common import inv_diagonal
 from filterpy.kalman import (
-    CubatureKalmanFilter,
-    ExtendedKalmanFilter,
     FadingKalmanFilter,
-    FixedLagSmoother,
-    IMMEstimator,
-    InformationFilter,
     KalmanFilter,
-    MerweScaledSigmaPoints,
     SquareRootKalmanFilter,
-    UnscentedKalmanFilter,
 )
 from scipy import signal
 
@@ -110,40 +102,6 @@ def test_inputs_are_used_or_refused():
     given.B = np.ones(3)
     with pytest.raises(ValueError, match=r"B of shape \(3,\); needed \(3, p\)"):
         read_model(given, U)
-
-
-class Gated(KalmanFilter):
-    """Ignores far measurements, as a class of a user may."""
-
-    def update(self, z, R=None, H=None):
-        if np.all(np.abs(z - self.H @ self.x) < 3):
-            super().update(z, R, H)
-
-
-POINTS = MerweScaledSigmaPoints(2, 0.1, 2.0, 1.0)
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        Gated(2, 1),
-        FixedLagSmoother(2, 1, N=4),
-        ExtendedKalmanFilter(2, 1),
-        InformationFilter(2, 1),
-        UnscentedKalmanFilter(2, 1, 0.1, lambda x: x, lambda x, dt: x, POINTS),
-        CubatureKalmanFilter(2, 1, 0.1, lambda x: x, lambda x, dt: x),
-        IMMEstimator([KalmanFilter(2, 1), KalmanFilter(2, 1)], (0.5, 0.5), np.full((2, 2), 0.5)),
-        SimpleNamespace(F=1, H=1, Q=1, R=1, x=0, P=1),
-        SimpleNamespace(A=[[1]], B=[[1]], C=[[1]], D=[[0]], dt=0.1),
-        control.NonlinearIOSystem(None, lambda t, x, u, params: u, inputs=1, outputs=1, dt=0.1),
-        control.frd([1, 2], [1, 2]),
-        3,
-    ],
-    ids=lambda given: type(given).__name__,
-)
-def test_another_class_is_refused_by_name(given):
-    with pytest.raises(TypeError, match=f"^got a {type(given).__name__}; needed .* KalmanFilter"):
-        read_model(given)
 
 
 B2, A2 = signal.butter(3, 0.3)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import errno
 import os
 import stat
 import subprocess
@@ -103,29 +102,6 @@ def test_a_device_or_pipe_is_refused_and_stays(option, folder, capsys, computed)
         assert f"{name} is a device or pipe; needed a file in a folder" in capsys.readouterr().err
         assert stat.S_ISFIFO((folder / "pipe.html").stat().st_mode)
     assert computed == []
-
-
-@pytest.mark.parametrize("before", [None, "old"])
-def test_a_full_disk_leaves_the_answer_and_no_empty_page(folder, capsys, monkeypatch, computed, before):
-    page, json = folder / "a.html", folder / "a.json"
-    if before:
-        page.write_text(before)
-
-    def partly(path, content):
-        path.touch()
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(Path, "write_bytes", partly)
-    given = [str(folder / "system.toml"), "--tolerance", "1", "--simulate", "step", "--report", str(page)]
-    assert main(given) == 2
-    shown = capsys.readouterr()
-    assert shown.out == "12 bits\n"
-    assert f"got --report {page}, which could not be written: [Errno 28] No space left on device" in shown.err
-    assert not json.exists()
-    assert (page.read_text() if before else page.exists()) == (before or False)
-    assert sorted(each.suffix for each in folder.iterdir()) == sorted(
-        [".toml", ".toml", ".csv", *[".html"] * bool(before)]
-    )
 
 
 def test_every_named_format_is_taken(folder, computed):

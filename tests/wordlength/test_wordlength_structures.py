@@ -141,19 +141,3 @@ def test_fraction_bits_of_a_system(structure):
     errors = WordGuarantee(system, np.abs(u).max()).errors(proved.format)
     assert dict(proved.tried)[proved.digits] == pytest.approx(errors[0] / 1e-3)
     assert errors[0] <= 1e-3
-
-
-def test_fraction_bits_of_a_function():
-    def smoother(fmt, z):
-        alpha, y, found = fmt.array("0.3"), fmt.array(0), []
-        for value in z:
-            y = y + alpha * (value - y)
-            found.append(y)
-        return found
-
-    z = np.random.default_rng(1).uniform(-1, 1, 60)
-    found = required_precision(smoother, z, 1e-3, kind="fixed", like=FixedFormat(2, 1))
-    system = required_precision(LinearSystem.smoother("0.3"), z[:, None], 1e-3, kind="fixed", like=FixedFormat(2, 1))
-    assert found.format == system.format
-    assert [ratio for _, ratio in found.tried] == pytest.approx([ratio for _, ratio in system.tried], rel=1e-6)
-    assert required_precision(smoother, z, 1e-3, kind="fixed").digits == found.digits
