@@ -31,6 +31,13 @@ def disagreement(given, fmt, form, z):
     return ""
 
 
+def driven():
+    """A Kalman filter with two known inputs, one of which moves the position, too."""
+    u = np.random.default_rng(3).uniform(-1, 1, (40, 2))
+    B, Q = [["0.005", 0], ["0.1", "0.3"]], [["0.001", 0], [0, "0.01"]]
+    return LinearModel([[1, "0.1"], [0, 1]], [[1, 0]], Q, [["0.5"]], [0, 0], [[1, 0], [0, 1]], "driven", B=B, u=u)
+
+
 def models():
     """Kalman filters: one state, three states and two correlated sensors, and one whose sensor changes."""
     return {

@@ -173,7 +173,9 @@ def by_closed_loop(algebra: Algebra, model: StepModel, K: Matrix, x: Matrix, z: 
     return algebra.rounded(algebra.times(loop, x) + algebra.times(K, z))
 
 
-def kalman_step(algebra: Algebra, form: Form, model: StepModel, x: Matrix, P: Matrix, z: Matrix) -> KalmanStep:
+def kalman_step(
+    algebra: Algebra, form: Form, model: StepModel, x: Matrix, P: Matrix, z: Matrix, known: Matrix | None = None
+) -> KalmanStep:
     """Take one step in any form that computes the covariance itself.
 
     Parameters
@@ -181,6 +183,7 @@ def kalman_step(algebra: Algebra, form: Form, model: StepModel, x: Matrix, P: Ma
     algebra : how numbers of this kind are computed.
     form : any form except UD, whose steps are in :mod:`gpbnb.filters.array_steps`.
     x (n, 1), P (n, n) : estimate and covariance before the step. z (m, 1) : measurement.
+    known (n, 1) : what known inputs add to the predicted estimate; None without inputs, which Hung's forms need.
     """
     if form is Form.UD:
         raise ValueError(
@@ -193,4 +196,6 @@ def kalman_step(algebra: Algebra, form: Form, model: StepModel, x: Matrix, P: Ma
         K = second_gain(algebra, model.H, model.R, P)
     if form in HUNG_FORMS:
         return KalmanStep(by_closed_loop(algebra, model, K, x, z), K, P)
-    return KalmanStep(corrected(algebra, model.H, K, algebra.times(model.Phi, x), z), K, P)
+    ahead = algebra.times(model.Phi, x)
+    ahead = ahead if known is None else algebra.rounded(ahead + known)
+    return KalmanStep(corrected(algebra, model.H, K, ahead, z), K, P)

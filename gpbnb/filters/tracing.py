@@ -181,7 +181,8 @@ class TracedStep(NamedTuple):
     Parameters
     ----------
     trace : its operations. The states are x (n), then the entries of P at `places`, or of U in the UD form.
-        Coefficients are Phi (n, n), H (m, n), Q (n, n), R (m, m), then 0 and 1; Q and R are factors in the UD form.
+        Coefficients are Phi (n, n), H (m, n), Q (n, n), R (m, m), B (n, p), then 0 and 1; Q and R are factors in the UD
+        form. The inputs are z (m), then u (p).
     coefficients : names of the coefficients.
     places : rows and columns of the entries of the covariance that are states.
     x, P : estimate (n,) and covariance (n, n), or factor, after the step.
@@ -198,35 +199,37 @@ class TracedStep(NamedTuple):
     innovation: Matrix
 
 
-def traced_step(n: int, m: int, form: Form) -> TracedStep:
-    """Take a step of a Kalman filter in a form on traced numbers."""
-    (Phi, H, Q, R), zero = coefficient_matrices((n, n), (m, n), (n, n), (m, m))
+def traced_step(n: int, m: int, form: Form, p: int = 0) -> TracedStep:
+    """Take a step of a Kalman filter in a form on traced numbers, with p known inputs."""
+    (Phi, H, Q, R, B), zero = coefficient_matrices((n, n), (m, n), (n, n), (m, m), (n, p))
     upper = form is Form.UD
     places = [(i, j) for i in range(n) for j in range(n) if not upper or i <= j]
-    trace = Trace(n + len(places), m, zero, zero + 1)
+    trace = Trace(n + len(places), m + p, zero, zero + 1)
     states = trace.build.states
     x, P = trace.values(states[:n], n), np.full((n, n), trace.number(0), dtype=object)
     for (i, j), state in zip(places, states[n:], strict=True):
         P[i, j] = Traced(trace, state)
-    z, model = trace.values(trace.build.inputs, m), StepModel(*(trace.coefficients(each) for each in (Phi, H, Q, R)))
-    letters = ("Phi", "H", "UQ", "UR") if upper else ("Phi", "H", "Q", "R")
-    names = [
-        each for letter, matrix in zip(letters, (Phi, H, Q, R), strict=True) for each in entries(letter, *matrix.shape)
-    ]
+    z, u = trace.values(trace.build.inputs[:m], m), trace.values(trace.build.inputs[m:], p, 1)
+    model = StepModel(*(trace.coefficients(each) for each in (Phi, H, Q, R)))
+    letters = ("Phi", "H", *(("UQ", "UR") if upper else ("Q", "R")), "B")
+    shapes = [each.shape for each in (Phi, H, Q, R, B)]
+    names = [each for letter, shape in zip(letters, shapes, strict=True) for each in entries(letter, *shape)]
     names += ["zero", "one"]
     if upper:
         P, _ = predict_ud(model.Phi, P, model.Q)
         ahead = product_in_order(model.Phi, x[:, None])[:, 0]
+        ahead = ahead + product_in_order(trace.coefficients(B), u)[:, 0] if p else ahead
         x, P, gains, _ = observed(observe_ud, model.H, model.R, z, ahead, P)
         return TracedStep(trace, names, places, x, P, np.stack(gains, axis=1), trace.values([], 0, m))
-    found = kalman_step(trace.algebra(), form, model, x[:, None], P, z[:, None])
+    known = product_in_order(trace.coefficients(B), u) if p else None
+    found = kalman_step(trace.algebra(), form, model, x[:, None], P, z[:, None], known)
     trace.build.checks += [(trace.loaded(found.P[i, i]), POSITIVE) for i in range(n)]
     return TracedStep(trace, names, places, found.x[:, 0], found.P, found.K, trace.inverted[0])
 
 
-def kalman_program(n: int, m: int, form: Form) -> Program:
+def kalman_program(n: int, m: int, form: Form, p: int = 0) -> Program:
     """List the operations of a step of a Kalman filter in a form, with the states and coefficients of a TracedStep."""
-    trace, coefficients, places, x, P, *_ = traced_step(n, m, form)
+    trace, coefficients, places, x, P, *_ = traced_step(n, m, form, p)
     after = [trace.loaded(each) for each in (*x, *(P[place] for place in places))]
     covariance = "U" if form is Form.UD else "P"
     state_names = [*entries("x", n), *(f"{covariance}[{i}][{j}]" for i, j in places)]

@@ -32,8 +32,10 @@ from gpbnb.files import replace_file
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, Form, plain_name
+from gpbnb.filters.kalman_step import HUNG_FORMS
 from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import compiled_form
+from gpbnb.filters.nonlinear_run import opened
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.run import Run
@@ -99,7 +101,8 @@ def write_code(
 
     Parameters
     ----------
-    model : a linear system in its structure, a design, a Kalman filter, or a nonlinear system, whose step is a function
+    model : a linear system in its structure, a design, a Kalman filter, perhaps with known inputs, which follow the
+        measurements in the code's input, or a nonlinear system, whose step is a function
         of your own; or what :func:`gpbnb.read_model` reads.
     fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; a :class:`~gpbnb.filters.words.WordFormats`; or the name
         of a format, such as "float32" or "Q15".
@@ -360,8 +363,13 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
     if isinstance(fmt, FixedFormat):
         _words(fmt)
     in_loops = isinstance(fmt, FloatFormat) or isinstance(fmt.backend, Compiled)
+    if model.b is not None or model.d is not None:
+        raise ValueError(f"got offsets of {model.name}; needed none in C: make each a known input that is always 1")
+    p = 0 if model.u is None else model.u.shape[-1]
+    if p and chosen in HUNG_FORMS:
+        raise ValueError(f"got known inputs in the {chosen} form, which is not defined with them; needed another form")
     stored, start = _in_loops(model, fmt, chosen) if in_loops else _in_long_words(model, fmt, chosen)
-    step = CodeStep(without_exact(kalman_program(model.n, model.m, chosen), stored), stored, start)
+    step = CodeStep(without_exact(kalman_program(model.n, model.m, chosen, p), stored), stored, start)
     arithmetic = word_arithmetic(step, _words(fmt)) if isinstance(fmt, FixedFormat) else CodeFloats(kind)
 
     def bound(within: FilterLimits) -> str:
@@ -381,22 +389,24 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
         step,
         arithmetic,
         model.name,
-        f"{chosen} form",
+        f"{chosen} form" + (", whose input holds the measurements, then the known inputs" if p else ""),
         lambda z: _model_vectors(model, z, fmt, chosen) if in_loops else _long_vectors(model, z, fmt, step),
-        lambda steps: simulated_measurements(model, steps),
+        lambda steps: simulated_measurements(model, min(steps, model.steps or steps)),
         bound,
     )
 
 
-def model_coefficients(run: Run) -> NDArray[Any]:
+def model_coefficients(run: Run, B: Any = None) -> NDArray[Any]:
     """Return the coefficients of each step of a cycle, (p, c), ordered as the program of a step expects."""
     given = run.matrices
     Q, R = (run.UQ, run.UR) if run.form is Form.UD else (given.Q, given.R)
-    return _coefficients([run.exactly(each) for each in (given.Phi, given.H, Q, R)])
+    fmt: Any = run.fmt
+    known = [] if B is None else [fmt.array(B).to_fractions()]
+    return _coefficients([*(run.exactly(each) for each in (given.Phi, given.H, Q, R)), *known])
 
 
 def _coefficients(members: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """Return the coefficients of each step of a cycle from Phi, H, Q and R, each with a cycle of its own."""
+    """Return the coefficients of each step of a cycle from Phi, H, Q, R and B, each with a cycle of its own."""
     period = lcm(*(len(each) for each in members))
     rows = [np.concatenate([each[k % len(each)].ravel() for each in members]) for k in range(period)]
     constants = np.full((period, 1), Fraction(0), dtype=object)
@@ -405,8 +415,8 @@ def _coefficients(members: Sequence[NDArray[Any]]) -> NDArray[Any]:
 
 def _in_loops(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return coefficients and first states, exact, as a run in compiled loops stores them."""
-    run = Run(model, fmt, form, ())
-    return model_coefficients(run), _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), form)[0]
+    run = Run(model.without_inputs(), fmt, form, ())
+    return model_coefficients(run, model.B), _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), form)[0]
 
 
 def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -449,7 +459,7 @@ def _statuses(steps: int, indefinite: int | None) -> NDArray[np.int64]:
 
 
 def _model_vectors(model: LinearModel, z: Any, fmt: FloatFormat | FixedFormat, form: Form) -> Vectors:
-    run = Run(model, fmt, form, ())  # type: ignore[arg-type]
+    run = Run(model.without_inputs(), fmt, form, ())  # type: ignore[arg-type]
 
     def stored(numbers: NDArray[np.float64]) -> NDArray[Any]:
         """Return numbers, exact in float64, as the code stores them."""
@@ -457,4 +467,11 @@ def _model_vectors(model: LinearModel, z: Any, fmt: FloatFormat | FixedFormat, f
 
     start = stored(_flat(run.x[None], run.P[None], form))
     states = np.concatenate([start[:0], *(stored(_flat(x[1:], P[1:], form)) for x, P in run.blocks(z))])
-    return _ended(stored(fmt.array(z).to_float()), start[0], states, _statuses(len(states), run.indefinite))
+    inputs = fmt.array(z).to_float()
+    if model.u is not None:  # the covariances are those without inputs
+        driven = opened(model, fmt, form).states(z)[..., 0]  # type: ignore[arg-type]
+        states = states[: len(driven)]
+        states[:, : model.n] = stored(driven[: len(states)])
+        u = np.broadcast_to(model.u, (len(z), model.u.shape[-1])) if model.u.ndim == 1 else model.u[: len(z)]
+        inputs = np.hstack([inputs, fmt.array(u).to_float()])
+    return _ended(stored(inputs), start[0], states, _statuses(len(states), run.indefinite))

@@ -54,7 +54,6 @@ CANNOT: dict[str, Mapping[str, str]] = {
     | dict.fromkeys((STEP, SMOOTHER, FUNCTION), "emulate, with a long constant input")
     | {LIMITED: "emulate, with a long constant input"},
     "be written in C": {
-        DRIVEN: _OWN_STEP,
         NONLINEAR: _OWN_STEP,
         SMOOTHER: "write_code of its filter",
         FUNCTION: "write its step as a NonlinearSystem",

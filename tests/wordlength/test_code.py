@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from built_code import SANITIZER, disagreement, installed, models
+from built_code import SANITIZER, disagreement, driven, installed, models
 
 from gpbnb import (
     BINARY16,
@@ -23,6 +23,7 @@ from gpbnb import (
     LinearModel,
     LinearSystem,
     WordFormats,
+    emulate,
     guarantee,
     limits,
     write_code,
@@ -49,6 +50,26 @@ def test_code_has_the_digits_of_its_emulation(name):
     assert faults == []
     assert builds >= len(conformance.LEVELS)
     assert steps > 3
+
+
+@needs_compiler
+@pytest.mark.parametrize("fmt", [BINARY32, FixedFormat(6, 20, "half up", "saturate")], ids=["binary32", "fixed"])
+def test_known_inputs_follow_the_measurements(fmt, tmp_path):
+    z = np.random.default_rng(2).uniform(-1, 1, (40, 1))
+    for form in ("innovation", "joseph", "ud"):
+        assert disagreement(driven(), fmt, form, z) == ""
+    path, *_ = write_code(driven(), fmt, tmp_path)
+    assert "whose input holds the measurements, then the known inputs" in header(path)
+    assert "const filter_number input[3]" in path.read_text()
+    moved = emulate(driven(), z, fmt).x.to_float()
+    assert not np.array_equal(moved, emulate(driven().without_inputs(), z, fmt).x.to_float())
+
+
+def test_offsets_and_inputs_of_hungs_forms_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="make each a known input that is always 1"):
+        write_code(replace(driven(), d=["0.5"]), BINARY32, tmp_path)
+    with pytest.raises(ValueError, match="not defined with them; needed another form"):
+        write_code(driven(), BINARY32, tmp_path, form="hung")
 
 
 def built(folder, flags=FLAGS):
