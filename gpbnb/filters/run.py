@@ -153,7 +153,7 @@ class Run:
                 "leaves the range would be wrong by more than any rounding"
             )
         if not isinstance(sums, Sums):
-            raise TypeError(f"sums: got {sums!r}; needed gpbnb.filters.run.Sums(...), as Sums(fmt=BINARY32)")
+            raise TypeError(f"sums: got {sums!r}; needed gpbnb.filters.run.Sums(...), such as fmt=BINARY32")
         if sums.fmt is not None and not isinstance(sums.fmt, (FloatFormat, FixedFormat)):
             raise TypeError(f"sums: got {sums.fmt!r}; needed a FloatFormat or a FixedFormat")
         if compensated and self.form not in (Form.INNOVATION, Form.JOSEPH):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +15,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_named
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
@@ -22,9 +23,10 @@ from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import opened, true_states
+from gpbnb.filters.opening import stored_start
 from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem, system_inputs
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.words import WordFormats, first_integers, integer_program
 from gpbnb.wordlength.answer import format_in_words
 from gpbnb.wordlength.functions import STOPS, exact_outputs, function_strategy, outputs_of
 from gpbnb.wordlength.models import ModelSource
@@ -132,10 +134,11 @@ def emulate(
 
 
 def _in_format(pairs: NDArray[np.float64], fmt: Any) -> FloatArray:
-    """Return numbers of a format that are given as sums of two float64."""
-    found: FloatArray = fmt.array(
-        pairs[..., 0] if not pairs[..., 1].any() else exact(pairs[..., 0]) + exact(pairs[..., 1])
-    )
+    """Return numbers of a format that are given as sums of two float64, which in base 10 are only near them."""
+    sums = pairs[..., 0] if not pairs[..., 1].any() else exact(pairs[..., 0]) + exact(pairs[..., 1])
+    if fmt.base == 10:
+        sums = replace(fmt, rounding=Rounding.EVEN).array(sums).to_fractions()
+    found: FloatArray = fmt.array(sums)
     return found
 
 
@@ -165,12 +168,24 @@ def _system(system: LinearSystem, data: Data, fmt: Any, stored: bool) -> Emulate
         x0 = of_data.array(system.x0).to_fractions()
         A, B, C, D = system.stored(fmt)
         true = LinearSystem(A, B, C, D, x0).outputs(of_data.array(u).to_fractions())
+    _check_stored(system, fmt)
     _, pairs, reason = longest(lambda steps: system_pairs(system, u[:steps], fmt), len(u))
     if pairs is None:
         pairs = np.zeros((0, system.n + system.p, 2))
     numbers, n = _in_format(pairs, of_data), system.n
     off = pairs[:, n:] - true[: len(pairs)]
     return EmulatedRun(fmt, numbers[:, :n], numbers[:, n:], np.asarray(off.sum(axis=2)), reason)
+
+
+def _check_stored(system: LinearSystem, fmt: Any) -> None:
+    """Reject a system whose coefficients or first state the format does not hold: overflow is for results."""
+    words = WordFormats(fmt) if isinstance(fmt, FixedFormat) else fmt
+    if isinstance(words, WordFormats):
+        integer_program(system.as_filter(), words)
+        first_integers(system.x0, words.data)
+    else:
+        system.as_filter().stored(fmt)
+        stored_start(fmt, system.x0)
 
 
 def longest(run: Callable[[int], Any], steps: int) -> tuple[int, Any, str]:
@@ -183,8 +198,8 @@ def longest(run: Callable[[int], Any], steps: int) -> tuple[int, Any, str]:
         middle = (low + high) // 2
         try:
             found, low = run(middle), middle
-        except OverflowError:
-            high = middle
+        except OverflowError as error:
+            high, why = middle, str(error)
     return low, found, why
 
 

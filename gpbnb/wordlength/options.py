@@ -330,8 +330,11 @@ def _is_report(path: Path) -> bool:
     return isinstance(found, dict) and {"answers", "limiting"} <= found.keys()
 
 
-def _numbers(text: str) -> float | list[float]:
-    found = [plain_number(each.strip()) for each in text.split(",")]
+def _numbers(text: str) -> str | list[str]:
+    """Check numbers with commas between, and leave them as text, which is read exactly."""
+    found = [each.strip() for each in text.split(",")]
+    for each in found:
+        plain_number(each)
     return found if len(found) > 1 else found[0]
 
 

@@ -162,7 +162,7 @@ class Question:
     """
 
     model: LinearModel | LinearSystem
-    tolerance: float | Sequence[float]
+    tolerance: str | float | Sequence[str | float]
     z: Any = None
     steps: int | None = None
     base: int = 2
@@ -340,7 +340,7 @@ def study(
         base=asked.base if fmt is None else fmt.base,
         rounding=str(asked.rounding) if fmt is None else fmt.rounding.value,
         steps=asked.count,
-        tolerance=tuple(_finite(float(each)) for each in tolerances),
+        tolerance=tuple(_finite(float(each)) for each in np.broadcast_to(asked.tolerance, width).tolist()),
         source=source or origin,
         answers=tuple(_plain(part.label, answer) for part, answer in found),
         errors=_errors(model, z, main.format if met else None, asked.form, tolerances),

@@ -316,7 +316,7 @@ def write_run(asked: CommandInput, report: Report, file: Path) -> None:
 
 
 def _level(given: argparse.Namespace) -> Any:
-    return 1.0 if given.level is None else given.level
+    return 1.0 if given.level is None else np.asarray(given.level, dtype=np.float64)
 
 
 def _shown(level: Any) -> str:

@@ -73,6 +73,8 @@ def tolerances_of(tolerance: Any, count: int, what: str) -> NDArray[np.float64]:
     if tolerances.shape not in ((), (1,), (count,)):
         got = f"tolerance {tolerance}" if tolerances.size <= 2 * count else "a tolerance"
         raise ValueError(f"got {got} of shape {tolerances.shape}; {needed}: one number, or {count} in a row")
+    if ((tolerances == 0) & np.array([each < 0 for each in negative]).reshape(tolerances.shape)).any():
+        raise ValueError(f"got tolerance {tolerance}; needed at least 2**-1074, which float64 holds; scale the {what}")
     if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
         raise ValueError(f"got tolerance {tolerance}; {needed}")
     return np.broadcast_to(tolerances, (count,))

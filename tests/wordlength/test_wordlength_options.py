@@ -7,6 +7,7 @@ import os
 import stat
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
 from typing import get_args
@@ -23,6 +24,7 @@ from gpbnb.report.ledger.render import FORMATS
 from gpbnb.wordlength import options, running
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.answer import Basis
+from gpbnb.wordlength.strategy import tolerances_of
 
 SYSTEM = 'A = [[0.875]]\nB = [[0.125]]\ninputs = ["sensor (V)"]\noutputs = ["level (V)"]\n'
 FILTER = "Phi = [[1]]\nH = [[1]]\nQ = [[0.01]]\nR = [[1]]\nx0 = [0]\nP0 = [[1]]\n"
@@ -171,3 +173,14 @@ except SystemExit as end:
     with pytest.raises(SystemExit, match="0"):
         main(["--version"])
     assert isinstance(options.parser(), argparse.ArgumentParser)
+
+
+def test_numbers_are_read_exactly(folder, computed):
+    """The nearest float64 of 0.1 is larger than it."""
+    limits = ["--basis", "guarantee", "--state", "9", "--innovation", "0.1"]
+    assert main([str(folder / "filter.toml"), "--tolerance", "0.1,inf", *limits]) == 0
+    assert computed[0].tolerance == ["0.1", "inf"]
+    assert computed[0].within.innovation >= Fraction("0.1")
+    assert tolerances_of(computed[0].tolerance, 2, "states")[0] <= Fraction("0.1")
+    with pytest.raises(ValueError, match=r"got tolerance 1e-400; needed at least 2\*\*-1074"):
+        tolerances_of("1e-400", 1, "states")
