@@ -1,12 +1,10 @@
-"""Limits of a probability from counted trials, and of a quantile from a sample."""
+"""Limits of a probability from counted trials."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 CONFIDENCE = 0.95
 
@@ -42,18 +40,3 @@ def records_needed(probability: float, confidence: float = CONFIDENCE) -> int:
     if not 0 < probability < 1 or not 0 < confidence < 1:
         raise ValueError(f"got {probability} and {confidence}; needed both between 0 and 1")
     return math.ceil(math.log(1 - confidence) / math.log(probability))
-
-
-def quantile_limit(errors: NDArray[np.float64], probability: float = 0.99, confidence: float = CONFIDENCE) -> float:
-    """Return an upper limit of a quantile for errors with normally distributed logarithms, by Owen 1968.
-
-    The limit is infinite with fewer than two records, or if an error is infinite.
-    """
-    if not (errors > 0).all():
-        raise ValueError("got an error that is not positive; needed errors above 0, whose logarithms exist")
-    n = len(errors)
-    if n < 2 or not np.isfinite(errors).all():
-        return math.inf
-    logs = np.log(errors)
-    factor = scipy.stats.nct.ppf(confidence, n - 1, scipy.stats.norm.ppf(probability) * math.sqrt(n)) / math.sqrt(n)
-    return float(np.exp(logs.mean() + factor * logs.std(ddof=1)))

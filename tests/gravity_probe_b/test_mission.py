@@ -141,12 +141,3 @@ def test_measurements_are_whole_multiples_of_their_resolution(monkeypatch):
     assert np.array_equal(coarse * 4, np.rint(coarse * 4))
     assert not np.array_equal(coarse, np.rint(coarse))
     assert np.abs(coarse - fine).max() == 0.5
-
-
-def test_the_filter_learns_the_roll_phase():
-    early, late = (mission.roll_phase_after(blocks) for blocks in (1, 6))
-    assert early.days == pytest.approx(4096 * 10 / 86400)
-    # A milliradian before the first measurement.
-    assert late.deviation < early.deviation < 206
-    assert 0 < early.error < 4 * early.deviation
-    assert 0 < late.error < 4 * late.deviation

@@ -1,10 +1,8 @@
-"""How many digits does a year need? The printed answers, the corrected and the observed one, and what choices add."""
+"""How many digits does a year need? The printed answers, the corrected and the observed one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +11,6 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.gravity_probe_b import year
-from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.kalman import report_bounds
 
 _REPORT = (2, Form.HUNG, Rounding.NEAREST)
@@ -101,104 +98,3 @@ def _best(runs: tuple[year.Year, ...]) -> float:
 
 def _both(counts: report_bounds.Coefficients) -> tuple[int, int]:
     return report_bounds.precision_for_coefficient(counts.first), report_bounds.precision_for_coefficient(counts.second)
-
-
-_USUAL = ("deviation", "hung", "2", "nearest")
-
-
-class Moved(NamedTuple):
-    """One changed choice, before and after, and the resulting change in bits of the precision for the tolerance."""
-
-    choice: str
-    before: str
-    after: str
-    bits: float
-    records: int
-
-
-def median_precision(found: Sequence[Share], tolerance: float = 1.0) -> float:
-    """Return the precision at which the median error would equal the tolerance, for one kind of formats.
-
-    Between a format whose median exceeds the tolerance and the next, the logarithm of the error is interpolated.
-    If all medians lie on one side of the tolerance, the estimate starts from the nearest on a logarithmic scale, and
-    assumes that each further digit divides the error by the base.
-    """
-    if not found:
-        raise ValueError("got no formats; needed at least one")
-    distances = _distances(found, tolerance)
-    for (t, high), (next_t, low) in reversed([*pairwise(distances)]):
-        if high > 0 >= low:
-            return t + (next_t - t) * high / (high - low)
-    t, away = min(distances, key=lambda each: abs(each[1]))
-    return t + away
-
-
-def _distances(found: Sequence[Share], tolerance: float = 1.0) -> list[tuple[int, float]]:
-    """List precisions, and by how many digits each median exceeds the tolerance."""
-    return sorted((each.fmt.precision, math.log(each.quantile(0.5) / tolerance, each.fmt.base)) for each in found)
-
-
-def sensitivity(found: Sequence[Share]) -> tuple[Moved, ...]:
-    """Change one choice at a time, starting from deviation states, Hung's form, base 2 and rounding to nearest.
-
-    A choice is omitted if no such formats were run.
-
-    Parameters
-    ----------
-    found : shares for the simple model, in the setting "simple", and for settings of the mission model.
-    """
-    groups: dict[tuple[str, ...], list[Share]] = {}
-    for each in found:
-        fmt = each.fmt
-        groups.setdefault((each.setting, each.states, each.form, str(fmt.base), fmt.rounding.value), []).append(each)
-    pairs = []
-    for setting in ("simple", "mission"):
-        usual = (setting, *_USUAL)
-        for choice, place, after in (("states", 1, "absolute"), ("form", 2, "innovation"), ("rounding", 4, "chop")):
-            pairs.append((f"{choice}, {setting} model", usual, (*usual[:place], after, *usual[place + 1 :]), place))
-    for setting in dict.fromkeys(each.setting for each in found if each.setting != "simple"):
-        before = "simple" if setting == "mission" else "mission"
-        pairs.append(("model", (before, *_USUAL), (setting, *_USUAL), 0))
-    return tuple(
-        _moved(choice, usual[place], other[place], groups[usual], groups[other])
-        for choice, usual, other, place in pairs
-        if usual in groups and other in groups
-    )
-
-
-def _moved(choice: str, before: str, after: str, usual: Sequence[Share], other: Sequence[Share]) -> Moved:
-    """Compare two kinds of formats: both where they meet the tolerance, else in the formats that both have."""
-    common = {each.fmt.precision for each in usual} & {each.fmt.precision for each in other}
-    if common and not (_on_both_sides(usual) and _on_both_sides(other)):
-        usual = [each for each in usual if each.fmt.precision in common]
-        other = [each for each in other if each.fmt.precision in common]
-    bits = median_precision(other) - median_precision(usual)
-    return Moved(choice, before, after, bits, min(each.records for each in (*usual, *other)))
-
-
-def _on_both_sides(found: Sequence[Share]) -> bool:
-    """Whether medians lie on both sides of the tolerance."""
-    sides = [away > 0 for _, away in _distances(found)]
-    return any(sides) and not all(sides)
-
-
-def single_record(runs: Sequence[year.Year], precision: int = 24) -> tuple[Moved, ...]:
-    """Change one choice at a time for one record of the simple model, with absolute angles.
-
-    Parameters
-    ----------
-    runs : years from :mod:`gpbnb.report.gravity_probe_b.year`.
-    precision : precision in bits; each bit is assumed to halve the error.
-    """
-    by_case = {run.case: run for run in runs}
-    usual = year.YearCase(year.MODELS[0], 2, precision, Rounding.NEAREST, Form.HUNG)
-    changes = [
-        *(("roll and process noise", usual.model, name, usual._replace(model=name)) for name in year.MODELS[1:]),
-        ("rounding", "nearest", "chop", usual._replace(rounding=Rounding.CHOP)),
-        *(("form", "hung", form.name.lower(), usual._replace(form=form)) for form in (Form.INNOVATION, Form.UD)),
-    ]
-    error = largest(by_case[usual])
-    return tuple(
-        Moved(choice, before, after, math.log2(largest(by_case[case]) / error), 1)
-        for choice, before, after, case in changes
-    )

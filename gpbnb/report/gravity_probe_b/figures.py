@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,14 +10,12 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.display.style import (
     BLACK,
     OBSERVED,
-    OBSERVED_OTHERS,
     REFERENCE,
     REFUTED,
     VALID,
@@ -29,9 +26,7 @@ from gpbnb.report.display.style import (
     name,
     name_ends,
 )
-from gpbnb.report.gravity_probe_b.mission import PARAMETERS, YEAR_SECONDS
 from gpbnb.report.gravity_probe_b.summary import DRIFT, YearAnswer, binary_digits
-from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.gravity_probe_b.year import Year
 
 _QUANTITIES = {
@@ -130,49 +125,3 @@ def answer_line(found: Sequence[YearAnswer], ax: Axes) -> list[Artist]:
     legend(ax, loc="upper right", ncols=3)
     label(ax, "bits", "allowed")
     return artists
-
-
-def shares(found: Sequence[Share], ax: Axes, tolerance: float = 1.0) -> list[Artist]:
-    """Draw the largest error of each record (points) against bits or digits, a column for each format, with medians."""
-    artists: list[Artist] = []
-    for states, colour in zip(dict.fromkeys(each.states for each in found), (OBSERVED, *OBSERVED_OTHERS), strict=False):
-        group = [each for each in found if each.states == states]
-        for each in group:
-            # Spread points by rank, so that every record is visible.
-            places = each.fmt.precision + 0.6 * (np.arange(each.records) + 0.5) / each.records - 0.3
-            artists += ax.plot(places, np.sort(each.errors), ".", color=colour, ms=3)
-        points = [(each.fmt.precision, each.quantile(0.5)) for each in group]
-        artists += ax.plot(*zip(*points, strict=True), "_", color=colour, ms=18, mew=2, label=f"{states}, median")
-    artists.append(ax.axhline(tolerance, color=REFERENCE, ls=":", label="tolerance"))
-    ax.set_yscale("log")
-    ax.set_xticks(sorted({each.fmt.precision for each in found}))
-    legend(ax)
-    label(ax, "bits" if found[0].fmt.base == 2 else "decimal digits", "largest error in a year (mas, mas/yr)")
-    return artists
-
-
-def ladder(formats: Sequence[FloatFormat], ax: Axes) -> list[Artist]:
-    """Draw the angles of the mission on one scale, and the last place that a year's drift has in each format."""
-    given = {each.name: each.value for each in PARAMETERS}
-    drift = given["geodetic drift, predicted"]
-    steps = YEAR_SECONDS / given["time between measurements, report"]
-    angles = {
-        "aberration of starlight, Earth": 1000 * given["aberration due to the Earth's motion"],
-        "geodetic drift in a year": drift,
-        "aberration of starlight, orbit": 1000 * given["aberration due to the orbit"],
-        "frame dragging in a year": given["frame dragging, predicted"],
-        "allowed error in a year": 1.0,
-        "geodetic drift in a step": drift / steps,
-    }
-    rungs = {words: (size, BLACK) for words, size in angles.items()}
-    for fmt in formats:
-        above = math.floor(math.log(drift, fmt.base)) + 1
-        rungs[f"last place, {arithmetic(fmt)}"] = float(fmt.base) ** (above - fmt.precision), bits_colour(fmt)
-    artists: list[Artist] = []
-    for size, colour in rungs.values():
-        artists.append(ax.axhline(size, color=colour, lw=1.6, ls=":" if size == 1 else "-"))
-    ax.set_yscale("log")
-    ax.set_xticks([])
-    ax.grid(axis="x", visible=False)
-    label(ax, "", "angle (mas)")
-    return [*artists, *name_ends(ax, rungs)]

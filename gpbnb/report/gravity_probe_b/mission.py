@@ -30,12 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.definiteness import factor
-from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.simulation import measured
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import BLOCK
-from gpbnb.report.gravity_probe_b.lockstep import REFERENCE
 
 STATES = (
     ("drift φ2", "mas"),
@@ -339,35 +336,3 @@ SETTINGS = {
     "a tenth of the readout noise": Mission(quiet=10.0),
     "steps and roll as flown": Mission(flown=True),
 }
-
-
-class RollPhase(NamedTuple):
-    """How well the filter knows the roll-phase offset after some days: error and standard deviation, arcseconds."""
-
-    days: float
-    error: float
-    deviation: float
-
-
-def roll_phase_after(blocks: int) -> RollPhase:
-    """Run the mission model in float64 with deviation states, and return its knowledge of the roll phase.
-
-    Parameters
-    ----------
-    blocks : number of blocks of 4096 steps, of the first record.
-    """
-    mission = Mission(deviations=True)
-    run = Run(mission.model(2), REFERENCE, Form.INNOVATION, ())
-    truth = np.array(mission.start)
-    for block in range(blocks):
-        H = mission.matrices(block, 2)
-        z, truth = mission.measurements(0, block, truth, H, BLOCK)
-        run.use_measurement_matrices(H)
-        run.carry(z[:, :, np.newaxis], 1)
-    state = [name for name, _ in STATES].index("roll-phase offset δ")
-    arcseconds = math.degrees(1e-3) * 3600  # of a milliradian
-    return RollPhase(
-        blocks * BLOCK * mission.interval / 86400,
-        abs(float(run.x[state, 0]) - truth[state]) * arcseconds,
-        math.sqrt(float(run.P[state, state])) * arcseconds,
-    )

@@ -145,5 +145,5 @@ def _as_in_the_report(share: Share) -> bool:
 def _least(found: Sequence[Share], setting: str, states: str) -> Share:
     """Return the share of the smallest precision with which 99 % of the records stay within a milliarcsecond."""
     kept = [each for each in found if (each.setting, each.states) == (setting, states)]
-    precision = threshold.needed(kept).observed
+    precision = threshold.needed(kept)
     return next(each for each in kept if each.fmt.precision == precision)

@@ -24,7 +24,7 @@ from gpbnb.arithmetic.search import least_from_which_on
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.simulation import Simulation
-from gpbnb.report.confidence import interval, quantile_limit
+from gpbnb.report.confidence import interval
 from gpbnb.report.gravity_probe_b.lockstep import Lockstep, error_rows, run_lockstep
 from gpbnb.report.gravity_probe_b.mission import SETTINGS, Mission
 from gpbnb.report.gravity_probe_b.model import TRUTH, YEAR
@@ -245,8 +245,7 @@ MISSION_SWEEP = _sweep("mission", MISSION_COLUMNS, MISSION_CELLS, MISSION_SEED)
 class Share(NamedTuple):
     """Largest errors of a year in one format, over many records; in mas and mas/yr.
 
-    `low` and `high` limit the probability that a record stays within the tolerance. `quantile_limit` is an upper limit
-    of the 99 % quantile if the logarithms of the errors are normally distributed. Each limit is one-sided and has a
+    `low` and `high` limit the probability that a record stays within the tolerance. Each limit is one-sided and has a
     confidence of 95 %.
     """
 
@@ -258,16 +257,11 @@ class Share(NamedTuple):
     within: int
     low: float
     high: float
-    quantile_limit: float
 
     @property
     def records(self) -> int:
         """Number of records."""
         return len(self.errors)
-
-    def quantile(self, probability: float) -> float:
-        """Return a quantile of the observed errors."""
-        return float(np.quantile(self.errors, probability))
 
 
 def shares(table: StoredTable, tolerance: float = 1.0) -> tuple[Share, ...]:
@@ -287,8 +281,7 @@ def shares(table: StoredTable, tolerance: float = 1.0) -> tuple[Share, ...]:
         errors = np.array(group)
         within = int((errors <= tolerance).sum())
         fmt = FloatFormat(int(base), int(precision), Rounding(rounding))
-        limits = interval(within, len(errors))
-        found.append(Share(setting, states, form, fmt, errors, within, *limits, quantile_limit(errors)))
+        found.append(Share(setting, states, form, fmt, errors, within, *interval(within, len(errors))))
     return tuple(sorted(found, key=_order))
 
 
@@ -297,22 +290,8 @@ def _order(share: Share) -> tuple[object, ...]:
     return share.setting, share.states, fmt.base, fmt.rounding.value, share.form, fmt.precision
 
 
-class Needed(NamedTuple):
-    """The smallest precisions of one base that meet a tolerance with a probability; None if no format does.
-
-    For `observed`, the share of records within the tolerance is at least this probability. For `lognormal`, the upper
-    limit of the quantile is within the tolerance. For `shown`, the lower limit of the probability, without an
-    assumption about the distribution, is at least this probability; higher precisions may have fewer records but must
-    not refute it.
-    """
-
-    observed: int | MaybeNone
-    lognormal: int | MaybeNone
-    shown: int | MaybeNone
-
-
-def needed(found: Sequence[Share], probability: float = 0.99, tolerance: float = 1.0) -> Needed:
-    """Find the smallest precision from which on every format that was run meets the tolerance.
+def needed(found: Sequence[Share], probability: float = 0.99) -> int | MaybeNone:
+    """Find the smallest precision from which on, in every format that was run, so many records meet the tolerance.
 
     Parameters
     ----------
@@ -321,12 +300,4 @@ def needed(found: Sequence[Share], probability: float = 0.99, tolerance: float =
     kinds = {(each.setting, each.states, each.form, each.fmt.base, each.fmt.rounding) for each in found}
     if len(kinds) != 1:
         raise ValueError(f"got formats of {len(kinds)} kinds; needed formats of one kind")
-
-    by_precision = sorted(found, key=lambda each: each.fmt.precision)
-    refuted = [each.fmt.precision for each in by_precision if each.within < probability * each.records]
-    shown = (each.fmt.precision for each in by_precision if each.low >= probability)
-    return Needed(
-        least_from_which_on({each.fmt.precision: each.within >= probability * each.records for each in found}),
-        least_from_which_on({each.fmt.precision: each.quantile_limit <= tolerance for each in found}),
-        next((each for each in shown if each > max(refuted, default=0)), None),
-    )
+    return least_from_which_on({each.fmt.precision: each.within >= probability * each.records for each in found})
