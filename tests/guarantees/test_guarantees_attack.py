@@ -12,7 +12,7 @@ def test_no_run_of_a_linear_system_exceeds_its_bound(seed: int) -> None:
     found = attack.linear(seed)
     assert found.kind == attack.KINDS[seed % 5]
     assert found.largest <= 1
-    assert found.runs in (0, 9)
+    assert found.runs in (0, 11)
     assert not found.runs or found.largest > 0.02
 
 

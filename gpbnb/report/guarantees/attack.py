@@ -1,9 +1,9 @@
 """Attack guarantees with emulated runs: ``python -m gpbnb.report.guarantees.attack`` prints a table by form and format.
 
 A seed determines a filter, a format, limits and inputs. Kalman filters are those of
-:mod:`gpbnb.report.guarantees.filters`. Linear systems are compared with the system as given, in floating point with and
-without a range, in fixed point and in words. Their inputs are random, constant, those that move an output furthest, and
-the best of some tries at each step.
+:mod:`gpbnb.report.guarantees.filters`. Linear systems, in every structure, are compared with the system as given, in
+floating point with and without a range, in fixed point and in words. Their inputs are random, constant, those that move
+an output or its error due to stored coefficients furthest, and the best of some tries for each stretch of a run.
 """
 
 from __future__ import annotations
@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.system import output_errors
 from gpbnb.bounds.words import WordGuarantee
+from gpbnb.filters.program import matrices
+from gpbnb.filters.structures import WITH_FIR
 from gpbnb.filters.system import LinearSystem
-from gpbnb.filters.words import WordFormats, run_words
+from gpbnb.filters.words import WordFormats, integer_program, run_words
 from gpbnb.interrupts import interruptible
 from gpbnb.report.guarantees.filters import examine
-from gpbnb.report.guarantees.random_filters import DETERMINISTIC
 
 KINDS = ("unlimited", "subnormal", "flushed", "fixed point", "words")
 STEPS, CANDIDATES = 200, 8
@@ -46,8 +48,16 @@ def kalman(seed: int) -> Attacked:
 
 
 def drawn_system(rng: np.random.Generator) -> tuple[LinearSystem, NDArray[np.float64]]:
-    """Draw a stable system with one to four states, and limits on its inputs."""
+    """Draw a stable system of order one to four in some structure, and limits on its inputs."""
     n, m, p = int(rng.integers(1, 5)), int(rng.integers(1, 3)), int(rng.integers(1, 3))
+    structure = (*WITH_FIR, "dense")[int(rng.integers(len(WITH_FIR) + 1))]
+    if structure != "dense":
+        angles = rng.uniform(0, np.pi, n // 2)
+        poles = rng.uniform(0.2, 0.95, n // 2) * np.exp(1j * angles)
+        a = np.poly([*poles, *poles.conj(), *rng.uniform(-0.95, 0.95, n % 2)]).real
+        b, a = (np.round(each * 2**12) / 2**12 for each in (rng.standard_normal(n + 1), a))
+        system = LinearSystem.from_coefficients(b, [1] if structure == "FIR" else a, structure)
+        return system, 10.0 ** rng.uniform(-1, 1, 1)
     A = rng.standard_normal((n, n))
     A *= rng.uniform(0.2, 0.95) / np.abs(np.linalg.eigvals(A)).max()
     parts = (A, rng.standard_normal((n, m)), rng.standard_normal((p, n)), rng.standard_normal((p, m)))
@@ -57,7 +67,10 @@ def drawn_system(rng: np.random.Generator) -> tuple[LinearSystem, NDArray[np.flo
 
 def drawn_format(rng: np.random.Generator, kind: str) -> FloatFormat | FixedFormat | WordFormats:
     """Draw a format of a kind."""
-    rounding, base = DETERMINISTIC[int(rng.integers(len(DETERMINISTIC)))], int(rng.choice([2, 3, 10, 16]))
+    among = [each for each in Rounding if kind not in KINDS[3:] or each is not Rounding.STOCHASTIC]
+    rounding, base = among[int(rng.integers(len(among)))], int(rng.choice([2, 10, 16]))
+    if rounding is Rounding.STOCHASTIC:
+        base = 2  # the only one with compiled loops
     digits = int(rng.integers(8, 25) / np.log2(base)) + 2
     if kind == "unlimited":
         return FloatFormat(base, digits, rounding)
@@ -86,6 +99,22 @@ def errors(system: LinearSystem, fmt: Any, u: NDArray[np.float64]) -> NDArray[np
     return np.asarray(off[..., 0] + off[..., 1])
 
 
+def response(system: LinearSystem, fmt: Any, output: int) -> NDArray[np.float64]:
+    """Return what inputs add to the error of an output after the last step, due to stored coefficients, (steps, m)."""
+    made, n = system.as_filter(), system.n
+    words = WordFormats(fmt) if isinstance(fmt, FixedFormat) else fmt
+    stored = integer_program(made, words).coefficients if isinstance(words, WordFormats) else made.stored(fmt)
+    rows = []
+    for coefficients in (stored, made.coefficients):
+        A, B = (each.astype(np.float64) for each in matrices(made.program, coefficients))
+        row, found = np.eye(len(A))[n + output], []
+        for _ in range(STEPS):
+            found.append(row @ B)
+            row = row @ A
+        rows.append(found[::-1])
+    return np.array(rows[0]) - np.array(rows[1])
+
+
 def inputs(
     system: LinearSystem, fmt: Any, most: NDArray[np.float64], rng: np.random.Generator
 ) -> Iterator[NDArray[np.float64]]:
@@ -103,12 +132,16 @@ def inputs(
     worst = most * np.where(np.array(responses).T >= 0, 1.0, -1.0)
     yield worst
     yield worst * rng.uniform(0.9, 1, (STEPS, m))
-    chosen = worst.copy()
+    of_error = most * np.where(response(system, fmt, at) >= 0, 1.0, -1.0)
+    yield of_error
+    yield -of_error * rng.uniform(0.9, 1, (STEPS, m))
+    chosen = of_error.copy()
     for k in range(0, STEPS, 25):  # the best of some tries for a stretch, by the error at its end
         tries = [chosen]
-        for _ in range(CANDIDATES - 1):
+        for i in range(CANDIDATES - 1):
             other = chosen.copy()
-            other[k : k + 25] = most * rng.uniform(-1, 1, (len(other[k : k + 25]), m))
+            stretch = chosen[k : k + 25] if i % 2 else most
+            other[k : k + 25] = stretch * rng.uniform(0.8 if i % 2 else -1, 1, (25, m))
             tries.append(other)
         chosen = max(tries, key=lambda u: float(np.abs(errors(system, fmt, u[: k + 25])[-1, at])))
     yield chosen
