@@ -34,6 +34,8 @@ FILTER, DRIVEN, NONLINEAR, SYSTEM, LIMITED, STEP, SMOOTHER, FUNCTION = KINDS = (
 """The kinds of model."""
 
 _RUNS = (NONLINEAR, STEP, SMOOTHER, FUNCTION)
+_FIXED = "since a bound needs coefficients that do not depend on estimates or inputs"
+_UNBOUNDED = dict.fromkeys(_RUNS, _FIXED) | {SMOOTHER: "since no bound covers its pass backwards"}
 _OBSERVE = 'ask with basis="emulation", and survey_records for many records'
 _OF_SYSTEMS = (FILTER, DRIVEN, NONLINEAR, STEP, SMOOTHER, FUNCTION)
 _WORDS = 'kind="fixed", which finds one format for all numbers'
@@ -61,6 +63,13 @@ CANNOT: dict[str, Mapping[str, str]] = {
     "have a form": dict.fromkeys(KINDS[3:], "leave out form="),
 }
 """For each task, the kinds of model that cannot do it, each with what to use instead."""
+
+WHY: dict[str, Mapping[str, str]] = {
+    "be bounded along a run": _UNBOUNDED,
+    "have a guarantee": _UNBOUNDED | {DRIVEN: "since no proof covers known inputs"},
+    "have a probable error": _UNBOUNDED,
+}
+"""Why a kind of model cannot do a task, where the names of both do not tell."""
 
 TASK_OF_BASIS = {
     "emulation": "",
@@ -106,7 +115,8 @@ def admitted(model: Any, *tasks: str) -> Any:
             name = f"{name}, {kind}," if name and name != kind else kind
             way = CANNOT[task][kind]
             verb = "" if way.split()[0] in ("ask", "leave", "write") else "use "
-            raise ValueError(f"{name} cannot {task}; {verb}{way}")
+            why = f", {WHY[task][kind]}" if kind in WHY.get(task, {}) else ""
+            raise ValueError(f"{name} cannot {task}{why}; {verb}{way}")
     return found
 
 
