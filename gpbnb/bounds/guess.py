@@ -451,15 +451,16 @@ def filter_guess(given: Schedule, within: FilterLimits, steps: int | None, dense
         return none
     exact = each.loop * known.state, each.gain * known.innovation
     part = np.array([ROUNDING] * len(program.roots) + [LOOP] * n + [GAIN] * m)
-    sizes, found = value_sizes(each, known), np.zeros((0, n, 3))
+    sizes, found, before = value_sizes(each, known), np.zeros((0, n, 3)), np.zeros(0)
 
     def bounded(b: Array) -> Array:
-        nonlocal found
+        nonlocal found, before
         h = rounding_errors(program, given.fmt, each, sizes, known.state + b, b)
         if not np.isfinite(h).all():
             return np.full(n, np.inf)
-        G = np.concatenate([columns(program, each, h), *exact], axis=2)
-        found = summed(chosen, each.F, G, part)
+        if not np.array_equal(h, before):
+            G, before = np.concatenate([columns(program, each, h), *exact], axis=2), h
+            found = summed(chosen, each.F, G, part)
         return np.asarray(found.sum(axis=2).max(axis=0, initial=0.0))
 
     b = raised(bounded, n)
@@ -483,15 +484,16 @@ def derived_limits(given: Schedule, chosen: Course, each: Steps, within: FilterL
         return within
     n, m, Z = given.program.n, given.program.m, within.measurement
     x0 = given.x0.astype(np.float64)
-    X, V, part = np.zeros(n), np.zeros(m), np.zeros(m + n + m, dtype=np.int64)
+    X, V = np.zeros(n), np.zeros(m)
     ends = np.concatenate([[0], chosen.ends])
     whole = chosen._replace(ends=ends)
     following = each.HPhi[chosen.rows(ends)]
     starts = np.concatenate([np.broadcast_to(np.eye(n), (len(ends), n, n)), following], axis=1)
     begun = np.abs(_begun(whole, each.F, starts, x0))
+    G = np.concatenate([each.K * Z, each.loop, each.gain], axis=2)
+    sums = summed(whole, each.F, G, np.arange(m + n + m), starts)
     for _ in range(_ROUNDS):
-        G = np.concatenate([each.K * Z, each.loop * X, each.gain * V], axis=2)
-        peaks = (summed(whole, each.F, G, part, starts)[..., 0] + begun).max(axis=0)
+        peaks = (sums @ np.concatenate([np.ones(m), X, V]) + begun).max(axis=0)
         x, v = np.minimum(peaks[:n], within.state), np.minimum(Z + peaks[n:], within.innovation)
         if not (np.isfinite(x).all() and np.isfinite(v).all()):
             break
