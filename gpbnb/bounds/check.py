@@ -15,10 +15,11 @@ the file: filter, format, form, limits. It verifies the answer: the bound b, and
     (1) If e_{k-1} lies in a set, e_k lies in its image under F' and the columns. A set is a sum of segments and of
     an ellipsoid {y: |ay|^2 <= a M a' for all a}, which also contains segments g_j after M := s (M/t + sum g_j
     g_j'/t_j), with s = t + sum t_j, for any t, t_j > 0, by the inequality of Cauchy and Schwarz. Segments of g + h
-    and g - h contain those of g and h; if these are old and alike, the smaller one joins the ellipsoid. The largest
-    size m(r) of r e over a set is a seminorm of the row r, so m(r) <= sum |c_j| m(r_j) + |r - sum c_j r_j| b for any
-    rows r_j, if |e| <= b. Steps are taken in blocks: after j steps, e is P_j e_0 plus the effects of their own w, for
-    the product P_j of loops; r P_j is near (1 - j/J) r + (j/J) r P_J, so only the end of a block moves the set.
+    and g - h contain those of g and h, since pg + qh = (p + q)/2 (g + h) + (p - q)/2 (g - h), with factors of at most
+    1. Two old steps are merged in this way, with the smaller of the two in the ellipsoid. The largest size m(r) of
+    r e over a set is a seminorm of the row r, so m(r) <= sum |c_j| m(r_j) + |r - sum c_j r_j| b for any rows r_j, if
+    |e| <= b. Steps are taken in blocks: after j steps, e is P_j e_0 plus the effects of their own w, for the product
+    P_j of loops; r P_j is near (1 - j/J) r + (j/J) r P_J, so only the end of a block moves the set.
 
     (2) For a row C_0, any rows C_1, ..., C_L with 1 <= L <= k, and R_l = C_l F'_{k-l} - C_{l+1}, telescoping gives
     exactly C_0 e_k = sum_{l<L} (C_l w_{k-l} + R_l e_{k-l-1}) + C_L e_{k-L}. If |e_j| <= b for all j < k, then
@@ -217,6 +218,10 @@ class Arithmetic:
             return 0
         return max(self.normal, up(self.powers[place], 1 + self.nearest))
 
+    def rounds_up(self, n: int, m: int) -> Any:
+        """Whether a tie between the sizes m and m + 1 becomes the larger one."""
+        return {"nearest": True, "even": m & 1, "half up": n > 0}[self.rounding]
+
     def fit(self, n: int, d: int = 1) -> Any:
         """Round n / d units."""
         q, r = divmod(abs(n), d)
@@ -229,8 +234,7 @@ class Arithmetic:
         if rest or r:
             if self.nearest:
                 beyond = 2 * (rest * d + r) - p * d
-                ties = {"nearest": True, "even": m & 1, "half up": n > 0}
-                m += beyond > 0 or (beyond == 0 and ties[self.rounding])
+                m += beyond > 0 or (beyond == 0 and self.rounds_up(n, m))
             elif self.rounding != "chop":
                 m += {"up": n > 0, "down": n < 0, "odd": not m & 1, "stochastic": True}[self.rounding]
         need(m * p <= self.largest, "a computed number exceeds the largest of the format")

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
+from operator import mul
 from pathlib import Path
 from typing import Any
 
@@ -153,6 +154,58 @@ def test_an_error_that_peaks_within_a_block_of_steps_counts(peak: int) -> None:
     prove(content)
     scale_bound("0.999")(content)
     assert f"may exceed its bound after step {peak}" in refused(content)
+
+
+def test_a_row_is_bounded_by_rows_near_it() -> None:
+    rng = np.random.default_rng(41)
+    for _ in range(200):
+        segments, (row, *others) = rng.integers(-99, 100, (5, 3)).tolist(), rng.integers(-9, 10, (3, 3)).tolist()
+        most = lambda row, segments=segments: int(np.abs(np.array(segments) @ row).sum())  # noqa: E731
+        box, shares, whole = [most(unit) for unit in np.eye(3, dtype=int)], rng.integers(-9, 10, 2).tolist(), 7
+        known = [(share, other, most(other)) for share, other in zip(shares, others, strict=True)]
+        assert most(row) <= check.near(row, known, whole, box)
+        assert check.near(row, [(whole, row, most(row))], whole, box) == most(row)
+
+
+def largest(loops: list[Any], columns: list[Any], row: list[int]) -> Fraction:
+    """The largest size of a row times the sum of the effects of all steps, without a rounding."""
+    total, c = Fraction(0), [Fraction(x) for x in row]
+    for F, G in zip(reversed(loops), reversed(columns), strict=True):
+        total += sum(abs(sum(map(mul, c, g))) for g in G)
+        c = [sum(map(mul, c, column)) for column in zip(*F, strict=True)]
+    return total
+
+
+@pytest.mark.parametrize("keep", [1, 4, 64])
+@pytest.mark.parametrize("case", ["tracker", "signs that alternate", "columns of any sign", "numbers of columns"])
+def test_a_set_contains_all_sums_of_effects(case: str, keep: int) -> None:
+    """Old steps are merged, and then contained in an ellipsoid, which only adds to the set."""
+    rng, steps, bits = np.random.default_rng(keep), 240, 64
+    slow = [["15/16", "15/16"], ["-1/512", "511/512"]]
+    each = [[Fraction(x) * (-1 if case.startswith("signs") else 1) for x in row] for row in slow]
+    drawn, alike = rng.integers(-999, 1000, (steps, 3, 2)), [[[999, 0], [0, 9], [99, 99]]] * steps
+    G = drawn if case.startswith("columns") else alike
+    counts = [3 - k % 2 if case.startswith("numbers") else 3 for k in range(steps)]
+    columns = [[[int(x) << 40 for x in g] for g in step[:count]] for step, count in zip(G, counts, strict=True)]
+    F = [[int(x * 2**bits) for x in row] for row in each]
+    found = check.ErrorSet([10**9 << 40] * 2, [], bits, "an error is larger")
+    slack = [20 + (4 * 10**9 << 40 >> bits)] * 2
+    for k in range(0, steps, 8):
+        found.advance([(F, g, slack, []) for g in columns[k : k + 8]], keep)
+    for row in [[1, 0], [0, 1], *rng.integers(-9, 10, (5, 2)).tolist()]:
+        true, claimed = largest([each] * steps, columns, row), Fraction(found.most([x << bits for x in row]), 2**bits)
+        assert true <= claimed
+        assert keep < 64 or claimed <= Fraction("1.05") * true
+
+
+def test_an_ellipsoid_contains_parallel_segments_and_hardly_more() -> None:
+    found = check.ErrorSet([10**12] * 2, [], 64, "an error is larger")
+    found.add([[3 * 10**9, -(10**9)], [9 * 10**9, -3 * 10**9], [-6 * 10**8, 2 * 10**8]], [0, 0], [(3, 1)])
+    found.absorb(0)
+    assert found.groups == []
+    for row in ([1, 0], [0, 1], [2, -5], [7, 1]):
+        size = abs(row[0] * 3 - row[1]) * 42 * 10**8
+        assert size <= found.most(row) <= size * 1.0001
 
 
 def test_a_running_sum_is_proved_for_its_steps() -> None:
