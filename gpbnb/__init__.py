@@ -36,9 +36,9 @@ __version__ = "0.2.0"
 __all__ = [
     "BFLOAT16", "BINARY16", "BINARY32", "BINARY64", "BINARY128", "DECIMAL32", "DECIMAL64", "DECIMAL128", "FP4_E2M1",
     "FP6_E2M3", "FP6_E3M2", "FP8_E4M3", "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32",
-    "BlockFormats", "EmulatedRun", "FixedFormat", "FixedIntervalSmoother", "FloatArray", "FloatFormat", "Form",
-    "Guarantee", "LimitCycles", "LinearModel", "LinearSystem", "NonlinearModel", "NonlinearSystem", "OutputGuarantee",
-    "RecordSurvey", "Requirement", "Rounding", "SmoothedRecord", "TracedFunction", "WordFormats",
+    "BlockFormats", "EmulatedRun", "FilterGuarantee", "FixedFormat", "FixedIntervalSmoother", "FloatArray",
+    "FloatFormat", "Form", "Guarantee", "LimitCycles", "LinearModel", "LinearSystem", "NonlinearModel",
+    "NonlinearSystem", "RecordSurvey", "Requirement", "Rounding", "SmoothedRecord", "TracedFunction", "WordFormats",
     "emulate", "guarantee", "limit_cycles", "limits", "linalg",
     "peek", "read_model", "required_precision", "survey_records", "write_code",
 ]

@@ -56,6 +56,7 @@ from gpbnb.arithmetic.named import (
 )
 from gpbnb.arithmetic.rounding import Rounding as Rounding
 from gpbnb.arithmetic.traced import TracedFunction as TracedFunction
+from gpbnb.bounds.guarantee import FilterGuarantee as FilterGuarantee
 from gpbnb.bounds.guarantee import Guarantee as Guarantee
 from gpbnb.bounds.guarantee import limits as limits
 from gpbnb.bounds.limit_cycles import LimitCycles as LimitCycles
@@ -70,7 +71,6 @@ from gpbnb.filters.system import LinearSystem as LinearSystem
 from gpbnb.filters.words import WordFormats as WordFormats
 from gpbnb.names import NAMED_FORMATS as NAMED_FORMATS
 from gpbnb.wordlength.answer import Requirement as Requirement
-from gpbnb.wordlength.bounding import OutputGuarantee as OutputGuarantee
 from gpbnb.wordlength.bounding import guarantee as guarantee
 from gpbnb.wordlength.bounding import limit_cycles as limit_cycles
 from gpbnb.wordlength.code import write_code as write_code

@@ -21,6 +21,7 @@ ALIASES = {
 HOMES = {
     "BlockFormats": "gpbnb.filters.blocks",
     "EmulatedRun": "gpbnb.wordlength.emulation",
+    "FilterGuarantee": "gpbnb.bounds.guarantee",
     "FixedFormat": "gpbnb.arithmetic.fixed",
     "FixedIntervalSmoother": "gpbnb.filters.smoothing",
     "FloatArray": "gpbnb.arithmetic.array",
@@ -32,7 +33,6 @@ HOMES = {
     "LinearSystem": "gpbnb.filters.system",
     "NonlinearModel": "gpbnb.filters.nonlinear",
     "NonlinearSystem": "gpbnb.filters.nonlinear_system",
-    "OutputGuarantee": "gpbnb.wordlength.bounding",
     "RecordSurvey": "gpbnb.wordlength.records",
     "Requirement": "gpbnb.wordlength.answer",
     "Rounding": "gpbnb.arithmetic.rounding",

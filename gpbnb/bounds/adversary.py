@@ -20,7 +20,7 @@ from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
 from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
 from gpbnb.bounds.gains import Schedule
-from gpbnb.bounds.guarantee import Guarantee, closed_loops
+from gpbnb.bounds.guarantee import FilterGuarantee, closed_loops
 from gpbnb.bounds.guess import FilterLimits, linear_steps
 from gpbnb.bounds.units import largest_errors, units
 from gpbnb.filters.kernels.bounded import widened
@@ -273,7 +273,7 @@ def responses(given: Schedule, F: NDArray[np.float64], state: int, steps: int) -
 
 
 def attack(
-    found: Guarantee,
+    found: FilterGuarantee,
     steps: int = 1_000,
     candidates: int = 200,
     seed: int = 0,
@@ -324,7 +324,7 @@ def shares_of(errors: NDArray[np.float64], bound: NDArray[np.float64]) -> NDArra
     return np.asarray(np.divide(errors, bound, out=beyond, where=(errors != 0) & (bound != 0)))
 
 
-def ceiling(found: Guarantee, z: NDArray[np.float64], state: int) -> float:
+def ceiling(found: FilterGuarantee, z: NDArray[np.float64], state: int) -> float:
     """Return the error that a state would have after a run if all roundings of this run had the same effect.
 
     Each rounding error is as large as a result of that size allows. The errors of gain and closed loop are those of the
@@ -366,7 +366,7 @@ def ceiling(found: Guarantee, z: NDArray[np.float64], state: int) -> float:
     return total + abs(known)
 
 
-def random_errors(found: Guarantee, steps: int, center: Any = None) -> NDArray[np.float64]:
+def random_errors(found: FilterGuarantee, steps: int, center: Any = None) -> NDArray[np.float64]:
     """Return errors after each step, (steps, n), of one run with random measurements within the limits.
 
     Parameters
@@ -386,7 +386,7 @@ def random_errors(found: Guarantee, steps: int, center: Any = None) -> NDArray[n
 
 
 def run_against(
-    found: Guarantee,
+    found: FilterGuarantee,
     rows: NDArray[np.float64],
     pool: NDArray[np.float64],
     steer: NDArray[np.float64],
@@ -409,7 +409,7 @@ def run_against(
 
 
 def _pool(
-    found: Guarantee,
+    found: FilterGuarantee,
     F: NDArray[np.float64],
     state: int,
     steps: int,
@@ -442,7 +442,7 @@ def _pool(
     return Z * (1 - 1e-9) * (low + (high - low) * rng.uniform(0, 1, (steps, candidates, m)))
 
 
-def _steering(found: Guarantee, center: Any) -> NDArray[np.float64]:
+def _steering(found: FilterGuarantee, center: Any) -> NDArray[np.float64]:
     """Return a regulator whose innovations bring the exact filter to a given state, from transition and gain."""
     given, n, m = found.schedule, found.schedule.program.n, found.schedule.program.m
     Phi, K = given.Phi[-1, :, :, 0], given.exact[-1, :, :, 0]

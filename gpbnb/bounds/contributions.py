@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds.guarantee import Guarantee
+from gpbnb.bounds.guarantee import FilterGuarantee
 from gpbnb.bounds.probable import separate_roundings
 
 _NEGLIGIBLE = 1e-9
@@ -37,7 +37,7 @@ class Contributions(NamedTuple):
     sums: NDArray[np.float64]
 
 
-def contributions(found: Guarantee) -> Contributions:
+def contributions(found: FilterGuarantee) -> Contributions:
     """Divide the bound of a filter with a settled gain among the operations of a step.
 
     If the gain has a period, operations are those of its last step.

@@ -34,6 +34,7 @@ from gpbnb.bounds.units import stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LARGEST_EXPONENT, LinearModel
 from gpbnb.filters.system import LinearFilter
+from gpbnb.filters.words import WordFormats
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain")
 """Names of the parts of a bound, in the order in which a guarantee lists them."""
@@ -42,33 +43,23 @@ EFFORT = 9e6
 """The most that a proof may take, in about the products of its steps; more if more steps are asked for."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Guarantee:
-    """A bound on the effect of rounding on an estimate, proved by :mod:`gpbnb.bounds.check`.
+    """A bound on the effect of rounding on estimates or outputs, for all measurements or inputs within limits.
 
     Parameters
     ----------
-    bound : (n,), bound of the error of each state after every step; infinite if there is none.
+    bound : bound of the error of each state or output after every step; infinite if there is none.
     steps : None if the bound holds for ever; otherwise the number of steps for which it holds.
     why : why the bound does not hold for ever; empty if it does.
-    parts : (n, 3), shares of each state's bound at the step where it is largest; see :data:`PARTS`.
-    limits : limits on the filter without rounding: those given, and those that follow from them.
-    schedule : the filter's coefficients.
-    radius : growth of an error per step, averaged over a period.
-    asked : limits as given.
-    lags : how many earlier steps the checker sums one by one, for fixed coefficients.
-    text : what was proved, as JSON; empty if there is no bound.
+    format : the format or formats.
+    text : what :mod:`gpbnb.bounds.check` proved, as JSON; empty if there is no bound, or if a system limits its values.
     """
 
     bound: NDArray[np.float64]
     steps: int | None
     why: str
-    parts: NDArray[np.float64]
-    limits: FilterLimits
-    schedule: Schedule
-    radius: float
-    asked: FilterLimits
-    lags: int = 1
+    format: FloatFormat | FixedFormat | WordFormats
     text: str = ""
 
     @property
@@ -81,21 +72,45 @@ class Guarantee:
 
         Raises
         ------
-        ValueError : there is no bound.
+        ValueError : there is no bound, or a system limits its values.
         """
         if not self.text:
-            raise ValueError(f"got a guarantee {self.bound} without a bound: {self.why}; needed one")
+            raise ValueError(
+                f"got no certificate for the bound {self.bound}: {self.why or 'the system limits its values'}"
+            )
         return self.text
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         numbers = ", ".join(f"{b:.3g}" for b in self.bound)
-        fmt = arithmetic(self.schedule.fmt)
-        if self.steps is not None:
-            return f"within {numbers} for {self.steps} steps only, because {self.why}; in {fmt}"
-        at = "" if self.schedule.repeat is None else f"; the gain repeats from step {self.schedule.repeat}"
-        return f"within {numbers} for ever, in {fmt}{at}"
+        time = "for ever" if self.for_ever else f"for {self.steps} steps only, because {self.why};"
+        fmt = str(self.format) if isinstance(self.format, WordFormats) else arithmetic(self.format)
+        return f"within {numbers} {time}{',' * self.for_ever} in {fmt}"
 
-    __repr__ = __str__  # the fields have thousands of numbers
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FilterGuarantee(Guarantee):
+    """A bound on the estimates of a filter, and what it was computed from.
+
+    Parameters
+    ----------
+    parts : (n, 3), shares of each state's bound at the step where it is largest; see :data:`PARTS`.
+    limits : limits on the filter without rounding: those given, and those that follow from them.
+    schedule : the filter's coefficients.
+    radius : growth of an error per step, averaged over a period.
+    asked : limits as given.
+    lags : how many earlier steps the checker sums one by one, for fixed coefficients.
+    """
+
+    parts: NDArray[np.float64]
+    limits: FilterLimits
+    schedule: Schedule
+    radius: float
+    asked: FilterLimits
+    lags: int = 1
+
+    def __repr__(self) -> str:
+        settled = self.for_ever and self.schedule.repeat is not None
+        return super().__repr__() + (f"; the gain repeats from step {self.schedule.repeat}" if settled else "")
 
 
 def limits(*, state: Any = math.inf, innovation: Any = math.inf, measurement: Any = math.inf) -> FilterLimits:
@@ -185,7 +200,7 @@ def guarantee(
     form: Form | str = Form.INNOVATION,
     most: int | None = None,
     horizon: int = 1_000,
-) -> Guarantee:
+) -> FilterGuarantee:
     """Bound the effect of rounding on the estimates of a Kalman filter, for every admissible measurement sequence.
 
     The bound is for a run of the model as given, with sums from left to right and no fused multiply-add. Its
@@ -211,7 +226,7 @@ def guessed(
     form: Form | str = Form.INNOVATION,
     most: int | None = None,
     horizon: int = 1_000,
-) -> Guarantee:
+) -> FilterGuarantee:
     """Return what :func:`guarantee` is going to prove, without a proof."""
     if not isinstance(model, LinearModel):
         raise TypeError(
@@ -231,12 +246,12 @@ def guessed(
     return found
 
 
-def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000) -> Guarantee:
+def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000) -> FilterGuarantee:
     """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`."""
     return _answered(from_guess(given, within, horizon))
 
 
-def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000, effort: float = EFFORT) -> Guarantee:
+def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000, effort: float = EFFORT) -> FilterGuarantee:
     """Return what :func:`from_schedule` is going to prove, without a proof; `effort` limits what it may take."""
     within = sized_limits(within, given.program.n, given.program.m, given.x0)
     radius = loop_radius(given) if given.settled else math.nan
@@ -259,7 +274,10 @@ def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000, effo
         elif given.fmt.limits is not None:
             why = f"no bound was found within the range of {arithmetic(given.fmt)}: a number may exceed the largest"
     derived = FilterLimits(found.state, found.innovation, stored_sizes(given.fmt, within.measurement))
-    return Guarantee(found.bound, steps, why, found.parts, derived, given, radius, within, found.lags)
+    return FilterGuarantee(
+        found.bound, steps, why, given.fmt, parts=found.parts, limits=derived, schedule=given, radius=radius,
+        asked=within, lags=found.lags,
+    )  # fmt: skip
 
 
 def _too_slow(given: Schedule, steps: int | None, radius: float, effort: float) -> str:
@@ -286,7 +304,7 @@ def _guess(given: Schedule, within: FilterLimits, steps: int | None, dense: bool
     return filter_guess(given, stored, steps, dense)
 
 
-def _answered(found: Guarantee) -> Guarantee:
+def _answered(found: FilterGuarantee) -> FilterGuarantee:
     """Prove a guarantee; return it with its certificate, or without a bound."""
     given, steps = found.schedule, found.steps
     if not np.isfinite(found.bound).all():

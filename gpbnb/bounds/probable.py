@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.gains import filter_schedule
-from gpbnb.bounds.guarantee import Guarantee, from_guess, limits
+from gpbnb.bounds.guarantee import FilterGuarantee, from_guess, limits
 from gpbnb.bounds.guess import linear_steps, rounding_errors, value_sizes
 from gpbnb.bounds.system import guessed_errors
 from gpbnb.filters.structures import steady_covariance
@@ -38,7 +38,7 @@ class StepRoundings(NamedTuple):
     errors: NDArray[np.float64]
 
 
-def separate_roundings(found: Guarantee) -> StepRoundings:
+def separate_roundings(found: FilterGuarantee) -> StepRoundings:
     """Return the roundings of a period, one by one, even if operations have the same effect."""
     if not found.for_ever:
         raise ValueError(
@@ -51,7 +51,7 @@ def separate_roundings(found: Guarantee) -> StepRoundings:
     return StepRoundings(steps.F, steps.effects[program.n + program.m :].transpose(1, 2, 0), h.T)
 
 
-def probable_error(found: Guarantee) -> NDArray[np.float64]:
+def probable_error(found: FilterGuarantee) -> NDArray[np.float64]:
     """Return the standard deviation of each state's rounding error, the largest over a period; (n,).
 
     Values are assumed to be as large as their limits allow; smaller values have smaller rounding errors.

@@ -16,7 +16,7 @@ from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.search import Outcome
-from gpbnb.bounds.guarantee import Guarantee, check_within, guarantee, guessed, sized_limits
+from gpbnb.bounds.guarantee import FilterGuarantee, check_within, guarantee, guessed, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.probable import probable_error, probable_output_errors
 from gpbnb.bounds.system import guessed_errors, output_errors
@@ -208,7 +208,7 @@ class Guaranteed(Strategy):
         """Return the largest bound over its tolerance as it is proved, or infinity and the reason."""
         return self._outcome(fmt, guarantee)
 
-    def _outcome(self, fmt: Any, bounded: Callable[..., Guarantee]) -> Outcome:
+    def _outcome(self, fmt: Any, bounded: Callable[..., FilterGuarantee]) -> Outcome:
         asked = np.isfinite(self.tolerances)
         try:
             if self.steps is None:
@@ -233,7 +233,7 @@ class Guaranteed(Strategy):
         """Return why the errors may say little about other runs, or what this run leaves."""
         return self.outside
 
-    def _errors(self, found: Guarantee) -> NDArray[np.float64]:
+    def _errors(self, found: FilterGuarantee) -> NDArray[np.float64]:
         """Return the error of each state, (n,)."""
         return found.bound
 
@@ -246,7 +246,7 @@ class Probable(Guaranteed):
     def over(self, steps: int) -> None:
         """Return None: the probable error is that of a steady state."""
 
-    def _errors(self, found: Guarantee) -> NDArray[np.float64]:
+    def _errors(self, found: FilterGuarantee) -> NDArray[np.float64]:
         return 3 * probable_error(found)
 
 

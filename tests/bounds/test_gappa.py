@@ -10,12 +10,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.bounds.guarantee import Guarantee
+from gpbnb.bounds.guarantee import FilterGuarantee
 from gpbnb.report.guarantees import gappa
 from gpbnb.report.guarantees.table import FORMAT, case_guarantee, case_named
 
 
-def one_step(name: str) -> Guarantee:
+def one_step(name: str) -> FilterGuarantee:
     case = case_named(name)
     return gappa.single_step(case_guarantee(case, case.make(), FORMAT))
 

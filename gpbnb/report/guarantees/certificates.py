@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.check import NotProvedError, prove
-from gpbnb.bounds.guarantee import Guarantee, guarantee, limits
+from gpbnb.bounds.guarantee import FilterGuarantee, guarantee, limits
 from gpbnb.filters.forms import Form
 from gpbnb.interrupts import interruptible
 from gpbnb.report.display.tables import Table
@@ -55,17 +55,17 @@ class CheckedCertificate(NamedTuple):
     verdict: str
 
 
-def _cyclic() -> Guarantee:
+def _cyclic() -> FilterGuarantee:
     """The filter with ten states of the chapter, in the UD form, whose gain repeats."""
     return guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(state=100, innovation=10), form=Form.UD)
 
 
-def tracker_guarantee(factor: int = 1, fmt: FloatFormat = FORMAT) -> Guarantee:
+def tracker_guarantee(factor: int = 1, fmt: FloatFormat = FORMAT) -> FilterGuarantee:
     """The tracker of the chapter, with limits that are wider by a factor."""
     return guarantee(tracker(), fmt, limits(state=[factor * 1000, factor * 30], innovation=factor * 8))
 
 
-def _within_a_centimetre() -> Guarantee:
+def _within_a_centimetre() -> FilterGuarantee:
     """The tracker in the least precision that keeps its errors within 0.01."""
     within = limits(state=[1000, 30], innovation=8)
     answer = required_precision(tracker(), 1, [0.01, 0.01], basis="guarantee", within=within)
@@ -74,7 +74,7 @@ def _within_a_centimetre() -> Guarantee:
     return tracker_guarantee(fmt=answer.format)
 
 
-def guarantees() -> dict[str, Callable[[], Guarantee]]:
+def guarantees() -> dict[str, Callable[[], FilterGuarantee]]:
     """Return functions that compute the guarantees of the book, by name."""
     found = {case.make().name: lambda case=case: case_guarantee(case, case.make(), FORMAT) for case in CASES}
     return {

@@ -9,12 +9,12 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from gpbnb.bounds.adversary import run_against
-from gpbnb.bounds.guarantee import Guarantee
+from gpbnb.bounds.guarantee import FilterGuarantee
 from gpbnb.bounds.probable import separate_roundings
 from gpbnb.report.display.style import OBSERVED, OBSERVED_OTHERS, VALID, envelope, label, legend, loglog
 
 
-def errors_of(found: Guarantee, z: Any) -> NDArray[np.float64]:
+def errors_of(found: FilterGuarantee, z: Any) -> NDArray[np.float64]:
     """Return errors (steps, n) of the run with measurements `z` (steps, m), which are numbers of the format."""
     measured = np.asarray(z, dtype=np.float64)
     n, m = found.schedule.program.n, found.schedule.program.m
@@ -22,7 +22,12 @@ def errors_of(found: Guarantee, z: Any) -> NDArray[np.float64]:
 
 
 def draw_errors(
-    ax: Axes, found: Guarantee, chosen: NDArray[np.float64], random: NDArray[np.float64], state: int, quantity: str
+    ax: Axes,
+    found: FilterGuarantee,
+    chosen: NDArray[np.float64],
+    random: NDArray[np.float64],
+    state: int,
+    quantity: str,
 ) -> None:
     """Draw the bound, and bands of the errors that an adversary achieved and that random measurements caused.
 
@@ -46,7 +51,7 @@ def draw_errors(
     legend(ax, loc="upper left")
 
 
-def reachable_corners(found: Guarantee) -> NDArray[np.float64]:
+def reachable_corners(found: FilterGuarantee) -> NDArray[np.float64]:
     """Return the corners of the set of errors that the roundings of all steps can add up to, (k, 2), in order.
 
     It is the sum of one line segment for each operation and step, for a filter with two states and a settled gain.
@@ -66,7 +71,7 @@ def reachable_corners(found: Guarantee) -> NDArray[np.float64]:
 
 
 def draw_set(
-    ax: Axes, found: Guarantee, chosen: NDArray[np.float64], names: tuple[str, str], scale: float = 1.0
+    ax: Axes, found: FilterGuarantee, chosen: NDArray[np.float64], names: tuple[str, str], scale: float = 1.0
 ) -> None:
     """Draw the set of errors of a filter with two states, its box, and the path of errors that an adversary chose.
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.named import rounding_text
 from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.bounds.adversary import attack, responses, shares_of
-from gpbnb.bounds.guarantee import Guarantee, closed_loops, guarantee
+from gpbnb.bounds.guarantee import FilterGuarantee, closed_loops, guarantee
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.report.display.tables import Table
@@ -142,7 +142,7 @@ def first_outside(drawn: Drawn, true: NDArray[np.float64], stored: NDArray[np.fl
     return len(z) if inside.all() else int(inside.argmin())
 
 
-def other_gains(drawn: Drawn, found: Guarantee) -> int:
+def other_gains(drawn: Drawn, found: FilterGuarantee) -> int:
     """Return the number of steps in which a user's run has another gain than those for which the guarantee holds."""
     given = found.schedule
     steps = STEPS if found.steps is None else min(STEPS, found.steps)
@@ -156,7 +156,7 @@ def other_gains(drawn: Drawn, found: Guarantee) -> int:
     return int((~same.all(axis=1)).sum())
 
 
-def inputs(drawn: Drawn, found: Guarantee, rng: np.random.Generator) -> Iterator[tuple[str, NDArray[np.float64]]]:
+def inputs(drawn: Drawn, found: FilterGuarantee, rng: np.random.Generator) -> Iterator[tuple[str, NDArray[np.float64]]]:
     """Give the inputs of each run, (steps, m), and their kind."""
     n, m = drawn.model.n, drawn.model.m
     steps = STEPS if found.steps is None else min(STEPS, found.steps)
@@ -185,7 +185,7 @@ def inputs(drawn: Drawn, found: Guarantee, rng: np.random.Generator) -> Iterator
 _FACTORS = np.array([[0.999], [0.5], [0.0], [-0.5], [-0.999]])
 
 
-def _admissible(drawn: Drawn, found: Guarantee, course: NDArray[np.float64]) -> NDArray[np.float64]:
+def _admissible(drawn: Drawn, found: FilterGuarantee, course: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return measurements with a course of shares of their limits, or of the innovations' limits.
 
     An innovation that takes the state out of its limits is reduced or reversed.
@@ -209,7 +209,7 @@ def _admissible(drawn: Drawn, found: Guarantee, course: NDArray[np.float64]) -> 
 
 
 def examine(
-    seed: int, drawn: Drawn | None = None, bounded: Callable[..., Guarantee] = guarantee, smaller: float = 1.0
+    seed: int, drawn: Drawn | None = None, bounded: Callable[..., FilterGuarantee] = guarantee, smaller: float = 1.0
 ) -> FilterRow:
     """Compute one row; its seed determines all random numbers.
 

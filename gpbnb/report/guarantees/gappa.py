@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gpbnb.bounds.guarantee import Guarantee
+from gpbnb.bounds.guarantee import FilterGuarantee
 from gpbnb.bounds.guess import FilterLimits, columns, linear_steps, rounding_errors, value_sizes
 from gpbnb.filters.program import ADD, MULTIPLY
 from gpbnb.report.display.tables import Table, short
@@ -47,14 +47,14 @@ class GappaRow(NamedTuple):
     gappa: str
 
 
-def single_step(found: Guarantee) -> Guarantee:
+def single_step(found: FilterGuarantee) -> FilterGuarantee:
     """Return a guarantee whose limits are those of one step from any exact estimate and measurement."""
     H = np.abs(found.schedule.HPhi[-1, :, :, 0])
     X, V = found.limits.state, found.limits.innovation
     return replace(found, limits=FilterLimits(X, H @ X + H @ X + V, H @ X + V), bound=np.zeros(len(X)))
 
 
-def ours(found: Guarantee) -> list[float]:
+def ours(found: FilterGuarantee) -> list[float]:
     """Bound the rounding errors of one step by our columns."""
     given, program, b = found.schedule, found.schedule.program, found.bound
     step = linear_steps(given, np.array([given.steps - 1]))
@@ -62,7 +62,7 @@ def ours(found: Guarantee) -> list[float]:
     return [float(x) for x in np.abs(columns(program, step, h))[0].sum(axis=1)]
 
 
-def script(found: Guarantee) -> str:
+def script(found: FilterGuarantee) -> str:
     """Write the operations of the last step and the question of its rounding errors for Gappa."""
     program, X, Z = found.schedule.program, found.limits.state, found.limits.measurement
     c = [Fraction(float(high)) + Fraction(float(low)) for high, low in found.schedule.coefficients[-1]]

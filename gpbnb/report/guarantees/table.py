@@ -19,7 +19,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.bounds.adversary import attack, ceiling, random_errors
 from gpbnb.bounds.gains import filter_schedule
-from gpbnb.bounds.guarantee import Guarantee, from_guess, from_schedule, guarantee, guessed, limits
+from gpbnb.bounds.guarantee import FilterGuarantee, from_guess, from_schedule, guarantee, guessed, limits
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
@@ -226,7 +226,7 @@ def compute(case: GuaranteeCase) -> GuaranteeRow:
 
 def case_guarantee(
     case: GuaranteeCase, made: LinearModel | LinearFilter, fmt: FloatFormat, proved: bool = True
-) -> Guarantee:
+) -> FilterGuarantee:
     """Compute the guarantee of a case, whose filter is `made`, in a format; or only guess it."""
     bounded, of_filter = (guarantee, from_schedule) if proved else (guessed, from_guess)
     if isinstance(made, LinearModel):

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
 from gpbnb.bounds.contributions import Contributions, contributions
-from gpbnb.bounds.guarantee import Guarantee
+from gpbnb.bounds.guarantee import FilterGuarantee
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, innovation_program
 from gpbnb.report.display import style
 from gpbnb.report.guarantees.certificates import tracker_guarantee
@@ -98,7 +98,7 @@ def _lines() -> tuple[ListedValue, ...]:
 
 
 @cache
-def _found() -> tuple[Guarantee, Contributions]:
+def _found() -> tuple[FilterGuarantee, Contributions]:
     found = tracker_guarantee()
     return found, contributions(found)
 
