@@ -1,0 +1,63 @@
+"""Slow filters nearly reach their bounds where the computed estimate stands still while the exact one moves on.
+
+A constant measurement corrects the estimate by less than the rounding of its last sum takes away, in every step for
+hundreds of steps. These are the filters whose old errors the checker merges.
+"""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gpbnb import FilterGuarantee, FloatFormat, Form, LinearModel, Rounding, limits
+from gpbnb.bounds.certificate import _APART
+from gpbnb.bounds.guarantee import guarantee
+from gpbnb.filters.program import ADD, MULTIPLY
+from gpbnb.report.guarantees.filters import errors
+
+REACHED = {Form.HUNG: 0.3, Form.HUNG_SECOND_GAIN: 0.3}
+"""Least error / bound, 0.75 for other forms: Hung's have a product more, whose rounding an estimate fixes."""
+STEADY = 2.0**-7
+WITHIN = limits(state=1.7, innovation=1.2 * 2.0**-9 / STEADY)
+
+
+def slow(x: Any = 0) -> LinearModel:
+    """A filter of a constant whose gain is small from the first step on."""
+    return LinearModel([[1]], [[1]], [[STEADY**2]], [[1]], [x], [[STEADY]], name="a slow filter")
+
+
+def following(found: FilterGuarantee, x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The computed estimates after one step with the settled gain."""
+    program, fmt = found.schedule.program, found.schedule.fmt
+    c = [fmt.array(float(each)) for each in found.schedule.coefficients[-1, :, 0]]
+    values = [fmt.array(x), fmt.array(z)]
+    for code, a, b in program.operations.tolist():
+        values.append(
+            c[a] * values[b] if code == MULTIPLY else values[a] + values[b] if code == ADD else values[a] - values[b]
+        )
+    return np.asarray(values[program.outputs[0]].to_float())
+
+
+@pytest.mark.parametrize("rounding", [Rounding.NEAREST, Rounding.EVEN, Rounding.HALF_UP], ids=str)
+@pytest.mark.parametrize("form", Form)
+def test_an_estimate_that_stands_still_nearly_reaches_the_bound(form: Form, rounding: Rounding) -> None:
+    fmt = FloatFormat(2, 10, rounding)
+    found = guarantee(slow(), fmt, WITHIN, form)
+    assert json.loads(found.certificate())["keep"] == _APART
+    X, V, K = 1.7, float(WITHIN.innovation[0]), float(found.schedule.exact[-1, 0, 0, 0])
+    x = np.arange(1, X, float(fmt.unit_roundoff) * 2)[:, None] * [[1, -1]]
+    x, z = np.broadcast_arrays(x.reshape(-1, 1), fmt.array(x.reshape(-1, 1) + np.linspace(-1, 1, 51) * V).to_float())
+    still = (following(found, x, z) == x) & (np.abs(z) <= X) & (np.abs(z - x) < V)  # the exact estimate tends to z
+    i = np.unravel_index(np.where(still, np.abs(x - z), 0).argmax(), x.shape)
+    model = slow(Fraction(float(x[i])))
+    drawn: Any = SimpleNamespace(model=model, fmt=fmt, form=form, stored=model.rounded(fmt), within=WITHIN)
+    steps = int(8 / K)
+    off, _ = errors(drawn, np.full((steps, 1), z[i]))
+    assert len(off) == steps
+    assert REACHED.get(form, 0.75) * found.bound[0] < np.abs(off).max() <= found.bound[0]
