@@ -218,10 +218,6 @@ class Arithmetic:
             return 0
         return max(self.normal, up(self.powers[place], 1 + self.nearest))
 
-    def rounds_up(self, n: int, m: int) -> Any:
-        """Whether a tie between the sizes m and m + 1 becomes the larger one."""
-        return {"nearest": True, "even": m & 1, "half up": n > 0}[self.rounding]
-
     def fit(self, n: int, d: int = 1) -> Any:
         """Round n / d units."""
         q, r = divmod(abs(n), d)
@@ -234,7 +230,7 @@ class Arithmetic:
         if rest or r:
             if self.nearest:
                 beyond = 2 * (rest * d + r) - p * d
-                m += beyond > 0 or (beyond == 0 and self.rounds_up(n, m))
+                m += beyond > 0 if beyond else {"nearest": True, "even": m & 1, "half up": n > 0}[self.rounding]
             elif self.rounding != "chop":
                 m += {"up": n > 0, "down": n < 0, "odd": not m & 1, "stochastic": True}[self.rounding]
         need(m * p <= self.largest, "a computed number exceeds the largest of the format")
