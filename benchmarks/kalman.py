@@ -21,8 +21,7 @@ from gpbnb.arithmetic import named
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.matrices import difference, matrix_sum
-from gpbnb.arithmetic.kernels.scalar import divide, load, matmul, multiply, negative, store, subtract
+from gpbnb.arithmetic.kernels.scalar import add, divide, load, matmul, multiply, negative, store, subtract
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
@@ -31,6 +30,20 @@ from gpbnb.filters.nonlinear_run import opened
 N, M = 10, 2
 STEPS = 20  # in one call of the compiled loop
 C_SOURCE = Path(__file__).parent / "kalman.c"
+
+
+@njit
+def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    for i in range(c.shape[0]):
+        for j in range(c.shape[1]):
+            store(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+
+
+@njit
+def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    for i in range(c.shape[0]):
+        for j in range(c.shape[1]):
+            store(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
 
 
 @njit(cache=True, nogil=True)

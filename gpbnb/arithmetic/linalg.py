@@ -108,7 +108,7 @@ def matmul(
     check_order(order, fused, block)
     if sums is not None:
         a.operand(b)
-        if not hasattr(sums, "run_tag"):
+        if not hasattr(sums, "check_compiled"):
             raise TypeError(f"sums: got {sums!r}; needed a FloatFormat or a FixedFormat")
         if sums.base != a.format.base or sums.precision < a.format.precision:
             raise ValueError(

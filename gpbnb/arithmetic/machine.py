@@ -63,7 +63,9 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
             raise ValueError("no loops")
         kinds.add(_row(fmt, found, whole[i], numbers[i]))
     (kind,) = kinds
-    made = {"masks": machine.Masks, "pairs": machine.InPairs, "words": machine.InTwoWords}[kind]()
+    made: Any = {"pairs": machine.InPairs, "words": machine.InTwoWords}.get(kind, machine.Careful)()
+    if kind == "floats" and whole[:, machine.QUICK].all():
+        made = machine.Quick()
     return made, machine.Formats(whole, numbers, random)
 
 
@@ -92,15 +94,15 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
         limits = 0.0, 2.0**-960, math.nan, -largest, largest, math.nan, math.nan
         low, high = 2.0**-960, largest
     else:
-        mode, precision, limits = _code(tag.mode), tag.precision, tag[4:]
+        mode, precision, limits = _code(tag.mode), tag.precision, tag[3:]
         low, high = max(tag.gradual, tag.least), min(tag.largest, -tag.lowest)
         low = low or 2.0**-960
     whole[:3], numbers[:] = (bits, precision, mode), limits
     exact = mode == EVEN and precision == 53
     fixed = fmt.rules.limits is not None and fmt.rules.limits.fixed
-    known = (AWAY, EVEN, HALF_UP, ZERO, tags.UP, tags.DOWN)
-    quick = bits == 1 and not fixed and mode in known and (precision < 53 or exact)
+    quick = bits == 1 and not fixed and mode in (AWAY, EVEN, HALF_UP, ZERO, tags.UP, tags.DOWN)
     short = exact or (mode in (AWAY, EVEN) and precision <= tags.SAFE_TWICE)
+    how = machine.SHORT if short else machine.TIED if precision == 53 and mode == AWAY else machine.LONG
     unit = 1 << (53 - precision)
     half, even = unit >> 1, mode == EVEN and not exact
     nearest = half - even if mode in (AWAY, EVEN, HALF_UP) else 0
@@ -111,8 +113,8 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
     sticky = even or ties_up or mode == tags.DOWN, even or mode == tags.UP
     low, high = max(low, machine.LEAST), min(high, 1 / machine.LEAST)
     bits_low, bits_high = np.array([low, high]).view(np.int64).tolist()
-    whole[3:13] = quick, short, unit, below, above, *sticky, even, bits_low, bits_high - bits_low
-    return "masks"
+    whole[3:13] = quick, how, unit, below, above, *sticky, even, bits_low, bits_high - bits_low
+    return "floats"
 
 
 def _code(mode: Any) -> int:
@@ -256,11 +258,74 @@ def _divided(rows: list[list[int]], begin: int, end: int) -> Iterator[tuple[int,
 _SKIP = CODES["skip"]
 
 
+class Memory:
+    """Numbers and truth values of the machine, in the shapes in which its kinds of numbers take them.
+
+    Parameters
+    ----------
+    values : (places, [lanes], ...).
+    truths : (truths, [lanes]).
+    """
+
+    def __init__(self, values: NDArray[Any], truths: NDArray[np.uint8]) -> None:
+        self.values, self.width = values, math.prod(values.shape[1:])
+        self.flat = values.reshape(-1)
+        self.truths = truths.reshape(len(truths), math.prod(truths.shape[1:]))
+
+    def of(self, kind: Any) -> NDArray[Any]:
+        """Return the numbers as a kind takes them."""
+        from gpbnb.arithmetic.kernels import machine
+
+        if isinstance(kind, machine.Quick) and self.width == 1:
+            return self.flat
+        return self.values.reshape(len(self.values), -1) if isinstance(kind, machine.Careful) else self.values
+
+    def places(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the places of numbers in flat memory, those of all lanes and parts."""
+        return (numbers[:, np.newaxis] * self.width + np.arange(self.width)).reshape(-1)
+
+
+def is_far(numbers: NDArray[Any]) -> bool:
+    """Whether some numbers are too small or too large for quick computation."""
+    from gpbnb.arithmetic.kernels import machine
+
+    sizes = np.abs(numbers)
+    return bool(np.any((sizes < machine.LEAST) & (sizes > 0)) or np.any(sizes > 1 / machine.LEAST))
+
+
+def advance(kind: Any, formats: Any, code: Any, memory: Memory, far: bool, notes: NDArray[np.int64], *run: Any) -> None:
+    """Take steps of a run, of which a quick kind leaves those that it cannot compute to the careful one.
+
+    Parameters
+    ----------
+    far : whether numbers may be too small or too large for quick computation.
+    run : the other arguments of :func:`gpbnb.arithmetic.kernels.machine.advance`, in its order.
+    """
+    from gpbnb.arithmetic.kernels import machine
+
+    feeds, places, kept, first, cycle = run
+    notes[machine.DONE], quick = 0, isinstance(kind, machine.Quick)
+    for each in (*([kind] if not (quick and far) else []), *([machine.Careful()] if quick else [])):
+        held = machine.Held(memory.of(each), memory.flat, memory.truths)
+        machine.advance(each, formats, code, feeds, places, held, kept, first, cycle, notes)
+        if notes[machine.ROW] < 0:
+            return
+
+
 def evaluate(kind: Any, formats: Any, code: Any, values: NDArray[Any], truths: NDArray[np.uint8]) -> int:
     """Run operations once for each lane; return how many have results, 0 if the machine does not tell."""
     from gpbnb.arithmetic.kernels import machine
 
+    memory, notes = Memory(values, truths), np.zeros(5, np.int64)
+    none, nowhere = np.zeros(0, values.dtype), np.zeros(0, np.int64)
+    feeds = machine.Feeds(none.reshape(1, 0), none.reshape(0, 1), nowhere.reshape(0, 4))
+    kept = machine.Kept(feeds.own, np.zeros((1, memory.truths.shape[1]), np.uint8), none, none)
+    far = isinstance(kind, machine.Quick) and is_far(values)
     try:
-        return int(machine.evaluate(kind, formats, code, values, truths))
+        advance(
+            kind, formats, code, memory, far, notes, feeds, machine.Places(0, nowhere, nowhere, nowhere, 0), kept, 0, 0
+        )
     except (OverflowError, ZeroDivisionError):
         return 0
+    row = int(notes[machine.ROW])
+    return len(code.rows) if row < 0 else row

@@ -14,8 +14,8 @@ import numpy as np
 from gpbnb.arithmetic.conversion import exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import ExactKernel, kernel
-from gpbnb.arithmetic.kernels.selection import Accumulator, compiled_tag, mixed_tag, run_tag
-from gpbnb.arithmetic.kernels.tags import Tag
+from gpbnb.arithmetic.kernels.selection import Accumulator, check_accumulator, compiled_tag, run_tag
+from gpbnb.arithmetic.kernels.tags import Tag, random_state
 from gpbnb.arithmetic.rounding import Order, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.text import at_entry
 from gpbnb.arithmetic.words import Layout, words
@@ -82,7 +82,7 @@ class NumberFormat(ABC, Generic[Made]):
     def run_tag(
         self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
     ) -> Tag:
-        """Return the tag that selects this format's arithmetic in a compiled loop.
+        """Return the tag of the arithmetic from which a run draws random numbers, if it has any.
 
         Stochastic rounding restarts its random numbers from the seed.
 
@@ -97,9 +97,11 @@ class NumberFormat(ABC, Generic[Made]):
         ValueError : the format has no compiled loops, or these do not support the given `fused`, `sums` or `order`; an
             unknown order.
         """
-        if sums is not None:
-            return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
-        return run_tag(self.rules, fused, order, block)
+        if sums is None:
+            return run_tag(self.rules, fused, order, block)
+        own, other = self.run_tag(), sums.run_tag(fused, order=order, block=block)
+        check_accumulator(own, other)
+        return other if random_state(own) is None else own
 
     def check_compiled(self) -> None:
         """Reject a format without compiled loops.

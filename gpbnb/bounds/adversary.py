@@ -23,8 +23,8 @@ from gpbnb.bounds.gains import Schedule
 from gpbnb.bounds.guarantee import FilterGuarantee, closed_loops
 from gpbnb.bounds.guess import FilterLimits, linear_steps
 from gpbnb.bounds.units import largest_errors, units
-from gpbnb.filters.kernels.bounded import widened
 from gpbnb.filters.kernels.linear import effects, execute
+from gpbnb.filters.kernels.widened import widened
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.program import MULTIPLY, SUBTRACT
 

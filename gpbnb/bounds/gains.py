@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
-from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
+from gpbnb.arithmetic.lanes import recorded
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.array_steps import decorrelated
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
@@ -103,29 +102,13 @@ def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Sched
     )  # fmt: skip
 
 
-@compiled
-def _stored_loops(fmt: Any, K: Any, H: Any, Phi: Any, identity: Any, F: Any) -> None:
-    """Compute closed loops (I - KH)Φ of some steps with every operation rounded, in the order of the filter."""
-    T, W = np.empty_like(identity), np.empty_like(identity)
-    for k in range(K.shape[0]):
-        product_by_sparse(fmt, K[k], H[k % H.shape[0]], T)
-        difference(fmt, identity, T, W)
-        product_by_sparse(fmt, W, Phi[k % Phi.shape[0]], F[k])
+def _closed_loop(K: Any, H: Any, Phi: Any) -> tuple[Any]:
+    """Return (I - KH)Φ, in the order of the filter."""
+    return ((K.format.eye(len(Phi)) - K @ H) @ Phi,)
 
 
-@compiled
-def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
-    """Compute D, the inverse of the unit upper triangle U times H, by back substitution for each step."""
-    for k in range(D.shape[0]):
-        u, h = U[k % U.shape[0]], H[k % H.shape[0]]
-        for j in range(D.shape[2]):
-            for i in range(D.shape[1] - 1, -1, -1):
-                s = load(fmt, h, (i, j))
-                for r in range(i + 1, D.shape[1]):
-                    c = load(fmt, u, (i, r))
-                    if not is_zero(fmt, c):
-                        s = subtract(fmt, s, multiply(fmt, c, load(fmt, D[k], (r, j))))
-                store(fmt, D[k], (i, j), s)
+def _decorrelated(UR: Any, H: Any) -> tuple[Any]:
+    return (decorrelated(UR, H),)
 
 
 def check_deterministic(fmt: FloatFormat | FixedFormat) -> None:
@@ -234,7 +217,7 @@ def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> t
     rows : indices of the run's checkpoints; the first checkpoint is for step `before` + 1.
     """
     n, m, last = run.model.n, run.model.m, int(rows.max()) + 1
-    Phi, H, identity = run.matrices.Phi, run.matrices.H, run.matrices.identity
+    Phi, H = run.matrices.Phi, run.matrices.H
     K = np.ascontiguousarray(run.G[:last])
     tail = K.shape[3:]
 
@@ -246,13 +229,14 @@ def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> t
         return matrices[(before + rows) % len(matrices)].reshape(len(rows), -1, *tail)
 
     if run.form in (Form.HUNG, Form.HUNG_SECOND_GAIN):
-        F = np.empty((last, n, n, *tail), K.dtype)
-        _stored_loops(run.tag, K, np.roll(H, -before, axis=0), np.roll(Phi, -before, axis=0), identity, F)
+        every = before + np.arange(last)
+        loop = recorded(_closed_loop, (n, m), (m, n), (n, n))
+        (F,) = loop.run(run.fmt, K, H[every % len(H)], Phi[every % len(Phi)])
         return loop_program(n, m), np.concatenate([flat(F), flat(K)], axis=1)
     if run.form is Form.UD:
-        cycle = int(np.lcm(len(H), len(run.UR)))
-        D = np.empty((cycle, m, n, *tail), K.dtype)
-        _decorrelated(run.tag, run.UR, H, D)
+        every = np.arange(int(np.lcm(len(H), len(run.UR))))
+        rows_of = recorded(_decorrelated, (m, m), (m, n))
+        (D,) = rows_of.run(run.fmt, run.UR[every % len(run.UR)], H[every % len(H)])
         U = np.array(run.UR)
         for i in range(m):  # the diagonal stores variances in place of ones
             U[:, i, : i + 1] = 0

@@ -25,7 +25,6 @@ from typing import Any, cast
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.tags import Blocks
 from gpbnb.arithmetic.rounding import Rounding, digit_unit
 
 BLOCKS = ("state", "gain", "covariance", "innovation")
@@ -78,7 +77,8 @@ class BlockFormats:
             if fmt.rounding is Rounding.STOCHASTIC:
                 raise ValueError(f"got stochastic rounding for {field.name}; needed another rounding")
             fmt.check_compiled()
-        self.run_tag()
+        for name in BLOCKS:
+            getattr(self, name).run_tag(sums=self.sums)
 
     @classmethod
     def uniform(cls, fmt: FloatFormat, sums: FloatFormat | None = None) -> BlockFormats:
@@ -103,11 +103,6 @@ class BlockFormats:
         widest = max((getattr(self, name) for name in BLOCKS), key=lambda fmt: fmt.precision)
         unlimited = FloatFormat(widest.base, widest.precision, widest.rounding)
         return unlimited if isinstance(unlimited.backend, Compiled) else cast(FloatFormat, widest)
-
-    def run_tag(self) -> Blocks:
-        """Return the tags that select the arithmetic of each block in compiled loops."""
-        each = {name: getattr(self, name).run_tag(sums=self.sums) for name in BLOCKS}
-        return Blocks(**each)
 
     def array(self, values: Any) -> FloatArray:
         """Round measurements into the format of the state."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
-from gpbnb.arithmetic.machine import code_of, evaluate, packed_constants, tables
+from gpbnb.arithmetic.lanes import Lanes, recorded
+from gpbnb.filters.array_steps import decorrelated
 from gpbnb.filters.contraction import (
     Contraction,
     Repeated,
@@ -23,9 +23,8 @@ from gpbnb.filters.contraction import (
 )
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel
-from gpbnb.filters.kernels.bounded import represented, residuals, symmetric_parts, whole_gain
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.opening import StepArrays, as_packed, opening, step_arrays
+from gpbnb.filters.opening import Opening, opening
 from gpbnb.filters.recording import recorded_step, step_kind
 
 Array = NDArray[np.float64]
@@ -34,7 +33,6 @@ DECAYED = 2.0**-700
 """Size below which an entry of the estimate becomes zero where a step would leave the range of float64."""
 
 _UNIT = 2.0**-100  # of double-double
-_NUMBERS = 1 << 19  # that are computed at once
 
 
 class Bounds(NamedTuple):
@@ -80,9 +78,8 @@ class CarriedBound:
         self.form, self.checkpoint_steps = form, checkpoint_steps
         given = stored.to_float()
         self._plain = given["Phi"], given["H"], given["Q"], given["R"]
-        start = opening(stored, None, Form.INNOVATION, DoubleDouble())
-        self._exact = step_arrays(start, as_packed(None, np.eye(stored.n)))
-        self._repetition = _Repetition(self._exact)
+        self._exact = opening(stored, None, Form.INNOVATION, DoubleDouble())
+        self._repetition = _repetition(self._exact)
         n, m, count = stored.n, stored.m, len(checkpoint_steps)
         #: Bounds at the checkpoint steps.
         self.saved = Bounds(*(np.full((count, *shape), np.inf) for shape in ((n,), (n, m), (n, n))))
@@ -113,9 +110,9 @@ class CarriedBound:
             decayed = (sizes > 0) & (sizes < DECAYED)
             if decayed.any():
                 taken, self._dropped = taken._replace(x=np.where(decayed[..., np.newaxis], 0.0, taken.x)), True
-            covariances = np.empty_like(taken.P)
-            (represented if self.form == Form.UD else symmetric_parts)(taken.P, covariances)
-            done = self._take(first, taken, covariances)
+            covariance = _represented if self.form == Form.UD else _symmetric
+            (covariances,), _ = recorded(covariance, taken.P.shape[1:3]).begin(None, taken.P)
+            done = self._take(first, taken, covariances) if len(covariances) else 0
         except (OverflowError, ZeroDivisionError):
             done = 0
         if done < len(taken.z):
@@ -123,20 +120,25 @@ class CarriedBound:
 
     def _take(self, first: int, taken: Taken, covariances: Array) -> int:
         """Take the bound over as many steps as can be repeated; return their number."""
-        z, x, exact = taken.z, taken.x, self._exact
-        xe, Ke, Pe, Se = self._repetition.take(z, first, x[:-1], covariances[:-1])
+        x, steps = taken.x[:, :, 0], len(covariances) - 1
+        z, every = taken.z[:steps, :, 0], first + np.arange(steps)
+        Phi, H, Q, R = (each[every % len(each)] for each in _model(self._exact).values())
+        (xe, Ke, Pe, Se), _ = self._repetition.begin(None, x[:steps], covariances[:-1], z, Phi, H, Q, R)
         steps, n, m = len(xe), x.shape[1], z.shape[1]
+        compared = recorded(_residuals, (n, n), (m, n), (m,), (n,), (n,), (n, n), (n,), (n, n))
+        given = Phi, H, z, x, x[1:], covariances[1:], xe, Pe
+        found, _ = compared.begin(None, *(each[:steps] for each in given))
+        y, q, T = (each[..., 0] for each in found)
+        steps = len(y)
         if not steps:
             return 0
-        y, q, T = np.empty((steps, m)), np.empty((steps, n)), np.empty((steps, n, n))
-        residuals(exact, z[:steps], first, x[: steps + 1], covariances[: steps + 1], (xe, Pe), (y, q, T))
         before, measured, K, S, size = map(
-            np.ascontiguousarray, (x[..., 0, 0], z[..., 0, 0], Ke[..., 0], Se[..., 0], covariances[..., 0])
+            np.ascontiguousarray, (x[..., 0], z[..., 0], Ke[:steps, ..., 0], Se[:steps, ..., 0], covariances[..., 0])
         )
         if self.form == Form.UD:
             diagonal = np.diagonal(size, axis1=1, axis2=2)
             size = np.sqrt(np.abs(diagonal[:, :, np.newaxis] * diagonal[:, np.newaxis, :])) * (1 + 2.0**-50)
-        every = np.arange(first, first + steps)
+        every = first + np.arange(steps)
         model = StepModel(*(each[every % len(each)] for each in self._plain))
         off = evaluation_errors(model, before[:steps], size[:steps], measured[:steps], K, S, _UNIT)
         bounds = contraction_steps(self.now, model, Repeated(K, S, y, q, T), off)
@@ -145,10 +147,8 @@ class CarriedBound:
         i = self.checkpoint_steps[at:last] - first - 1
         some, used = Contraction(*(each[i] for each in bounds)), taken.gains[i]
         if self.form == Form.UD:
-            used = np.empty_like(used)
-            for j, k in enumerate(i):
-                of_step = exact.H[(first + k) % len(exact.H)], taken.UR[(first + k) % len(taken.UR)]
-                whole_gain(taken.gains[k], *of_step, used[j])
+            UR = taken.UR[(first + i) % len(taken.UR)]
+            (used,) = recorded(_whole_gain, (n, m), (m, n), (m, m)).run(None, used, H[i], UR)
         bound = state_error_bound(some)
         self.saved.state[at:last] = np.nextafter(bound + DECAYED, np.inf) if self._dropped else bound
         self.saved.gain[at:last] = gain_error_bound(some, K[i], used[..., 0], off.gain[i])
@@ -156,55 +156,43 @@ class CarriedBound:
         return steps
 
 
-class _Repetition:
-    """Steps in double-double, each from a given state, all at once: each is a lane of the machine."""
+def _repetition(exact: Opening) -> Lanes:
+    """Return a step in double-double from a given state; it takes the arrays x, P, z, Phi, H, Q and R."""
+    step = recorded_step(step_kind(Form.INNOVATION, _model(exact), None))
+    parts = step.gain, step.estimate
+    rows = np.concatenate([part.rows for part in parts])[np.argsort(np.concatenate([part.at for part in parts]))]
+    given = [step.places[letter] for letter in ("x", "P", "z", "Phi", "H", "Q", "R")]
+    return Lanes(rows, step.sizes, step.constants, given, [step.after["x"], step.K, step.after["P"], step.S])
 
-    def __init__(self, exact: StepArrays) -> None:
-        self._model = {"Phi": exact.Phi, "H": exact.H, "Q": exact.Q, "R": exact.R}
-        self._step = recorded_step(step_kind(Form.INNOVATION, self._model, None))
-        gain, estimate = self._step.gain, self._step.estimate
-        rows = np.concatenate([gain.rows, estimate.rows])[np.argsort(np.concatenate([gain.at, estimate.at]))]
-        self._code = code_of(rows, np.zeros(len(rows), np.int64))
-        self._kind, self._formats = tables([None])
 
-    def take(self, z: Array, first: int, x: Array, P: Array) -> tuple[Array, ...]:
-        """Return estimates, gains, covariances and innovation covariances of steps, as far as they can be repeated."""
-        most = max(_NUMBERS // self._step.sizes[0], 1)
-        found = []
-        for begin in range(0, len(z), most):
-            steps = slice(begin, begin + most)
-            each = self._together(z[steps], first + begin, x[steps], P[steps])
-            if each is None:  # some of them, one by one
-                each = self._alone(z[steps], first + begin, x[steps], P[steps])
-            found.append(each)
-            if len(each[0]) < len(z[steps]):
-                break
-        return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
+def _model(exact: Opening) -> dict[str, Array]:
+    return {"Phi": exact.Phi, "H": exact.H, "Q": exact.Q, "R": exact.R}
 
-    def _alone(self, z: Array, first: int, x: Array, P: Array) -> tuple[Array, ...]:
-        found = [tuple(each[:0] for each in self._together(z[:0], first, x[:0], P[:0]) or ())]
-        for k in range(len(z)):
-            each = self._together(z[k : k + 1], first + k, x[k : k + 1], P[k : k + 1])
-            if each is None:
-                break
-            found.append(each)
-        return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
 
-    def _together(self, z: Array, first: int, x: Array, P: Array) -> tuple[Array, ...] | None:
-        step, steps = self._step, len(z)
-        values, truths = np.zeros((step.sizes[0], steps, 2)), np.zeros((step.sizes[1], steps), np.uint8)
-        truths[1] = 1
-        for constants in filter(attrgetter("places"), step.constants):
-            values[constants.places] = packed_constants(None, constants)[:, np.newaxis]
-        every = first + np.arange(steps)
-        given = {"z": z, "x": x, "P": P} | {letter: each[every % len(each)] for letter, each in self._model.items()}
-        for letter, each in given.items():
-            places = step.places[letter].ravel()
-            values[places] = np.moveaxis(each.reshape(steps, len(places), 2), 0, 1)
-        if steps and evaluate(self._kind, self._formats, self._code, values, truths) < len(self._code.rows):
-            return None
+def _symmetric(P: Any) -> tuple[Any]:
+    return ((P + P.T) * 0.5,)
 
-        def taken(places: NDArray[np.int64]) -> Array:
-            return np.ascontiguousarray(np.moveaxis(values[places], -2, 0))
 
-        return taken(step.after["x"][:, np.newaxis]), taken(step.K), taken(step.after["P"]), taken(step.S)
+def _represented(factors: Any) -> tuple[Any]:
+    """Return the covariance that factors represent, with D on their diagonal and U above."""
+    n, one = len(factors), factors.format.eye(len(factors))
+    U = np.stack([np.stack([factors[i, j] if i < j else one[i, j] for j in range(n)]) for i in range(n)])
+    return ((U * np.diagonal(factors)) @ U.T,)
+
+
+def _residuals(Phi: Any, H: Any, z: Any, x: Any, after: Any, P: Any, repeated: Any, again: Any) -> tuple[Any, Any, Any]:
+    """Return the innovation, and the state and covariance of a run minus the repeated ones."""
+    return z - H @ (Phi @ x), after - repeated, P - _symmetric(again)[0]
+
+
+def _whole_gain(K: Any, H: Any, UR: Any) -> tuple[Any]:
+    """Return the gain of a step in the UD form, combined from the gains of its single measurements."""
+    m, rows = len(UR), decorrelated(UR, H)
+    columns = [K[:, j] for j in range(m)]
+    for i in range(m):
+        for j in range(i):
+            columns[j] = columns[j] - K[:, i] * (rows[i] * columns[j]).sum()
+    for j in range(1, m):
+        for i in range(j):
+            columns[j] = columns[j] - columns[i] * UR[i, j]
+    return (np.stack(columns, axis=1),)

@@ -41,28 +41,6 @@ from gpbnb.filters.model import LinearModel, remembered, stored_arrays
 DONE, NEXT_CHECKPOINT, INDEFINITE, STOPPED = range(4)
 
 
-class StepArrays(NamedTuple):
-    """What a step of a filter uses, each with its own cycle of members, packed."""
-
-    #: (p, n, n) and its transposed members.
-    Phi: NDArray[Any]
-    PhiT: NDArray[Any]
-    #: (p, m, n) and its transposed members.
-    H: NDArray[Any]
-    HT: NDArray[Any]
-    #: (p, n, n) and (p, m, m).
-    Q: NDArray[Any]
-    R: NDArray[Any]
-    #: (p, m, m), inverses of R, for Hung's form with the second gain.
-    RI: NDArray[Any]
-    #: (n, n).
-    identity: NDArray[Any]
-    #: (p, n, n), Phi - I, for compensated summation of the estimate; otherwise (0, n, n).
-    increment: NDArray[Any]
-    #: (n, 1), rounding error of the estimate, from the previous step and for the next.
-    carried: NDArray[Any]
-
-
 class Opening(NamedTuple):
     """What a run starts with, as the compiled loops expect it.
 
@@ -148,30 +126,6 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
             f"computed; needed a covariance that does; use more {unit}, or add a little to the diagonal of {lost}"
         )
     return Opening(Phi, H, Q, R, x0, P0, UQ, UR, U0, RI, tuple(raised), (*stored.repairs, *raised))
-
-
-def step_arrays(start: Opening, identity: NDArray[Any], increment: NDArray[Any] | None = None) -> StepArrays:
-    """Return the arrays that the compiled steps of a filter use before the first step.
-
-    Parameters
-    ----------
-    identity : (n, n), packed.
-    increment : (p, n, n), packed, for compensated summation; by default none.
-    """
-    PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (start.Phi, start.H))
-    none, carried = np.zeros((0, *identity.shape), identity.dtype), np.zeros_like(start.x0[:, np.newaxis])
-    return StepArrays(
-        start.Phi,
-        PhiT,
-        start.H,
-        HT,
-        start.Q,
-        start.R,
-        start.RI,
-        identity,
-        none if increment is None else increment,
-        carried,
-    )
 
 
 def as_packed(fmt: FloatFormat | FixedFormat | None, values: Any) -> NDArray[Any]:

@@ -23,8 +23,8 @@ from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kernels.bounded import widen
 from gpbnb.filters.kernels.records import pairs_as_floats
+from gpbnb.filters.kernels.widened import widen
 from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.opening import (
@@ -35,8 +35,6 @@ from gpbnb.filters.opening import (
     Opening,
     as_packed,
     opening,
-    packed_array,
-    step_arrays,
     widened_array,
 )
 from gpbnb.filters.recording import recorded_step, step_kind
@@ -117,11 +115,11 @@ class Run:
         self.checkpoint_steps = _ascending(checkpoint_steps)
         self._check(sums, compensated, bounded, records)
         self.sums = sums
-        #: The arithmetic of the compiled loops.
+        #: The arithmetic from which the run draws random numbers, if it has any.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(*sums)
         start = opening(model, fmt, self.form, self.tag)
         if self.block_formats is not None:
-            self.tag, start = self.block_formats.run_tag(), self._in_blocks(start, self.block_formats)
+            start = self._in_blocks(start, self.block_formats)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(start.repairs)
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
@@ -133,8 +131,11 @@ class Run:
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, records), (n, m), (n, n))
         )
         self.notes = np.zeros(4, dtype=np.int64)
-        increment = as_packed(self.fmt, model.Phi - np.eye(n, dtype=int)) if compensated else None
-        self.matrices = step_arrays(start, self._identity(), increment)
+        if fmt is not None:
+            identity_in(fmt, 1)
+        #: What the run starts with, and the matrices of its model.
+        self.matrices = start
+        self._increment = as_packed(fmt, model.Phi - np.eye(n, dtype=int)) if compensated else None
         self._compensation = np.zeros_like(self.x)
         self._stepper: Stepper | None = None
         #: Why the run stopped, if it did.
@@ -167,10 +168,6 @@ class Run:
                 f"got the {self.form} form and {records} records; needed at least one record, and for many no "
                 "bound, no checkpoints, and a form whose gain does not depend on the measurements: any but UD"
             )
-
-    def _identity(self) -> NDArray[Any]:
-        n = self.model.n
-        return as_packed(None, np.eye(n)) if self.fmt is None else packed_array(identity_in(self.fmt, n))
 
     def _in_blocks(self, start: Opening, formats: BlockFormats) -> Opening:
         """Return a start whose state and covariance are rounded into the formats of their blocks."""
@@ -281,7 +278,7 @@ class Run:
             packed[..., 1] -= np.where(packed[..., 0] == 0, 0, decimals)
         else:
             packed = as_packed(self.fmt, H)
-        self.matrices = self.matrices._replace(H=packed, HT=np.ascontiguousarray(np.swapaxes(packed, 1, 2)))
+        self.matrices = self.matrices._replace(H=packed)
         self._stepper = None
 
     def save_at(self, checkpoint_steps: NDArray[np.int64]) -> None:
@@ -407,10 +404,10 @@ class Run:
         model |= {"UQ": self.UQ, "UR": self.UR} if upper else {"Q": each.Q, "R": each.R}
         if self.form is Form.HUNG_SECOND_GAIN:
             model["RI"] = each.RI
-        if len(each.increment):
-            model["increment"] = each.increment
+        if self._increment is not None:
+            model["increment"] = self._increment
         formats, blocks, sums = self._formats()
-        kind = step_kind(self.form, model, formats[0], blocks, sums, bool(len(each.increment)))
+        kind = step_kind(self.form, model, formats[0], blocks, sums, self._increment is not None)
         cycle = int(np.lcm.reduce([len(table) for table in model.values()]))
         repeats = self.fmt is None or self.fmt.rounding is not Rounding.STOCHASTIC
         return Stepper(recorded_step(kind), formats, model, self.records, cycle if repeats else 0, self.tag)

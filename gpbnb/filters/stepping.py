@@ -9,7 +9,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.machine import Fault, code_of, fault_of, first_without_result, packed_constants, tables
+from gpbnb.arithmetic.machine import (
+    Fault,
+    Memory,
+    advance,
+    code_of,
+    fault_of,
+    first_without_result,
+    is_far,
+    packed_constants,
+    tables,
+)
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.recording import ProgramPart, RecordedStep
 from gpbnb.interrupts import slices
@@ -78,17 +88,18 @@ class _Repeated:
                 numbers = packed_constants(formats[0], constants)
                 self.values[constants.places] = numbers[(slice(None), *spread)]
         self._constants = np.concatenate([self.values[np.array(each.places, np.int64)] for each in step.constants])
-        self._distant = True
+        self._memory, self._distant = Memory(self.values, self._truths), True
         self._states = np.concatenate([step.places[each].ravel() for each in changes])
         self.after = np.concatenate([step.after[each].ravel() for each in changes])
-        self._before = np.full((len(self._states), *lanes), -1, self.values.dtype)
+        self._before = np.full(len(self._states) * self._memory.width, -1, self.values.dtype)
         self.notes, self.cycle_at = np.zeros(5, np.int64), machine.CYCLE
-        self.feeds = machine.Feeds(np.zeros((0, *lanes[1:]), self.values.dtype), np.zeros((0, 4), np.int64))
+        self._table, self._feeds = np.zeros((0, 1), self.values.dtype), np.zeros((0, 4), np.int64)
 
     @property
     def _parts(self) -> int:
         """How many numbers of the machine hold one."""
-        return 0 if isinstance(self._kind, self._machine.Masks) else self.values.shape[-1]
+        floats = isinstance(self._kind, self._machine.Quick | self._machine.Careful)
+        return 0 if floats else self.values.shape[-1]
 
     def uses(self, places: NDArray[np.int64]) -> bool:
         """Whether an operation takes a number at one of these places, or it is a result."""
@@ -103,19 +114,19 @@ class _Repeated:
             flat.append(table.reshape(members * count, *table.shape[2:]))
             at += members * count
         if flat:
-            self.feeds = self._machine.Feeds(np.concatenate(flat), np.array(rows, np.int64))
-        self._distant = self._far(self._constants) or self._far(self.feeds.table)
+            table = np.concatenate(flat)
+            self._table, self._feeds = table.reshape(len(table), -1), np.array(rows, np.int64)
+        self._distant = self._far(self._constants) or self._far(self._table)
 
     def _far(self, numbers: NDArray[Any]) -> bool:
         """Whether numbers may be too small or too large for quick computation."""
-        sizes, least = np.abs(numbers), self._machine.LEAST
-        return self._parts == 0 and bool(np.any((sizes < least) & (sizes > 0)) or np.any(sizes > 1 / least))
+        return isinstance(self._kind, self._machine.Quick) and is_far(numbers)
 
     def compare_from(self, states: NDArray[Any], cycle: int) -> None:
         """Begin to look for states that repeat."""
         self.notes[:] = 0
         self.notes[self._machine.LASTS] = cycle
-        self._before[:] = states
+        self._before[:] = states.reshape(-1)
 
     @property
     def states(self) -> NDArray[Any]:
@@ -142,23 +153,33 @@ class _Repeated:
         -------
         kept, definite : the results of each step, and whether it was definite.
         """
-        steps, lanes = len(own), self.values.shape[1:]
+        steps, lanes, machine, memory = len(own), self.values.shape[1:], self._machine, self._memory
         kept = np.empty((steps, len(kept_at), *lanes), self.values.dtype)
         held, row = np.ones((steps, *lanes[:1]), np.uint8), 0
+        results = machine.Kept(
+            kept.reshape(steps, len(kept_at) * memory.width),
+            held.reshape(steps, memory.truths.shape[1]),
+            self._before,
+            np.empty_like(self._before),
+        )
+        far = self._distant or self._far(own) or self._far(self.states)
         with contextlib.suppress(OverflowError, ZeroDivisionError):
-            self._machine.advance(
+            advance(
                 self._kind,
-                self._machine.Loaded(self._formats, self._code, self.feeds, self._distant or self._far(own)),
-                first,
-                own,
-                self._machine.Places(at, self._states, self.after, kept_at, self._step.definite),
-                self.values,
-                self._truths,
-                self._machine.Kept(kept, held, self._before),
-                cycle,
+                self._formats,
+                self._code,
+                memory,
+                far,
                 self.notes,
+                machine.Feeds(own.reshape(steps, own.shape[1] * memory.width), self._table, self._feeds),
+                machine.Places(
+                    at * memory.width, *map(memory.places, (self._states, self.after, kept_at)), self._step.definite
+                ),
+                results,
+                first,
+                cycle,
             )
-            row = int(self.notes[self._machine.ROW])
+            row = int(self.notes[machine.ROW])
         done, stop = int(self.notes[self._machine.DONE]), None
         if done < steps and not self.notes[self._machine.CYCLE]:
             rows = self.part.rows

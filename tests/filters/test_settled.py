@@ -6,10 +6,6 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.arithmetic.kernels.matrices import product, product_by_sparse
-from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, zero
-from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.named import BINARY32, BINARY64
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
@@ -83,37 +79,3 @@ def test_a_run_may_be_cut_anywhere():
         cut.take(z[begin:end])
     for one, other in ((whole.x, cut.x), (whole.P, cut.P), (whole.C, cut.C), (whole.G, cut.G), (whole.X, cut.X)):
         assert np.array_equal(one, other)
-
-
-@compiled
-def every_product(fmt, a, b, c, d):
-    product(fmt, a, b, c)
-    product_by_sparse(fmt, a, b, d)
-
-
-@compiled
-def by_scalars(fmt, a, b, c):
-    for i in range(a.shape[0]):
-        for j in range(b.shape[1]):
-            s = zero(fmt)
-            for k in range(a.shape[1]):
-                s = add(fmt, s, multiply(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j))))
-            store(fmt, c, (i, j), s)
-
-
-@pytest.mark.parametrize("scale", [0, -190, 190, 300, -500])
-def test_products_in_double_double(scale):
-    """Those of high and low parts taken apart are those of scalar operations, to the sign of zeros."""
-    rng = np.random.default_rng(abs(scale))
-    for n, m, p in [(8, 9, 8), (9, 3, 11), (12, 12, 12), (7, 8, 9), (4, 8, 1), (10, 10, 1), (2, 20, 2), (17, 1, 5)]:
-        a, b = (rng.standard_normal((*s, 2)) * [1.0, 2.0**-55] for s in ((n, m), (m, p)))
-        a[rng.random((n, m)) < 0.3] = 0
-        a[rng.random((n, m)) < 0.2] = (1.0, 0.0)
-        b[rng.random((m, p)) < 0.2, 1] = 0
-        a *= 2.0**scale
-        b *= 2.0 ** (scale // 2)
-        found, expected = [np.empty((n, p, 2)) for _ in range(2)], np.empty((n, p, 2))
-        every_product(DoubleDouble(), a, b, *found)
-        by_scalars(DoubleDouble(), a, b, expected)
-        for each in found:
-            assert each.tobytes() == expected.tobytes(), (n, m, p)

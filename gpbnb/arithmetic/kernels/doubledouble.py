@@ -47,7 +47,7 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
     t, f = two_sum(a[1], b[1])
     s, e = _fast_two_sum(s, e + t)
     s, e = _fast_two_sum(s, e + f)
-    return _within_range(s, e, True)
+    return _within_range(s, e, s == 0.0)
 
 
 @inner(forceinline=True)
@@ -84,7 +84,7 @@ def sqrt(fmt: Any, a: Any) -> Any:
         return 0.0, 0.0
     s = math.sqrt(a[0])
     s, low = _fast_two_sum(s, (fma(-s, s, a[0]) + a[1]) / (2.0 * s))
-    return _within_range(s, low, False)
+    return _within_range(s, low, a[0] == 0.0)
 
 
 @inner(forceinline=True)

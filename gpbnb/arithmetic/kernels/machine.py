@@ -2,7 +2,10 @@
 
 A row of a program has a code, three operands and the place of its result. Rows stand in segments of one destination
 format, whose precision, rounding and range are data, so that one compiled loop serves all formats of a kind. The kinds
-are tags without fields: :class:`Masks`, :class:`InPairs`, :class:`InTwoWords` and :class:`DoubleDouble`.
+are tags without fields: :class:`Quick`, :class:`Careful`, :class:`InPairs`, :class:`InTwoWords` and
+:class:`DoubleDouble`. What :class:`Quick` cannot compute, :class:`Careful` does.
+
+numba compiles a function anew for a literal argument, such as True or a code, in each place where it differs.
 """
 
 from __future__ import annotations
@@ -18,7 +21,6 @@ from gpbnb.arithmetic.kernels import scalar
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits, select
 from gpbnb.arithmetic.kernels.compiling import borrowing, compiled, inner
 from gpbnb.arithmetic.kernels.processor import fused_sum
-from gpbnb.arithmetic.kernels.rows import copy_row, same_rows
 from gpbnb.arithmetic.kernels.tags import (
     AWAY,
     DOWN,
@@ -47,8 +49,12 @@ format into that of the segment, FUSED adds its third operand to a product, NONZ
 and SKIP leaves out as many rows as its second operand says if its truth value is false."""
 
 
-class Masks(NamedTuple):
-    """Bases 2 and 16 on float64: values (places,) or (places, lanes)."""
+class Quick(NamedTuple):
+    """Base 2 on float64, where no number is near the ends of its range: values (places,) or (places, lanes)."""
+
+
+class Careful(NamedTuple):
+    """Bases 2 and 16 on float64: values (places, lanes)."""
 
 
 class InPairs(NamedTuple):
@@ -88,15 +94,25 @@ class Code(NamedTuple):
     gathered: NDArray[np.float64]
 
 
-class Places(NamedTuple):
-    """Where a run finds and puts its numbers."""
+class Held(NamedTuple):
+    """What a run computes with."""
 
-    #: the first place of the numbers that each step takes.
+    #: Its numbers, with the axes of the kind, and the same memory with one axis.
+    numbers: NDArray[Any]
+    flat: NDArray[Any]
+    #: (truths, lanes).
+    truths: NDArray[np.uint8]
+
+
+class Places(NamedTuple):
+    """Where a run finds and puts its numbers; a number of each lane counts as one, and so does each of its parts."""
+
+    #: the first of the numbers that each step takes.
     own: int
-    #: (states,), places of the states, and of their next values.
+    #: (states,), the states, and their next values.
     states: NDArray[np.int64]
     after: NDArray[np.int64]
-    #: (kept,), numbers to keep, and the truth value to keep.
+    #: (kept,), numbers to keep, and the place of the truth value to keep.
     kept: NDArray[np.int64]
     truth: int
 
@@ -104,43 +120,42 @@ class Places(NamedTuple):
 class Kept(NamedTuple):
     """What is kept of each step."""
 
-    #: (steps, kept, ...) and (steps, ...).
+    #: (steps, kept) and (steps, lanes).
     numbers: NDArray[Any]
     truths: NDArray[np.uint8]
-    #: (states, ...), the states with which later ones are compared.
+    #: (states,), the states with which later ones are compared, and room for their next values.
     before: NDArray[Any]
+    after: NDArray[Any]
 
 
 class Feeds(NamedTuple):
-    """Numbers that each step of a run takes from tables."""
+    """Numbers that a run takes from outside."""
 
-    #: (numbers, [lanes], ...).
+    #: (steps, own), those of each step.
+    own: NDArray[Any]
+    #: (numbers, width), of which steps take some in turn; of many lanes, or of one to be repeated for each lane.
     table: NDArray[Any]
     #: (feeds, 4): the first place, count, number of members of the cycle, and where the first member begins.
     feeds: NDArray[np.int64]
 
 
-class Loaded(NamedTuple):
-    """A program with its formats and tables, as a run takes it."""
-
-    formats: Formats
-    code: Code
-    feeds: Feeds
-    #: whether numbers other than the states may be too small or too large for quick computation.
-    distant: bool
-
-
 # -- float64 with masks ------------------------------------------------------------------------------------------------
 
 # Columns of Formats.whole.
-BITS, PRECISION, MODE, QUICK, SHORT, UNIT, BELOW_ZERO, ABOVE_ZERO, STICKY_BELOW, STICKY_ABOVE, TO_EVEN, LOW, SPAN = (
-    range(13)
+BITS, PRECISION, MODE, QUICK, HOW, UNIT, BELOW_ZERO, ABOVE_ZERO, STICKY_BELOW, STICKY_ABOVE, TO_EVEN, LOW, SPAN = range(
+    13
 )
 _ONE = np.int64(1)
 _SIGN, _MAGNITUDE = np.int64(-(2**63)), np.int64(2**63 - 1)
 _EXPONENT, _HALF_ULP = np.int64(0x7FF << 52), np.int64(53 << 52)
 _GOLDEN, _FIRST, _SECOND = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 _DRAWN = np.uint64(64 - DRAW_BITS)
+_NONE = np.int64(-1)
+_ADD, _SUBTRACT, _MULTIPLY = np.int64(ADD), np.int64(SUBTRACT), np.int64(MULTIPLY)
+LONG, SHORT, TIED = range(3)
+"""How quick results are rounded: by the sign of a residual, without, or by the size of the residual, which tells ties
+away from zero in 53 bits."""
+_SHORT, _LONG = np.int64(SHORT), np.int64(LONG)
 
 
 class Masked(NamedTuple):
@@ -255,7 +270,7 @@ def _carefully(fmt: Any, random: Any, code: Any, x: Any, y: Any, z: Any) -> Any:
         y = 0.0 - y if code == SUBTRACT else y
         s = x + y
         c = s - x
-        return _fit(fmt, random, s, (x - (s - c)) + (y - c), True)
+        return _fit(fmt, random, s, (x - (s - c)) + (y - c), s == 0.0)
     if code == MULTIPLY:
         p = x * y
         return _fit(fmt, random, p, fma(x, y, -p), (x == 0.0) | (y == 0.0))
@@ -309,6 +324,22 @@ def _quick_of_short(p: Any, rule: Any) -> Any:
     return from_bits(size | (u & _SIGN)), size
 
 
+@inner(forceinline=True)
+def _quick_tied(p: Any, r: Any) -> Any:
+    """Round p + r to 53 bits, where p is p + r to nearest with ties to even, with ties away from zero."""
+    u = bits(p)
+    half = from_bits((u & _EXPONENT) - _HALF_ULP)
+    size = (u & _MAGNITUDE) + np.int64(r == (half if p > 0.0 else -half))
+    return from_bits(size | (u & _SIGN)), size
+
+
+@inner(forceinline=True)
+def _quick_sum(how: Any, p: Any, r: Any, rule: Any) -> Any:
+    if how == SHORT:
+        return _quick_of_short(p, rule)
+    return _quick(p, r, rule) if how == LONG else _quick_tied(p, r)
+
+
 @borrowing(forceinline=True)
 def _rule(formats: Any, f: Any) -> Any:
     whole = formats.whole[f]
@@ -321,84 +352,106 @@ def _outside(size: Any, low: Any, span: Any) -> Any:
     return (np.uint64(size - low) > span) & (size != 0)
 
 
-@inner
-def _of_truths(code: Any, a: Any, b: Any, c: Any) -> Any:
-    return (c >> (2 * a + b)) & 1
-
-
 @borrowing(error_model="numpy", forceinline=True)
-def _quick_result(operation: Any, short: Any, rule: Any, x: Any, y: Any) -> Any:
+def _quick_result(operation: Any, how: Any, rule: Any, x: Any, y: Any) -> Any:
     """The result of a product, quotient or sum as if the range had no end, and the bits of its size."""
     if operation == MULTIPLY:
         p = x * y
-        return _quick_of_short(p, rule) if short else _quick(p, fma(x, y, -p), rule)
+        return _quick_sum(how, p, fma(x, y, -p), rule)
     if operation == DIVIDE:
         p = x / y
         r = fma(-p, y, x)
-        found, size = _quick_of_short(p, rule) if short else _quick(p, -r if y < 0.0 else r, rule)
-        return found, select(y == 0.0, np.int64(-1), size)
+        r = 0.0 if how == TIED else -r if y < 0.0 else r  # no quotient is a tie
+        found, size = _quick_sum(how, p, r, rule)
+        return found, select(y == 0.0, _NONE, size)
     y = -y if operation == SUBTRACT else y
     p = x + y
     c = p - x
-    return _quick_of_short(p, rule) if short else _quick(p, (x - (p - c)) + (y - c), rule)
+    return _quick_sum(how, p, (x - (p - c)) + (y - c), rule)
 
 
 @borrowing(forceinline=True)
-def _along(operation: Any, short: Any, rule: Any, low: Any, span: Any, a: Any, b: Any, c: Any) -> Any:
+def _along(operation: Any, how: Any, rule: Any, low: Any, span: Any, a: Any, b: Any, c: Any) -> Any:
     """Compute c from a and b, entry by entry."""
     gone = np.int64(0)
     for i in range(c.shape[0]):
-        found, size = _quick_result(operation, short, rule, a[i], b[i])
+        found, size = _quick_result(operation, how, rule, a[i], b[i])
         gone |= np.int64(_outside(size, low, span))
         c[i] = found + 0.0
     return gone
 
 
 @borrowing
-def _all_along(operation: Any, short: Any, rule: Any, low: Any, span: Any, a: Any, b: Any, c: Any) -> Any:
+def _all_along(operation: Any, how: Any, rule: Any, low: Any, span: Any, a: Any, b: Any, c: Any) -> Any:
+    # A loop for each case, so that none branches and processors compute several entries at once.
     if operation == MULTIPLY:
-        if short:
-            return _along(MULTIPLY, True, rule, low, span, a, b, c)
-        return _along(MULTIPLY, False, rule, low, span, a, b, c)
+        if how == SHORT:
+            return _along(_MULTIPLY, _SHORT, rule, low, span, a, b, c)
+        return _along(_MULTIPLY, _LONG, rule, low, span, a, b, c)
     if operation == ADD:
-        if short:
-            return _along(ADD, True, rule, low, span, a, b, c)
-        return _along(ADD, False, rule, low, span, a, b, c)
-    if short:
-        return _along(SUBTRACT, True, rule, low, span, a, b, c)
-    return _along(SUBTRACT, False, rule, low, span, a, b, c)
+        if how == SHORT:
+            return _along(_ADD, _SHORT, rule, low, span, a, b, c)
+        return _along(_ADD, _LONG, rule, low, span, a, b, c)
+    if how == SHORT:
+        return _along(_SUBTRACT, _SHORT, rule, low, span, a, b, c)
+    return _along(_SUBTRACT, _LONG, rule, low, span, a, b, c)
 
 
 @borrowing
-def _quick_run(rule: Any, short: Any, low: Any, span: Any, code: Any, begin: int, end: int, values: Any) -> Any:
-    """Run rows of one code; return whether a result is out of range."""
+def _one_by_one(operation: Any, how: Any, rule: Any, low: Any, span: Any, rows: Any, values: Any) -> Any:
     gone = False
-    rows = code.rows
-    operation = rows[begin, 0]
-    for o in range(begin, end):
-        found, size = _quick_result(operation, short, rule, values[rows[o, 1]], values[rows[o, 2]])
+    for o in range(rows.shape[0]):
+        found, size = _quick_result(operation, how, rule, values[rows[o, 1]], values[rows[o, 2]])
         gone |= _outside(size, low, span)
         values[rows[o, 4]] = found + 0.0
     return gone
 
 
+@borrowing(error_model="numpy")
+def _quick_other(operation: Any, how: Any, rule: Any, x: Any, y: Any, z: Any) -> Any:
+    """The result of any operation on numbers, as :func:`_quick_result`."""
+    if operation <= DIVIDE:
+        return _quick_result(operation, how, rule, x, y)
+    if operation in (NEGATIVE, ABSOLUTE):
+        return (0.0 - x if operation == NEGATIVE else abs(x)), np.int64(0)
+    p, r = x, 0.0
+    if operation == ROOT:
+        p = math.sqrt(x)
+        r = 0.0 if how == TIED else fma(-p, p, x)  # nor is a root
+    elif operation == FUSED:
+        if how == TIED:
+            return x, _NONE
+        if rule[0] == 1:  # 53 bits
+            p = fma(x, y, z)
+        else:
+            p, r, _ = fused_sum(x, y, z)
+            how = _LONG
+    found, size = _quick_sum(how, p, r, rule)
+    return found, select(p != p, _NONE, size)
+
+
+@borrowing
+def _of_truths(a: Any, b: Any, c: Any) -> Any:
+    return (np.int64(c) >> (2 * np.int64(a) + np.int64(b))) & 1
+
+
+@borrowing
+def _compared(x: Any, y: Any, orders: Any) -> Any:
+    return (np.int64(orders) >> (np.int64(x > y) - np.int64(x < y) + 1)) & 1
+
+
 @borrowing
 def quick_scalars(formats: Any, code: Any, values: Any, truths: Any) -> Any:
-    """Run all rows for one lane, assuming that nothing leaves the range; return whether anything did."""
+    """Run all rows for one lane; return whether anything left the range."""
     gone = False
     s = -1
     while s + 1 < code.segments.shape[0]:
         s += 1
         begin, end, f = code.segments[s, 0], code.segments[s, 1], code.segments[s, 2]
-        if formats.whole[f, QUICK] == 0:
-            return True
-        operation = code.rows[begin, 0]
-        if operation <= DIVIDE:
-            low, span = formats.whole[f, LOW], np.uint64(formats.whole[f, SPAN])
-            rule, short, pattern = _rule(formats, f), formats.whole[f, SHORT] != 0, code.segments[s, 3]
-            if pattern == ONE_BY_ONE:
-                gone |= _quick_run(rule, short, low, span, code, begin, end, values)
-                continue
+        operation = np.int64(code.rows[begin, 0])
+        low, span = formats.whole[f, LOW], np.uint64(formats.whole[f, SPAN])
+        rule, how, pattern = _rule(formats, f), formats.whole[f, HOW], code.segments[s, 3]
+        if pattern != ONE_BY_ONE and how != TIED:
             a, b, out = np.int64(code.rows[begin, 1]), np.int64(code.rows[begin, 2]), np.int64(code.rows[begin, 4])
             count = end - begin
             first, second = values[a : a + count], values[b : b + count]
@@ -408,35 +461,68 @@ def quick_scalars(formats: Any, code: Any, values: Any, truths: Any) -> Any:
                 for i in range(count):
                     first[i] = values[lefts[i]]
                     second[i] = values[rights[i]]
-            gone |= _all_along(operation, short, rule, low, span, first, second, values[out : out + count]) != 0
-            continue
-        if operation == SKIP:
-            if not truths[code.rows[begin, 1]]:
+            gone |= _all_along(operation, how, rule, low, span, first, second, values[out : out + count]) != 0
+        elif operation <= DIVIDE:
+            gone |= _one_by_one(operation, how, rule, low, span, code.rows[begin:end], values)
+        elif operation == SKIP:
+            if not truths[code.rows[begin, 1], 0]:
                 after = end + np.int64(code.rows[begin, 2])
                 while s + 1 < code.segments.shape[0] and code.segments[s + 1, 0] < after:
                     s += 1
-            continue
-        for o in range(begin, end):
-            a, b, c, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 3], code.rows[o, 4]
-            if operation == CHOOSE:
-                values[out] = values[b] if truths[a] else values[c]
-            elif operation == COMPARE:
-                order = np.int64(values[a] > values[b]) - np.int64(values[a] < values[b]) + 1
-                truths[out] = (np.int64(c) >> order) & 1
-            elif operation == COMBINE:
-                truths[out] = _of_truths(operation, np.int64(truths[a]), np.int64(truths[b]), np.int64(c))
-            elif operation == NONZERO:
-                gone |= values[a] == 0.0
-            else:
-                z = values[c] if operation == FUSED else 0.0
-                found = _carefully(_masked(formats, f), formats.random, operation, values[a], values[b], z)
-                gone |= found != found
-                values[out] = found
+        else:
+            for o in range(begin, end):
+                a, b, c, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 3], code.rows[o, 4]
+                if operation == CHOOSE:
+                    values[out] = values[b] if truths[a, 0] else values[c]
+                elif operation == COMPARE:
+                    truths[out, 0] = _compared(values[a], values[b], c)
+                elif operation == COMBINE:
+                    truths[out, 0] = _of_truths(truths[a, 0], truths[b, 0], c)
+                elif operation == NONZERO:
+                    gone |= values[a] == 0.0
+                else:
+                    z = values[c] if operation == FUSED else 0.0
+                    found, size = _quick_other(operation, how, rule, values[a], values[b], z)
+                    gone |= _outside(size, low, span)
+                    values[out] = found + 0.0
     return gone
 
 
 @borrowing
-def careful_scalars(formats: Any, code: Any, values: Any, truths: Any) -> Any:
+def quick_lanes(formats: Any, code: Any, values: Any, truths: Any) -> Any:
+    """Run all rows for each lane; return whether anything left the range."""
+    gone = np.int64(0)
+    for s in range(code.segments.shape[0]):
+        f = code.segments[s, 2]
+        rule, how = _rule(formats, f), formats.whole[f, HOW]
+        low, span = formats.whole[f, LOW], np.uint64(formats.whole[f, SPAN])
+        for o in range(code.segments[s, 0], code.segments[s, 1]):
+            operation = np.int64(code.rows[o, 0])
+            a, b, c, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 3], code.rows[o, 4]
+            if operation <= MULTIPLY and how != TIED:
+                gone |= _all_along(operation, how, rule, low, span, values[a], values[b], values[out])
+                continue
+            if operation == SKIP:
+                continue
+            for i in range(values.shape[1]):
+                if operation == CHOOSE:
+                    values[out, i] = values[b, i] if truths[a, i] else values[c, i]
+                elif operation == COMPARE:
+                    truths[out, i] = _compared(values[a, i], values[b, i], c)
+                elif operation == COMBINE:
+                    truths[out, i] = _of_truths(truths[a, i], truths[b, i], c)
+                elif operation == NONZERO:
+                    gone |= np.int64(values[a, i] == 0.0)
+                else:
+                    z = values[c, i] if operation == FUSED else 0.0
+                    found, size = _quick_other(operation, how, rule, values[a, i], values[b, i], z)
+                    gone |= np.int64(_outside(size, low, span))
+                    values[out, i] = found + 0.0
+    return gone != 0
+
+
+@borrowing
+def careful_lane(formats: Any, code: Any, values: Any, truths: Any, i: Any) -> Any:
     """Run all rows for one lane; return the number of rows that have a result, counted from the first."""
     o: Any = -1
     for s in range(code.segments.shape[0]):
@@ -444,69 +530,26 @@ def careful_scalars(formats: Any, code: Any, values: Any, truths: Any) -> Any:
         fmt, random = _masked(formats, f), formats.random
         while o + 1 < code.segments[s, 1]:
             o += 1
-            operation = code.rows[o, 0]
+            operation = np.int64(code.rows[o, 0])
             a, b, c, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 3], code.rows[o, 4]
             if operation == SKIP:
-                o += 0 if truths[a] else np.int64(b)
+                o += 0 if truths[a, i] else np.int64(b)
             elif operation == CHOOSE:
-                values[out] = values[b] if truths[a] else values[c]
+                values[out, i] = values[b, i] if truths[a, i] else values[c, i]
             elif operation == COMPARE:
-                order = np.int64(values[a] > values[b]) - np.int64(values[a] < values[b]) + 1
-                truths[out] = (np.int64(c) >> order) & 1
+                truths[out, i] = _compared(values[a, i], values[b, i], c)
             elif operation == COMBINE:
-                truths[out] = _of_truths(operation, np.int64(truths[a]), np.int64(truths[b]), np.int64(c))
+                truths[out, i] = _of_truths(truths[a, i], truths[b, i], c)
             elif operation == NONZERO:
-                if values[a] == 0.0:
+                if values[a, i] == 0.0:
                     return o
             else:
-                found = _carefully(
-                    fmt, random, operation, values[a], values[b], values[c] if operation == FUSED else 0.0
-                )
+                z = values[c, i] if operation == FUSED else 0.0
+                found = _carefully(fmt, random, operation, values[a, i], values[b, i], z)
                 if found != found:
                     return o
-                values[out] = found
+                values[out, i] = found
     return code.rows.shape[0]
-
-
-@borrowing(error_model="numpy")
-def quick_lanes(formats: Any, code: Any, values: Any, truths: Any) -> Any:
-    """Run all rows for each lane, assuming that nothing leaves the range; return whether anything did."""
-    lanes = values.shape[1]
-    gone = np.int64(0)
-    for s in range(code.segments.shape[0]):
-        f = code.segments[s, 2]
-        rule, short = _rule(formats, f), formats.whole[f, SHORT] != 0
-        low, span = formats.whole[f, LOW], np.uint64(formats.whole[f, SPAN])
-        if formats.whole[f, QUICK] == 0:
-            return True
-        for o in range(code.segments[s, 0], code.segments[s, 1]):
-            operation = code.rows[o, 0]
-            a, b, c, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 3], code.rows[o, 4]
-            if operation <= MULTIPLY:
-                gone |= _all_along(operation, short, rule, low, span, values[a], values[b], values[out])
-            elif operation == CHOOSE:
-                for i in range(lanes):
-                    values[out, i] = values[b, i] if truths[a, i] else values[c, i]
-            elif operation == COMPARE:
-                for i in range(lanes):
-                    order = np.int64(values[a, i] > values[b, i]) - np.int64(values[a, i] < values[b, i]) + 1
-                    truths[out, i] = (np.int64(c) >> order) & 1
-            elif operation == COMBINE:
-                for i in range(lanes):
-                    truths[out, i] = _of_truths(operation, np.int64(truths[a, i]), np.int64(truths[b, i]), np.int64(c))
-            elif operation == NONZERO:
-                for i in range(lanes):
-                    gone |= np.int64(values[a, i] == 0.0)
-            elif operation == SKIP:
-                pass
-            else:
-                fmt = _masked(formats, f)
-                for i in range(lanes):
-                    z = values[c, i] if operation == FUSED else 0.0
-                    found = _carefully(fmt, formats.random, operation, values[a, i], values[b, i], z)
-                    gone |= np.int64(found != found)
-                    values[out, i] = found
-    return gone != 0
 
 
 # -- other numbers -----------------------------------------------------------------------------------------------------
@@ -552,7 +595,7 @@ def _run_segment(fmt: Any, code: Any, begin: int, end: int, values: Any, truths:
             continue
         for i in range(values.shape[1]):
             if operation == COMBINE:
-                truths[out, i] = _of_truths(operation, np.int64(truths[a, i]), np.int64(truths[b, i]), np.int64(c))
+                truths[out, i] = _of_truths(truths[a, i], truths[b, i], c)
                 continue
             if operation == CHOOSE:
                 scalar.put(fmt, values, (out, i), scalar.load(fmt, values, (b if truths[a, i] else c, i)))
@@ -592,36 +635,6 @@ LEAST = 2.0**-480
 """Least size of the numbers with which the machine computes quickly, and the inverse of the largest: no product and no
 quotient of two of them leaves float64."""
 
-_LEAST_BITS, _SPAN_BITS = (
-    np.array([LEAST, 1 / LEAST]).view(np.int64)[0],
-    np.uint64(np.diff(np.array([LEAST, 1 / LEAST]).view(np.int64))[0]),
-)
-
-
-def far(kind: Any, values: Any) -> Any:
-    """Whether numbers are too small or too large for quick computation; those of other kinds never are."""
-    raise TypeError("got a call of far from Python; needed one from a function compiled by numba")
-
-
-@overload(far, strict=False, jit_options={"_nrt": False})
-def _overloaded_far(kind: Any, values: Any) -> Any:
-    def alone(kind: Any, values: Any) -> Any:
-        found = False
-        for i in range(values.shape[0]):
-            found |= _outside(bits(values[i]) & _MAGNITUDE, _LEAST_BITS, _SPAN_BITS)
-        return found
-
-    def in_lanes(kind: Any, values: Any) -> Any:
-        found = False
-        for i in range(values.shape[0]):
-            for j in range(values.shape[1]):
-                found |= _outside(bits(values[i, j]) & _MAGNITUDE, _LEAST_BITS, _SPAN_BITS)
-        return found
-
-    if kind.instance_class is not Masks:
-        return lambda kind, values: False
-    return alone if values.ndim == 1 else in_lanes
-
 
 @borrowing
 def _run_segments(fmt: Any, code: Any, values: Any, truths: Any) -> Any:
@@ -635,33 +648,28 @@ def _run_segments(fmt: Any, code: Any, values: Any, truths: Any) -> Any:
     return code.rows.shape[0]
 
 
-def execute(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
-    """Run all rows for each lane; return how many rows have results in every lane, counted from the first.
-
-    Parameters
-    ----------
-    far : whether numbers may be too small or too large for quick computation.
-    """
+def execute(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
+    """Run all rows for each lane; return how many rows have results in every lane, counted from the first."""
     raise TypeError("got a call of execute from Python; needed one from a function compiled by numba")
 
 
 @overload(execute, strict=False, jit_options={"_nrt": False})
-def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
+def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
     tag = kind.instance_class
 
-    def of_one_lane(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
-        if far or quick_scalars(formats, code, values, truths):
-            return careful_scalars(formats, code, values, truths)
-        return code.rows.shape[0]
+    def of_one_lane(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
+        return 0 if quick_scalars(formats, code, values, truths) else code.rows.shape[0]
 
-    def of_lanes(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
+    def of_lanes(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
+        return 0 if quick_lanes(formats, code, values, truths) else code.rows.shape[0]
+
+    def carefully(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
         least = code.rows.shape[0]
-        if far or quick_lanes(formats, code, values, truths):
-            for i in range(values.shape[1]):
-                least = min(least, careful_scalars(formats, code, values[:, i], truths[:, i]))
+        for i in range(values.shape[1]):
+            least = min(least, careful_lane(formats, code, values, truths, i))
         return least
 
-    def of_pairs(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
+    def of_pairs(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
         done = np.int64(0)
         for s in range(code.segments.shape[0]):
             end, given = code.segments[s, 1], formats.whole[code.segments[s, 2]]
@@ -676,7 +684,7 @@ def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths:
                 return ~done
         return code.rows.shape[0]
 
-    def of_two_words(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
+    def of_two_words(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
         given = formats.whole[0]
         lowest, largest = (given[7], given[8], given[9]), (given[10], given[11], given[12])
         fmt = Wide(
@@ -684,18 +692,12 @@ def _overloaded_execute(kind: Any, formats: Any, code: Any, values: Any, truths:
         )
         return _run_segments(fmt, code, values, truths)
 
-    def of_double_doubles(kind: Any, formats: Any, code: Any, values: Any, truths: Any, far: Any) -> Any:
+    def of_double_doubles(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
         return _run_segments(kind, code, values, truths)
 
-    if tag is Masks:
+    if tag is Quick:
         return of_one_lane if values.ndim == 1 else of_lanes
-    return {InPairs: of_pairs, InTwoWords: of_two_words, DoubleDouble: of_double_doubles}[tag]
-
-
-@compiled
-def evaluate(kind: Any, formats: Any, code: Any, values: Any, truths: Any) -> Any:
-    """Run all rows once for each lane; return how many have results, counted from the first."""
-    return execute(kind, formats, code, values, truths, far(kind, values))
+    return {Careful: carefully, InPairs: of_pairs, InTwoWords: of_two_words, DoubleDouble: of_double_doubles}[tag]
 
 
 DONE, ROW, CYCLE, SINCE, LASTS = range(5)
@@ -704,65 +706,74 @@ the number of steps after which the states repeat, once they do; and since when 
 those of one step."""
 
 
+@borrowing
+def _take_feeds(feeds: Any, step: int, every: bool, width: int, values: Any) -> None:
+    table = feeds.table
+    for g in range(feeds.feeds.shape[0]):
+        place, count, members, at = feeds.feeds[g, 0], feeds.feeds[g, 1], feeds.feeds[g, 2], feeds.feeds[g, 3]
+        if members > 1 or every:
+            at += count * (step % members)
+            to = values[place * width : (place + count) * width]
+            for j in range(count):
+                for k in range(0, width, table.shape[1]):
+                    for m in range(table.shape[1]):
+                        to[j * width + k + m] = table[at + j, m]
+
+
 @compiled
 def advance(
     kind: Any,
-    loaded: Any,
-    first: int,
-    own: Any,
+    formats: Any,
+    code: Any,
+    feeds: Any,
     places: Any,
-    values: Any,
-    truths: Any,
+    held: Any,
     kept: Any,
+    first: int,
     cycle: int,
     notes: Any,
 ) -> None:
-    """Take steps of a run, each of which replaces the states by their next values.
+    """Take steps of a run, each of which replaces the states by their next values, from step notes[DONE] on.
 
     Parameters
     ----------
-    first : number of steps taken before.
-    own : (steps, count, ...), numbers of each step.
-    places, kept : see :class:`Places` and :class:`Kept`.
+    held, places, kept, feeds : see :class:`Held`, :class:`Places`, :class:`Kept` and :class:`Feeds`.
+    first : number of steps taken before those of `feeds`.
     cycle : number of steps after which the model repeats; 0 if states are not to be compared.
     notes : see :data:`DONE` and the following; brought up to date.
     """
-    formats, code, feeds, distant = loaded
-    states_at, outputs, kept_at, before = places.states, places.after, places.kept, kept.before
-    after = before.copy()
-    for j in range(outputs.shape[0]):
-        copy_row(values, states_at[j], after, j)
-    notes[DONE], notes[ROW] = 0, -1
-    for step in range(own.shape[0]):
-        for g in range(feeds.feeds.shape[0]):
-            place, count, members, begin = feeds.feeds[g, 0], feeds.feeds[g, 1], feeds.feeds[g, 2], feeds.feeds[g, 3]
-            if members > 1 or step == 0:
-                begin += count * ((first + step) % members)
-                for j in range(count):
-                    copy_row(feeds.table, begin + j, values, place + j)
+    numbers, values, truths = held
+    begin, own = notes[DONE], feeds.own
+    width = values.shape[0] // numbers.shape[0]
+    for step in range(begin, own.shape[0]):
+        _take_feeds(feeds, first + step, step == begin, width, values)
         for j in range(own.shape[1]):
-            copy_row(own[step], j, values, places.own + j)
+            values[places.own + j] = own[step, j]
         notes[ROW] = 0
-        done = execute(kind, formats, code, values, truths, distant | far(kind, after))
+        done = execute(kind, formats, code, numbers, truths)
         if done < code.rows.shape[0]:
             notes[ROW] = done
             return
-        for j in range(outputs.shape[0]):
-            copy_row(values, outputs[j], after, j)
-        for j in range(kept_at.shape[0]):
-            copy_row(values, kept_at[j], kept.numbers[step], j)
-        for j in range(outputs.shape[0]):
-            copy_row(after, j, values, states_at[j])
-        copy_row(truths, places.truth, kept.truths, step)
+        for j in range(places.after.shape[0]):
+            kept.after[j] = values[places.after[j]]
+        for j in range(places.kept.shape[0]):
+            kept.numbers[step, j] = values[places.kept[j]]
+        same = cycle > 0
+        for j in range(places.after.shape[0]):
+            values[places.states[j]] = kept.after[j]
+            same &= kept.after[j] == kept.before[j]
+        for i in range(truths.shape[1]):
+            kept.truths[step, i] = truths[places.truth, i]
         notes[DONE] = step + 1
         if cycle > 0:
             notes[SINCE] += 1
-            if notes[SINCE] % cycle == 0 and same_rows(after, before):
+            if notes[SINCE] % cycle == 0 and same:
                 notes[CYCLE] = notes[SINCE]
+                notes[ROW] = -1
                 return
             if notes[SINCE] == notes[LASTS]:
-                for j in range(outputs.shape[0]):
-                    copy_row(after, j, before, j)
+                for j in range(places.after.shape[0]):
+                    kept.before[j] = kept.after[j]
                 notes[SINCE] = 0
                 notes[LASTS] += cycle * (notes[LASTS] // (8 * cycle) + 1)
     notes[ROW] = -1

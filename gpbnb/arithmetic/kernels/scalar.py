@@ -33,18 +33,14 @@ from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
     PAIRS,
     Binary,
-    Blocked,
     Decimal,
     Double,
     DoubleDouble,
     Free,
-    Fused,
     Hardware32,
     Hexadecimal,
     Limited,
     LimitedDecimal,
-    Mixed,
-    Separate,
     ShortDecimal,
     ShortEven,
     Wide,
@@ -71,11 +67,6 @@ def _free_machine(fmt: Any) -> Any:
     """The machine's arithmetic that a tag leaves unchecked, or None."""
     tag = _tag(fmt.types[0]) if _tag(fmt) is Free else None
     return tag if tag in processor.MACHINE else None
-
-
-def _fuses(fmt: Any) -> bool:
-    sums = fmt.types[2] if _tag(fmt) is Limited else fmt
-    return _tag(sums.types[1] if _tag(sums) is Blocked else sums) is Fused
 
 
 def _only_compiled(name: str) -> TypeError:
@@ -186,7 +177,7 @@ def _beyond_largest(fmt: Any, a: Any) -> Any:
 
 
 def multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    """fl(c + fl(a * b)), or fl(c + a * b) where the tag fuses.
+    """fl(c + fl(a * b)).
 
     A product out of range is reported only if it affects the sum.
     """
@@ -196,21 +187,6 @@ def multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 def add_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     """The same as :func:`multiply_add`, faster where c is the result of the one before."""
     raise _only_compiled("add_product")
-
-
-def first_product(fmt: Any, a: Any, b: Any) -> Any:
-    """The first product of a sum, rounded in the arithmetic in which the tag accumulates sums."""
-    raise _only_compiled("first_product")
-
-
-def stored_sum(fmt: Any, x: Any) -> Any:
-    """A sum of products as it is stored: rounded, if the tag accumulates sums in another arithmetic."""
-    raise _only_compiled("stored_sum")
-
-
-def settle(fmt: Any, c: Any) -> None:
-    """Round a matrix of accumulated sums for storage; only ``Mixed`` needs this."""
-    raise _only_compiled("settle")
 
 
 # -- plain float64 -----------------------------------------------------------------------------------
@@ -289,8 +265,6 @@ def _overloaded_fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 def _overload_two(stub: Callable[..., Any]) -> None:
     @overload(stub, strict=False, jit_options=_INLINE)
     def choose(fmt: Any, a: Any, b: Any) -> Any:
-        if _tag(fmt) is Mixed:
-            return lambda fmt, a, b: stub(fmt.stored, a, b)
         function = _implementation(fmt, stub.__name__)
         if _tag(fmt) is Free:
             return lambda fmt, a, b: function(fmt.tag, a, b)
@@ -300,8 +274,6 @@ def _overload_two(stub: Callable[..., Any]) -> None:
 def _overload_one(stub: Callable[..., Any]) -> None:
     @overload(stub, strict=False, jit_options=_INLINE)
     def choose(fmt: Any, x: Any) -> Any:
-        if _tag(fmt) is Mixed:
-            return lambda fmt, x: stub(fmt.stored, x)
         function = _implementation(fmt, stub.__name__)
         if _tag(fmt) is Free:
             return lambda fmt, x: function(fmt.tag, x)
@@ -352,8 +324,6 @@ def _overloaded_beyond_largest(fmt: Any, a: Any) -> Any:
     # A fixed-point format has one more negative number than positive ones.
     if _tag(fmt) is Limited:
         return lambda fmt, a: fmt.over if a > fmt.largest else a
-    if _tag(fmt) is Mixed:
-        return lambda fmt, a: _beyond_largest(fmt.stored, a)
     return lambda fmt, a: a
 
 
@@ -418,45 +388,19 @@ def _one(fmt: Any) -> Any:
 
 @overload(multiply_add, strict=False, jit_options=_INLINE)
 def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    if _fuses(fmt):
-        return lambda fmt, a, b, c: fused(fmt, a, b, c)
     if _free_machine(fmt) is not None:
         return lambda fmt, a, b, c: c + a * b  # no negative zero, as c is none
     if _tag(fmt) is ShortDecimal:
         return lambda fmt, a, b, c: shortdecimal.multiply_add(fmt, a, b, c)
-    if _tag(fmt) is Mixed:
-        return lambda fmt, a, b, c: multiply_add(fmt.sums, a, b, c)
     return lambda fmt, a, b, c: add(fmt, c, multiply(fmt, a, b))
 
 
 @overload(add_product, strict=False, jit_options=_INLINE)
 def _overloaded_add_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    if _tag(fmt) is not Limited or _fuses(fmt) or _tag(fmt.types[1]) is not ShortEven:
+    if _tag(fmt) is not Limited or _tag(fmt.types[1]) is not ShortEven:
         return lambda fmt, a, b, c: multiply_add(fmt, a, b, c)
     function = _implementation(fmt, "add_product")
     return lambda fmt, a, b, c: function(fmt, a, b, c)
-
-
-@overload(first_product, strict=False, jit_options=_INLINE)
-def _overloaded_first_product(fmt: Any, a: Any, b: Any) -> Any:
-    if _tag(fmt) is Mixed:
-        return lambda fmt, a, b: multiply(fmt.sums, a, b)
-    return lambda fmt, a, b: multiply(fmt, a, b)
-
-
-@overload(stored_sum, strict=False, jit_options=_INLINE)
-def _overloaded_stored_sum(fmt: Any, x: Any) -> Any:
-    return (lambda fmt, x: round_(fmt.stored, x)) if _tag(fmt) is Mixed else lambda fmt, x: x
-
-
-@overload(settle, strict=False)
-def _overloaded_settle(fmt: Any, c: Any) -> Any:
-    def rounded(fmt: Any, c: Any) -> None:
-        for i in range(c.shape[0]):
-            for j in range(c.shape[1]):
-                c[i, j] = round_(fmt.stored, c[i, j])
-
-    return rounded if _tag(fmt) is Mixed else lambda fmt, c: None
 
 
 # -- arrays ------------------------------------------------------------------------------------------
@@ -550,36 +494,6 @@ def _store(fmt: Any, array: Any, index: Any, x: Any) -> Any:
     return checked
 
 
-def freed(fmt: Any) -> Any:
-    """The tag without range checks, or the same tag if there is none."""
-    raise _only_compiled("freed")
-
-
-def can_be_freed(fmt: Any) -> bool:
-    """Whether a tag, given as its numba type, has loops without range checks on the same arrays."""
-    tag = _tag(fmt)
-    if tag is Limited:
-        return _tag(fmt.types[1]) is ShortEven and _tag(fmt.types[2]) is Separate
-    return tag in (Binary, Hexadecimal)
-
-
-@overload(freed, strict=False, jit_options=_INLINE)
-def _freed(fmt: Any) -> Any:
-    return (lambda fmt: Free(fmt)) if can_be_freed(fmt) else (lambda fmt: fmt)
-
-
-def repeats(fmt: Any) -> Any:
-    """Whether the same operation always has the same result: not so with random roundings."""
-    raise _only_compiled("repeats")
-
-
-@overload(repeats, strict=False, jit_options=_INLINE)
-def _repeats(fmt: Any) -> Any:
-    if "Random" in repr(fmt):
-        return lambda fmt: False
-    return lambda fmt: True
-
-
 # -- sums of products --------------------------------------------------------------------------------
 
 
@@ -589,10 +503,10 @@ def dot(fmt: Any, x: Any, y: Any) -> Any:
     n = len(x)
     if n == 0:
         return zero(fmt)
-    s = first_product(fmt, load(fmt, x, 0), load(fmt, y, 0))
+    s = multiply(fmt, load(fmt, x, 0), load(fmt, y, 0))
     for k in range(1, n):
         s = add_product(fmt, load(fmt, x, k), load(fmt, y, k), s)
-    return stored_sum(fmt, s)
+    return s
 
 
 @borrowing
@@ -614,7 +528,7 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
         else:
             factor = load(fmt, a, (i, 0))
             for j in range(b.shape[1]):
-                put(fmt, c, (i, j), first_product(fmt, factor, load(fmt, b, (0, j))))
+                put(fmt, c, (i, j), multiply(fmt, factor, load(fmt, b, (0, j))))
         for k in range(1, a.shape[1]):
             factor = load(fmt, a, (i, k))
             for j in range(b.shape[1]):
@@ -624,13 +538,6 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
 @borrowing
 def check(fmt: Any, c: Any) -> None:
-    """Settle the matrix c; raises OverflowError if an entry has left the range of its backend."""
-    settle(fmt, c)
-    guard(fmt, c)
-
-
-@borrowing
-def guard(fmt: Any, c: Any) -> None:
     """Raise OverflowError if an entry of the matrix c has left the range of its backend."""
     gone = False
     for i in range(c.shape[0]):

@@ -34,7 +34,7 @@ class Accumulator(Protocol):
     """A format that can accumulate sums of products."""
 
     def run_tag(self, fused: bool = False, *, order: Order = "left", block: int = 32) -> tags.Tag:
-        """Return the tag of its arithmetic for a compiled loop."""
+        """Return the tag of its arithmetic."""
 
 
 def tag_of(rules: Rules) -> Any:
@@ -112,7 +112,7 @@ def _float_tag(rules: Rules, hardware: bool = True) -> Any:
     if limits is None:
         nan, least, largest = math.nan, 2.0**-960, 2.0**960
         return (
-            tags.Limited(digits, mode, tags.Separate(), precision, 0.0, least, nan, -largest, largest, nan, nan)
+            tags.Limited(digits, mode, precision, 0.0, least, nan, -largest, largest, nan, nan)
             if precision <= longest and not (random and base == 16) and not hidden
             else None
         )
@@ -137,7 +137,6 @@ def _float_tag(rules: Rules, hardware: bool = True) -> Any:
     return tags.Limited(
         digits,
         mode,
-        tags.Separate(),
         precision,
         least if limits.subnormal else 0.0,
         0.0 if limits.subnormal else least,
@@ -236,7 +235,7 @@ def _described(rules: Rules) -> str:
 
 
 def run_tag(rules: Rules, fused: bool, order: Order = "left", block: int = 32) -> tags.Tag:
-    """Return the tag for a separate compiled loop; see :meth:`gpbnb.arithmetic.number_format.NumberFormat.run_tag`."""
+    """Return the tag of a run's arithmetic; see :meth:`gpbnb.arithmetic.number_format.NumberFormat.run_tag`."""
     check_order(order, fused, block)
     plain = compiled_tag(rules)
     if not fused and order == "left":
@@ -245,9 +244,7 @@ def run_tag(rules: Rules, fused: bool, order: Order = "left", block: int = 32) -
     if tag is None:
         what = "fused multiply-add" if fused else f"{order} sums"
         raise ValueError(f"got {what} in {_described(rules)}; needed up to 52 bits, or up to 13 base-16 digits")
-    products: Any = tags.Fused() if fused else tags.Separate()
-    sums = {"left": products, "pairwise": tags.Pairwise(), "blocked": tags.Blocked(block, products)}[order]
-    return tag._replace(sums=sums)
+    return tag
 
 
 def fusing_tag(rules: Rules) -> tags.Limited | None:
@@ -255,17 +252,16 @@ def fusing_tag(rules: Rules) -> tags.Limited | None:
     return cast(tags.Limited | None, _float_tag(rules, hardware=False) if rules.base in (2, 16) else None)
 
 
-def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:
-    """Return the tag for numbers in one arithmetic whose sums of products are accumulated in another."""
+def check_accumulator(stored: tags.Tag, sums: tags.Tag) -> None:
+    """Check the arithmetic of numbers and that in which their sums of products are accumulated."""
     for tag in (stored, sums):
-        if not isinstance(tag, tags.FLOATS) or isinstance(tag, tags.Mixed):
+        if not isinstance(tag, tags.FLOATS):
             raise ValueError(f"got sums kept in {sums} with numbers in {stored}; needed base 2 or 16 for both")
     if _digits(sums) < _digits(stored):
         raise ValueError(
             f"got sums of precision {_digits(sums)} with numbers of precision {_digits(stored)}; needed at least as "
             "many digits for sums as for numbers"
         )
-    return tags.Mixed(stored, sums)
 
 
 def _digits(tag: tags.Tag) -> int:

@@ -89,31 +89,11 @@ class Random(NamedTuple):
     state: Any  # (2,) uint64
 
 
-class Separate(NamedTuple):
-    """Products in sums are rounded before they are added."""
-
-
-class Fused(NamedTuple):
-    """Products in sums are added by fused multiply-add."""
-
-
-class Pairwise(NamedTuple):
-    """Products are summed in two halves, and each half likewise; the first half has floor(n / 2) products."""
-
-
-class Blocked(NamedTuple):
-    """Products are summed from left to right within blocks, then the sums of the blocks from left to right."""
-
-    block: int
-    products: Any  # Separate or Fused
-
-
 class Limited(NamedTuple):
     """Bases 2 and 16 with any rounding mode and a limited range; a number is a float64, an array is float64 (...)."""
 
     digits: Any  # Two or Sixteen
     mode: Any  # Even, ShortEven, LongEven, Mode or Random
-    sums: Any  # Separate, Fused, Pairwise or Blocked
     precision: int
     gradual: float  # smaller numbers keep the spacing just above it; 0 without subnormal numbers
     least: float  # smaller magnitudes, except an exact zero, become `below`
@@ -139,22 +119,6 @@ class Free(NamedTuple):
     """
 
     tag: Any  # Binary, Hexadecimal, Limited with ShortEven, Hardware32 or Hardware64
-
-
-class Mixed(NamedTuple):
-    """Numbers in one arithmetic whose sums of products are accumulated in another; both are single float64."""
-
-    stored: Any
-    sums: Any
-
-
-class Blocks(NamedTuple):
-    """An arithmetic for each block of a filter's step; loops take the arithmetic of a block from it."""
-
-    state: Any
-    gain: Any
-    covariance: Any
-    innovation: Any
 
 
 class LimitedDecimal(NamedTuple):
@@ -199,13 +163,10 @@ def extents_of_sums(n: int, base: int, precision: int, gradual: float, low: floa
 
 def random_state(tag: Any) -> Any:
     """Return the seed and the count of random numbers of an arithmetic, which its operations update; None if none."""
-    if isinstance(tag, Mixed):
-        found = random_state(tag.stored)
-        return random_state(tag.sums) if found is None else found
     return tag.mode.state if isinstance(tag, Limited) and isinstance(tag.mode, Random) else None
 
 
-FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64, Free, Mixed)  # numbers are single float64
+FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64, Free)  # numbers are single float64
 PAIRS = (Decimal, ShortDecimal, LimitedDecimal)
 
 Tag = (
@@ -220,7 +181,5 @@ Tag = (
     | Hardware64
     | LimitedDecimal
     | Free
-    | Mixed
-    | Blocks
     | Wide
 )

@@ -1,0 +1,108 @@
+"""A function of arrays that is recorded once, and then runs on many arrays together: each is a lane of the machine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.interpreting import Constants
+from gpbnb.arithmetic.machine import code_of, evaluate, fault_of, packed_constants, tables
+from gpbnb.arithmetic.tape import Tape
+from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
+
+_NUMBERS = 1 << 19  # that are computed at once
+
+
+class Lanes:
+    """A program of one format that runs on many arrays, in any format with loops or in double-double.
+
+    Parameters
+    ----------
+    rows : operations of the machine.
+    sizes : numbers of places, and of truth values.
+    given : places of the arrays that it takes.
+    found : places of the arrays that it returns, or a truth value in an array of its own.
+    """
+
+    def __init__(
+        self,
+        rows: NDArray[np.int64],
+        sizes: tuple[int, int],
+        constants: Sequence[Constants],
+        given: Sequence[NDArray[np.int64]],
+        found: Sequence[NDArray[np.int64] | TracedTruth],
+    ) -> None:
+        self._rows, self._code = rows, code_of(rows, np.zeros(len(rows), np.int64))
+        self._sizes, self._constants = sizes, [each for each in constants if each.places]
+        self._given, self._found = given, found
+
+    def run(self, fmt: Any, *given: NDArray[Any], tag: Any = None) -> list[NDArray[Any]]:
+        """Return the results for packed arrays (lanes, ...), in double-double (lanes, ..., 2) if `fmt` is None.
+
+        Parameters
+        ----------
+        tag : the arithmetic from which random numbers are drawn.
+
+        Raises
+        ------
+        OverflowError, ZeroDivisionError : a lane has no result.
+        """
+        found, error = self.begin(fmt, *given, tag=tag)
+        if error is not None:
+            raise error
+        return found
+
+    def begin(
+        self, fmt: Any, *given: NDArray[Any], tag: Any = None
+    ) -> tuple[list[NDArray[Any]], ArithmeticError | None]:
+        """Return the results of the first lanes, as far as they have any, and the error of the next one, if it has."""
+        lanes, most, done = len(given[0]), max(_NUMBERS // self._sizes[0], 1), 0
+        parts = [self._together(fmt, tag, [each[:0] for each in given])]
+        while done < lanes:
+            try:
+                parts.append(self._together(fmt, tag, [each[done : done + most] for each in given]))
+            except ArithmeticError as error:
+                if most == 1:
+                    return [np.concatenate(each) for each in zip(*parts, strict=True)], error
+                most = 1  # some of them, one by one
+            else:
+                done += most
+        return [np.concatenate(each) for each in zip(*parts, strict=True)], None
+
+    def _together(self, fmt: Any, tag: Any, given: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
+        lanes, parts = len(given[0]), given[0].shape[1 + self._given[0].ndim :]
+        values = np.zeros((self._sizes[0], lanes, *parts), given[0].dtype)
+        truths = np.zeros((self._sizes[1], lanes), np.uint8)
+        truths[1] = 1
+        for constants in self._constants:
+            values[constants.places] = packed_constants(fmt, constants)[:, np.newaxis]
+        for places, each in zip(self._given, given, strict=True):
+            values[places.ravel()] = np.moveaxis(each.reshape(lanes, places.size, *parts), 0, 1)
+        if lanes and len(self._rows):
+            done = evaluate(*tables([fmt], tag), self._code, values, truths)
+            if done < len(self._rows):
+                fault = fault_of(self._rows, values, done)
+                raise (OverflowError if fault.overflows else ZeroDivisionError)(f"got {fault.reason}")
+        return [
+            truths[int(each.components[0])] != 0
+            if isinstance(each, TracedTruth)
+            else np.moveaxis(values[each.ravel()], 1, 0).reshape(lanes, *each.shape, *parts)
+            for each in self._found
+        ]
+
+
+@lru_cache(maxsize=128)
+def recorded(function: Callable[..., tuple[Any, ...]], *shapes: tuple[int, ...]) -> Lanes:
+    """Record a function of arrays of some shapes, which returns arrays and truth values in a tuple."""
+    tape, places, at = Tape(sum(map(math.prod, shapes))), [], 1
+    for shape in shapes:
+        places.append(np.arange(at, at + math.prod(shape)).reshape(shape))
+        at += math.prod(shape)
+    results = function(*map(TracedFormat(tape).made, places))
+    found = [each if isinstance(each, TracedTruth) else each.components[0] for each in results]
+    return Lanes(tape.instructions.astype(np.int64), tape.sizes, tape.all_constants, places, found)
