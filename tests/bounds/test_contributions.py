@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.contributions import contributions
 from gpbnb.bounds.guarantee import PARTS, guarantee, limits
 from gpbnb.filters.forms import Form
@@ -21,7 +20,6 @@ TRACKER = tracker(), limits(state=[1000, 30], innovation=8)
 
 def cases():
     yield "tracker", *TRACKER, FloatFormat(2, 24), Form.INNOVATION
-    yield "chopped", *TRACKER, FloatFormat(10, 7, Rounding.CHOP), Form.INNOVATION
     yield "Hung's form", *TRACKER, FloatFormat(2, 24), Form.HUNG
     yield (
         "a period",

@@ -146,7 +146,7 @@ def test_no_rounding_exceeds_the_unit_of_its_magnitude(fmt: FloatFormat) -> None
     [(0.95, None, 1024), (0.9999, None, 16384), (1.0, 100_000, 1024), (1.02, 300, 1024)],
 )
 def test_sums_by_squares_are_those_of_balls(radius: float, steps: int | None, lags: int) -> None:
-    """Against ball arithmetic that shares nothing with them; blocks lose where a state is a difference of others."""
+    """Against balls, which take seconds for 16384 lags; blocks lose where a state is a difference of others."""
     rng = np.random.default_rng(5)
     A, B = rng.standard_normal((4, 4)), rng.standard_normal((4, 2))
     A *= radius / np.abs(np.linalg.eigvals(A)).max()

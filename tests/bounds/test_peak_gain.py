@@ -165,7 +165,7 @@ def test_an_adversary_comes_within_a_factor_of_four_of_a_guarantee_at_60_hertz()
     assert bound / 4 < observed <= bound
 
 
-@pytest.mark.parametrize(("order", "frequency", "rate"), [(2, 20, 48_000), (2, 20, 192_000), (4, 60, 96_000)])
+@pytest.mark.parametrize(("order", "frequency", "rate"), [(2, 20, 48_000), (4, 60, 96_000)])
 def test_low_frequencies_have_a_guarantee_that_the_checker_proves(order: int, frequency: float, rate: float) -> None:
     _, system = cascade(order, frequency, rate)
     found = required_precision(system, np.ones((100, 1)), 1e-3, basis="guarantee", within=limits(measurement=1))
