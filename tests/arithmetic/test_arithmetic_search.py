@@ -39,6 +39,10 @@ def test_whatever_meets_the_requirement_the_answer_qualifies_and_the_next_lower_
     for bits in range(2**8):
         good, calls = {k + 1 for k in range(8) if bits >> k & 1}, []
         found = smallest_precision(among(good, calls), largest=8)
+        outcome = Search(
+            lambda fmt, good=good: Outcome(1 + (fmt.precision not in good)), FloatFormat(2, 5), (), largest=8, least=1
+        )
+        assert outcome.fmt == found
         if found is None:
             assert 8 not in good
             continue

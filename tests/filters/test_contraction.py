@@ -137,10 +137,13 @@ def test_a_singular_start_is_weighted_all_the_same():
     assert np.all(np.linalg.matrix_rank(start.L) == 2)
 
 
-def test_evaluation_errors_cover_what_float64_does():
+@pytest.mark.parametrize("alike", [False, True])
+def test_evaluation_errors_cover_what_float64_does(alike):
+    """Also with two precise sensors that are alike, whose gain has the errors of an inverse."""
     rng = np.random.default_rng(6)
     for _ in range(40):
-        *given, x, P = model(rng, 3, 2)
+        Phi, H, Q, R, x, P = model(rng, 3, 2)
+        given = (Phi, H[[0, 0]], Q, R / 10**6) if alike else (Phi, H, Q, R)
         z = exact(rng.integers(-99, 100, 2))
         Phi, H, Q, R, x1, P1, z1 = map(floats, (*given, x, P, z))
         stored, plain = [exact(each) for each in (Phi, H, Q, R, x1, P1, z1)], StepModel(Phi, H, Q, R)

@@ -78,6 +78,8 @@ def test_without_inputs_the_simulation_is_that_of_the_model():
     assert not np.array_equal(z, silent)
     simulation = Simulation(plain, tuple(map(float, plain.x0)), 0, fine_resolution(plain))
     assert np.array_equal(silent, simulation.measurements(STEPS))
+    walk = LinearModel([[1]], [[1]], [[1]], [[1]], [0], [[1]])
+    assert (simulated_measurements(replace(walk, d=["0.25"]), 9) - simulated_measurements(walk, 9) == 0.25).all()
 
 
 CART = {

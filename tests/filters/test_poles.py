@@ -28,6 +28,14 @@ def test_the_change_of_a_response_is_that_of_scipy(order, cutoff, digits):
     assert found.stored_pole == pytest.approx(max(abs(p) for row in stored for p in np.roots(row[3:])), rel=1e-9)
 
 
+def test_a_change_counts_down_to_60_decibels_below_the_peak():
+    """The response is zero at half of the sampling rate, where any change of it is infinite."""
+    b, a = [0.1, 0.2003, 0.1003], [1, -0.5]
+    found = stored_response(LinearSystem.from_coefficients(b, a), FloatFormat(2, 10))
+    (response,) = np.abs(signal.freqz(b, a, [found.frequency], fs=1)[1])
+    assert 1e-3 <= response / (sum(b) / sum(a)) < 1.02e-3
+
+
 def test_eigenvalues_of_a_cascade_are_those_of_its_sections():
     A = np.array([[0.999, 0, 0], [1e6, 0.999, 0], [1e12, 1e6, 0.999]])
     assert np.abs(np.linalg.eigvals(A)).max() == pytest.approx(0.999)
