@@ -24,14 +24,15 @@ _STEPS = (
     "list, and join them with np.stack"
 )
 INSTEAD = {
-    "a NumPy array": _STEPS,
+    "a NumPy array": f"write fmt.array([a, b]) in place of np.array([a, b]), and {_STEPS}",
     "astype()": _STEPS,
     "to_float()": _STEPS,
     "to_fractions()": _STEPS,
     "to_pairs()": _STEPS,
     "tolist()": "write x[i] for an entry, which stays in the format",
     "item()": "write x[i] for an entry, which stays in the format",
-    "float()": "write np.sqrt(x), np.exp(x) and so on instead of functions of math, and compare x itself",
+    "float()": "write np.sqrt(x), np.exp(x) and so on instead of functions of math, compare x itself, and collect "
+    "results in a list",
     "int()": "choose by comparisons, np.where, np.argmax or np.argsort",
     "an index": "choose by comparisons, np.where, np.argmax or np.argsort",
     "round()": "round into the format with its own operations",

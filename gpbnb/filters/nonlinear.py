@@ -379,7 +379,7 @@ class NonlinearModel:
             return self._checked("normalize", self.normalize(x), x, (self.n,))
 
     def _checked(self, name: str, found: Any, x: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-        found = _joined(found)
+        found = _joined(found, x)
         if isinstance(found, FloatArray) and found.format == x.format and found.shape == shape:
             return found
         if isinstance(found, FloatArray):
@@ -392,12 +392,12 @@ class NonlinearModel:
         )
 
 
-def _joined(found: Any) -> Any:
-    """Join arrays of a format in lists, or in rows of lists; anything else stays as it is."""
-    if not isinstance(found, (list, tuple)):
+def _joined(found: Any, x: FloatArray) -> Any:
+    """Join arrays of a format and exact numbers in lists, or in rows of lists; anything else stays as it is."""
+    if not isinstance(found, (list, tuple)) or not found:
         return found
-    rows = [_joined(each) for each in found]
-    return np.stack(rows) if any(isinstance(each, FloatArray) for each in rows) else found
+    rows = [_joined(each, x) for each in found]
+    return np.stack(rows) if any(isinstance(each, FloatArray) for each in rows) else x.operand(found)
 
 
 AnyModel = LinearModel | NonlinearModel

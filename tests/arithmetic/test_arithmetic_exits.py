@@ -159,7 +159,7 @@ def test_a_message_says_what_to_write():
         for leave, words in (
             (
                 np.asarray,
-                r"got a NumPy array of a FloatArray .*write the steps with \+ - .*np.stack; to look at x, write ",
+                r"got a NumPy array of a FloatArray .*write fmt.array\(\[a, b\]\) .*np.stack; to look at x, write ",
             ),
             (lambda x: math.sqrt(x[0]), r"got float\(\) of a FloatArray .* write np.sqrt\(x\), np.exp\(x\)"),
             (lambda x: int(x[0]), r"got int\(\) of a FloatArray .* choose by comparisons, np.where"),

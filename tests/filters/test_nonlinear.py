@@ -208,8 +208,12 @@ def without_rule(x):
         ({"iterations": 0}, ValueError, "iterations"),
         ({"iterations": 2, "method": "unscented"}, ValueError, "for the unscented filter"),
         ({"points": (0, 2, 0), "method": "unscented"}, ValueError, "needed alpha other than zero"),
-        ({"points": None}, TypeError, r"got points None; needed SigmaPoints\(alpha, beta, kappa\)"),
-        ({"points": ("a", 2, 0)}, ValueError, r"got points \('a', 2, 0\); needed SigmaPoints.*: got 'a'"),
+        (
+            {"points": None},
+            TypeError,
+            r"got points None; needed gpbnb.filters.nonlinear.SigmaPoints\(alpha, beta, kappa\)",
+        ),
+        ({"points": ("a", 2, 0)}, ValueError, r"got points \('a', 2, 0\); needed gpbnb.filters.nonlinear.SigmaPoints"),
         ({"angles": None}, ValueError, "got the angle None; needed a measurement, 0 to 1"),
         ({"h": lambda x, u: x}, TypeError, r"got h with other arguments: .*'u'; needed h\(x\), for a model without u"),
         ({"u": [[1]]}, TypeError, r"got f with other arguments: .*; needed f\(x, u\), for a model with u"),
@@ -235,7 +239,7 @@ def test_a_model_that_is_none_is_refused(options, error, message):
         (in_float64, TypeError, "got to_float"),
         (in_another_format, ValueError, "got numbers in .* from f"),
         (without_rule, TypeError, "got np.floor on an array that carries its derivatives"),
-        (lambda x: [1, 2], ValueError, "got a list from f"),
+        (lambda x: "12", ValueError, "got a str from f"),
     ],
 )
 def test_a_function_that_leaves_the_format_is_refused(function, error, message):
@@ -245,3 +249,27 @@ def test_a_function_that_leaves_the_format_is_refused(function, error, message):
     for slopes in (None, lambda x: x.format.eye(2)) if function is not without_rule else (None,):
         with pytest.raises(error, match=message):
             NonlinearRun(NonlinearModel(function, slopes, h, None, **NOISE), FloatFormat(2, 24)).take(RECORD)
+
+
+def test_exact_numbers_may_stand_in_lists():
+    """A Jacobian of constants, or of constants beside functions of the state, is the one with arrays of the format."""
+
+    def moved(x):
+        return [x[0] + x[1] / 8, x[1]]
+
+    def seen(x):
+        return [np.arctan2(x[0], 10)]
+
+    def rows(x):
+        return [[10 / (x[0] * x[0] + 100), 0]]
+
+    given = {**NOISE, "R": [[1]]}
+    record = RECORD[:, :1]
+    found = [
+        NonlinearRun(NonlinearModel(moved, F, seen, rows, **given), FloatFormat(2, 24)).states(record).tolist()
+        for F in (lambda x: [[1, 0.125], [0, 1]], lambda x: x.format.array([[1, "1/8"], [0, 1]]))
+    ]
+    assert found[0] == found[1]
+    inexact = NonlinearModel(moved, lambda x: [[1, 0.1], [0, 1]], seen, rows, **given)
+    with pytest.raises(ValueError, match=r"got the operand 0\.1; needed a number that .* holds exactly"):
+        NonlinearRun(inexact, FloatFormat(2, 24)).states(record)
