@@ -139,13 +139,8 @@ def test_what_does_not_exist_or_fit_has_no_value(form):
         ("abs(-x)", 2),
         ("sqrt(x)", 2**0.5),
         ("exp(x)", math.exp(2)),
-        ("log(x)", math.log(2)),
         ("sin(x)", math.sin(2)),
         ("cos(x)", math.cos(2)),
-        ("tan(x)", math.tan(2)),
-        ("max(x, 3)", 3),
-        ("min(x, 3)", 2),
-        ("diff(y**3, y)", 3 * sp.Symbol("y") ** 2),
         ("group(x)", 2),
     ],
 )

@@ -8,8 +8,8 @@ A form is one or more parts, separated by semicolons. Each part is one of:
   are alternatives that it could have used.
 
 In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``P[k-1]`` has an index; ``A.T`` and
-``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
-``diff`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
+``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs`` and ``sqrt``
+are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
 printed sequence or sum: for the members between its neighbours, in which each number that differs changes by one from
 member to member. A matrix with dots is a :class:`~gpbnb.report.ledger.dotted.DottedMatrix`, which equals every matrix
 that has the printed cells in their places. Dots in a product can be typeset but not evaluated. The name ``dots`` stands
@@ -53,7 +53,6 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
-    ast.MatMult: operator.matmul,
 }
 
 
@@ -428,6 +427,5 @@ def _apply(node: ast.expr, operation: Callable[..., Any], *operands: Any) -> Any
 
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "abs": abs, "sqrt": sp.sqrt, "exp": sp.exp, "log": sp.log, "sin": sp.sin, "cos": sp.cos, "tan": sp.tan,
-    "max": sp.Max, "min": sp.Min, "diff": sp.diff, "group": lambda inside: inside,
+    "abs": abs, "sqrt": sp.sqrt, "exp": sp.exp, "sin": sp.sin, "cos": sp.cos, "group": lambda inside: inside,
 }  # fmt: skip

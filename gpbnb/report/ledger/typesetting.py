@@ -18,7 +18,7 @@ _SIGNS: dict[type[ast.cmpop], str] = {
 }
 
 _GREEK = {name: name for small in greeks for name in (small, small.capitalize())} | {"lamda": "lambda"}
-_ACCENTS = ("hat", "tilde", "bar", "dot", "ddot", "underline", "overline")
+_ACCENTS = ("hat", "tilde", "dot", "underline")
 _TEMPLATES = {
     ("Sum", 1): r"\sum %s",
     ("Max", 1): r"\max %s",
@@ -33,7 +33,7 @@ _TEMPLATES = {
     ("exp", 1): "e^{%s}",
 }
 """How calls with so many arguments are typeset."""
-_NAMED = ("sin", "cos", "tan", "exp", "log", "ln", "max", "min", "dim")
+_NAMED = ("sin", "cos")
 
 
 def name_latex(name: str) -> str:
@@ -44,8 +44,6 @@ def name_latex(name: str) -> str:
     for word in rest:
         if word in _ACCENTS:
             text = rf"\{word} {{{text}}}" if len(text) > 1 else rf"\{word} {text}"
-        elif word == "prime":
-            text += "'"
         elif word == "star":
             text += "^*"
         else:
@@ -100,7 +98,7 @@ def typeset(node: ast.expr, level: int) -> str:
             return _wrap(f"{typeset(left, 1)}-{typeset(right, 2)}", level > 1)
         case ast.BinOp(op=ast.Mult()) if positive := _without_minus(node):
             return _wrap("-" + typeset(positive, 2), level > 1)
-        case ast.BinOp(left=left, op=ast.Mult() | ast.MatMult(), right=right):
+        case ast.BinOp(left=left, op=ast.Mult(), right=right):
             a, b = typeset(left, 2), typeset(right, 2)
             return _wrap(a + _times(a, b) + b, level > 3)
         case ast.BinOp(left=left, op=ast.Div(), right=right):
@@ -167,8 +165,6 @@ def _call(function: ast.expr, arguments: list[ast.expr]) -> str:
     inside = [typeset(argument, 0) for argument in arguments]
     if (name, len(inside)) in _TEMPLATES:
         return _TEMPLATES[name, len(inside)] % tuple(inside)
-    if name == "diff" and len(inside) == 2:
-        return rf"\frac{{d}}{{d{inside[1]}}}{inside[0]}"
     if name == "digits":
         return f".{''.join(inside)}"
     if name in _NAMED:

@@ -21,7 +21,7 @@ import sympy as sp
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, max_norm, row_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters import emulation, forms
+from gpbnb.filters import forms
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.kalman import derivation as d
 from gpbnb.report.kalman import ensembles, exact_step, report_bounds, smallest
@@ -437,20 +437,6 @@ def refined() -> ensembles.Summary:
 
 
 @cache
-def year_again() -> bool:
-    """Whether ten steps of a stored year give the stored errors when emulated again."""
-    stored = year.load()[0]
-    case = stored.case
-    if case.fmt is None:
-        raise ValueError(f"got {case.name} as the first run in year.csv; needed a run in a floating-point format")
-    steps = tuple(int(step) for step in stored.steps if step <= 10)
-    z = year.simulation(case.model).measurements(max(steps))
-    found = emulation.emulate(year.model(case.model, case.base), z, case.fmt, case.form, steps)
-    again = np.array([[float(f"{number:.6g}") for number in line] for line in found.state[:, 2:4]])
-    return bool(np.array_equal(again, stored.rate[: len(steps)]))
-
-
-@cache
 def needed_precision(base: int) -> int | None:
     """Return the fewest stored digits from which on the drift rates meet the tolerance at all checkpoints."""
     needed = None
@@ -463,10 +449,6 @@ def needed_precision(base: int) -> int | None:
                 break
             needed = found.case.precision
     return needed
-
-
-def years_meet_the_goal() -> bool:
-    return year_again() and None not in (needed_precision(10), needed_precision(2))
 
 
 CHECKS = read(__name__, globals(), vars(kalman_errors))
