@@ -18,12 +18,13 @@ import numpy as np
 import pytest
 from test_openings import NINE, WITHIN, raised_while_factored
 
-from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
+from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, WordFormats
 from gpbnb.bounds import check, guess
 from gpbnb.bounds.certificate import first_proved, of_operations
 from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
+from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.forms import Form
 from gpbnb.filters.system import biquad
 from gpbnb.report.guarantees import certificates
@@ -52,6 +53,12 @@ def section(fmt: Any) -> Content:
     made = biquad("0.01", "0.02", "0.01", "-1.6", "0.7")
     found = from_schedule(filter_schedule(made, fmt), limits(measurement=1.0))
     return dict(json.loads(found.certificate()))
+
+
+def in_words() -> Content:
+    system = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"])
+    words = WordFormats(FixedFormat(6, 12), 14, FixedFormat(6, 16))
+    return dict(json.loads(WordGuarantee(system, 1.0).proof(words).text))
 
 
 def refused(content: Content) -> str:
@@ -275,6 +282,7 @@ def original(name: str) -> str:
         ),
         "section": lambda: section(FORMAT),
         "fixed": lambda: section(FixedFormat(6, 12)),
+        "words": in_words,
         "cycle": lambda: written(
             small(R=[[["0.75"]], [["0.5"]]]), FloatFormat(2, 11), limits(measurement=4), Form.JOSEPH
         ),
@@ -366,6 +374,29 @@ ALTERED: dict[str, tuple[tuple[str, ...], Callable[[Content], None]]] = {
     "another recursion": (("section",), set_to("filter", "A", 0, 0, lambda x: str(Fraction(x) + 1))),
     "too small a range": (("hung",), set_to("format", "emax", 1)),
     "limits of another filter": (EVERY, set_to("limits", "measurement", ["1", "1"])),
+    "words, a bound smaller by a thousandth": (("words",), scale_bound("0.999")),
+    "words, the bound of one state smaller by a hundredth": (("words",), scale_one(1)),
+    "words, inputs twice as large": (("words",), set_to("limits", "measurement", ["2"])),
+    "words, no limit on the input": (("words",), set_to("limits", "measurement", [None])),
+    "words, a derived limit too small": (("words",), set_to("derived", "state", 0, lambda x: factor(x, "0.9"))),
+    "words, a coefficient": (("words",), set_to("filter", "coefficients", 3, lambda x: factor(x, "1.01"))),
+    "words, another operation": (("words",), set_to("filter", "operations", 1, 0, "subtract")),
+    "words, states that are not stored": (("words",), set_to("filter", "wide", lambda wide: [not x for x in wide])),
+    "words, compared with what was stored": (("words",), set_to("filter", "exact", "as stored")),
+    "words, a coefficient's bit less": (("words",), set_to("format", "coefficients", "precision", 13)),
+    "words, coefficients in base 3": (("words",), set_to("format", "coefficients", "base", 3)),
+    "words, coefficients at random": (("words",), set_to("format", "coefficients", "rounding", "stochastic")),
+    **{
+        f"words, {place} {name}": (("words",), set_to("format", place, key, value))
+        for place in ("data", "sums")
+        for name, key, value in (
+            ("with a bit less after the point", "fraction_bits", lambda bits: bits - 1),
+            ("with a range too small", "precision", lambda bits: bits - 8),
+            ("chopped", "rounding", "chop"),
+            ("in base 3", "base", 3),
+            ("of a million bits", "precision", 10**6),
+        )
+    },
 }
 
 
@@ -380,7 +411,7 @@ def test_altered_certificates_are_rejected(name: str, alteration: str) -> None:
     refused(content)
 
 
-@pytest.mark.parametrize("name", [*EVERY, "cycle"])
+@pytest.mark.parametrize("name", [*EVERY, "cycle", "words"])
 def test_the_originals_are_proved(name: str) -> None:
     prove(json.loads(original(name)))
 
