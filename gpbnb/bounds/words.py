@@ -27,23 +27,18 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.certificate import Proof, first_proved, of_operations
 from gpbnb.bounds.guess import EXCESS, Guess, gains, lags_of, loops, positive
+from gpbnb.bounds.units import units
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, exact_functionals, matrices
 from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable
 from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program
 
 
-def largest_rounding(rounding: Rounding) -> float:
-    """Return the largest rounding error, in units of the last bit."""
-    return 0.5 if rounding.to_nearest else 1.0
-
-
 def rounding_limits(made: IntegerProgram) -> NDArray[np.float64]:
     """Return the largest rounding error of each operation, (o,); zero where the result needs no more bits."""
     data, sums = made.words.data, made.words.accumulator
-    units = [largest_rounding(fmt.rounding) * float(fmt.unit) for fmt in (sums, data)]
+    of_sums, of_data = (float(units(fmt).errors[0]) for fmt in (sums, data))
     bits: list[float] = [data.fraction_bits] * (made.program.n + made.program.m)
     found = np.zeros(len(made.program.operations))
     for o, (code, a, b) in enumerate(made.program.operations.tolist()):
@@ -53,7 +48,7 @@ def rounding_limits(made: IntegerProgram) -> NDArray[np.float64]:
             needed = needed + math.log2(factor.denominator) - _twos(factor.numerator) if factor else -math.inf
         elif code in (ADD, SUBTRACT):
             needed = max(needed, bits[a])
-        for fmt, error in ((sums, units[0]), (data, units[1])):
+        for fmt, error in ((sums, of_sums), (data, of_data)):
             if needed > fmt.fraction_bits and (fmt is sums or not wide):
                 found[o] += error
                 needed = fmt.fraction_bits
@@ -164,7 +159,7 @@ class WordGuarantee:
     def _guess(self, words: WordFormats) -> Guess:
         made = integer_program(self._made, words)
         found = self._sums(made)
-        share = largest_rounding(words.data.rounding) * float(words.data.unit)
+        share = float(units(words.data).errors[0])
         inputs = self._largest + share
         if (inputs > float(words.data.largest)).any():
             raise OverflowError(
