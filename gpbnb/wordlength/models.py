@@ -36,7 +36,7 @@ INPUTS = ("B", "u", "b", "d", "steps")
 SYSTEM = ("A", "B")
 """Keys of a linear system in a TOML file; ``C``, ``D`` and ``x0`` are optional. Each model may have a ``name``."""
 
-DESIGN = ("b", "a", "sos", "structure", "pairing", "order", "scale")
+DESIGN = ("b", "a", "sos", "pairing", "order", "scale", "structure")
 """Keys of a digital filter in a TOML file, with ``b`` or ``sos``; see :class:`gpbnb.filters.design.FilterDesign`."""
 
 NAMES = {f"{kind}s": f"{kind}_names" for kind in ("state", "measurement", "input", "output")}
@@ -44,6 +44,14 @@ NAMES = {f"{kind}s": f"{kind}_names" for kind in ("state", "measurement", "input
 
 PID = ("Kp", "Ki", "Kd", "leak", "limits", "integral_limits", "back_calculation")
 """Keys of a controller in a TOML file; only ``Kp`` and ``Ki`` are needed. See :meth:`gpbnb.LinearSystem.pid`."""
+
+_KINDS: dict[str, tuple[Any, Sequence[str], Sequence[str]]] = {
+    "a Kalman filter": (LinearModel, KALMAN, (*INPUTS, "repair", "states", "measurements", "inputs")),
+    "a linear system": (LinearSystem, SYSTEM, ("C", "D", "x0", "states", "inputs", "outputs")),
+    "a digital filter": (FilterDesign, (), (*DESIGN, "inputs", "outputs")),
+    "a controller": (LinearSystem.pid, PID[:2], PID[2:]),
+}
+"""What makes each kind of model in a file, the keys that it needs, and those that it may have beside a name."""
 
 FILTERS = ("KalmanFilter", "SquareRootKalmanFilter", "FadingKalmanFilter")
 """Classes of FilterPy that are read; their estimates after ``predict()`` and ``update(z)`` are those of the model."""
@@ -126,7 +134,18 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
     if isinstance(source, tuple | list | np.ndarray):
         source = _coefficients(source)
     if isinstance(source, (str, Path, Mapping)):
-        return _from_mapping(*_read(source), u, structure)
+        given, where = _read(source)
+        made, named = _made(given, where, u)
+        if not isinstance(made, FilterDesign):
+            if structure is not None:
+                raise ValueError(
+                    f"{where}: got structure={structure!r}; needed none: only a digital filter has structures"
+                )
+            return made
+        try:
+            return made.system(structure or (None if named == "all" else named))
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{where}: {error}") from None
     library, kind = type(source).__module__.partition(".")[0], type(source).__name__
     own = isinstance(source, LinearModel | LinearSystem | NonlinearModel | NonlinearSystem | FixedIntervalSmoother)
     of_filter = own or (library == "filterpy" and kind in FILTERS)
@@ -257,9 +276,9 @@ def read_filter(source: str | Path | Mapping[str, Any], u: Numbers | None = None
     ValueError, OSError : as for :func:`read_model`.
     """
     given, where = _read(source)
-    if not _is_design(given):
-        return FilterSource(_from_mapping(given, where, u, None))
-    design, named = _design(given, where, u)
+    design, named = _made(given, where, u)
+    if not isinstance(design, FilterDesign):
+        return FilterSource(design)
     try:
         if named == "all":
             return FilterSource(design.system(), *design.compared("all"), True, design)
@@ -305,28 +324,6 @@ def _json(path: Path) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise ValueError(f"{path.name}: got a {type(found).__name__}; needed an object with {_KEYS}")
     return found
-
-
-def _is_design(given: Mapping[str, Any]) -> bool:
-    return "sos" in given or ("b" in given and not any(key in given for key in (*KALMAN, *SYSTEM)))
-
-
-def _design(given: Mapping[str, Any], where: str, u: Any) -> tuple[FilterDesign, str | None]:
-    """Return a design, and the structure that a file names, perhaps "all"; there must be no known inputs `u`."""
-    if u is not None:
-        raise ValueError(f"{where}: got known inputs for a digital filter; needed none: its measurements are inputs")
-    own = {name: NAMES[name] for name in ("inputs", "outputs")}
-    if unknown := sorted(map(str, set(given) - {*DESIGN, *own, "name"})):
-        allowed = ", ".join((*DESIGN[3:], *own, "name"))
-        raise ValueError(f"{where}: {', '.join(unknown)} unknown; needed b and a, or sos, and perhaps {allowed}")
-    arguments = {"name": where.removesuffix(".toml")} | {own.get(key, key): value for key, value in given.items()}
-    structure = arguments.pop("structure", None)
-    if not isinstance(arguments["name"], str):
-        raise ValueError(f"{where}: got name {arguments['name']!r}; needed text")
-    try:
-        return FilterDesign(**arguments), structure
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{where}: {error}") from None
 
 
 def _from_system(given: Any, library: str, structure: str | None) -> LinearSystem:
@@ -401,55 +398,34 @@ def _toml(path: Path) -> dict[str, Any]:
         raise ValueError(f"{path.name} is not TOML: its lists are nested too deeply") from None
 
 
-def _from_mapping(given: Mapping[str, Any], where: str, u: Any, structure: str | None) -> LinearModel | LinearSystem:
-    if _is_design(given):
-        design, named = _design(given, where, u)
-        try:
-            return design.system(structure or (None if named == "all" else named))
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"{where}: {error}") from None
-    if structure is not None:
-        raise ValueError(f"{where}: got structure={structure!r}; needed none: only a digital filter has structures")
-    kalman = any(key in given for key in ("Phi", "H", "Q", "R", "P0"))
+def _made(given: Mapping[str, Any], where: str, u: Any) -> tuple[LinearModel | LinearSystem | FilterDesign, Any]:
+    """Return a model or a design, and the structure that a file names, perhaps "all"; `u` are its known inputs."""
+    if any(key in given for key in ("Phi", "H", "Q", "R", "P0")):
+        kind = "a Kalman filter"
+    elif "sos" in given or ("b" in given and not any(key in given for key in (*KALMAN, *SYSTEM))):
+        kind = "a digital filter"
+    else:
+        kind = "a controller" if "Kp" in given else "a linear system"
+    make, needed, optional = _KINDS[kind]
     if u is not None:
-        if not kalman:
-            raise ValueError(
-                f"{where}: got known inputs for a linear system; needed none: its measurements are its inputs"
-            )
+        if make is not LinearModel:
+            raise ValueError(f"{where}: got known inputs for {kind}; needed none: its measurements are its inputs")
         given = {**given, "u": u}
-    if "Kp" in given:
-        return _controller(given, where, structure)
-    needed = KALMAN if kalman else SYSTEM
-    own = ("states", "measurements", "inputs") if kalman else ("states", "inputs", "outputs")
-    allowed = {*needed, *own, *INPUTS, "name", "repair"} if kalman else {*needed, *own, "C", "D", "x0", "name"}
-    missing, unknown = [key for key in needed if key not in given], sorted(map(str, set(given) - allowed))
+    missing = [key for key in needed if key not in given]
+    unknown = sorted(map(str, set(given) - {*needed, *optional, "name"}))
     if missing or unknown:
-        problems = [f"{', '.join(missing)} missing"] if missing else []
-        problems += [f"{', '.join(unknown)} unknown"] if unknown else []
-        more = f", with {', '.join((*INPUTS, *own, 'name'))} if it has them" if kalman else ""
-        raise ValueError(
-            f"{where}: {'; '.join(problems)}; needed {', '.join(KALMAN)} for a Kalman filter{more}, "
-            f"{', '.join(SYSTEM)} and optionally C, D, x0 for a linear system, b and a, or sos, for a digital filter, "
-            "or Kp and Ki for a controller"
-        )
-    arguments: dict[str, Any] = {"repair": True} if kalman else {}
-    arguments |= {"name": where.removesuffix(".toml")}
+        problems = [f"{', '.join(keys)} {what}" for keys, what in ((missing, "missing"), (unknown, "unknown")) if keys]
+        more = f" for {kind}; or, for another model, {_KEYS}" if make is LinearSystem else ""
+        own = ", ".join(needed) or "b and a, or sos,"
+        perhaps = ", ".join(each for each in (*optional, "name") if each not in ("b", "a", "sos"))
+        raise ValueError(f"{where}: {'; '.join(problems)}; needed {own} and perhaps {perhaps}{more}")
+    arguments = ({"repair": True} if make is LinearModel else {}) | {"name": where.removesuffix(".toml")}
     arguments |= {NAMES.get(key, key): value for key, value in given.items()}
+    structure = arguments.pop("structure", None)
     if not isinstance(arguments["name"], str):
         raise ValueError(f"{where}: got name {arguments['name']!r}; needed text")
     try:
-        return LinearModel(**arguments) if kalman else LinearSystem(**arguments)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{where}: {error}") from None
-
-
-def _controller(given: Mapping[str, Any], where: str, structure: str | None) -> LinearSystem:
-    if unknown := sorted(map(str, set(given) - {*PID, "name"})):
-        raise ValueError(f"{where}: {', '.join(unknown)} unknown; needed Kp, Ki and perhaps {', '.join(PID[2:])}")
-    if "Ki" not in given:
-        raise ValueError(f"{where}: Ki missing; needed Kp and Ki")
-    try:
-        return LinearSystem.pid(**{"name": where.removesuffix(".toml")} | dict(given))
+        return make(**arguments), structure
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None
 

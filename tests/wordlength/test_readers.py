@@ -51,7 +51,7 @@ def test_a_kalman_filter_from_arrays_in_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"Kp": 1}, "Ki missing; needed Kp and Ki"),
+        ({"Kp": 1}, "Ki missing; needed Kp, Ki and perhaps Kd"),
         ({"Kp": 1, "Ki": 1, "Kx": 1}, "Kx unknown; needed Kp, Ki and perhaps Kd, leak, limits"),
         ({"Kp": 1, "Ki": 1, "limits": [2, 1]}, "limits"),
         ([[1, 2, 3]], r"got a list of shape \(1, 3\); needed \(b, a\), or sections"),
