@@ -49,10 +49,25 @@ _KEYWORDS = frozenset(_WORDS.split())
 """Words of C and of the generated code, which are no names of coefficients or states."""
 
 _NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)((?:\[\d+\])*)")
-_SIGNS = {ADD: "+", SUBTRACT: "-", PRODUCT: "*", DIVIDE: "/"}
-_COMPARISONS = {LESS: "<", EQUAL: "=="}
 _WHOLE = {FLOOR: "floor", CEILING: "ceil", TRUNCATE: "trunc", NEAREST: "rint"}
-_FUNCTIONS = {ROOT: "sqrt", MODULO: "fmod", **_WHOLE}
+_EITHER = {
+    CONSTANT: "{c}", LESS: "{a} < {b}", EQUAL: "{a} == {b}", AT_LEAST: "{b} < {c} ? {c} : {b}",
+    AT_MOST: "{b} > {c} ? {c} : {b}",
+}  # fmt: skip
+_FLOATING = _EITHER | {
+    ADD: "{a} + {b}", SUBTRACT: "{a} - {b}", PRODUCT: "{a} * {b}", DIVIDE: "{a} / {b}", MULTIPLY: "{c} * {b}",
+    ROOT: "sqrt{f}({b})", MODULO: "fmod{f}({a}, {b})", **{code: name + "{f}({b})" for code, name in _WHOLE.items()},
+}  # fmt: skip
+_INTEGER = _EITHER | {
+    ADD: "add({left}, {right}{o})", SUBTRACT: "subtract({left}, {right}{o})", PRODUCT: "multiply({a}, {b}, {shift}{o})",
+    DIVIDE: "divide({a}, {b}{o})", MULTIPLY: "multiply({c}, {b}, {shift}{o})", ROOT: "root({b}{o})",
+    MODULO: "modulo({a}, {b})", **{code: f"whole_{name}({{b}}{{o}})" for code, name in _WHOLE.items()},
+}  # fmt: skip
+"""How each operation is written, for any number, in floating point, and by the functions for integers."""
+
+_SUMMED = (MULTIPLY, PRODUCT, ADD, SUBTRACT)
+"""Operations whose results are in the format of the sums."""
+
 _STOPS = {DIVISOR: ("== 0", "a divisor is zero"), RADICAND: ("< 0", "a square root has a negative argument")}
 
 
@@ -117,14 +132,8 @@ class CodeFloats:
     def operation(self, step: CodeStep, o: int, coefficient: str) -> str:
         """Return the expression for an operation."""
         code, a, b = step.program.operations[o].tolist()
-        if code == MULTIPLY:
-            return f"{coefficient} * r{b}"
-        if code in _SIGNS:
-            return f"r{a} {_SIGNS[code]} r{b}"
-        if code in _FUNCTIONS:
-            operands = ", ".join(f"r{each}" for each in values_of(code, a, b))
-            return f"{_FUNCTIONS[code]}{'f' if self.number == 'float' else ''}({operands})"
-        return limits(code, a, b, coefficient)
+        single = "f" if self.number == "float" else ""
+        return _FLOATING[code].format(a=f"r{a}", b=f"r{b}", c=coefficient, f=single)
 
     def helpers(self, body: str) -> str:
         """Return nothing: C has these operations."""
@@ -184,27 +193,13 @@ class CodeWords:
         program, words = step.program, self.words
         code, a, b = program.operations[o].tolist()
         overflow = ", &overflow" if self.may_overflow else ""
-        if code in (CONSTANT, CHOOSE, AT_LEAST, AT_MOST, LESS, EQUAL):
-            return limits(code, a, b, coefficient)
-        if code == MODULO:
-            return f"modulo(r{a}, r{b})"
-        if code == ROOT:
-            return f"root(r{b}{overflow})"
-        if code in _WHOLE:
-            return f"whole_{_WHOLE[code]}(r{b}{overflow})"
-        if code == MULTIPLY:
-            found = f"multiply({coefficient}, r{b}, {_shift(step, o, words)}{overflow})"
-        elif code == PRODUCT:
-            found = f"multiply(r{a}, r{b}, {_shift(step, o, words)}{overflow})"
-        elif code == DIVIDE:
-            return f"divide(r{a}, r{b}{overflow})"
-        else:
-            found = (
-                f"{'add' if code == ADD else 'subtract'}({self._term(program, a)}, {self._term(program, b)}{overflow})"
-            )
-        if words.sums is not None and not program.wide[o]:
-            found = f"store({found}{overflow})"
-        return found
+        left, right = (self._term(program, a), self._term(program, b)) if code in (ADD, SUBTRACT) else ("", "")
+        shift = _shift(step, o, words) if code in (MULTIPLY, PRODUCT) else 0
+        found = _INTEGER[code].format(
+            a=f"r{a}", b=f"r{b}", c=coefficient, left=left, right=right, shift=shift, o=overflow
+        )
+        is_stored = code in _SUMMED and words.sums is not None and not program.wide[o]
+        return f"store({found}{overflow})" if is_stored else found
 
     def _term(self, program: Program, value: int) -> str:
         """Return a term of a sum in units of the accumulator."""
@@ -223,15 +218,6 @@ class CodeWords:
 
 CodeNumbers = CodeFloats | CodeWords
 """How the operations of a program are written for a type of number."""
-
-
-def limits(code: int, a: int, b: int, coefficient: str) -> str:
-    """Return a constant, a value limited by one, or a comparison of two values."""
-    if code == CONSTANT:
-        return coefficient
-    if code in _COMPARISONS:
-        return f"r{a} {_COMPARISONS[code]} r{b}"
-    return f"r{b} {'<' if code == AT_LEAST else '>'} {coefficient} ? {coefficient} : r{b}"
 
 
 def _limits_of(program: Program) -> set[int]:

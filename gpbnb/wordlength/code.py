@@ -426,7 +426,11 @@ def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[An
             f"got the UD form in {_word(fmt)}; needed another form, or words of at most 52 bits that do not "
             "wrap around: compiled loops compute the factors of its covariances"
         )
-    model.refuse_inputs("generated code")
+    if model.has_inputs:
+        raise ValueError(
+            f"got known inputs in {_word(fmt)}; needed words of at most 52 bits that do not wrap around: the emulation "
+            "has no other loops with inputs"
+        )
     identity_in(fmt, 1)
     arrays = {letter: each.to_fractions() for letter, each in model.definite_in(fmt).arrays(fmt).items()}
     stored = _coefficients([arrays[letter] for letter in ("Phi", "H", "Q", "R")])

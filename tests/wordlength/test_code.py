@@ -70,6 +70,8 @@ def test_offsets_and_inputs_of_hungs_forms_are_refused(tmp_path):
         write_code(replace(driven(), d=["0.5"]), BINARY32, tmp_path)
     with pytest.raises(ValueError, match="not defined with them; needed another form"):
         write_code(driven(), BINARY32, tmp_path, form="hung")
+    with pytest.raises(ValueError, match="needed words of at most 52 bits that do not wrap around"):
+        write_code(driven(), FixedFormat(3, 28, overflow="wrap"), tmp_path)
 
 
 def built(folder, flags=FLAGS):
