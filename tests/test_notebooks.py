@@ -16,10 +16,6 @@ MOST_LINES = 30
 MOST_LINES_OF_A_FUNCTION = 17
 OPEN = ("integration", "inversion", "kalman", "rolling", "rounding")
 """Chapters whose cells do the work in sight."""
-CLOSED = ("geometry",)
-"""Pages that glue numbers of helpers into their text."""
-SHOWN = tuple(path.stem for path in PATHS if path.stem not in CLOSED)
-"""Pages that show at least half of their code, and everything it uses."""
 ABSOLUTE = re.compile(r"(?<![\w.:/<])/(home|root|Users|work|tmp|usr|opt|var|private|mnt|srv)/|\b[A-Z]:\\\\")
 MOST_DIGITS = 6
 # A number in a text, not part of a name, an address or a fraction.
@@ -92,9 +88,9 @@ def visible(cell: dict) -> bool:
     return not tags(cell) & {"remove-cell", "remove-input", "hide-input", "hide-cell"}
 
 
-@pytest.mark.parametrize("name", SHOWN)
-def test_an_open_page_shows_its_code_and_all_that_the_code_uses(name):
-    cells = code_cells(BOOK / f"{name}.ipynb")
+@each_notebook
+def test_a_page_shows_its_code_and_all_that_the_code_uses(path):
+    cells = code_cells(path)
     lines = {shown: sum(len(c["source"]) for c in cells if visible(c) is shown) for shown in (True, False)}
     assert lines[True] >= lines[False]
     known, missing = set(dir(builtins)), []
@@ -106,12 +102,12 @@ def test_an_open_page_shows_its_code_and_all_that_the_code_uses(name):
     assert missing == []
 
 
-@pytest.mark.parametrize("name", SHOWN)
-def test_an_open_page_glues_nothing_into_its_text_and_a_chapter_ends_with_exercises(name):
-    cells = json.loads((BOOK / f"{name}.ipynb").read_text(encoding="utf-8"))["cells"]
+@each_notebook
+def test_a_page_glues_nothing_into_its_text_and_a_chapter_ends_with_exercises(path):
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
     text = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
     assert "{glue:" not in text
-    assert "## Exercises" in text or name not in OPEN
+    assert "## Exercises" in text or path.stem not in OPEN
 
 
 @each_notebook

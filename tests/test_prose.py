@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from test_notebooks import SHOWN
+from test_notebooks import PATHS
 
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
@@ -95,7 +95,7 @@ def in_sight(page: str) -> set[float]:
     return {float(each) for text in found for each in re.findall(r"(?<![\w.])\d*\.?\d+(?:e[+-]?\d+)?", text)}
 
 
-@pytest.mark.parametrize("page", SHOWN)
+@pytest.mark.parametrize("page", [path.stem for path in PATHS])
 def test_each_number_in_the_text_of_an_open_page_is_in_sight(page):
     text, seen = prose(page), in_sight(page)
     for phrase in GIVEN.get(page, ()):
