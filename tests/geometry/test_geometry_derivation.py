@@ -10,41 +10,15 @@ import steps
 import sympy as sp
 
 from gpbnb.report import measurement as m
-from gpbnb.report.geometry import derivation, theory
+from gpbnb.report.geometry import derivation
 
 DERIVATIONS = steps.Derivations(
-    derivation.turns,
-    derivation.deroll,
-    derivation.printed_deroll,
     derivation.first_order_effects,
     derivation.second_order_effects,
-    derivation.one_ring,
     derivation.precessions,
 )
 
 NAMES = {
-    "turns": {
-        "first column, first row: 1": "1",
-        r"second row: $-\alpha_3$": "-alpha_3",
-        r"third row: $\alpha_2$": "alpha_2",
-        r"third column, second row: $\alpha_1$": "alpha_1",
-    },
-    "deroll": {
-        "(5), first row": "-alpha_3",
-        "(5), second row": "alpha_2",
-        "(6), first row": "-theta_3",
-        "(6), second row": "theta_2",
-        "(7), first row": "alpha_3 - theta_3",
-        "(7), second row": "theta_2 - alpha_2",
-    },
-    "printed_deroll": {
-        r"(8), first row, should be $\alpha_3$": "alpha_2*sin(2*psi) - alpha_3*cos(2*psi)",
-        r"(8), second row, times $-1$, should be $\alpha_2$": "-alpha_2*cos(2*psi) - alpha_3*sin(2*psi)",
-        "mean of the first row over a roll": "0",
-        "mean of the second row over a roll": "0",
-        "correct only after a quarter and three quarters of a roll: first row": "alpha_3",
-        "the same for the second row": "alpha_2",
-    },
     "first_order_effects": {
         "telescope, first row: β is fixed in the spacecraft, so the deroll rotates it": (
             "-alpha_3 - beta_3*cos(psi) - beta_2*sin(psi)"
@@ -60,10 +34,6 @@ NAMES = {
     "second_order_effects": {
         "mean error of the difference, first row": "(alpha_1 + beta_1 + gamma_1)*varphi_2 + gamma_1*alpha_2",
         "mean error of the difference, second row": "(alpha_1 + beta_1 + gamma_1)*varphi_3 + gamma_1*alpha_3",
-    },
-    "one_ring": {
-        r"$-2\sin\psi$ times the reading, mean over a roll": "-theta_3",
-        r"$2\cos\psi$ times the reading, mean over a roll": "theta_2",
     },
     "precessions": {
         "mean field along the axis of the Earth": "omega_E/2",
@@ -86,8 +56,6 @@ def test_each_step_holds_and_is_named_for_what_it_derives(name):
 @pytest.mark.parametrize(
     ("derivation", "name", "integrand"),
     [
-        ("printed_deroll", "mean of the first row over a roll", "alpha_2*sin(2*psi) - alpha_3*cos(2*psi)"),
-        ("printed_deroll", "mean of the second row over a roll", "-alpha_2*cos(2*psi) - alpha_3*sin(2*psi)"),
         (
             "first_order_effects",
             "mean over a roll of the remaining γ, first row",
@@ -118,14 +86,6 @@ def test_the_fewest_signs_are_two_and_only_one_pair_does():
             working.append(signs.count(-1))
     assert sorted(working)[0] == 2
     assert working.count(2) == 1
-
-
-def test_printed_estimates_are_those_of_theory():
-    _, y, z = derivation.aligned(derivation.star())
-    values = {derivation.ALPHA[1]: 0.3, derivation.ALPHA[2]: 0.7, derivation.P: 0.9}
-    third, second = (float(e.subs(values)) for e in derivation.printed_estimates(y, z))
-    readings = [float(y.subs(values)), float(z.subs(values))]
-    assert np.allclose(theory.printed_deroll(readings, 0.9), [-third, second], atol=1e-15)
 
 
 def test_a_star_off_the_plane_has_drifts_that_are_not_perpendicular():

@@ -14,8 +14,6 @@ from gpbnb.report.geometry.derivation import ALPHA, BETA, GAMMA, PHI
 from gpbnb.report.geometry.theory import Misalignments
 from gpbnb.report.measurement import ARCSEC, MAS, deroll
 
-NAMES = dict(zip(theory.SINGLE, (*ALPHA, *BETA, *GAMMA), strict=True))
-
 
 @cache
 def mean_errors(order):
@@ -34,20 +32,6 @@ def test_second_order_of_a_rolling_spacecraft_is_that_of_sympy():
         y, z = (float(e.subs(numbers)) for e in mean_errors(2))
         # products of two numbers of 1e-4; sympy and numpy round them differently by an ulp or two
         assert np.allclose(theory.measured(case, True, 1.0), [z, -y], rtol=1e-12, atol=1e-22)
-
-
-@pytest.mark.parametrize("name", theory.SINGLE)
-def test_small_angle_loss_is_the_third_order_of_sympy(name):
-    for size, drift in ((1e-3, (3e-5, 2e-5)), (1e-5, (3e-5, -4e-5))):
-        worst = []
-        for signed in (size, -size):
-            numbers = dict.fromkeys((*ALPHA, *BETA, *GAMMA), 0) | {
-                NAMES[name]: signed,
-                PHI[1]: drift[0],
-                PHI[2]: drift[1],
-            }
-            worst.append(math.hypot(*(float(e.subs(numbers)) for e in mean_errors(3))))
-        assert theory.small_angle_loss(name, size, drift) == pytest.approx(max(worst), rel=1e-12, abs=0)
 
 
 def test_without_roll_the_readout_misalignment_stands_and_the_telescope_one_cancels():

@@ -76,31 +76,6 @@ def up_to(order: int, expression: sp.Expr, small: Iterable[sp.Symbol]) -> sp.Exp
     return sp.expand(sum(kept, start=sp.Integer(0)))
 
 
-def orders_agree() -> bool:
-    """Whether the printed matrix is the first order of the exact one, for every order of rotations."""
-    return all(
-        (exact(ALPHA, sequence).applyfunc(lambda entry: up_to(1, entry, ALPHA)) - printed_small(ALPHA)).is_zero_matrix
-        for sequence in SEQUENCES
-    )
-
-
-def turns() -> Derivation:
-    """Derive the printed matrix from the exact one, for the entries that (3) and (4) use."""
-    matrix = exact(ALPHA).applyfunc(sp.expand)
-    names = {
-        (0, 0): "first column, first row: 1",
-        (1, 0): "second row: $-\\alpha_3$",
-        (2, 0): "third row: $\\alpha_2$",
-        (1, 2): "third column, second row: $\\alpha_1$",
-    }
-    steps = []
-    for (i, j), name in names.items():
-        scaled = matrix[i, j].subs({a: H * a for a in ALPHA}, simultaneous=True)
-        right = printed_small(ALPHA)[i, j]
-        steps.append(Step(name, sp.Limit(scaled if i == j else scaled / H, H, 0), right))
-    return Derivation(tuple(steps))
-
-
 # -- what is read ---------------------------------------------------------------------------------
 
 
@@ -126,76 +101,12 @@ def derolled(y: sp.Expr, z: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
     return C * y - S * z, S * y + C * z
 
 
-def printed_estimates(y: sp.Expr, z: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Return the third and second angle by (8) and (9) as printed; the minus sign of the second is moved over."""
-    return C * y + S * z, -(-S * y + C * z)
-
-
-def deroll() -> Derivation:
-    """Derive (3) to (7): without misalignments, the derolled readings are the angles."""
-    t, r = aligned(star()), aligned(spin())
-    y, z = r[1] - t[1], r[2] - t[2]
-    return Derivation(
-        (
-            RollStep(
-                "(5), first row", unevaluated(C) * unevaluated(t[1]) - unevaluated(S) * unevaluated(t[2]), -ALPHA[2]
-            ),
-            RollStep(
-                "(5), second row", unevaluated(S) * unevaluated(t[1]) + unevaluated(C) * unevaluated(t[2]), ALPHA[1]
-            ),
-            RollStep(
-                "(6), first row", unevaluated(C) * unevaluated(r[1]) - unevaluated(S) * unevaluated(r[2]), -THETA[2]
-            ),
-            RollStep(
-                "(6), second row", unevaluated(S) * unevaluated(r[1]) + unevaluated(C) * unevaluated(r[2]), THETA[1]
-            ),
-            RollStep(
-                "(7), first row", unevaluated(C) * unevaluated(y) - unevaluated(S) * unevaluated(z), ALPHA[2] - THETA[2]
-            ),
-            RollStep(
-                "(7), second row",
-                unevaluated(S) * unevaluated(y) + unevaluated(C) * unevaluated(z),
-                THETA[1] - ALPHA[1],
-            ),
-        )
-    )
-
-
 # -- (8) and (9) as printed -----------------------------------------------------------------------
 
 
 def mean(expression: sp.Expr) -> sp.Expr:
     """Return the mean over a roll, unevaluated."""
     return over(sp.Integral(expression, (P, 0, 2 * sp.pi)), 2 * sp.pi)
-
-
-def printed_deroll() -> Derivation:
-    """Apply (8) to the readings of an aligned telescope: it rolls them a second time, as does (9) with θ."""
-    _, y, z = aligned(star())
-    third, second = printed_estimates(y, z)
-    twice = sp.cos(2 * P), sp.sin(2 * P)
-    return Derivation(
-        (
-            RollStep(
-                "(8), first row, should be $\\alpha_3$",
-                unevaluated(C) * unevaluated(y) + unevaluated(S) * unevaluated(z),
-                -twice[0] * ALPHA[2] + twice[1] * ALPHA[1],
-            ),
-            RollStep(
-                "(8), second row, times $-1$, should be $\\alpha_2$",
-                unevaluated(S) * unevaluated(y) - unevaluated(C) * unevaluated(z),
-                -twice[1] * ALPHA[2] - twice[0] * ALPHA[1],
-            ),
-            RollStep("mean of the first row over a roll", mean(sp.expand(third)), sp.S.Zero),
-            RollStep("mean of the second row over a roll", mean(sp.expand(second)), sp.S.Zero),
-            RollStep(
-                "correct only after a quarter and three quarters of a roll: first row",
-                sp.Limit(third, P, sp.pi / 2),
-                ALPHA[2],
-            ),
-            RollStep("the same for the second row", sp.Limit(second, P, sp.pi / 2), ALPHA[1]),
-        )
-    )
 
 
 def fewest_signs() -> tuple[tuple[int, ...], ...]:
@@ -302,18 +213,6 @@ def second_order_effects() -> Derivation:
                 ("first", errors[0], PHI[1], ALPHA[1]),
                 ("second", errors[1], PHI[2], ALPHA[2]),
             )
-        )
-    )
-
-
-def one_ring() -> Derivation:
-    """Derive both angles from one ring, which reads only z_r, by means over a roll, without β and γ."""
-    small = (*BETA, *GAMMA, *THETA)
-    z = up_to(1, spin()[2], small)
-    return Derivation(
-        (
-            RollStep("$-2\\sin\\psi$ times the reading, mean over a roll", mean(sp.expand(-2 * S * z)), -THETA[2]),
-            RollStep("$2\\cos\\psi$ times the reading, mean over a roll", mean(sp.expand(2 * C * z)), THETA[1]),
         )
     )
 

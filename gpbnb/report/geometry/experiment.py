@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -138,73 +138,6 @@ def _year(case: Misalignments, roll_period: float | None, step: float, progress:
     )
 
 
-def years(
-    cases: Mapping[str, Misalignments], step: float = 60.0, roll_period: float = 600.0, *, progress: bool = False
-) -> dict[str, tuple[MisalignedYear, MisalignedYear]]:
-    """Simulate each case without and with roll; see :func:`year`."""
-    return {
-        name: (year(case, None, step), year(case, roll_period, step))
-        for name, case in tqdm(cases.items(), desc="years", ncols=80, disable=not progress)
-    }
-
-
-@dataclass(frozen=True)
-class Part:
-    """Error of one reading over a roll, in radians: the size of its mean and its amplitude at the roll frequency."""
-
-    mean: float
-    turning: float
-
-
-def parts(case: Misalignments, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
-    """Return the errors of the derolled readings over one roll: ``telescope``, ``gyro`` and their ``difference``.
-
-    The telescope is compared with the star, and the gyro with the spin axis, both in the intermediate frame. The
-    difference is compared with the drift in the absolute frame. Rotations are exact.
-
-    Parameters
-    ----------
-    case : the angles.
-    years : time since the start at which angles and drift are evaluated.
-    samples : number per roll, at least 3.
-    """
-    if samples < 3:
-        raise ValueError(f"got {samples} samples in a roll; needed 3 or more")
-    phase = 2 * math.pi * np.arange(samples) / samples
-    alpha, beta, gamma = (case.at(name, years) for name in ("alpha", "beta", "gamma"))
-    pointing, drifted = rotation(alpha), spin_axis(case, years)
-    star, spin = pointing[:, 0], apply(pointing, drifted)
-    telescope = into_spacecraft(star, phase, beta)[:, 1:]
-    gyro = into_spacecraft(spin, phase, beta, gamma)[:, 1:]
-    found = {}
-    for name, readings, true in (
-        ("telescope", telescope, star),
-        ("gyro", gyro, spin),
-        ("difference", gyro - telescope, drifted),
-    ):
-        error = deroll(readings, phase) - true[1:]
-        mean = error.mean(axis=0)
-        turning = deroll(error - mean, -phase).mean(axis=0)
-        found[name] = Part(float(np.hypot(*mean)), float(np.hypot(*turning)))
-    return found
-
-
-def misalignment_cases(size: float) -> dict[str, Misalignments]:
-    """Return cases with one angle of `size` radians, pairs of angles, and angles that grow by `size` per year."""
-    none = Misalignments()
-    single = {name: none.with_angle(name, size) for which in ("alpha", "beta", "gamma") for name in _three(which)}
-    pairs = {
-        f"{a} and {b}": none.with_angle(a, size).with_angle(b, size)
-        for a, b in (("beta1", "alpha2"), ("gamma1", "alpha2"), ("gamma1", "alpha3"), ("beta2", "gamma3"))
-    }
-    changing = {
-        name: none.with_angle(name, size)
-        for name in ("alpha_rate2", "beta_rate2", "beta_rate3", "gamma_rate2", "gamma_rate3")
-    }
-    both = {"gamma1 and alpha_rate2": none.with_angle("gamma1", size).with_angle("alpha_rate2", size)}
-    return {"no angle": none} | single | pairs | changing | both
-
-
 def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float]) -> Floats:
     """Simulate the error of φ in a mean over one roll, the length of (Δφ2, Δφ3), for one angle of several `sizes`.
 
@@ -223,10 +156,6 @@ def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float]) 
             worst = max(worst, float(np.hypot(*(mean - angles))))
         errors.append(worst)
     return np.array(errors)
-
-
-def _three(which: str) -> list[str]:
-    return [f"{which}{axis}" for axis in (1, 2, 3)]
 
 
 def _slope(time: Floats, values: Floats) -> Floats:

@@ -210,63 +210,6 @@ def line_fit_leak(amplitude: float, rolls: float, samples: float | None = None) 
     return 6 / (rolls * spread) * abs(amplitude)
 
 
-SINGLE = ("alpha1", "alpha2", "alpha3", "beta1", "beta2", "beta3", "gamma1", "gamma2", "gamma3")
-"""Angles whose small-angle form is examined."""
-
-
-def small_angle_loss(name: str, size: ArrayLike, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> Floats:
-    r"""Return the error of φ in a mean over whole rolls if products of small angles with one angle x are dropped.
-
-    To third order and for the worse sign of x, the errors are as follows: for rotations about the roll axis, for the
-    other angles β and γ, and for α2,
-
-    .. math:: |x|\,|\varphi| + \dots, \qquad \tfrac14 x^2|\varphi|, \qquad
-        \tfrac12 x^2|\varphi_2| + \tfrac12|x|\,|\varphi|^2
-
-    To each is added the error due to the drift alone, :math:`\varphi^3/6`.
-
-    Parameters
-    ----------
-    name : one of `SINGLE`.
-    size : (...), size of this angle; radians.
-    drift : true φ2, φ3; radians.
-
-    Returns
-    -------
-    loss : (...), length of the vector (Δφ2, Δφ3); radians.
-    """
-    if name not in SINGLE:
-        raise ValueError(f"got angle {name!r}; needed one of {', '.join(SINGLE)}")
-    phi2, phi3 = drift
-    square = phi2**2 + phi3**2
-    worst = []
-    for x in (np.asarray(size, dtype=float), -np.asarray(size, dtype=float)):
-        y, z = phi3**3 / 6 + 0 * x, -(phi2**3) / 6 - phi2 * phi3**2 / 2 + 0 * x
-        if name.endswith("1"):
-            y, z = y + x * phi2 + x**2 * phi3 / 2, z + x * phi3 - x**2 * phi2 / 2
-        elif name == "alpha2":
-            z = z - x**2 * phi2 / 2 - x * square / 2
-        elif name == "alpha3":
-            y = y + x**2 * phi3 / 2 + x * square / 2
-        else:
-            y, z = y + x**2 * phi3 / 4, z - x**2 * phi2 / 4
-        worst.append(np.hypot(y, z))
-    return np.asarray(np.maximum(*worst))
-
-
-def reach(name: str, allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
-    """Return the size of an angle whose :func:`small_angle_loss` equals `allowed`, in radians, at most half a turn."""
-    if not 0 < allowed < small_angle_loss(name, math.pi, drift):
-        raise ValueError(
-            f"got allowed = {allowed}; needed an angle above 0 and below the error that half a turn of {name} causes"
-        )
-    low, high = 0.0, math.pi
-    for _ in range(80):
-        middle = (low + high) / 2
-        low, high = (middle, high) if small_angle_loss(name, middle, drift) < allowed else (low, middle)
-    return high
-
-
 def twist_limit(allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
     """Return the rotation about the roll axis that moves `allowed` from one drift to the other; both in radians."""
     if not allowed > 0:
