@@ -105,19 +105,18 @@ def runs(n: int) -> tuple[tuple[Elimination, Names, Fraction], ...]:
     return tuple(found)
 
 
-def alternating(n: int, seed: int, shrink: int = 1) -> Matrix:
-    """Return a system (n, n + 1) in which each step changes the sign of every entry that it changes.
+def _last_largest(rng: random.Random, others: int) -> list[Fraction]:
+    return [*(Fraction(rng.randint(3, 5)) for _ in range(others)), Fraction(rng.randint(20, 30))]
 
-    The last row and the last column have the largest entries of every block. Then each rounding error adds to the
-    others, in each entry and in the norms. With multipliers that `shrink` divides, the pivot row is larger still.
-    """
+
+def alternating(n: int, seed: int, shrink: int = 1) -> Matrix:
+    """Return a system (n, n + 1) whose rounding errors all add up: each step changes every sign that it can."""
     rng = random.Random(seed)
     sign, block = 1, np.array([[Fraction(1), Fraction(rng.randint(2, 9))]], dtype=object)
     for _ in range(n - 1):
         rows, columns = block.shape
-        factors = [Fraction(rng.randint(3, 5)) for _ in range(rows - 1)] + [Fraction(rng.randint(20, 30))]
-        sizes = [Fraction(rng.randint(3, 5)) for _ in range(columns - 2)] + [Fraction(rng.randint(20, 30))] * 2
-        pivots = [-sign * shrink * abs(block).max() * size for size in sizes]
+        factors, sizes = _last_largest(rng, rows - 1), _last_largest(rng, columns - 2)
+        pivots = [-sign * shrink * abs(block).max() * size for size in (*sizes, sizes[-1])]
         pivot = Fraction(-sign * rng.randint(2, 4))
         below = [
             [factor / shrink * pivot, *(entry + factor / shrink * p for entry, p in zip(row, pivots, strict=True))]
@@ -638,21 +637,22 @@ def counterexample(form: str) -> tuple[experiment.InverseTrial, str]:
 @cache
 def exceeded() -> str:
     """Return the factors by which the errors of the counterexamples exceed the printed bound."""
-    texts = []
-    for form in COUNTEREXAMPLES:
-        trial, name = counterexample(form)
-        if not trial.violates(name):
-            raise ArithmeticError(
-                f"got a counterexample to {form} whose error is within the bound; needed an error above the bound"
-            )
-        rows = ", ".join("(" + ", ".join(f"{float(x):g}" for x in row) + ")" for row in trial.matrix.to_float())
-        texts.append(
-            f"for the matrix with rows {rows} and condition number {trial.condition:.3g}, inverted in "
-            f"{trial.matrix.format.precision} digits {'with' if trial.pivot else 'without'} pivoting, "
-            f"the error is {trial.ratio(name):.2g} times "
-            f"{'the bound in the last box of the chart' if form == 'chart' else 'bound (96)'}"
+    return "; ".join(map(_exceeded, COUNTEREXAMPLES))
+
+
+def _exceeded(form: str) -> str:
+    trial, name = counterexample(form)
+    if not trial.violates(name):
+        raise ArithmeticError(
+            f"got an error of {trial.ratio(name)} times bound {form}; needed an error above the bound"
         )
-    return "; ".join(texts)
+    rows = ", ".join("(" + ", ".join(f"{float(x):g}" for x in row) + ")" for row in trial.matrix.to_float())
+    return (
+        f"for the matrix with rows {rows} and condition number {trial.condition:.3g}, inverted in "
+        f"{trial.matrix.format.precision} digits {'with' if trial.pivot else 'without'} pivoting, "
+        f"the error is {trial.ratio(name):.2g} times "
+        f"{'the bound in the last box of the chart' if form == 'chart' else 'bound (96)'}"
+    )
 
 
 @cache

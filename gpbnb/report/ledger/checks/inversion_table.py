@@ -104,10 +104,8 @@ def claims() -> Names:
     mantissas = {number.split("e")[0] for number in _numbers(printed, "proposed").values()}
     more = [one for one in readings("proposed") if one.detail.endswith("more digits")]
     same = sum(one.same_digits for one in more)
-    margin, trend = (
-        "are indeed very conservative" if above else "are not conservative",
-        "decreases" if falling else "increases",
-    )
+    margin = f"are {'indeed very' if above else 'not'} conservative"
+    trend = "decreases" if falling else "increases"
     return {
         "margin": margin, "trend": trend, "verb": {margin, trend}, "same": same, "more": len(more),
         "mantissa": "the same mantissa" if len(mantissas) == 1 and same == len(more) else "different mantissas",

@@ -1,7 +1,8 @@
 """Sections 12 to 14 on the Kalman filter: true values of their names, exact and to first order in ε.
 
-Estimates, covariances, gains and closed loops come from the weighted least squares of prediction and measurement. The
-report's own error algebra gives every matrix one ε, so there matrices are plain symbols.
+Estimates, covariances, gains and closed loops come from the weighted least squares of prediction and measurement,
+solved through the information matrix. The report's own error algebra gives every matrix one ε, so there matrices are
+plain symbols.
 """
 
 from __future__ import annotations
@@ -51,11 +52,7 @@ def _covariance(rng: np.random.Generator, size: int) -> sp.Matrix:
 
 @cache
 def least_squares_run() -> dict[str, dict[int, sp.Matrix]]:
-    """Return five steps of a random filter, with each matrix by letter and index.
-
-    Estimates, covariances, gains and closed loops come from the weighted least squares of prediction and measurement,
-    solved through the information matrix, and not from the filter's equations. All matrices change from step to step.
-    """
+    """Return five steps of a random filter by least squares, with each matrix by letter and index."""
     rng, n, m = np.random.default_rng(98), STATES, MEASUREMENTS
     found: dict[str, dict[int, sp.Matrix]] = defaultdict(dict)
     found["x"][0], found["P"][0] = _numbers(rng, n, 1), _covariance(rng, n)

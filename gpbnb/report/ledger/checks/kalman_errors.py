@@ -22,10 +22,12 @@ from gpbnb.arithmetic.rational import exact, inverse_of, row_sum_norm
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel, gain, predicted, reduction, second_gain, updated
 from gpbnb.report.kalman import report_bounds, smallest
+from gpbnb.report.kalman.smallest import FilterCase
 from gpbnb.report.ledger.first_order import FirstOrder
 from gpbnb.report.ledger.tracked import Matrix, largest, rounded, tracked
 
 Names = dict[str, Any]
+Number = Callable[[Any], Matrix]
 
 
 FOUR = FloatFormat(10, 4)
@@ -47,14 +49,7 @@ class ComputedStep:
     x: Matrix
 
 
-def take(
-    algebra: Algebra,
-    number: Callable[[Any], Matrix],
-    case: smallest.FilterCase,
-    x: Matrix,
-    P: Matrix,
-    second: bool = True,
-) -> ComputedStep:
+def take(algebra: Algebra, number: Number, case: FilterCase, x: Matrix, P: Matrix, second: bool = True) -> ComputedStep:
     """Take one step, (100)-(111), of a filter; the estimate uses the second or the first form of (99)."""
     model = StepModel(*map(number, (case.Phi, case.H, case.Q, case.R)))
     P_kp = predicted(algebra, model.Phi, P, model.Q)
@@ -128,7 +123,7 @@ SCALARS = tuple(
 )
 
 
-def _mixed(seed: int, n: int) -> smallest.FilterCase:
+def _mixed(seed: int, n: int) -> FilterCase:
     """Return a random filter with one measurement and numbers of either sign."""
     rng = np.random.default_rng(seed)
 
@@ -138,11 +133,11 @@ def _mixed(seed: int, n: int) -> smallest.FilterCase:
     half, noise = numbers(n, n), numbers(n, n)
     one = exact(np.eye(n, dtype=int))
     Q, P = (factor @ factor.T + one / 50 for factor in (noise, half))
-    return smallest.FilterCase(numbers(n, n), numbers(1, n), Q, exact([["1/4"]]), numbers(n), P, numbers(1))
+    return FilterCase(numbers(n, n), numbers(1, n), Q, exact([["1/4"]]), numbers(n), P, numbers(1))
 
 
 @cache
-def cases() -> tuple[smallest.FilterCase, ...]:
+def cases() -> tuple[FilterCase, ...]:
     """Return filters with one measurement: scalar ones whose gain almost cancels the state, and random ones."""
     cancelling = smallest.correlated()
     product = cancelling._replace(Phi=exact([["1.001", 1], [1, 0]]))
@@ -154,10 +149,10 @@ class Roundings:
     """How to compute, how to make numbers, and which errors to take."""
 
     algebra: Algebra
-    number: Callable[[Any], Matrix]
+    number: Number
     emulated: bool
 
-    def take(self, case: smallest.FilterCase) -> ComputedStep:
+    def take(self, case: FilterCase) -> ComputedStep:
         """Take the first step of a case."""
         return take(self.algebra, self.number, case, self.number(case.x[:, None]), self.number(case.P))
 
@@ -174,7 +169,7 @@ KINDS = (
 
 
 @cache
-def _steps() -> tuple[tuple[smallest.FilterCase, ComputedStep, Roundings, dict[str, Matrix]], ...]:
+def _steps() -> tuple[tuple[FilterCase, ComputedStep, Roundings, dict[str, Matrix]], ...]:
     """Return for each case and kind the exact step and the errors of its quantities."""
     found = []
     for case in cases():
@@ -207,7 +202,7 @@ def local_gain() -> list[Names]:
     return found
 
 
-def _names_of_a_step(case: smallest.FilterCase, true: ComputedStep, errors: dict[str, Matrix]) -> Names:
+def _names_of_a_step(case: FilterCase, true: ComputedStep, errors: dict[str, Matrix]) -> Names:
     given = {
         "phi": at(2, case.Phi), "P": at(2, case.P), "Q": at(2, case.Q), "x": at(2, case.x[:, None]),
         "H_k": FirstOrder(case.H), "R_k": FirstOrder(case.R), "z_k": FirstOrder(case.z[:, None]),
@@ -304,7 +299,7 @@ LAST = 5
 """Steps of the longest run."""
 
 
-def _exact_run(case: smallest.FilterCase) -> list[ComputedStep]:
+def _exact_run(case: FilterCase) -> list[ComputedStep]:
     found: list[ComputedStep] = []
     x, P = exact(case.x)[:, None], exact(case.P)
     for _ in range(LAST):
@@ -313,7 +308,7 @@ def _exact_run(case: smallest.FilterCase) -> list[ComputedStep]:
     return found
 
 
-def _errors_of_a_run(case: smallest.FilterCase, run: list[ComputedStep], kind: Roundings) -> list[list[Matrix]]:
+def _errors_of_a_run(case: FilterCase, run: list[ComputedStep], kind: Roundings) -> list[list[Matrix]]:
     """Return for each step the errors of x, of F, of u, and of x from this step alone."""
     x, P, errors = kind.number(case.x[:, None]), kind.number(case.P), []
     for true in run:

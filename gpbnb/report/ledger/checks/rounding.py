@@ -307,17 +307,19 @@ def all_pairs() -> tuple[int, Fraction]:
     a, b = x.to_fractions()[:, np.newaxis], y.to_fractions()
     largest, count = Fraction(0), 0
     for name, op in OPERATIONS.items():
-        computed = getattr(np, name)(x[:, np.newaxis], y).to_fractions()
-        true = op(a, b)
-        some = true != 0
-        count += true.size
-        if not np.all(computed[~some] == 0):
-            raise ArithmeticError("got a nonzero computed result; needed zero, as the exact result is zero")
-        computed, true = computed[some], true[some]
-        error = abs(computed.astype(np.float64) / true.astype(np.float64) - 1)
-        nearly = error > error.max() - 1e-12  # far more than float64 can be wrong; exact errors of all would take long
-        largest = max(largest, *abs(computed[nearly] / true[nearly] - 1))
+        computed, true = getattr(np, name)(x[:, np.newaxis], y).to_fractions(), op(a, b)
+        largest, count = max(largest, _largest_relative_error(computed, true)), count + true.size
     return count, largest / (gap(10, 2) / 2)
+
+
+def _largest_relative_error(computed: Any, true: Any) -> Fraction:
+    some = true != 0
+    if not np.all(computed[~some] == 0):
+        raise ArithmeticError("got a nonzero computed result; needed zero, as the exact result is zero")
+    computed, true = computed[some], true[some]
+    error = abs(computed.astype(np.float64) / true.astype(np.float64) - 1)
+    nearly = error > error.max() - 1e-12  # far more than float64 can be wrong; exact errors of all would take long
+    return Fraction(max(abs(computed[nearly] / true[nearly] - 1)))
 
 
 # -- section 6: sums, products and quotients ------------------------------------------------------
