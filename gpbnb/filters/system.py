@@ -25,7 +25,7 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.named import arithmetic, format_named
 from gpbnb.arithmetic.rational import exact, rationals
-from gpbnb.filters.kernels.linear import advance
+from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
 from gpbnb.filters.opening import as_packed, packed_array, stored_start, widened_array
@@ -52,14 +52,10 @@ from gpbnb.filters.structures import (
     sum_structure,
     transfer_function,
 )
-from gpbnb.interrupts import slices
 
 _WORDS = (
     "; coefficients may have a format of their own: WordFormats(data, coefficients), or --fixed --mixed in the command"
 )
-
-_TINY = 2.0**-700
-"""A decayed state below this becomes zero where its products would leave the range of float64."""
 
 MOST_INPUTS = 100_000
 """Largest number of inputs of a sum, whose operations are listed in seconds."""
@@ -597,11 +593,9 @@ class LinearSystem:
             except OverflowError as error:
                 raise OverflowError(f"inputs: {error}") from None
             x = packed_array(stored_start(fmt, start))
-        program, first = given.program, x.copy()
-        out = _advanced(tag, program, coefficients, z, x)
-        if out is None:
-            place = self._overflow(tag, program, coefficients, z, first)
-            raise OverflowError(f"{place}: {self.beyond(fmt)}")
+        out, lost = LinearSteps(given.program, fmt, tag, coefficients, x).take(z)
+        if lost >= 0:
+            raise OverflowError(f"{self._value(lost)} at step {len(out) + 1}: {self.beyond(fmt)}")
         return out
 
     def stored(self, fmt: FloatFormat | FixedFormat) -> tuple[NDArray[Any], ...]:
@@ -642,28 +636,6 @@ class LinearSystem:
             return named("state", i, self.state_names)
         return named("output", i - self.n, self.output_names)
 
-    def _overflow(self, tag: Any, program: Program, coefficients: Any, z: Any, x: Any) -> str:
-        """Return the first state or output that cannot be stored, and its step; `x` is the first state."""
-        for k in range(len(z)):
-            for i, value in enumerate(program.outputs):
-                count = max(value - len(x) - z.shape[1] + 1, 0)
-                operations = program.operations[:count]  # those that lead to this value
-                try:
-                    advance(
-                        tag,
-                        operations,
-                        np.minimum(program.outputs, value),
-                        coefficients[None],
-                        0,
-                        z[k : k + 1],
-                        x.copy(),
-                        np.empty((1, *x.shape), x.dtype),
-                    )
-                except OverflowError:
-                    return f"{self._value(i)} at step {k + 1}"
-            advance(tag, program.operations, program.outputs, coefficients[None], 0, z[k : k + 1], x, x[None].copy())
-        return "the run"
-
     def _widened(self, outputs: NDArray[Any], first: int | None = None) -> NDArray[np.float64]:
         """Return packed outputs (steps, p) of any format, or states from the first, as pairs of float64."""
         try:
@@ -676,35 +648,6 @@ class LinearSystem:
                     place = self._value((self.n if first is None else first) + i)
                     raise OverflowError(f"{place} at step {k + 1}: {self.beyond(None)}") from None
             raise
-
-
-def _advanced(tag: Any, program: Program, coefficients: Any, z: Any, x: Any) -> NDArray[Any] | None:
-    """Take all steps from the state x; return the states, or None if a number is beyond the range of float64.
-
-    A number may be too small only because a state has decayed. Such a state becomes zero, and the run resumes.
-    """
-    out = np.zeros((len(z), *x.shape), x.dtype)
-    if x.dtype == np.float64:
-        out[:] = np.nan
-    done, most = 0, next(slices(len(z), len(program.operations))).stop
-    while done < len(z):
-        start, end = x.copy(), min(done + most, len(z))
-        try:
-            advance(tag, program.operations, program.outputs, coefficients[None], 0, z[done:end], x, out[done:end])
-            done = end
-            continue
-        except OverflowError:
-            if x.dtype != np.float64:  # in base 10, nothing decays that far
-                return None
-        lost = np.isnan(out[done:end].reshape(end - done, -1)).any(axis=1)
-        at = done + int(np.argmax(lost))
-        x = out[at - 1].copy() if at > done else start
-        sizes = np.abs(x.reshape(len(x), -1)).max(axis=1)
-        tiny = (sizes > 0) & (sizes < _TINY)
-        if not tiny.any():
-            return None
-        x[tiny], done = 0.0, at
-    return out
 
 
 def _ascending(name: str, given: Any) -> tuple[Fraction, Fraction] | None:

@@ -19,7 +19,7 @@ from gpbnb.bounds.linear import error_coefficients, peak_gain
 from gpbnb.bounds.probable import probable_error, separate_roundings
 from gpbnb.bounds.units import units
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kernels.linear import advance
+from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.run import Run
@@ -70,11 +70,13 @@ def test_the_program_gives_the_digits_of_the_filter(form: Form, fmt: FloatFormat
     z = np.random.default_rng(1).uniform(-100, 100, (steps, 2))
     run = Run(model, fmt, form, range(1, steps + 1))
     run.take(z)
-    x = as_packed(fmt, given.x0)
-    X = np.zeros((steps, *x.shape), x.dtype)
-    program = given.program
-    advance(run.tag, program.operations, program.outputs, given.packed, given.first, as_packed(fmt, z), x, X)
-    assert np.array_equal(run.exactly(X), run.checkpoints().x)
+    x, found = as_packed(fmt, given.x0), []
+    for row, each in zip(given.rows(np.arange(steps)), z, strict=True):
+        states, lost = LinearSteps(given.program, fmt, run.tag, given.packed[row], x).take(as_packed(fmt, each[None]))
+        assert lost < 0
+        x = states[0]
+        found.append(x)
+    assert np.array_equal(run.exactly(np.array(found)), run.checkpoints().x)
 
 
 # -- the recursion of the error, in exact fractions -----------------------------------------------------------------

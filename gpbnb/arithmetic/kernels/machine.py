@@ -440,17 +440,26 @@ def _compared(x: Any, y: Any, orders: Any) -> Any:
     return (np.int64(orders) >> (np.int64(x > y) - np.int64(x < y) + 1)) & 1
 
 
+@borrowing(forceinline=True)
+def _limits(formats: Any, f: Any) -> Any:
+    """How results of a format are rounded, and the range of their sizes."""
+    whole = formats.whole[f]
+    return _rule(formats, f), whole[HOW], whole[LOW], np.uint64(whole[SPAN])
+
+
 @borrowing
 def quick_scalars(formats: Any, code: Any, values: Any, truths: Any) -> Any:
     """Run all rows for one lane; return whether anything left the range."""
     gone = False
-    s = -1
+    s, f = -1, np.int64(0)
+    rule, how, low, span = _limits(formats, f)
     while s + 1 < code.segments.shape[0]:
         s += 1
-        begin, end, f = code.segments[s, 0], code.segments[s, 1], code.segments[s, 2]
+        begin, end, pattern = code.segments[s, 0], code.segments[s, 1], code.segments[s, 3]
         operation = np.int64(code.rows[begin, 0])
-        low, span = formats.whole[f, LOW], np.uint64(formats.whole[f, SPAN])
-        rule, how, pattern = _rule(formats, f), formats.whole[f, HOW], code.segments[s, 3]
+        if code.segments[s, 2] != f:
+            f = code.segments[s, 2]
+            rule, how, low, span = _limits(formats, f)
         if pattern != ONE_BY_ONE and how != TIED:
             a, b, out = np.int64(code.rows[begin, 1]), np.int64(code.rows[begin, 2]), np.int64(code.rows[begin, 4])
             count = end - begin
@@ -493,9 +502,7 @@ def quick_lanes(formats: Any, code: Any, values: Any, truths: Any) -> Any:
     """Run all rows for each lane; return whether anything left the range."""
     gone = np.int64(0)
     for s in range(code.segments.shape[0]):
-        f = code.segments[s, 2]
-        rule, how = _rule(formats, f), formats.whole[f, HOW]
-        low, span = formats.whole[f, LOW], np.uint64(formats.whole[f, SPAN])
+        rule, how, low, span = _limits(formats, code.segments[s, 2])
         for o in range(code.segments[s, 0], code.segments[s, 1]):
             operation = np.int64(code.rows[o, 0])
             a, b, c, out = code.rows[o, 1], code.rows[o, 2], code.rows[o, 3], code.rows[o, 4]

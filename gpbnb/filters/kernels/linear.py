@@ -39,22 +39,6 @@ def execute(fmt: Any, operations: Any, outputs: Any, coefficients: Any, x: Any, 
 
 
 @compiled
-def advance(fmt: Any, operations: Any, outputs: Any, coefficients: Any, start: Any, z: Any, x: Any, X: Any) -> None:
-    """Take a step with each of the measurements z and keep every state in X.
-
-    Parameters
-    ----------
-    coefficients : (steps, c), one row for each step; after the last row, those from `start` on repeat.
-    """
-    values = np.empty((x.shape[0] + z.shape[1] + operations.shape[0], *x.shape[1:]), x.dtype)
-    rows = coefficients.shape[0]
-    for k in range(z.shape[0]):
-        row = k if k < rows else start + (k - start) % (rows - start)
-        execute(fmt, operations, outputs, coefficients[row], x, z[k], values)
-        X[k] = x
-
-
-@compiled
 def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes: Any) -> None:
     """Compute the linear function of (x, z) that each value approximates.
 
