@@ -66,5 +66,6 @@ def test_the_tolerance_itself_is_met_and_what_is_just_below_is_not(rounding):
     looser = max(error, min(answers.largest(run) for run in found.runs if run.case.rounding is not rounding))
     assert answers.find_answers(looser).observed[rounding] <= digits
     assert error > 0
+    assert answers.find_answers(found.error).bits == found.bits
     assert answers._good(next(run for run in enough if answers.largest(run) == error), rounding, error) is not None
     assert answers._good(next(run for run in enough if answers.largest(run) == error), rounding, 0.999 * error) is None

@@ -132,6 +132,17 @@ def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(s
     assert len(stored("other")) == 3 * 2
 
 
+def test_words_choose_cells_and_the_other_stored_rows_stay(sweep, tmp_path):
+    sweep.store(EXPECTED)
+    higher = dataclasses.replace(sweep, compute=lambda cell, directory: [value + 1 for value in compute(cell, None)])
+    given = ["recompute", sweep.name, "--output", str(tmp_path / "new"), "--only", "second", "seed=4"]
+    assert run([higher], given) == 0
+    before, after = sweep.load().rows, sweep.load(tmp_path / "new" / "tests" / "normal.csv").rows
+    assert [row[: sweep.key] for row in before] == [row[: sweep.key] for row in after]
+    changed = {row[:2] for row, other in zip(before, after, strict=True) if row != other}
+    assert changed == {cell.key for cell in CELLS if cell.name == "second" or cell.seed == 4}
+
+
 def test_the_command_fails_where_a_result_must_not_occur(sweep, tmp_path, capsys):
     for faults, status in (([], 0), (["first 0 is wrong"], 1)):
         one = dataclasses.replace(sweep, faults=lambda file, faults=faults: faults if file.exists() else ["no file"])

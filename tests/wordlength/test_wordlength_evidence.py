@@ -13,8 +13,8 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.required import judge
 
-SLOW = LinearSystem([["0.99997"]], [["0.00003"]], name="slow")
-MEMORY = "shorter than the memory of the system, whose slowest response takes 160000 steps to decay to 1 %"
+SLOW = LinearSystem([["0.9997"]], [["0.0003"]], name="slow")
+MEMORY = "shorter than the memory of the system, whose slowest response takes 16000 steps to decay to 1 %"
 SECTIONS = signal.butter(2, 300, fs=48_000, output="sos")
 LOW_PASS = LinearSystem.from_sections(SECTIONS)
 
@@ -27,13 +27,13 @@ def answers(steps, tolerance):
 
 
 def test_a_run_shorter_than_the_memory_of_a_system_says_so():
-    """0.99997**153504 is 1 %; after 1000 steps, the answer is too low by half of its bits."""
-    assert 153_503 < math.log(0.01) / math.log(0.99997) < 153_504
-    for found in answers(1000, 1e-3):
+    """0.9997**15348 is 1 %; after 100 steps, the answer is too low by half of its bits."""
+    assert 15_348 < math.log(0.01) / math.log(0.9997) < 15_349
+    for found in answers(100, 1e-3):
         assert str(found).count(MEMORY) == 1
-        assert "the run of 1000 steps" in str(found)
-    assert all(MEMORY not in str(found) for found in answers(160_000, 1e-3))
-    long, short = (next(answers(steps, 1e-3)).digits for steps in (160_000, 1000))
+        assert "the run of 100 steps" in str(found)
+    assert all(MEMORY not in str(found) for found in answers(16_000, 1e-3))
+    long, short = (next(answers(steps, 1e-3)).digits for steps in (16_000, 100))
     assert short < long / 2
 
 

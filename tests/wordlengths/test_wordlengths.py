@@ -62,10 +62,9 @@ def test_growth_knows_nothing_of_what_comes_later():
     model, z = LinearModel(Phi, H, calm, R, [3, -1], P0), Z[:7, :1].copy()
     z[6] = 1e6
     later = LinearModel(Phi, H, [calm] * 6 + [thin], R, [3, -1], P0)
-    for basis in ("emulation", "bound"):
-        alone = [required_precision(model, z[:k], 1e-4, basis=basis) for k in (2, 6)]
-        assert study.required_precision_by_steps(later, z, 1e-4, (2, 6), basis=basis) == tuple(alone)
-        assert study.required_precision_by_steps(later, z, 1e-4, (7,), basis=basis)[0].tried != alone[1].tried
+    alone = [required_precision(model, z[:k], 1e-4) for k in (2, 6)]
+    assert study.required_precision_by_steps(later, z, 1e-4, (2, 6)) == tuple(alone)
+    assert study.required_precision_by_steps(later, z, 1e-4, (7,))[0].tried != alone[1].tried
 
 
 def test_spans_hold_every_number():
@@ -113,7 +112,7 @@ def test_a_companion_where_the_running_bound_says_nothing():
 
 
 def test_a_row_of_the_table_of_guarantees_is_as_stored():
-    """Of the filter that is cheapest to repeat; only the processor time may differ."""
+    """Of the filter that is cheapest to repeat, in seconds; only the processor time may differ."""
     case = next(case for case in guarantees.CASES if case.make().name == "Dyer and McReynolds")
     (expected,) = [row for row in guarantees.load() if row.name == "Dyer and McReynolds"]
     assert guarantees.compute(case)._replace(seconds=expected.seconds) == expected
