@@ -1,4 +1,4 @@
-"""Slow filters nearly reach their bounds where the computed estimate stands still while the exact one moves on.
+"""Slow filters come near their bounds where the computed estimate stands still while the exact one moves on.
 
 A constant measurement corrects the estimate by less than the rounding of its last sum takes away, in every step for
 hundreds of steps. These are the filters whose old errors the checker merges.
@@ -24,6 +24,7 @@ from gpbnb.report.guarantees.filters import errors
 REACHED = {Form.HUNG: 0.3, Form.HUNG_SECOND_GAIN: 0.3}
 """Least error / bound, 0.75 for other forms: Hung's have a product more, whose rounding an estimate fixes."""
 STEADY = 2.0**-7
+COURSES = 20
 WITHIN = limits(state=1.7, innovation=1.2 * 2.0**-9 / STEADY)
 
 
@@ -61,3 +62,24 @@ def test_an_estimate_that_stands_still_nearly_reaches_the_bound(form: Form, roun
     off, _ = errors(drawn, np.full((steps, 1), z[i]))
     assert len(off) == steps
     assert REACHED.get(form, 0.75) * found.bound[0] < np.abs(off).max() <= found.bound[0]
+
+
+@pytest.mark.parametrize("form", Form)
+def test_a_slow_tracker_comes_near_its_bound(form: Form) -> None:
+    """Its position moves by less than its last place in a step, or by a little more; the best of some courses."""
+    fmt, q, rng = FloatFormat(2, 14), 2.0**-22, np.random.default_rng(55)
+    w, unit, steps = (4 * q) ** 0.25, 2.0**-13, 2_000
+    P, Q = [[w, w * w / 2], [w * w / 2, w**3 / 2]], [[q / 4, q / 2], [q / 2, q]]
+    within = limits(state=[1.7, 2 * unit], innovation=2 * unit / w)
+    made = lambda x: LinearModel([[1, 1], [0, 1]], [[1, 0]], Q, [[1]], x, P, name="a slow tracker")  # noqa: E731
+    found = guarantee(made([0, 0]), fmt, within, form)
+    assert json.loads(found.certificate())["keep"] == _APART
+    reached = []
+    for _ in range(COURSES):
+        x = rng.uniform(0.9, 1.6), rng.uniform(-2, 2) * unit * rng.integers(2)
+        model = made([fmt.round(each) for each in x])
+        z = x[0] + x[1] * np.arange(1, steps + 1) + rng.uniform(-0.98, 0.98) * within.innovation[0]
+        drawn: Any = SimpleNamespace(model=model, fmt=fmt, form=form, stored=model.rounded(fmt), within=within)
+        off, _ = errors(drawn, z.reshape(-1, 1))
+        reached.append(float((np.abs(off).max(axis=0, initial=0) / found.bound).max()))
+    assert 0.3 < max(reached) <= 1
