@@ -181,7 +181,7 @@ def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
             text = arithmetic(fmt) if isinstance(fmt, FixedFormat) else digits_text(fmt, kind="significant")
             raise OverflowError(
                 f"got {name} = {float(value):.6g}, beyond the range of {text}; needed coefficients with more integer "
-                "bits, or a number of significant bits"
+                "bits, or a number of significant bits, as in WordFormats(data, 15)"
             ) from None
     point, target = words.data.fraction_bits, words.accumulator.fraction_bits
     factors, shifts = list[int](), list[int]()
