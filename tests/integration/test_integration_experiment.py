@@ -81,7 +81,7 @@ def test_the_error_of_a_trapezoid_is_that_beside_a_fine_integral():
 def test_a_sweep_agrees_with_the_exact_variance_and_tells_39_apart():
     found = experiment.sweep([1e-3, 0.3, 10.0, 100.0], 200, 4000, rng(13))
     assert np.abs(found.deviations()).max() < 4
-    away = found.deviations_from(found.mu / 6)
+    away = (6 * found.walk / found.mu - 1) / found.standard_error
     assert np.abs(away[:2]).max() < 4
     assert away[2] < -10
     assert away[3] < -30

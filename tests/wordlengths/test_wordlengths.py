@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -130,13 +131,21 @@ def test_each_bit_of_a_guarantee_halves_its_bound(halvings):
     assert guarantees._bits(case, made, "guarantee", bound / 2.0**40, bound) == ""
 
 
+def rescaled(model, sizes):
+    """The same filter with states in other units; sizes: old unit / new unit."""
+    given = np.array(sizes, dtype=object)
+    square = np.multiply.outer(given, given)
+    Phi = model.Phi * np.multiply.outer(given, Fraction(1) / given)
+    return replace(model, Phi=Phi, H=model.H / given, Q=model.Q * square, x0=model.x0 * given, P0=model.P0 * square)
+
+
 def test_units_of_powers_of_two_change_nothing():
     fmt, sizes = FloatFormat(2, 15), (4, 1, Fraction(1, 1024))
     for form in Form:
         plain = emulate(TILT, Z, fmt, form).state
-        other = emulate(study.rescaled(TILT, sizes), Z, fmt, form).state
+        other = emulate(rescaled(TILT, sizes), Z, fmt, form).state
         assert np.array_equal(other / np.array(sizes, dtype=float), plain)
-    tens = emulate(study.rescaled(TILT, (1, 1, 1000)), Z, fmt, Form.INNOVATION).state / (1, 1, 1000)
+    tens = emulate(rescaled(TILT, (1, 1, 1000)), Z, fmt, Form.INNOVATION).state / (1, 1, 1000)
     assert not np.array_equal(tens, emulate(TILT, Z, fmt, Form.INNOVATION).state)
 
 

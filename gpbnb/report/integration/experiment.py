@@ -167,10 +167,6 @@ class WalkSweep:
         exact = np.array([float(theory.error_variance(self.cycles, mu)) for mu in self.mu.tolist()]) / self.cycles
         return np.asarray((self.walk / exact - 1) / self.standard_error)
 
-    def deviations_from(self, factor: Floats) -> Floats:
-        """Return deviations from another formula for the variance per cycle, in standard errors."""
-        return np.asarray((self.walk / factor - 1) / self.standard_error)
-
 
 def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> WalkSweep:
     """Simulate the random walk of the trapezoidal rule at many ratios of bandwidth to iteration rate."""

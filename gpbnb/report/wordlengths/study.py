@@ -192,26 +192,3 @@ def inverse_precision(
     expected = report_bounds.precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
     needed = smallest_precision(matrix, tolerance, 2, rounding).fmt.precision
     return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, needed)
-
-
-def rescaled(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
-    """Return the same filter with states in other units.
-
-    Parameters
-    ----------
-    sizes : (n,), exact, old unit / new unit for each state.
-    """
-    given = exact(sizes)
-    if given.shape != (model.n,) or not (given > 0).all():
-        raise ValueError(f"got sizes {list(sizes)}; needed {model.n} positive numbers, one per state")
-    square = np.multiply.outer(given, given)
-    return replace(
-        model,
-        Phi=model.Phi * np.multiply.outer(given, 1 / given),
-        H=model.H / given,
-        Q=model.Q * square,
-        x0=model.x0 * given,
-        P0=model.P0 * square,
-        B=None if model.B is None else model.B * given[:, np.newaxis],
-        b=None if model.b is None else model.b * given,
-    )
