@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import math
 import re
@@ -32,7 +31,7 @@ NOT_PROSE = re.compile(
             r"<form.*?</form>",  # fields of calculators
             r"^:{3,}.*?$|^:\w+:.*?$",  # directives and their options
             r"\$\$.*?\$\$|\$[^$]*\$",  # math
-            r"\{[\w:-]+\}`[^`]*`|`[^`]*`",  # roles, glue among them, and inline code
+            r"\{[\w:-]+\}`[^`]*`|`[^`]*`",  # roles and inline code
             r"(?<=\])\([^)\s]*\)",  # where a link leads
             r'"[^"\n]{,200}"',  # quotations
             r"\(\d{1,3}[a-z]?\)",  # numbers of equations
@@ -53,8 +52,8 @@ GIVEN = {
 }
 """Phrases of open pages with a numeral that is given, not computed."""
 
-#: Sentences of the README, which cannot glue: what it says, and the number in the book, rounded to so many places: a
-#: glued one, or the given one of those that a cell prints.
+#: Sentences of the README: what it says, and the number in the book, the given one of those that a cell prints, rounded
+#: to so many places.
 README = {
     "below 31 arcseconds,": ("rolling", ("limit =", 0), 31, 0),
     "any error below 20.8 arcseconds": ("rolling", ("whatever its course", 0), 20.8, 1),
@@ -105,14 +104,6 @@ def test_each_number_in_the_text_of_an_open_page_is_in_sight(page):
     assert [text[max(0, at - 40) : at + 30] for at, number in found if float(number) not in seen] == []
 
 
-def glued(page: str, key: str) -> float:
-    for cell in cells(page):
-        for output in cell.get("outputs", []):
-            if output.get("metadata", {}).get("scrapbook", {}).get("name") == key:
-                return float(ast.literal_eval("".join(output["data"]["application/papermill.record/text/plain"])))
-    raise KeyError(f"{page} glues no {key}")
-
-
 def output(page: str, code: str) -> str:
     """The text that the cell with this code printed or returned."""
     cell = next(each for each in cells(page) if each["cell_type"] == "code" and code in "".join(each["source"]))
@@ -156,7 +147,7 @@ def near(number: float) -> Any:
     return pytest.approx(number, rel=0.01)
 
 
-#: Quantities in words and numbers in formulas that cannot be glued, by page and phrase. For formulas, each function
+#: Quantities in words and numbers in formulas, by page and phrase. For formulas, each function
 #: computes the number in another way than by the formula.
 COMPUTED: dict[tuple[str, str], Callable[[], Any]] = {
     ("guarantee", "more than half of the"): lambda: min(printed("guarantee", "outcome.ratios")) > 50,
@@ -189,8 +180,7 @@ def test_the_readme_says_what_the_book_computes(phrase):
     if key is None:
         assert number in in_sight(page)
         return
-    found = glued(page, key) if isinstance(key, str) else printed(page, key[0])[key[1]]
-    assert round(found, places) == number
+    assert round(printed(page, key[0])[key[1]], places) == number
 
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md", "CODE_OF_CONDUCT.md", "CHANGELOG.md"])

@@ -88,9 +88,8 @@ def hide_enum_arguments(app, what, name, obj, options, signature, returns):
 
 
 def write_powers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
-    """Write numbers in tables, and those that notebooks put into the text, as 1.5 × 10⁻⁸ instead of 1.5e-08."""
-    glued = [each for each in doctree.findall(nodes.inline) if "pasted-text" in each["classes"]]
-    for box in [*glued, *doctree.findall(nodes.entry)]:
+    """Write numbers in tables as 1.5 × 10⁻⁸ instead of 1.5e-08."""
+    for box in doctree.findall(nodes.entry):
         for text in list(box.findall(nodes.Text)):
             if isinstance(text.parent, (nodes.literal, nodes.math)) or not POWER.search(text.astext()):
                 continue
