@@ -17,6 +17,9 @@ from gpbnb.arithmetic.elementary import elementary
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.rational import exact
 
+MOST_DECIMALS = 100_000
+"""Most decimals to round to."""
+
 
 def remainder(x: Any, y: Any) -> Any:
     r"""Return :math:`x - y\lfloor x/y \rfloor` for each pair, rounded once; it has the sign of y.
@@ -71,7 +74,12 @@ def decimals(x: Any, count: int = 0) -> Any:
 
     With no decimals, the result is exact: the nearest whole number.
     """
-    places = operator.index(count)
+    try:
+        places = operator.index(count)
+    except TypeError:
+        raise TypeError(f"decimals: got {count!r}; needed a whole number") from None
+    if abs(places) > MOST_DECIMALS:
+        raise ValueError(f"decimals: got {places}; needed at most {MOST_DECIMALS:,} in size")
     if not places:
         return elementary("rint", x)
     rounded = np.frompyfunc(lambda value: round(value, places), 1, 1)(x.to_fractions())

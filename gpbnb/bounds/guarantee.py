@@ -33,11 +33,15 @@ from gpbnb.bounds.guess import FilterLimits, Guess, constant_guess, filter_guess
 from gpbnb.bounds.units import stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LARGEST_EXPONENT, LinearModel
+from gpbnb.filters.named import whole_number
 from gpbnb.filters.system import LinearFilter
 from gpbnb.filters.words import WordFormats
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain")
 """Names of the parts of a bound, in the order in which a guarantee lists them."""
+
+MOST_EMULATED = 1_000_000
+"""Largest number of steps to emulate while a gain settles."""
 
 EFFORT = 9e6
 """The most that a proof may take, in about the products of its steps; more if more steps are asked for."""
@@ -213,7 +217,7 @@ def guarantee(
     within : limits on the exact filter, from :func:`limits`; limits on the measurements apply to the values before they
         are stored.
     most : the largest number of steps to emulate while the gain settles, 20,000 by default, and fewer for more than 17
-        states. A proof takes more steps in proportion to a larger number.
+        states; at most 1,000,000. A proof takes more steps in proportion to a larger number.
     horizon : the number of steps that the bound covers if no bound holds for ever.
     """
     return _answered(guessed(model, fmt, within, form, most, horizon))
@@ -236,6 +240,8 @@ def guessed(
     if not isinstance(fmt, (FloatFormat, FixedFormat)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
     model.refuse_inputs("a guarantee")
+    if most is not None:
+        whole_number("most", most, most=MOST_EMULATED)
     within = sized_limits(within, model.n, model.m)
     if model.steps is not None:
         most, horizon = min(MOST if most is None else most, model.steps), min(horizon, model.steps)

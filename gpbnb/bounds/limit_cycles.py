@@ -21,13 +21,14 @@ from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.bounds.words import bounded_rounding
+from gpbnb.filters.named import whole_number
 from gpbnb.filters.program import ADD, SUBTRACT, Program, matrices
 from gpbnb.filters.system import LinearSystem, is_stable
 from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program, integers_of, run_integers, successors
 from gpbnb.interrupts import slices
 
-MOST_STATES = 2**24
-"""Largest number of states that a search tries by default."""
+MOST_STATES, LARGEST_SEARCH = 2**24, 2**28
+"""Largest number of states that a search tries, by default and at all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +101,7 @@ def limit_cycles(
     system : a stable system, in any structure.
     words : formats of data, coefficients and sums.
     u : the input, one number or (m,).
-    most : largest number of states to try; if there are more, only the bound is returned.
+    most : largest number of states to try, at most 2**28; if there are more, only the bound is returned.
     everywhere : whether to try every state that the word can store. By default, the search tries only the states within
         the error bound around the state of rest, which no cycle without an overflow can leave. Cycles with an overflow,
         in a format that saturates or wraps, are found only if this is True.
@@ -119,12 +120,15 @@ def limit_cycles(
         raise TypeError(f"got a {type(system).__name__}; needed a LinearSystem")
     if not isinstance(words, WordFormats):
         raise TypeError(f"got words {words!r}; needed WordFormats, such as WordFormats(FixedFormat(0, 15))")
-    given = system.as_filter()
+    most, given = whole_number("most", most, most=LARGEST_SEARCH), system.as_filter()
     made = integer_program(given, words)
     if not made.program.is_linear:
         raise ValueError(f"got {system.name}, which limits its values; needed a linear system for its limit cycles")
     data, n = words.data, made.program.n
-    inputs = integers_of(exact(np.broadcast_to(np.asarray(u, dtype=object), (1, system.m))), data)[0]
+    given_u = np.asarray(u, dtype=object)
+    if given_u.shape not in ((), (1,), (system.m,)):
+        raise ValueError(f"got an input of shape {given_u.shape}; needed one number, or {system.m}")
+    inputs = integers_of(exact(np.broadcast_to(given_u, (1, system.m))), data)[0]
     if cause := _unstable(made, system.n):
         raise ValueError(cause)
     error = bounded_rounding(given, words) / float(data.unit) * (1 + 2.0**-40)

@@ -223,6 +223,10 @@ class NonlinearModel:
                     "iterations=1: its sigma points take their place"
                 )
             self.weights()
+        elif self.points != USUAL_POINTS:
+            raise ValueError(
+                f'got points {tuple(self.points)} and method "extended"; needed method "unscented" for them'
+            )
         self._check_arguments()
 
     def _check_arguments(self) -> None:

@@ -57,6 +57,9 @@ _WORDS = (
     "; coefficients may have a format of their own: WordFormats(data, coefficients), or --fixed --mixed in the command"
 )
 
+BLOCK = 32
+"""Usual number of inputs in a block of a sum."""
+
 MOST_INPUTS = 100_000
 """Largest number of inputs of a sum, whose operations are listed in seconds."""
 
@@ -427,7 +430,7 @@ class LinearSystem:
 
     @classmethod
     def sum(
-        cls, count: int = 1, order: str = "pairwise", block: int = 32, running: bool = False, name: str | None = None
+        cls, count: int = 1, order: str = "pairwise", block: int = BLOCK, running: bool = False, name: str | None = None
     ) -> LinearSystem:
         """Return a system that adds the inputs of each step in a given order.
 
@@ -455,6 +458,8 @@ class LinearSystem:
         """
         count, block = whole_number("count", count), whole_number("block", block)
         found = structure_named(order, SUMS)
+        if block != BLOCK and found != "blocked":
+            raise ValueError(f'got block {block} and order "{found}"; needed order "blocked" for it')
         if count == 1 and not running:
             raise ValueError("got the sum of one input; needed at least two, or running=True")
         if count > MOST_INPUTS:

@@ -62,10 +62,10 @@ def guarantee(
     given = admitted(model, "have a guarantee", "" if form is None else "have a form")
     named: Any = format_named(fmt)
     horizon = whole_number("horizon", horizon)
-    if most is not None:
-        whole_number("most", most)
     if isinstance(given, LinearModel):
         return of_filters.guarantee(given, named, within, form or Form.INNOVATION, most, horizon)
+    if most is not None:
+        raise ValueError(f"got most={most} for {given.name}; needed none: only the gain of a Kalman filter settles")
     if not isinstance(named, (FloatFormat, FixedFormat, WordFormats)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat, WordFormats, or a name")
     return _of_system(given, named, largest_inputs(given, within), horizon)

@@ -146,7 +146,12 @@ def write_code(
     if not overwrite:
         refuse_others(target, name)
     found = prepared(given, chosen, form)
-    vectors = found.emulate(found.inputs(VECTORS) if inputs is None else data_of(given, inputs).z)
+    z = found.inputs(VECTORS) if inputs is None else data_of(given, inputs).z
+    if z is None:
+        raise ValueError(f"got inputs {inputs!r}; needed inputs or measurements, (steps, m)")
+    if within is not None and isinstance(given, NonlinearSystem):
+        raise ValueError(f"got limits for {given.name}; needed none: a step of its own has no bound")
+    vectors = found.emulate(z)
     bound = found.bound(within) if within is not None else ""
     bounded = not isinstance(given, NonlinearSystem)
     described = Described(

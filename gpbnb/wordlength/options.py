@@ -228,6 +228,8 @@ def _check(given: argparse.Namespace) -> None:
         raise ValueError(f"got --format and {', '.join(others)}; needed --format alone, which sets them all")
     if given.simulate and given.measurements:
         raise ValueError("got --simulate and --measurements; needed one of them")
+    if given.seed is not None and given.measurements:
+        raise ValueError("got --seed and --measurements; needed one of them: a seed is for what is simulated")
     if given.code and given.code.exists() and not given.code.is_dir():
         raise ValueError(f"got --code {given.code}, which is a file; needed a folder")
     if given.level is not None and not given.simulate:

@@ -30,7 +30,7 @@ from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.models import ModelSource
 from gpbnb.wordlength.strategies import strategy_for
 from gpbnb.wordlength.strategy import Data, Function, checked_basis, tolerances_of
-from gpbnb.wordlength.tasks import TASK_OF_BASIS, admitted, data_of
+from gpbnb.wordlength.tasks import MOST_STEPS, TASK_OF_BASIS, admitted, data_of
 
 MOST_RECORDS = 1_000_000
 """Largest number of records to simulate."""
@@ -118,7 +118,7 @@ def survey_records(
     model, tolerance, form, basis : as for :func:`gpbnb.required_precision`; basis "emulation" or "bound".
     records : (records, steps, m), or a list of records (steps, m) of any lengths, with NaN where a measurement is
         missing. A whole number requests that many simulated records of a Kalman filter with `steps` steps each and the
-        seeds 0, 1, …; at most :data:`MOST_RECORDS`.
+        seeds 0, 1, …; at most :data:`MOST_RECORDS`, and 100 million steps in all.
     formats : formats of any base, rounding and range, or their names; for a linear filter, with compiled loops.
     executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
     directory : folder for finished records of a linear filter. After an interruption, the same call resumes; other
@@ -200,7 +200,8 @@ def _data(model: Any, records: Any, steps: int | None) -> tuple[Data, ...]:
             raise ValueError(f"got {count} records to simulate; needed a list: only a Kalman filter simulates them")
         if steps is None:
             raise ValueError(f"got {count} records to simulate without steps; needed steps=, how many each has")
-        return tuple(data_of(model, whole_number("steps", steps), seed) for seed in range(count))
+        length = whole_number("steps", steps, most=MOST_STEPS // count)
+        return tuple(data_of(model, length, seed) for seed in range(count))
     if steps is not None:
         raise ValueError("got steps with records; needed steps only for records to simulate")
     if not isinstance(records, Iterable) or isinstance(records, str):

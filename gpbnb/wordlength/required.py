@@ -106,10 +106,10 @@ def required_precision(
     base, rounding : 2, 10 or 16; and a value or its name, such as "chop".
     range : smallest and largest exponent of a normal number; by default unlimited. A format in which a number overflows
         does not meet the tolerance; the answer names the quantity and the step.
-    highest : highest precision to try. For a linear model, the default is also the maximum: the highest precision with
-        compiled loops, which is 53 bits, 18 decimal digits or 13 hexadecimal digits, and lower for some roundings. A
-        function or a nonlinear filter runs in any precision; its default is 200 bits, 60 decimal digits or 50
-        hexadecimal digits.
+    highest : highest precision to try with kind="float". For a linear model, the default is also the maximum: the
+        highest precision with compiled loops, which is 53 bits, 18 decimal digits or 13 hexadecimal digits, and lower
+        for some roundings. A function or a nonlinear filter runs in any precision; its default is 200 bits, 60 decimal
+        digits or 50 hexadecimal digits.
     coefficient_bits : significant bits of each coefficient of a linear system in fixed point, each with its own binary
         point; by default 15. With kind="words", the most to try, by default 24.
     seed : seed of simulated measurements.
@@ -153,6 +153,10 @@ def required_precision(
     options = {"base": base != 2, "rounding": rounding != Rounding.NEAREST, "range": range is not None}
     if like is not None and (names := [name for name, value in options.items() if value]):
         raise ValueError(f"got {' and '.join(names)} beside like; needed like alone, which sets them")
+    if kind != "float" and highest is not None:
+        raise ValueError(
+            f'got highest={highest} and kind "{kind}"; needed none: only kind "float" has a highest precision to set'
+        )
     asked = Asked(given, data, tolerance, basis, within, found, highest, progress)
     if kind in ("fixed", "words"):
         if base != 2 or range is not None:

@@ -305,7 +305,8 @@ def write_run(asked: CommandInput, report: Report, file: Path) -> None:
     model = source.structures.get(report.structure, source.model)
     data = report.steps if asked.z is None else asked.z
     form = _form(given) if isinstance(model, LinearModel) else None
-    run = emulate(model, data, report.formats, form=form, seed=given.seed or 0)
+    seed = 0 if asked.z is not None else given.seed or 0
+    run = emulate(model, data, report.formats, form=form, seed=seed)
     numbers = run.x if isinstance(model, LinearModel) else run.y
     kind = "output" if run.form is None else "state"
     names = report.names or [f"{kind} {i}" for i in range(run.errors.shape[1])]

@@ -186,8 +186,8 @@ def check_order(order: Order, fused: bool, block: int) -> None:
         raise ValueError(f"order: got {order!r}; needed 'left', 'pairwise' or 'blocked'")
     if fused not in (True, False):
         raise ValueError(f"fused: got {fused!r}; needed True or False")
-    if block < 1:
-        raise ValueError(f"block: got {block}; needed at least 1")
+    if isinstance(block, bool) or not isinstance(block, int | np.integer) or block < 1:
+        raise ValueError(f"block: got {block!r}; needed a whole number, at least 1")
     if fused and order == "pairwise":
         raise ValueError("got pairwise sums with fused multiply-add; needed one of the two; use 'left' or 'blocked'")
 
