@@ -247,6 +247,19 @@ def test_the_probable_error_is_that_of_independent_roundings() -> None:
     assert np.allclose(np.sqrt(total), probable_error(found), rtol=4 * np.sqrt(2 * 20 / (200 * steps)))
 
 
+def test_the_probable_error_of_a_periodic_model_is_the_largest_of_its_steps() -> None:
+    found = guarantee(rolling(), FloatFormat(2, 24), limits(state=100, innovation=10))
+    F, effects, errors = separate_roundings(found)
+    G = effects * errors[:, None, :] / math.sqrt(3)
+    covariance, steps = np.zeros((2, 2)), []
+    for k in range(40 * len(F)):
+        covariance = F[k % len(F)] @ covariance @ F[k % len(F)].T + G[k % len(F)] @ G[k % len(F)].T
+        steps.append(np.diagonal(covariance))
+    scatter = np.sqrt(steps[-len(F) :])
+    assert (np.ptp(scatter, axis=0) > 0.01 * scatter.max()).any()
+    assert np.allclose(probable_error(found), scatter.max(axis=0), rtol=1e-9, atol=0)
+
+
 def test_the_probable_error_is_the_scatter_of_an_emulated_run() -> None:
     """Near the limits, where roundings are as large as assumed; measured: 0.99 and 1.04 of it.
 
