@@ -415,10 +415,10 @@ def _made(given: Mapping[str, Any], where: str, u: Any) -> tuple[LinearModel | L
     unknown = sorted(map(str, set(given) - {*needed, *optional, "name"}))
     if missing or unknown:
         problems = [f"{', '.join(keys)} {what}" for keys, what in ((missing, "missing"), (unknown, "unknown")) if keys]
-        more = f" for {kind}; or, for another model, {_KEYS}" if make is LinearSystem else ""
+        more = f"; or, for another model, {_KEYS}" if make is LinearSystem else ""
         own = ", ".join(needed) or "b and a, or sos,"
         perhaps = ", ".join(each for each in (*optional, "name") if each not in ("b", "a", "sos"))
-        raise ValueError(f"{where}: {'; '.join(problems)}; needed {own} and perhaps {perhaps}{more}")
+        raise ValueError(f"{where}: {'; '.join(problems)}; needed {own} and perhaps {perhaps} for {kind}{more}")
     arguments = ({"repair": True} if make is LinearModel else {}) | {"name": where.removesuffix(".toml")}
     arguments |= {NAMES.get(key, key): value for key, value in given.items()}
     structure = arguments.pop("structure", None)

@@ -92,7 +92,7 @@ def test_a_command_is_refused(arguments, message, folder, capsys):
         ),
         (
             {"outputs": ["y"]},
-            r"outputs unknown; .* for a Kalman filter, with B, u, .*, states, measurements, ",
+            r"outputs unknown; needed Phi, .* and perhaps B, u, .*, states, measurements, .* for a Kalman filter",
         ),
         ({"Phi": None, "phi": 1}, "needed Phi"),
     ],
