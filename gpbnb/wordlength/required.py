@@ -16,6 +16,7 @@ from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic, digits, format_named
 from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text, rounding_named
 from gpbnb.arithmetic.search import CHECKED, Search, largest_by_default, largest_compiled
+from gpbnb.bounds.guarantee import check_within
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
@@ -418,6 +419,7 @@ def _of_blocks(asked: Asked, like: FloatFormat) -> Requirement:
     model, form = asked.model, compiled_form(asked.form)
     if asked.basis != "emulation":
         raise ValueError(f'got basis "{asked.basis}" for blocks; needed "emulation": bounds are for one format')
+    check_within(asked.within, asked.basis)
     if isinstance(model, NonlinearModel):
         check_form(model, form, blocks=True)
     check_sizes(asked, like)

@@ -30,6 +30,7 @@ CALLS = {
     "a seed of a system": (lambda _: required_precision(SYSTEM, Z, 0.1, seed=1), "got seed 1"),
     "highest in words": (lambda _: required_precision(SYSTEM, Z, 0.1, kind="words", highest=9), "got highest=9"),
     "highest of blocks": (lambda _: required_precision(FILTER, Z, 0.1, kind="blocks", highest=9), "got highest=9"),
+    "limits of blocks": (lambda _: required_precision(FILTER, Z, 0.1, kind="blocks", within=WITHIN), "got limits and"),
     "most of a system": (lambda _: guarantee(SYSTEM, "float32", WITHIN, most=5), "got most=5"),
     "a block of a tree": (lambda _: LinearSystem.sum(9, "tree", 4), "got block 4"),
     "sigma points": (lambda _: NonlinearModel(abs, None, abs, None, *ONE, points=(1, 2, 1)), "got points"),
