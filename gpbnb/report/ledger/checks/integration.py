@@ -179,15 +179,11 @@ def closed_form(case: Case, cycles: int) -> sp.Expr:
 def errors_of_cycles(case: Case) -> tuple[sp.Expr, sp.Expr]:
     """Return r_0 and r_1, the variance of a cycle's error and its covariance with the error of the next cycle."""
     s, u = sp.symbols("s u", positive=True)
-    w, period = case.omega, case.period
-
-    def kernel(lag: sp.Expr) -> sp.Expr:
-        return case.steady * sp.exp(-w * lag)
-
-    half = period / 2
-    squared = 2 * sp.integrate((period - s) * kernel(s), (s, 0, period))
-    ends = 2 * half**2 * (kernel(sp.Integer(0)) + kernel(period))
-    mixed = 2 * half * sp.integrate(kernel(s), (s, 0, period))
+    w, period, half = case.omega, case.period, case.period / 2
+    kernel = case.steady * sp.exp(-w * s)
+    squared = 2 * sp.integrate((period - s) * kernel, (s, 0, period))
+    ends = 2 * half**2 * (kernel.subs(s, 0) + kernel.subs(s, period))
+    mixed = 2 * half * sp.integrate(kernel, (s, 0, period))
     r0 = ends + squared - 2 * mixed
     # Trapezoid and integral of one cycle times those of the next cycle, which starts where the first ends.
     before = half * (1 + sp.exp(w * period)) - sp.integrate(sp.exp(w * u), (u, 0, period))
@@ -469,24 +465,24 @@ def gives_entries(phrase: str) -> bool:
     return all(given.get(name, "").startswith("[[") for name in ("P", "A_underline", "N_p"))
 
 
+def _follows_from(start: int, carried: int) -> bool:
+    """Whether (23) follows from these multiples of the steady variance of x_1 and of the other steady values."""
+    for case in cases():
+        others = (carried * case.steady / case.omega * x for x in (1, case.period))
+        names = _in_time(case, (start * case.steady, *others))
+        values = {OMEGA: case.omega, P: case.steady, TIME: names["t"]}
+        pairs = (("P_12", derivation.p12(TIME)), ("P_22", derivation.p22(TIME)))
+        if not all(vanishes(names[key] - expected.subs(values)) for key, expected in pairs):
+            return False
+    return True
+
+
 def steady_start() -> Names:
     """For which variance of x_1 and which other conditions at the start (23) follows."""
-
-    def follows(start: int, carried: int) -> bool:
-        for case in cases():
-            names = _in_time(
-                case, (start * case.steady, *(carried * case.steady / case.omega * x for x in (1, case.period)))
-            )
-            values = {OMEGA: case.omega, P: case.steady, TIME: names["t"]}
-            pairs = (("P_12", derivation.p12(TIME)), ("P_22", derivation.p22(TIME)))
-            if not all(vanishes(names[key] - expected.subs(values)) for key, expected in pairs):
-                return False
-        return True
-
     starts = {"at its steady state value": 1, "zero": 0, "twice its steady state value": 2}
     conditions = {"zero": 0, "steady": 1}
-    return {"start": {name for name, start in starts.items() if follows(start, 0)},
-            "conditions": {name for name, carried in conditions.items() if follows(1, carried)}}  # fmt: skip
+    return {"start": {name for name, start in starts.items() if _follows_from(start, 0)},
+            "conditions": {name for name, carried in conditions.items() if _follows_from(1, carried)}}  # fmt: skip
 
 
 def first_change(printed: bool) -> float:

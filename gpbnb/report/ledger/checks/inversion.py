@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -360,21 +360,22 @@ def _cited(document: str, number: Any, part: int = 1) -> tuple[sp.Expr, sp.Expr]
     return relation.sides[0].value({"matrix": sp.Matrix}), relation.value({"matrix": sp.Matrix})
 
 
+def _substituted(document: str, number: int, row: int, phrase: str) -> bool:
+    """Whether the equations that a phrase names, in a line of (71), give an equation to first order."""
+    unknown, epsilon = sp.Symbol(f"x_hat[{row}]"), sp.Symbol("epsilon")
+    left, right = _cited(document, 71, row)
+    replaced = dict(_cited(document, each) for each in re.findall(r"\((\d+)", phrase))
+    pairs = ((left.subs(replaced), right), _cited(document, number))
+    found, stated = (sp.solve(a - b, unknown) for a, b in pairs)
+    difference = found[0] - stated[0] if found else sp.Integer(1)
+    orders = (difference.subs(epsilon, 0), difference.diff(epsilon).subs(epsilon, 0))
+    return all(sp.simplify(each) == 0 for each in orders)
+
+
 def substitution(document: str, number: int) -> Names:
     """Which equations give (74), (77) or (79), if substituted in the line of (71) with the unknown on its diagonal."""
     row = {74: 3, 77: 2, 79: 1}[number]
-    unknown, epsilon = sp.Symbol(f"x_hat[{row}]"), sp.Symbol("epsilon")
-    left, right = _cited(document, 71, row)
-
-    def gives(phrase: str) -> bool:
-        replaced = dict(_cited(document, each) for each in re.findall(r"\((\d+)", phrase))
-        pairs = ((left.subs(replaced), right), _cited(document, number))
-        found, stated = (sp.solve(a - b, unknown) for a, b in pairs)
-        difference = found[0] - stated[0] if found else sp.Integer(1)
-        return all(
-            sp.simplify(each) == 0 for each in (difference.subs(epsilon, 0), difference.diff(epsilon).subs(epsilon, 0))
-        )
-
+    gives = partial(_substituted, document, number, row)
     return {
         "equations": gives,
         "line": lambda phrase: phrase == f"(71{'abc'[row - 1]})" and (number != 74 or gives("(73)")),
@@ -552,21 +553,27 @@ def pivoting() -> Names:
     return {"method": "with partial pivoting" if needed else "without pivoting", "without": without, "pivoted": pivoted}
 
 
-@cache
-def residue_of_example() -> Names:
-    """Whether the residue in the example of 11.4 is easy to compute and gives the tightest bound."""
-    sample, _ = of_example()
+def _residue_in_twice_the_digits(sample: Any) -> tuple[int, Fraction]:
+    """Return twice the digits of the example, and how far its residue in these is from the true one."""
     twice = FloatFormat(10, 2 * FOUR.precision)
     a, x = (twice.array(part.to_fractions()) for part in (sample.matrix, linalg.inv(sample.matrix)))
     computed = exact(a @ x - twice.array(np.eye(3, dtype=int)))
     true = theory.residual(sample.matrix, sample.reduction.solution)
-    apart = column_sum_norm(computed - true) / column_sum_norm(true)
+    return twice.precision, column_sum_norm(computed - true) / column_sum_norm(true)
+
+
+@cache
+def residue_of_example() -> Names:
+    """Whether the residue in the example of 11.4 is easy to compute and gives the tightest bound."""
+    sample, _ = of_example()
+    digits, apart = _residue_in_twice_the_digits(sample)
+    true = theory.residual(sample.matrix, sample.reduction.solution)
     trial = experiment.trial(sample.matrix, False, experiment.BETTER)
     tightest = min(trial.bounds, key=trial.overestimation)
     easy = apart < Fraction(1, 100) and tightest == "a posteriori" and not trial.violates(tightest)
     return {
         "residue": "can easily be obtained" if easy else "cannot easily be obtained",
-        "parameter": "do not explicitly depend", "digits": twice.precision, "bounds": len(trial.bounds),
+        "parameter": "do not explicitly depend", "digits": digits, "bounds": len(trial.bounds),
         "apart": "exactly" if apart == 0 else f"to {float(apart):.0e}", "best": trial.overestimation(tightest),
         "first": float(theory.printed_first_bound(sample.inverse, true) / column_sum_norm(sample.error)),
     }  # fmt: skip

@@ -143,17 +143,23 @@ def numbers() -> tuple[dict[str, Any], ...]:
     return tuple(number_names(x, b, t) for b, t in FORMATS for x in samples(b, t))
 
 
+def _allowed_splits(names: Mapping[str, Any]) -> set[tuple[Any, Any, Any]]:
+    """Return the splits of a number that (2) allows: truncated, or away from zero if that is near enough."""
+    b, t, u, v, e = (names[letter] for letter in "btuve")
+    size = 1 if names["x"] > 0 else -1
+    away = (u + size / b**t, v - size, e)
+    if abs(away[0]) == 1:  # a carry
+        away = (size / b, away[1] / b, e + 1)
+    return {(u, v, e), away} if abs(away[1]) < 1 else {(u, v, e)}
+
+
 @cache
 def splits() -> tuple[dict[str, Any], ...]:
     """Return all numbers, and splits of theirs that (2) must not allow: neither truncated nor near enough."""
     found = list(numbers())
     for names in numbers():
-        b, t, u, v, e = (names[letter] for letter in "btuve")
-        size = 1 if names["x"] > 0 else -1
-        away = (u + size / b**t, v - size, e)
-        if abs(away[0]) == 1:  # a carry
-            away = (size / b, away[1] / b, e + 1)
-        allowed = {(u, v, e), away} if abs(away[1]) < 1 else {(u, v, e)}
+        b, t, e = (names[letter] for letter in "bte")
+        allowed = _allowed_splits(names)
         for other in (e - 1, e, e + 1):
             whole = math.trunc(names["x"] / b**other * b**t)
             for k in range(whole - 3, whole + 4):
