@@ -67,13 +67,14 @@ def tolerances_of(tolerance: Any, count: int, what: str) -> NDArray[np.float64]:
         if given.dtype.kind not in "iufOU":
             raise ValueError("no real numbers")
         negative = [-_exactly(each) for each in given.ravel().tolist()]
+        above = np.array([each < 0 for each in negative]).reshape(given.shape)
         tolerances = -all_above(np.array(negative, dtype=object)).reshape(given.shape)
     except (TypeError, ValueError, ArithmeticError):
         raise ValueError(f"got tolerance {tolerance!r}; {needed}") from None
     if tolerances.shape not in ((), (1,), (count,)):
         got = f"tolerance {tolerance}" if tolerances.size <= 2 * count else "a tolerance"
         raise ValueError(f"got {got} of shape {tolerances.shape}; {needed}: one number, or {count} in a row")
-    if ((tolerances == 0) & np.array([each < 0 for each in negative]).reshape(tolerances.shape)).any():
+    if ((tolerances == 0) & above).any():
         raise ValueError(f"got tolerance {tolerance}; needed at least 2**-1074, which float64 holds; scale the {what}")
     if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
         raise ValueError(f"got tolerance {tolerance}; {needed}")
