@@ -32,30 +32,21 @@ class Arithmetic:
         emin: int | None = None,
         emax: int | None = None,
         subnormal: bool = True,
-        ends_at_subnormal: bool = False,
     ) -> None:
         self.base, self.digits, self.rounding = base, digits, rounding
         self.emin, self.emax, self.subnormal = emin, emax, subnormal
-        self.ends_at_subnormal = ends_at_subnormal
         self.limit = base**digits
         self.one = (1, 0)
 
     @classmethod
-    def of(cls, fmt: Any, ends_at_subnormal: bool = False) -> Arithmetic:
+    def of(cls, fmt: Any) -> Arithmetic:
         """The same digits, rounding and range as a format of the package."""
-        span = fmt.emin, fmt.emax, fmt.subnormal
-        return cls(fmt.base, fmt.precision, fmt.rounding.value, *span, ends_at_subnormal)
+        return cls(fmt.base, fmt.precision, fmt.rounding.value, fmt.emin, fmt.emax, fmt.subnormal)
 
     # -- rounding -------------------------------------------------------------------------------------------
 
     def fit(self, p: int, q: int = 1, e: int = 0) -> Number:
         """Round the result p / q * base**e of an operation, with q > 0."""
-        m, e = self._fit(p, q, e)
-        if self.ends_at_subnormal and 0 < abs(m) < self.limit // self.base:
-            raise OverflowError
-        return m, e
-
-    def _fit(self, p: int, q: int, e: int) -> Number:
         if p == 0:
             return ZERO
         size, b, t = abs(p), self.base, self.digits
@@ -106,7 +97,7 @@ class Arithmetic:
     # -- operations -----------------------------------------------------------------------------------------
 
     def store(self, x: Fraction) -> Number:
-        return self._fit(x.numerator, x.denominator, 0)
+        return self.fit(x.numerator, x.denominator)
 
     def value(self, x: Number) -> Fraction:
         return Fraction(x[0] * self.base ** x[1]) if x[1] >= 0 else Fraction(x[0], self.base ** -x[1])

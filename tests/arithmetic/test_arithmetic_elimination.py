@@ -47,7 +47,7 @@ def hilbert(n: int) -> np.ndarray:
 
 def inverse(tag, a: np.ndarray, identity: np.ndarray) -> np.ndarray:
     factors, order, x = a.copy(), np.arange(len(a)), identity.copy()
-    assert elimination.lu(tag, factors, order, True) == -1
+    assert elimination.lu(tag, factors, order, True, 0, len(a)) == -1
     x = x[order]
     elimination.reduce(tag, factors, x)
     elimination.substitute(tag, factors, x)

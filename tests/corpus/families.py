@@ -214,7 +214,8 @@ def _system(draw: Draw, i: int) -> tuple[str, str, dict[str, Any], int]:
         return "controller", "pid", {"Kp": "0.8", "Ki": "0.1", "leak": "0.98", **limits}, 1
     if kind == 14:
         order = ("left", "pairwise", "blocked", "tree")[i // 16 % 4]
-        return f"sum {order}", "sum", {"count": 9, "order": order, "block": 4, "running": True}, 9
+        block = {"block": 4} if order == "blocked" else {}
+        return f"sum {order}", "sum", {"count": 9, "order": order, **block, "running": True}, 9
     A = draw.matrix(3, 3, 0.4, 3, 0.2)
     settings = {"A": A, "B": draw.matrix(3, 2), "C": draw.matrix(2, 3), "D": draw.matrix(2, 2, 1, 2, 0.5)}
     return "matrices", "matrices", {**settings, "x0": [draw.number() for _ in range(3)]}, 2

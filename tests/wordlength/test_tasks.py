@@ -28,7 +28,7 @@ from gpbnb import (
     survey_records,
     write_code,
 )
-from gpbnb.wordlength.tasks import CANNOT, admitted, kind_of
+from gpbnb.wordlength.tasks import CANNOT, WHY, admitted, kind_of
 
 STEPS = 12
 WALK = {"Phi": [["0.9"]], "H": [[1]], "Q": [["0.01"]], "R": [[1]], "x0": [0], "P0": [[1]]}
@@ -186,7 +186,8 @@ def test_a_task_works_or_names_its_way(name, task, tmp_path):
     kind = kind_of(admitted(model))
     needs = next((each for each in ([needs] if isinstance(needs, str) else needs) if kind in CANNOT.get(each, ())), "")
     if needs:
-        with pytest.raises(ValueError, match=rf"{kind},? cannot {needs}; ") as refused:
+        why = WHY.get(needs, {}).get(kind, "")
+        with pytest.raises(ValueError, match=rf"{kind},? cannot {needs}{why and f', {why}'}; ") as refused:
             does(model, tmp_path / "c")
         assert str(refused.value).endswith(CANNOT[needs][kind])
     elif (task, name) in FURTHER:
