@@ -70,7 +70,7 @@ class Numbers(independent_filter.Arithmetic):
         else:
             self.rounding = fmt.rounding
 
-    def _fit(self, p: int, q: int, e: int) -> tuple[int, int]:
+    def fit(self, p: int, q: int = 1, e: int = 0) -> tuple[int, int]:
         x = self.r(Fraction(p, q) * Fraction(self.base) ** e)
         if not x:
             return 0, 0
