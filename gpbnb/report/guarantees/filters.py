@@ -178,7 +178,10 @@ def inputs(drawn: Drawn, found: FilterGuarantee, rng: np.random.Generator) -> It
         seed, center = int(rng.integers(2**31)), None
         if drawn.limited != "measurement":
             center = rng.choice((-1.0, 0.0, 1.0), n) * drawn.within.state
-        outcome = attack(found, steps, CANDIDATES, seed, [(state + part) % n], center, 3 + 3 * part, steps / 4)
+        try:
+            outcome = attack(found, steps, CANDIDATES, seed, [(state + part) % n], center, 3 + 3 * part, steps / 4)
+        except OverflowError:
+            continue  # the format has a number that float64 cannot hold
         yield "chosen", outcome.z
 
 
