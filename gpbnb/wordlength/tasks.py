@@ -125,15 +125,15 @@ def data_of(model: Any, z: Any, seed: int = 0) -> Data:
 
     Raises
     ------
-    ValueError : another shape, a number of steps below 1, or a seed of what is not simulated.
+    ValueError : another shape, a number of steps below 1, or a seed where nothing is simulated.
     """
     if isinstance(z, str | Path) or z is None:
         raise ValueError(f"got {z!r} for z; needed measurements or inputs, (steps, m), or a number of steps")
     simulated = not isinstance(z, list | tuple) and not hasattr(z, "to_fractions") and np.ndim(z) == 0
     if (seed := whole_number("seed", seed, 0)) and not (simulated and isinstance(model, LinearModel | NonlinearModel)):
         raise ValueError(
-            f"got seed {seed} of what is not simulated; needed none: a seed is for the measurements of a Kalman filter "
-            "that are given as a number of steps"
+            f"got seed {seed} where nothing is simulated; needed none: a seed is for the measurements of a Kalman "
+            "filter that are given as a number of steps"
         )
     if simulated:
         return Data(None, whole_number("steps", z, most=MOST_STEPS), seed)
