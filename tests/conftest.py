@@ -7,4 +7,4 @@ import pytest
 matplotlib.use("Agg")
 
 # Failed assertions of the helpers beside this file tell what came, as those of the tests do.
-pytest.register_assert_rewrite("faults", "steps")
+pytest.register_assert_rewrite("steps")
