@@ -16,7 +16,6 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.units import largest_errors, stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, reference_states
-from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
 
 FORMAT = FloatFormat(2, 11)
 Asked = Callable[[LinearModel, Any, FloatFormat], Any]
@@ -42,10 +41,6 @@ def _from_schedule(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
     return from_schedule(schedule(model, fmt, Form.INNOVATION), within)
 
 
-def _blocks(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
-    return next(bounds_in_blocks(model, fmt, [within], [np.ones(model.n)], 5))
-
-
 def _precision(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
     return required_precision(model, 5, 0.01, rounding=fmt.rounding, basis="guarantee", within=within)
 
@@ -54,7 +49,7 @@ def _probable(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
     return required_precision(model, 5, 0.01, rounding=fmt.rounding, basis="probable", within=within)
 
 
-ASKED = [_guarantee, _from_schedule, _blocks, _precision, _probable]
+ASKED = [_guarantee, _from_schedule, _precision, _probable]
 
 
 # -- stochastic rounding ----------------------------------------------------------------------------------------------

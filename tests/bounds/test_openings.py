@@ -16,7 +16,6 @@ from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
-from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
 from gpbnb.report.wordlengths.study import companion_run
 
 # -- the guarantee is for that filter ---------------------------------------------------------------------------------
@@ -90,7 +89,7 @@ def test_the_coefficients_of_a_guarantee_are_those_of_the_run(fmt: FloatFormat) 
             assert np.array_equal(given.packed[:6, -count:].reshape(run.G.shape), run.G)
 
 
-def test_bounds_in_blocks_and_companions_are_for_the_run_of_the_model_as_given(monkeypatch: Any) -> None:
+def test_companions_are_for_the_run_of_the_model_as_given(monkeypatch: Any) -> None:
     opened = []
     start = Run.__init__
 
@@ -102,12 +101,10 @@ def test_bounds_in_blocks_and_companions_are_for_the_run_of_the_model_as_given(m
     (model,) = _raised_models(NINE, 1)
     user = Run(model, NINE, Form.UD, ())
     monkeypatch.setattr(Run, "__init__", noted)
-    next(bounds_in_blocks(model, NINE, [limits(state=1e3, innovation=1e3)], [np.full(model.n, 1e6)], 1, Form.UD))
     companion_run(model, np.zeros((2, model.m)), NINE, Form.UD)
-    assert len(opened) == 2
-    for UQ, P in opened:
-        assert np.array_equal(UQ, user.exactly(user.UQ))
-        assert np.array_equal(P, user.exactly(user.P))
+    ((UQ, P),) = opened
+    assert np.array_equal(UQ, user.exactly(user.UQ))
+    assert np.array_equal(P, user.exactly(user.P))
     array = ArrayRun(model, NINE, Form.UD, ())
     assert np.array_equal(array._given["UQ"][0].to_fractions(), user.exactly(user.UQ)[0])
     assert array.repairs == user.repairs == ArrayRun(model, NINE, ArrayForm.POTTER, ()).repairs
@@ -119,6 +116,4 @@ def test_a_covariance_that_must_not_be_raised_has_neither_run_nor_guarantee() ->
         Run(model, NINE, Form.UD, ())
     with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
         guarantee(model, NINE, WITHIN, form=Form.UD)
-    with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
-        next(bounds_in_blocks(model, NINE, [WITHIN], [[1, 1, 1]], 10, Form.UD))
     assert guarantee(model, NINE, WITHIN, form=Form.INNOVATION).for_ever

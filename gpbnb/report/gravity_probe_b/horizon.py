@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,30 +20,16 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.bounds.gains import check_deterministic, packed_coefficients
+from gpbnb.bounds.gains import packed_coefficients
 from gpbnb.bounds.guarantee import limits, sized_limits
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.bounds.units import stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import widened_array
-from gpbnb.filters.program import Program
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
-from gpbnb.report.gravity_probe_b.error_sets import (
-    GAIN,
-    LOOP,
-    ROUNDING,
-    Disturbances,
-    FilterSteps,
-    Reach,
-    columns,
-    disturbances,
-    forward,
-    nothing,
-    units,
-    units_of_trace,
-)
+from gpbnb.report.gravity_probe_b import error_sets
+from gpbnb.report.gravity_probe_b.error_sets import GAIN, LOOP, ROUNDING, Disturbances, FilterSteps, Reach
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS
 from gpbnb.report.gravity_probe_b.year import model as year_model
@@ -63,49 +49,57 @@ SAVE_EVERY = 50
 
 
 @dataclass
-class _Carried:
-    """State that is carried from block to block for one choice of limits."""
+class HorizonBounds:
+    """Bounds of the error of each state for one choice of limits, (n,), as they are after the latest step."""
 
     within: FilterLimits
     assumed: NDArray[np.float64]
-    last: NDArray[np.float64]
     worst: NDArray[np.float64]
+    last: NDArray[np.float64]
+    #: (n, 3), of the step where the bound was largest.
     parts: NDArray[np.float64]
+    #: unit of each state, and the columns that are not zero; known from the first disturbances on, like the reach.
+    size: NDArray[np.float64]
+    used: NDArray[np.bool_]
     reach: Reach | None = None
-    used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
-    size: NDArray[np.float64] = field(default_factory=lambda: np.ones(1))
 
-
-class HorizonBounds(NamedTuple):
-    """HorizonBounds of the error of each state at any step so far, (n,), for one choice of limits."""
-
-    worst: NDArray[np.float64]
-    last: NDArray[np.float64]
-    #: (n, 4), of the step where the bound was largest.
-    parts: NDArray[np.float64]
+    def follow(self, found: Disturbances, part: NDArray[np.int64], done: int, window: int) -> None:
+        """Take in the disturbances of the next steps; `part` is the part of the bound of each column."""
+        sizes = error_sets.columns(found)
+        if self.reach is None:
+            self.used = sizes.max(axis=(0, 1)) > 0
+            self.size = error_sets.units_of_trace((sizes.sum(axis=2) + found.slack).max(axis=0))
+            self.reach = error_sets.nothing(window, part[self.used], len(self.last))
+        slack = found.slack + sizes[:, :, ~self.used].sum(axis=2) * (1 + 2.0**-40)
+        G, limited = (np.ascontiguousarray(each[..., self.used]) for each in (found.G, found.limits))
+        given = found.F, found.spread, G, limited, slack, self.reach
+        bounds, parts = error_sets.forward(*given, done, len(slack), self.last, self.size)
+        bounds = np.where(np.isnan(bounds), np.inf, bounds)
+        most, of_most = bounds.max(axis=0), parts[bounds.argmax(axis=0), np.arange(len(self.last))]
+        self.parts = np.where((most > self.worst)[:, np.newaxis], of_most, self.parts)
+        self.worst, self.last = np.maximum(self.worst, most), bounds[-1]
 
 
 def bounds_in_blocks(
     model: LinearModel,
-    fmt: FloatFormat,
+    precision: int,
     within: Sequence[FilterLimits],
     assumed: Sequence[Any],
     steps: int,
-    form: Form | str = Form.INNOVATION,
     block: int | None = None,
     window: int = 8,
     saved: Path | None = None,
 ) -> Iterator[tuple[int, list[HorizonBounds]]]:
-    """Bound the effect of rounding on the estimates of the first steps, block by block.
+    """Bound the effect of rounding on the estimates of the innovation form in its first steps, block by block.
 
     Parameters
     ----------
-    model, fmt, form : the filter, as for :func:`gpbnb.bounds.guarantee.guarantee`.
-    within : limits on state and innovation, one for each bound.
+    model, precision : the filter and its bits; it rounds to nearest.
+    within : finite limits on state and innovation, one for each bound.
     assumed : for each bound, (n,), an error that is assumed not to be exceeded. It enters the size of the computed
         estimate; a bound above it ends the iteration with an ``ArithmeticError``.
-    steps : number of steps.
     block : number of steps at a time; by default a cycle of the model.
+    window : number of steps whose disturbances are kept one by one.
     saved : file for the state of the run, written now and then. If it exists, the run continues from there; the
         arguments must be the same.
 
@@ -113,21 +107,20 @@ def bounds_in_blocks(
     ------
     done, bounds : after each block.
     """
-    check_deterministic(fmt)
-    model.refuse_inputs("bounds in blocks")
-    model.check_steps(steps)
+    fmt = FloatFormat(2, precision)
     stored = model.rounded(fmt)
-    within = _sized(stored, within, assumed)
     block = stored.cycle if block is None else block
-    run, true = (
-        Run(model, fmt, form, range(1, block + 1)),
-        Run(stored, None, Form.INNOVATION, range(1, block + 1), bounded=True),
-    )
+    run = Run(model, fmt, Form.INNOVATION, range(1, block + 1))
+    true = Run(stored, None, Form.INNOVATION, range(1, block + 1), bounded=True)
     silence = ((run, fmt.array(np.zeros((block, stored.m)))), (true, np.zeros((block, stored.m))))
-    wide = _wide(stored)
-    done, each = 0, _begun(fmt, within, assumed)
+    products = [stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(stored.cycle)]
+    Phi, HPhi = double_doubles(stored.Phi), double_doubles(np.array(products))
+    done, each = 0, [_begun(stored, *given) for given in zip(within, assumed, strict=True)]
     if saved is not None and saved.exists():
-        done, each = _restored(saved, run, true)
+        done, states, true.bound, each = pickle.loads(saved.read_bytes())
+        for given, state in zip((run, true), states, strict=True):
+            for array, value in zip((given.x, given.P, given.notes), state, strict=True):
+                array[...] = value
     while done < steps:
         count = min(block, steps - done)
         for filter_run, z in silence:
@@ -138,99 +131,37 @@ def bounds_in_blocks(
                     f"{model.name} in {fmt}: the filter stopped or its covariance lost definiteness by "
                     f"step {done + count}"
                 )
-        program, numbers = _of_block(run, true, wide, done, count)
-        caps = np.full(len(program.operations), np.inf)
+        program, packed = packed_coefficients(run, np.arange(count), done)
+        at = done + np.arange(count)
+        numbers = FilterSteps(
+            widened_array(packed),
+            np.ascontiguousarray(Phi[at % len(Phi)]),
+            np.ascontiguousarray(HPhi[at % len(HPhi)]),
+            np.ascontiguousarray(true.G[:count].reshape(count, program.n, program.m, 2)),
+            true.bounds.gain[:count],
+        )
         part = np.array([ROUNDING] * len(program.roots) + [LOOP] * stored.n + [GAIN] * stored.m)
         for one in each:
-            found = Disturbances(*disturbances(program.compiled, numbers, units(fmt), one.within, one.assumed, caps))
-            _follow(one, found, part, done, count, window)
+            found = error_sets.disturbances(program.compiled, numbers, precision, one.within, one.assumed)
+            one.follow(Disturbances(*found), part, done, window)
             if not (one.worst <= one.assumed).all():
                 raise ArithmeticError(f"the bound {one.worst} exceeds the assumed {one.assumed} by step {done + count}")
         done += count
         if saved is not None and (done // block) % SAVE_EVERY == 0:
-            _save(saved, done, run, true, each)
-        yield done, [HorizonBounds(one.worst, one.last, one.parts) for one in each]
+            draft = saved.with_suffix(".draft")
+            states = [(given.x, given.P, given.notes) for given in (run, true)]
+            draft.write_bytes(pickle.dumps((done, states, true.bound, each)))
+            draft.replace(saved)
+        yield done, [replace(one) for one in each]
 
 
-def _sized(stored: LinearModel, within: Sequence[FilterLimits], assumed: Sequence[Any]) -> list[FilterLimits]:
-    """Return limits with one entry each; reject those that are not finite, and assumed errors of another shape."""
-    found = [sized_limits(limit, stored.n, stored.m, stored.x0) for limit in within]
-    for limit, error in zip(found, assumed, strict=True):
-        if not (np.isfinite(limit.state).all() and np.isfinite(limit.innovation).all()):
-            raise ValueError(
-                f"got limits {limit.state} on the state and {limit.innovation} on the innovation; needed finite ones: "
-                "bounds in blocks do not derive them from limits on the measurements"
-            )
-        if np.shape(error) != (stored.n,):
-            raise ValueError(f"got assumed errors of shape {np.shape(error)}; needed ({stored.n},), one for each state")
-    return found
-
-
-def _begun(fmt: FloatFormat, within: Sequence[FilterLimits], assumed: Sequence[Any]) -> list[_Carried]:
-    """Return the state before the first step, for each choice of limits."""
-    found = []
-    for limit, error in zip(within, assumed, strict=True):
-        none, most = np.zeros(len(error)), limit._replace(measurement=stored_sizes(fmt, limit.measurement))
-        found.append(_Carried(most, np.asarray(error, dtype=np.float64), none, none, np.zeros((len(error), 4))))
-    return found
-
-
-def _wide(stored: LinearModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the cycles of Phi and of H Phi in double-double."""
-    products = [stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(stored.cycle)]
-    return double_doubles(stored.Phi), double_doubles(np.array(products))
-
-
-def _of_block(
-    run: Run, true: Run, wide: tuple[NDArray[np.float64], NDArray[np.float64]], done: int, count: int
-) -> tuple[Program, FilterSteps]:
-    """Return the program of a step, and the numbers of a block that its disturbances follow from."""
-    (Phi, HPhi), rows = wide, np.arange(count)
-    at = (done + rows) % len(HPhi)
-    program, packed = packed_coefficients(run, rows, done)
-    coefficients = widened_array(packed)
-    return program, FilterSteps(
-        coefficients,
-        np.zeros(coefficients.shape[:2]),
-        np.ascontiguousarray(Phi[at % len(Phi)]),
-        np.ascontiguousarray(HPhi[at]),
-        np.ascontiguousarray(true.G[:count].reshape(count, program.n, program.m, 2)),
-        true.bounds.gain[:count],
+def _begun(stored: LinearModel, within: FilterLimits, assumed: Any) -> HorizonBounds:
+    """Return the state before the first step."""
+    limit, n = sized_limits(within, stored.n, stored.m, stored.x0), stored.n
+    size, used = np.ones(n), np.zeros(0, dtype=bool)
+    return HorizonBounds(
+        limit, np.asarray(assumed, dtype=float), np.zeros(n), np.zeros(n), np.zeros((n, 3)), size, used
     )
-
-
-def _save(file: Path, done: int, run: Run, true: Run, each: list[_Carried]) -> None:
-    """Write the state that the next block needs; an existing file is replaced as a whole."""
-    draft = file.with_suffix(".draft")
-    runs = [(given.x, given.P, given.notes) for given in (run, true)]
-    draft.write_bytes(pickle.dumps((done, runs, true.bound, each)))
-    draft.replace(file)
-
-
-def _restored(file: Path, run: Run, true: Run) -> tuple[int, list[_Carried]]:
-    """Restore both runs from a file written by :func:`_save`; return the rest of it."""
-    done, runs, true.bound, each = pickle.loads(file.read_bytes())
-    for given, state in zip((run, true), runs, strict=True):
-        for array, value in zip((given.x, given.P, given.notes), state, strict=True):
-            array[...] = value
-    return done, each
-
-
-def _follow(one: _Carried, found: Disturbances, part: NDArray[np.int64], done: int, count: int, window: int) -> None:
-    sizes = columns(found)
-    if one.reach is None:
-        one.used = sizes.max(axis=(0, 1)) > 0
-        one.size = units_of_trace((sizes.sum(axis=2) + found.slack).max(axis=0))
-        one.reach = nothing(window, part[one.used], len(one.last))
-    slack = found.slack + sizes[:, :, ~one.used].sum(axis=2) * (1 + 2.0**-40)
-    G, limits_of = (np.ascontiguousarray(each[..., one.used]) for each in (found.G, found.limits))
-    bounds, parts = forward(found.F, found.spread, G, limits_of, slack, one.reach, done, count, one.last, one.size)
-    bounds = np.where(np.isnan(bounds), np.inf, bounds)
-    at = bounds.argmax(axis=0)
-    for i, k in enumerate(at):
-        if bounds[k, i] > one.worst[i]:
-            one.parts[i] = parts[k, i]
-    one.worst, one.last = np.maximum(one.worst, bounds.max(axis=0)), bounds[-1].copy()
 
 
 # -- Gravity Probe B --------------------------------------------------------------------------------------------------
@@ -246,7 +177,7 @@ INNOVATION = (1000.0, 200.0)
 
 
 class HorizonRow(NamedTuple):
-    """HorizonBounds after some steps of the year for one choice of states."""
+    """Bounds after some steps of the year for one choice of states."""
 
     precision: int
     steps: int
@@ -289,8 +220,7 @@ def gravity_probe_b_bounds(
     """Yield bounds for a year of Gravity Probe B in a binary format, first for absolute states, then for deviations."""
     within = [limits(state=state, innovation=INNOVATION) for state in (ABSOLUTE, DEVIATION)]
     assumed = [1e-2 * np.array(state) for state in (ABSOLUTE, DEVIATION)]
-    fmt = FloatFormat(2, precision)
-    return bounds_in_blocks(year_model(MODELS[0], 2), fmt, within, assumed, steps, saved=saved)
+    return bounds_in_blocks(year_model(MODELS[0], 2), precision, within, assumed, steps, saved=saved)
 
 
 # -- the stored table -------------------------------------------------------------------------------------------------
