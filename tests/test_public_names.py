@@ -67,4 +67,4 @@ def test_only_long_computations_of_commands_show_progress_unasked():
                     for argument, default in defaults
                     if argument.arg == "progress" and default is not None and ast.unparse(default) == "True"
                 }
-    assert shown == {"sweep.run", "year.run_cases"}
+    assert shown == {"sweep.run"}

@@ -17,6 +17,7 @@ from gpbnb.sweeps.command import run
 
 SWEEPS: tuple[Sweep[Any], ...] = (
     year.SWEEP,
+    year.BOUND_SWEEP,
     threshold.SWEEP,
     threshold.MISSION_SWEEP,
     horizon.SWEEP,

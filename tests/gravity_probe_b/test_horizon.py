@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -81,17 +80,3 @@ def test_the_first_cycle_of_gravity_probe_b_again() -> None:
     assert done == 2340
     for name, each in zip(("absolute", "deviation"), found, strict=True):
         assert np.allclose(each.worst, first[name].bounds, rtol=1e-5, atol=0)
-
-
-def test_a_saved_run_continues_with_the_same_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(horizon, "SAVE_EVERY", 2)
-    given = constants(), 24, [limits(state=[10, 20], innovation=5)], [np.full(2, 1.0)], STEPS, 7, 8
-    whole = list(bounds_in_blocks(*given))
-    saved = tmp_path / "state.pickle"
-    interrupted = bounds_in_blocks(*given, saved)
-    assert [next(interrupted)[0] for _ in range(3)] == [7, 14, 21]  # saved after the second block
-    rest = list(bounds_in_blocks(*given, saved))
-    assert [done for done, _ in rest] == [21, 28, 35, 42, 49, 50]
-    for (_, (again,)), (_, (once,)) in zip(rest, whole[2:], strict=True):
-        assert (again.worst == once.worst).all()
-        assert (again.last == once.last).all()

@@ -12,8 +12,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import BLOCK
-from gpbnb.report.gravity_probe_b import mission
-from gpbnb.report.gravity_probe_b.lockstep import Lockstep
+from gpbnb.report.gravity_probe_b import mission, threshold
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS, STATES, Mission
 
 YEAR = np.linspace(0, 3_153_600, 2001).astype(np.int64)
@@ -115,9 +114,10 @@ def test_while_the_star_is_hidden_no_estimate_learns():
 
 def test_the_filter_finds_scale_and_roll_phase_by_the_aberration():
     mission = Mission(deviations=True, quiet=10.0)
-    lockstep = Lockstep("a trial", mission, [FloatFormat(2, 40)], Form.HUNG, range(4), 2 * BLOCK)
-    while not lockstep.finished:
-        lockstep.advance()
+    cell = threshold.YearCell("a tenth of the readout noise", "deviation", 2, "nearest", "hung", (40,), count=4)
+    lockstep = threshold.Lockstep(cell, 2 * BLOCK)
+    for block in range(2):
+        lockstep.advance(block)
     reference = lockstep.reference
     deviation = np.sqrt(np.diagonal(reference.P))
     start = np.sqrt(mission.model(2).P0.diagonal().astype(float))

@@ -8,7 +8,6 @@ two choices of states, drift or deviations from the predicted drift, have the sa
 from __future__ import annotations
 
 import math
-import pickle
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,7 +32,7 @@ from gpbnb.report.gravity_probe_b.error_sets import GAIN, LOOP, ROUNDING, Distur
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS
 from gpbnb.report.gravity_probe_b.year import model as year_model
-from gpbnb.sweeps import Column, Sweep, read_record, write_record
+from gpbnb.sweeps import Column, Sweep
 
 FILE = Path(__file__).with_name("horizon.csv")
 COLUMNS = (
@@ -44,8 +43,6 @@ COLUMNS = (
     *(Column(f"gain part {i}", low=0) for i in range(10)),
 )
 """Columns of the stored table."""
-SAVE_EVERY = 50
-"""Blocks between two saved states of a long run."""
 
 
 @dataclass
@@ -88,7 +85,6 @@ def bounds_in_blocks(
     steps: int,
     block: int | None = None,
     window: int = 8,
-    saved: Path | None = None,
 ) -> Iterator[tuple[int, list[HorizonBounds]]]:
     """Bound the effect of rounding on the estimates of the innovation form in its first steps, block by block.
 
@@ -100,8 +96,6 @@ def bounds_in_blocks(
         estimate; a bound above it ends the iteration with an ``ArithmeticError``.
     block : number of steps at a time; by default a cycle of the model.
     window : number of steps whose disturbances are kept one by one.
-    saved : file for the state of the run, written now and then. If it exists, the run continues from there; the
-        arguments must be the same.
 
     Yields
     ------
@@ -116,11 +110,6 @@ def bounds_in_blocks(
     products = [stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(stored.cycle)]
     Phi, HPhi = double_doubles(stored.Phi), double_doubles(np.array(products))
     done, each = 0, [_begun(stored, *given) for given in zip(within, assumed, strict=True)]
-    if saved is not None and saved.exists():
-        done, states, true.bound, each = pickle.loads(saved.read_bytes())
-        for given, state in zip((run, true), states, strict=True):
-            for array, value in zip((given.x, given.P, given.notes), state, strict=True):
-                array[...] = value
     while done < steps:
         count = min(block, steps - done)
         for filter_run, z in silence:
@@ -147,11 +136,6 @@ def bounds_in_blocks(
             if not (one.worst <= one.assumed).all():
                 raise ArithmeticError(f"the bound {one.worst} exceeds the assumed {one.assumed} by step {done + count}")
         done += count
-        if saved is not None and (done // block) % SAVE_EVERY == 0:
-            draft = saved.with_suffix(".draft")
-            states = [(given.x, given.P, given.notes) for given in (run, true)]
-            draft.write_bytes(pickle.dumps((done, states, true.bound, each)))
-            draft.replace(saved)
         yield done, [replace(one) for one in each]
 
 
@@ -214,43 +198,28 @@ def bits(row: HorizonRow, tolerance: float = 1.0) -> int:
     return math.ceil(row.precision + math.log2(max(row.bounds[:4]) / tolerance))
 
 
-def gravity_probe_b_bounds(
-    precision: int, steps: int = YEAR, saved: Path | None = None
-) -> Iterator[tuple[int, list[HorizonBounds]]]:
+def gravity_probe_b_bounds(precision: int, steps: int = YEAR) -> Iterator[tuple[int, list[HorizonBounds]]]:
     """Yield bounds for a year of Gravity Probe B in a binary format, first for absolute states, then for deviations."""
     within = [limits(state=state, innovation=INNOVATION) for state in (ABSOLUTE, DEVIATION)]
     assumed = [1e-2 * np.array(state) for state in (ABSOLUTE, DEVIATION)]
-    return bounds_in_blocks(year_model(MODELS[0], 2), precision, within, assumed, steps, saved=saved)
+    return bounds_in_blocks(year_model(MODELS[0], 2), precision, within, assumed, steps)
 
 
 # -- the stored table -------------------------------------------------------------------------------------------------
 
 
 def year_of_bounds(precision: int, directory: Path | None = None, steps: int = YEAR) -> list[list[str]]:
-    """Return two rows after each hundredth of the year and at the end; they hold for the steps done so far.
-
-    Parameters
-    ----------
-    directory : folder that holds the state of the run and its rows, from which it continues; None saves nothing.
-    """
-    saved = record = None
+    """Return two rows after each hundredth of the year and at the end; they hold for the steps done so far."""
     rows: list[list[str]] = []
-    if directory is not None:
-        saved, record = directory / f"state_{precision}.pickle", directory / f"rows_{precision}.json"
-        if saved.exists() and record.exists():
-            rows = read_record(record, SWEEP.command)["rows"]
-    every = int(rows[-1][1]) + YEAR // 100 if rows else 0
+    every = 0
     with tqdm(total=steps, unit="step", disable=directory is None) as bar:
-        for done, found in gravity_probe_b_bounds(precision, steps, saved):
+        for done, found in gravity_probe_b_bounds(precision, steps):
             bar.update(done - bar.n)
             if done == steps or done >= every:
                 every = done + YEAR // 100
-                rows = [row for row in rows if int(row[1]) < done]
                 for name, each in zip(("absolute", "deviation"), found, strict=True):
                     bounds, parts = (f"{b:.6g}" for b in each.worst), (f"{b:.3g}" for b in each.parts[:, GAIN])
                     rows.append([str(precision), str(done), name, *bounds, *parts])
-                if record is not None:
-                    write_record(record, {"rows": rows})
     return rows
 
 

@@ -10,9 +10,8 @@ from typing import NamedTuple
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY32, BINARY64
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.forms import Form
 from gpbnb.report.display.tables import Table
-from gpbnb.report.gravity_probe_b import answers, horizon, threshold, year
+from gpbnb.report.gravity_probe_b import answers, horizon, threshold
 from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.kalman import report_bounds
 
@@ -43,10 +42,9 @@ class YearAnswer(NamedTuple):
 
 def find() -> tuple[YearAnswer, ...]:
     """Collect the answers from the printed example, the stored years and the stored guarantee."""
-    printed = answers.find_answers()
+    printed = tuple(int(report_bounds.PRINTED[f"{term} digits"]) for term in ("first", "second"))
     formula = report_bounds.coefficients(*report_bounds.EXAMPLE)
     within = tuple(report_bounds.precision_for_coefficient(each, Fraction(1, DRIFT)) for each in formula)
-    record = answers.find_answers().bits
     simple = [each for each in threshold.shares(threshold.SWEEP.load()) if _as_in_the_report(each)]
     real = [each for each in threshold.shares(threshold.MISSION_SWEEP.load()) if _as_in_the_report(each)]
     absolute, deviation = (_least(simple, "simple", states) for states in threshold.STATES)
@@ -59,39 +57,23 @@ def find() -> tuple[YearAnswer, ...]:
         name: "too few" if t < least else "ample" if t >= max(bound.values()) else "enough" for name, t in sizes.items()
     }
     return (
-        YearAnswer("Report, own criterion", "error equals the drift", printed.printed),
-        YearAnswer("The same, simulated", _met(answers.find_answers(DRIFT)), (), answers.find_answers(DRIFT).bits),
+        YearAnswer("Report, own criterion", "error equals the drift", printed),
+        YearAnswer("The same, simulated", _met(DRIFT), (), answers.fewest_bits(DRIFT)),
         YearAnswer("Report, for 1 mas", "(125) is not a bound", within),
-        YearAnswer("One simulated year", "observed", (), record),
+        YearAnswer("One simulated year", "observed", (), answers.fewest_bits()),
+        _of_shares(f"{absolute.records} simulated years", absolute, deviation),
+        _of_shares("Closer to the mission", closer, closer_deviation),
+        YearAnswer("Same, step every 2 s", _passed(flown), deviation=flown.fmt.precision),
         YearAnswer(
-            f"{absolute.records} simulated years",
-            _passed(absolute, deviation),
-            (),
-            absolute.fmt.precision,
-            deviation.fmt.precision,
-        ),
-        YearAnswer(
-            "Closer to the mission",
-            _passed(closer, closer_deviation),
-            (),
-            closer.fmt.precision,
-            closer_deviation.fmt.precision,
-        ),
-        YearAnswer(
-            "Same, step every 2 s",
-            _passed(flown),
-            deviation=flown.fmt.precision,
-        ),
-        YearAnswer(
-            "Every admissible record",
-            "scaled from a proof in 53 bits",
-            (),
-            bound["absolute"],
-            bound["deviation"],
+            "Every admissible record", "scaled from a proof in 53 bits", (), bound["absolute"], bound["deviation"]
         ),
         YearAnswer("binary32 (float32)", verdicts["float32"], (), sizes["float32"]),
         YearAnswer("binary64 (double)", verdicts["double"], (), sizes["double"]),
     )
+
+
+def _of_shares(source: str, absolute: Share, deviation: Share) -> YearAnswer:
+    return YearAnswer(source, _passed(absolute, deviation), (), absolute.fmt.precision, deviation.fmt.precision)
 
 
 def table() -> Table:
@@ -118,11 +100,10 @@ def _both_bases(answer: YearAnswer) -> tuple[str, str]:
     return bits or "–", " or ".join(map(str, answer.decimal)) or "–"
 
 
-def _met(found: answers.Answers) -> str:
+def _met(tolerance: float) -> str:
     """Say how far the fewest bits stay below a tolerance, and by how much one bit less exceeds it."""
-    errors = {run.case: answers.largest(run) for run in found.runs}
-    fewer = year.YearCase(year.MODELS[0], 2, found.bits - 1, Rounding.NEAREST, Form.HUNG)
-    return f"one year: {found.error:,.0f} mas; {fewer.precision} bits: {errors[fewer]:,.0f}"
+    errors, bits = answers.errors(), answers.fewest_bits(tolerance)
+    return f"one year: {errors[bits]:,.0f} mas; {bits - 1} bits: {errors[bits - 1]:,.0f}"
 
 
 def _passed(*found: Share) -> str:

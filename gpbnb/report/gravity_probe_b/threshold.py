@@ -16,16 +16,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import least_from_which_on
 from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.records import update_largest
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.simulation import Simulation
+from gpbnb.filters.run import Run
+from gpbnb.filters.simulation import BLOCK, Simulation
 from gpbnb.report.confidence import interval
-from gpbnb.report.gravity_probe_b.lockstep import Lockstep, error_rows, run_lockstep
 from gpbnb.report.gravity_probe_b.mission import SETTINGS, Mission
 from gpbnb.report.gravity_probe_b.model import TRUTH, YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS, model
@@ -40,6 +42,8 @@ FORMS = {"hung": Form.HUNG, "innovation": Form.INNOVATION}
 #: True minus predicted drift rates in mas/yr, from the measured differences 6606.1 - 6601.8 and 39.2 - 37.2.
 DEVIATION = (4.3, 2.0)
 
+ANGLES, DECIMALS = 4, 4
+"""Number of first states that are compared, two angles and two rates; decimals of measurement matrices in base 10."""
 SEED, MISSION_SEED = 1984, 2004
 _HERE = Path(__file__).parent
 
@@ -49,20 +53,12 @@ class SimpleYear:
     """Measurements of the simple model; for deviations, the predicted drift has been subtracted from the truth."""
 
     states: str
-
-    def __post_init__(self) -> None:
-        if self.states not in STATES:
-            raise ValueError(f"got states {self.states!r}; needed one of {', '.join(STATES)}")
+    steps = YEAR
 
     @property
     def start(self) -> tuple[float, ...]:
         """Return the truth at step 0."""
         return TRUTH if self.states == "absolute" else (*TRUTH[:2], *DEVIATION, *TRUTH[4:])
-
-    @property
-    def steps(self) -> int:
-        """Steps of a year."""
-        return YEAR
 
     def model(self, base: int) -> LinearModel:
         """Return the filter's model as stored in a base."""
@@ -71,20 +67,16 @@ class SimpleYear:
     def matrices(self, block: int, base: int) -> None:
         """Return None, because the model has the matrices."""
 
+    @cache  # noqa: B019 — both years stay
     def simulation(self, record: int) -> Simulation:
         """Return the measurements of one record."""
-        return _simulation(self.states, record)
+        return Simulation(model(MODELS[0], 2), self.start, SEED + record, resolution=1.0)
 
     def measurements(
         self, record: int, block: int, truth: NDArray[np.float64], H: NDArray[np.float64] | None, steps: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return measurements of a block, (steps, 2), and the truth after them."""
         return self.simulation(record).block(block, truth, steps)
-
-
-@cache
-def _simulation(states: str, record: int) -> Simulation:
-    return Simulation(model(MODELS[0], 2), SimpleYear(states).start, SEED + record, resolution=1.0)
 
 
 # -- the sweeps ----------------------------------------------------------------------------------------
@@ -184,21 +176,54 @@ SIMPLE_CELLS, MISSION_CELLS = _simple_cells(), _mission_cells()
 """All cells of each sweep, the most valuable first. If 299 records all pass, they show a probability of 99 %."""
 
 
-def lockstep(cell: YearCell, steps: int | None = None) -> Lockstep:
-    """Create all filters of a cell, before their first step."""
-    formats = [FloatFormat(cell.base, t, Rounding(cell.rounding)) for t in cell.precisions]
-    year, records = cell.year, range(cell.first, cell.first + cell.count)
-    return Lockstep(repr(cell), year, formats, FORMS[cell.form], records, steps or year.steps)
+class Lockstep:
+    """The filters of a cell, one for each format, and their reference, the innovation form in float64."""
+
+    def __init__(self, cell: YearCell, steps: int | None = None) -> None:
+        self.cell, self.year, self.steps = cell, cell.year, steps or cell.year.steps
+        model, count = self.year.model(cell.base), cell.count
+        self.truth = np.tile(np.array(self.year.start), (count, 1))
+        self.reference = Run(model, FloatFormat(2, 53), Form.INNOVATION, (), records=count)
+        formats = (FloatFormat(cell.base, t, Rounding(cell.rounding)) for t in cell.precisions)
+        self.runs = [Run(model, fmt, FORMS[cell.form], (), records=count) for fmt in formats]
+        self.largest, self.end = (np.zeros((len(self.runs), ANGLES, count)) for _ in range(2))
+
+    def advance(self, block: int) -> None:
+        """Take one block of measurements."""
+        H, length = self.year.matrices(block, 2), min(BLOCK, self.steps - block * BLOCK)
+        z = np.empty((length, self.reference.model.m, self.cell.count))
+        for i, truth in enumerate(self.truth):
+            z[:, :, i], self.truth[i] = self.year.measurements(self.cell.first + i, block, truth, H, length)
+        if self.cell.base != 2:
+            H = self.year.matrices(block, self.cell.base)
+        if H is not None:
+            for run in (self.reference, *self.runs):
+                run.use_measurement_matrices(H, DECIMALS)
+        true = self.reference.carry(z, ANGLES)
+        for run, largest, end in zip(self.runs, self.largest, self.end, strict=True):
+            computed = run.carry(z, ANGLES)
+            update_largest(computed, true, largest)
+            end[:] = computed[-1] - true[-1]
 
 
 def compute(cell: YearCell, directory: Path | None = None, steps: int | None = None) -> dict[str, Any]:
-    """Run the years of a cell, and save progress in a directory if one is given."""
-    return run_lockstep(lockstep(cell, steps), directory)
+    """Run the years of a cell; return the largest errors and those at the end, by format, state and record."""
+    years = Lockstep(cell, steps)
+    for block in tqdm(range(-(-years.steps // BLOCK)), desc=repr(cell), disable=directory is None):
+        years.advance(block)
+    return {"largest": years.largest.tolist(), "end": years.end.tolist()}
 
 
 def rows(cell: YearCell, result: dict[str, Any]) -> list[tuple[str, ...]]:
     """List, for each format and record, the largest error of the year and the error at its end."""
-    return error_rows(cell.heads(), cell.first, result)
+    lines = []
+    for head, largest, end in zip(cell.heads(), np.array(result["largest"]), np.abs(result["end"]), strict=True):
+        numbers = np.stack([largest[:2].max(0), largest[2:].max(0), end[:2].max(0), end[2:].max(0)], axis=1)
+        numbers = np.nan_to_num(numbers, nan=np.inf)  # the filter stopped
+        lines += [
+            (*head, str(cell.first + i), *(f"{value:.6g}" for value in line)) for i, line in enumerate(numbers.tolist())
+        ]
+    return lines
 
 
 def sample(cell: YearCell, rng: np.random.Generator) -> list[tuple[str, ...]]:

@@ -43,7 +43,7 @@ def changes() -> tuple[str, str]:
     """Say what each letter means and what the change does to the digits, as prose with formulas."""
     digits = report_bounds.written_changes(report_bounds.example_digits(Fraction(1, summary.DRIFT)))
     change = {name: step for name, (_, step) in digits.items()}
-    year = answers.decimal_digits(FloatFormat(2, answers.find_answers().bits))
+    year = answers.decimal_digits(FloatFormat(2, answers.fewest_bits()))
     bits = {row.states: horizon.bits(row) for row in horizon.load()}  # of the last row, for the whole year
     every = answers.decimal_digits(FloatFormat(2, bits["absolute"]))
     return (

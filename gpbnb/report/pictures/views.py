@@ -10,10 +10,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.display import style
-from gpbnb.report.gravity_probe_b import figures, year
+from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.model import YEAR as STEPS
 from gpbnb.report.gravity_probe_b.summary import DRIFT
 from gpbnb.report.measurement import YEAR
@@ -105,9 +106,18 @@ def year_data() -> dict[str, Any]:
 
 
 def _year_still() -> Figure:
+    """Draw the error of the drift rate against the step, one curve for each of some runs."""
     fig, (ax,) = style.figure(height=4.2)
-    shown = [run for run in _runs() if run.case.rounding is Rounding.NEAREST and run.case.precision in (18, 24, 32, 40)]
-    figures.years(shown, "rate", ax, tolerance=TOLERANCE)
+    ends: dict[str, tuple[float, str]] = {}
+    for run in _runs():
+        if run.case.rounding is Rounding.NEAREST and run.case.precision in (18, 24, 32, 40) and run.case.fmt:
+            values, colour = np.abs(run.rate).max(axis=1), style.bits_colour(run.case.fmt)
+            ax.plot(run.steps[values > 0], values[values > 0], "o-", color=colour, lw=0.8)
+            ends[arithmetic(run.case.fmt)] = float(values[-1]), colour
+    ax.axhline(TOLERANCE, color=style.REFERENCE, ls=":")
+    style.loglog(ax)
+    style.label(ax, "step $k$", "error of the drift rate (mas/yr)")
+    style.name_ends(ax, ends | {"tolerance": (TOLERANCE, style.REFERENCE)})
     return fig
 
 
