@@ -138,6 +138,7 @@ def schedule(
         seldom repeat. A model with `steps` is continued with the cycles of its matrices.
     horizon : number of steps to return if the gain does not settle; by default all that were tried.
     """
+    model.refuse_inputs("a guarantee")
     form = compiled_form(form)
     check_deterministic(fmt)
     stored, nothing = model.rounded(fmt), np.array([Fraction(0)] * model.n, dtype=object)

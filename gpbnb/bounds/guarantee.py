@@ -239,7 +239,6 @@ def guessed(
         )
     if not isinstance(fmt, (FloatFormat, FixedFormat)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
-    model.refuse_inputs("a guarantee")
     if most is not None:
         whole_number("most", most, most=MOST_EMULATED)
     within = sized_limits(within, model.n, model.m)

@@ -1,4 +1,4 @@
-"""Forms of the filter that are computed with array operations, without compiled loops of their own."""
+"""Further forms of the filter, for which there is neither a guarantee nor C code."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ class ArrayForm(StrEnum):
     CARLSON       the same with Carlson's update, which keeps S upper triangular, as a Cholesky factor
     ============  =======================================================================================
 
-    Square roots decorrelate the measurements by the factors :math:`R = UDU^T`, as the UD form does. A step takes
-    about half a millisecond, a hundred times as long as a compiled one.
+    Square roots decorrelate the measurements by the factors :math:`R = UDU^T`, as the UD form does.
 
     References
     ----------
@@ -36,7 +35,10 @@ class ArrayForm(StrEnum):
 
 
 AnyForm = Form | ArrayForm
-"""A form with or without compiled loops."""
+"""Any form."""
+
+ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
+"""Forms with a square root of the covariance."""
 
 ALIASES = {"CHOLESKY": ArrayForm.CARLSON, "SQUARE_ROOT": ArrayForm.CARLSON, "SYMMETRISED": ArrayForm.SYMMETRIZED}
 """Other names of forms."""

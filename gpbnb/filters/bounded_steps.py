@@ -1,4 +1,4 @@
-"""The contraction bound of a run, taken along step by step, in compiled runs and in array runs alike."""
+"""The contraction bound of a run, taken along step by step."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.lanes import Lanes, recorded
+from gpbnb.filters.array_forms import ROOTS, AnyForm
 from gpbnb.filters.array_steps import decorrelated
 from gpbnb.filters.contraction import (
     Contraction,
@@ -25,7 +26,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import StepModel
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import Opening, opening
-from gpbnb.filters.recording import recorded_step, step_kind
+from gpbnb.filters.recording import FACTORED, recorded_step, step_kind
 
 Array = NDArray[np.float64]
 
@@ -51,8 +52,9 @@ class Taken(NamedTuple):
 
     #: (steps, m, 1, 2), the measurements.
     z: Array
-    #: (steps + 1, n, 1, 2), estimates before and after each step.
-    x: Array
+    #: (steps, n, 1, 2), estimates before and after each step, after it without known inputs.
+    before: Array
+    after: Array
     #: (steps + 1, n, n, 2), covariances, or factors in the UD form, before and after each step.
     P: Array
     #: (steps, n, m, 2), gains as the run computed them.
@@ -73,7 +75,7 @@ class CarriedBound:
     """
 
     def __init__(
-        self, stored: LinearModel, form: Form, first: NDArray[Any] | None, checkpoint_steps: NDArray[np.int64]
+        self, stored: LinearModel, form: AnyForm, first: NDArray[Any] | None, checkpoint_steps: NDArray[np.int64]
     ) -> None:
         self.form, self.checkpoint_steps = form, checkpoint_steps
         given = stored.to_float()
@@ -106,11 +108,8 @@ class CarriedBound:
         first : how many steps were taken before these.
         """
         try:
-            sizes = np.abs(taken.x[..., 0])
-            decayed = (sizes > 0) & (sizes < DECAYED)
-            if decayed.any():
-                taken, self._dropped = taken._replace(x=np.where(decayed[..., np.newaxis], 0.0, taken.x)), True
-            covariance = _represented if self.form == Form.UD else _symmetric
+            taken = taken._replace(before=self._kept(taken.before), after=self._kept(taken.after))
+            covariance = _squared if self.form in ROOTS else _represented if self.form is Form.UD else _symmetric
             (covariances,), _ = recorded(covariance, taken.P.shape[1:3]).begin(None, taken.P)
             done = self._take(first, taken, covariances) if len(covariances) else 0
         except (OverflowError, ZeroDivisionError):
@@ -118,15 +117,22 @@ class CarriedBound:
         if done < len(taken.z):
             self.end()
 
+    def _kept(self, x: Array) -> Array:
+        """Let decayed entries of estimates be zero."""
+        sizes = np.abs(x[..., :1])
+        decayed = (sizes > 0) & (sizes < DECAYED)
+        self._dropped = self._dropped or bool(decayed.any())
+        return np.where(decayed, 0.0, x)
+
     def _take(self, first: int, taken: Taken, covariances: Array) -> int:
         """Take the bound over as many steps as can be repeated; return their number."""
-        x, steps = taken.x[:, :, 0], len(covariances) - 1
+        x, after, steps = taken.before[:, :, 0], taken.after[:, :, 0], len(covariances) - 1
         z, every = taken.z[:steps, :, 0], first + np.arange(steps)
         Phi, H, Q, R = (each[every % len(each)] for each in _model(self._exact).values())
         (xe, Ke, Pe, Se), _ = self._repetition.begin(None, x[:steps], covariances[:-1], z, Phi, H, Q, R)
         steps, n, m = len(xe), x.shape[1], z.shape[1]
         compared = recorded(_residuals, (n, n), (m, n), (m,), (n,), (n,), (n, n), (n,), (n, n))
-        given = Phi, H, z, x, x[1:], covariances[1:], xe, Pe
+        given = Phi, H, z, x, after, covariances[1:], xe, Pe
         found, _ = compared.begin(None, *(each[:steps] for each in given))
         y, q, T = (each[..., 0] for each in found)
         steps = len(y)
@@ -135,7 +141,7 @@ class CarriedBound:
         before, measured, K, S, size = map(
             np.ascontiguousarray, (x[..., 0], z[..., 0], Ke[:steps, ..., 0], Se[:steps, ..., 0], covariances[..., 0])
         )
-        if self.form == Form.UD:
+        if self.form in FACTORED:
             diagonal = np.diagonal(size, axis1=1, axis2=2)
             size = np.sqrt(np.abs(diagonal[:, :, np.newaxis] * diagonal[:, np.newaxis, :])) * (1 + 2.0**-50)
         every = first + np.arange(steps)
@@ -146,7 +152,7 @@ class CarriedBound:
         at, last = np.searchsorted(self.checkpoint_steps, (first, first + steps), side="right")
         i = self.checkpoint_steps[at:last] - first - 1
         some, used = Contraction(*(each[i] for each in bounds)), taken.gains[i]
-        if self.form == Form.UD:
+        if self.form in FACTORED:
             UR = taken.UR[(first + i) % len(taken.UR)]
             (used,) = recorded(_whole_gain, (n, m), (m, n), (m, m)).run(None, used, H[i], UR)
         bound = state_error_bound(some)
@@ -178,6 +184,10 @@ def _represented(factors: Any) -> tuple[Any]:
     n, one = len(factors), factors.format.eye(len(factors))
     U = np.stack([np.stack([factors[i, j] if i < j else one[i, j] for j in range(n)]) for i in range(n)])
     return ((U * np.diagonal(factors)) @ U.T,)
+
+
+def _squared(root: Any) -> tuple[Any]:
+    return (root @ root.T,)
 
 
 def _residuals(Phi: Any, H: Any, z: Any, x: Any, after: Any, P: Any, repeated: Any, again: Any) -> tuple[Any, Any, Any]:

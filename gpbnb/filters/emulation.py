@@ -13,7 +13,6 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.filters.array_forms import AnyForm
-from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.forms import Form
@@ -97,7 +96,7 @@ def relative(error: NDArray[np.float64], true: NDArray[np.float64]) -> NDArray[n
     return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
 
 
-def compare_runs(run: Run | ArrayRun | NonlinearRun, true: Checkpoints) -> History:
+def compare_runs(run: Run | NonlinearRun, true: Checkpoints) -> History:
     """Subtract the reference from the checkpoints of a run, at the same steps."""
     checkpoints = run.checkpoints()
     x, K, P = checkpoints.minus(true)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.algebra import Matrix, inverse_in_order
 from gpbnb.arithmetic.lanes import recorded
-from gpbnb.filters.array_steps import if_nonzero
+from gpbnb.filters.array_steps import if_nonzero, root_of_factors
 
 
 def factors(a: Matrix) -> tuple[Matrix, Any]:
@@ -57,6 +57,16 @@ def factors_of_each(fmt: Any, tag: Any, matrices: NDArray[Any], found: NDArray[A
 def inverses_of_each(fmt: Any, tag: Any, matrices: NDArray[Any], found: NDArray[Any]) -> bool:
     """Fill in the inverses of packed covariances (p, n, n, ...); return whether all are definite."""
     return _of_each(inverse, fmt, tag, matrices, found)
+
+
+def roots_of_each(fmt: Any, tag: Any, factors: NDArray[Any]) -> NDArray[Any]:
+    """Return the roots of covariances for their packed factors (p, n, n, ...)."""
+    (found,) = recorded(_rooted, factors.shape[1:3]).run(fmt, factors, tag=tag)
+    return found
+
+
+def _rooted(factors: Matrix) -> tuple[Matrix]:
+    return (root_of_factors(factors),)
 
 
 def _of_each(

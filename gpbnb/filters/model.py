@@ -152,7 +152,7 @@ class LinearModel:
         matrices = [
             f"{letter} {_of_one(given) if letter in _CYCLES else given.shape} {range_text(given.flat)}"
             + (f" in a cycle of {len(given)}" if letter in _CYCLES and len(given) > 1 else "")
-            for letter in (*_LETTERS, *_INPUTS)
+            for letter in (*LETTERS, *INPUTS)
             if (given := getattr(self, letter)) is not None
         ]
         return (
@@ -214,7 +214,7 @@ class LinearModel:
             isinstance(self.steps, bool) or not isinstance(self.steps, (int, np.integer)) or self.steps < 1
         ):
             raise ValueError(f"got steps {self.steps!r}; needed a whole number, at least 1")
-        for letter in ("Phi", "H", "Q", "R", *_INPUTS):
+        for letter in ("Phi", "H", "Q", "R", *INPUTS):
             given = getattr(self, letter)
             if callable(given):
                 if self.steps is None:
@@ -237,7 +237,7 @@ class LinearModel:
                 f"got {'u without B' if self.B is None else 'B without u'}; needed both: B of shape ({n}, p) and u of "
                 "shape (steps, p)"
             )
-        for letter in _INPUTS:
+        for letter in INPUTS:
             given = getattr(self, letter)
             if given is None:
                 continue
@@ -269,7 +269,7 @@ class LinearModel:
     @property
     def has_inputs(self) -> bool:
         """Whether there are known inputs or offsets."""
-        return any(getattr(self, letter) is not None for letter in _INPUTS)
+        return any(getattr(self, letter) is not None for letter in INPUTS)
 
     def without_inputs(self) -> LinearModel:
         """Return the same model without known inputs and offsets."""
@@ -379,7 +379,7 @@ class LinearModel:
         ------
         OverflowError : the absolute value of an entry is not between 2**-450 and 2**450.
         """
-        for letter in (*_LETTERS, *_INPUTS):
+        for letter in (*LETTERS, *INPUTS):
             given = getattr(self, letter)
             for entry in () if given is None else {abs(each) for each in given.flat if each}:
                 exponent = entry.numerator.bit_length() - entry.denominator.bit_length()
@@ -448,7 +448,7 @@ class LinearModel:
         if random:
             fmt.restart()
         made: dict[str, FloatArray] = {}
-        for letter in (*_LETTERS, *_INPUTS):
+        for letter in (*LETTERS, *INPUTS):
             if (given := getattr(self, letter)) is None:
                 continue
             try:
@@ -530,8 +530,8 @@ def real_numbers(values: Any) -> NDArray[Any]:
         raise ValueError(f"measurements: {error}") from None
 
 
-_LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
-_INPUTS = ("B", "u", "b", "d")
+LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
+INPUTS = ("B", "u", "b", "d")
 _CYCLES = ("Phi", "H", "Q", "R", "B")
 _COVARIANCES = {"Q": False, "R": True, "P0": False}  # and whether they must be definite
 
@@ -550,7 +550,7 @@ def _mirrored(matrices: NDArray[Any]) -> NDArray[Any]:
 @remembered
 def _floats(model: LinearModel) -> dict[str, NDArray[np.float64]]:
     found = {}
-    for letter in _LETTERS:
+    for letter in LETTERS:
         try:
             found[letter] = getattr(model, letter).astype(np.float64)
         except OverflowError:

@@ -38,10 +38,10 @@ def form_named(form: AnyForm | str) -> AnyForm:
 
 
 def compiled_form(form: AnyForm | str) -> Form:
-    """Return a form that has compiled loops, or the one with this name."""
+    """Return a form that guarantees and C code know, or the one with this name."""
     found = form_named(form)
     if isinstance(found, ArrayForm):
-        raise ValueError(f"got the {found} form; needed one with compiled loops: {', '.join(map(str, Form))}")
+        raise ValueError(f"got the {found} form; needed one of {', '.join(map(str, Form))}")
     return found
 
 

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import operator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.algebra import Algebra
+from gpbnb.arithmetic.array import FloatArray, NegativeRootError, WholeNumberError
+from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.rational import exact
-from gpbnb.filters.array_forms import AnyForm, ArrayForm
-from gpbnb.filters.array_run import ROOTS, ArrayRun, SteppedRun, block_algebra
+from gpbnb.filters.array_forms import ROOTS, AnyForm, ArrayForm
 from gpbnb.filters.array_steps import BlockStorage, observed, root_of_factors
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
-from gpbnb.filters.factors import combined_gain, upper_factors
+from gpbnb.filters.factors import combined_gain, covariance_of_factors, upper_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import BlockAlgebra, corrected_by, measured_in, predicted_in
 from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
+from gpbnb.filters.opening import double_doubles_of
 from gpbnb.filters.recording import FACTORED
 from gpbnb.filters.reference import Step, agreed
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
@@ -45,8 +48,8 @@ class _Ahead(NamedTuple):
     P: Any
 
 
-class NonlinearRun(SteppedRun):
-    """A run of a nonlinear filter; its attributes are those of :class:`~gpbnb.filters.run.Run`.
+class NonlinearRun:
+    """A run of a nonlinear filter, one step after another; its attributes are those of a linear one.
 
     Parameters
     ----------
@@ -55,7 +58,7 @@ class NonlinearRun(SteppedRun):
         in the format of the state.
     form : one of ``NONLINEAR_FORMS``. The factors and roots of Q, R and P0 are computed exactly from the model as
         given, before a format stores them.
-    checkpoint_steps : as for ``Run``.
+    checkpoint_steps : as for :class:`~gpbnb.filters.run.Run`.
     """
 
     @stays
@@ -69,8 +72,12 @@ class NonlinearRun(SteppedRun):
         check_form(model, form, isinstance(fmt, BlockFormats))
         each = [getattr(fmt, name) for name in BLOCKS] if isinstance(fmt, BlockFormats) else [fmt] * len(BLOCKS)
         of_state, of_covariance = each[0], each[2]
-        super().__init__(model.n, model.m, of_state.array, form, checkpoint_steps)
-        self.model, self.fmt = model, fmt
+        self.model, self.fmt, self.form = model, fmt, form
+        self.checkpoint_steps = tuple(int(step) for step in checkpoint_steps)
+        self.steps, self.reason = 0, ""
+        self.indefinite: int | None = None
+        self.stopped: int | None = None
+        self._saved: list[tuple[int, Any, Any, Any]] = []
         for block in each:
             identity_in(block, 1)
         stored_in = fmt.model if isinstance(fmt, BlockFormats) else fmt
@@ -84,6 +91,7 @@ class NonlinearRun(SteppedRun):
             self._R = [stored_in.store(upper_factors(one)) for one in sound.R]
             self._Q = [self._factors(upper_factors(one), stored_in) for one in sound.Q]
             P = self._factors(upper_factors(sound.P0), stored_in)
+        self._stored = of_state.array
         self._weights = [of_state.array(each) for each in model.weights()] if model.method == "unscented" else []
         self._u = None if model.u is None else of_state.array(model.u)
         formats = list(dict.fromkeys([*each, stored_in]))
@@ -96,8 +104,66 @@ class NonlinearRun(SteppedRun):
         stored = fmt.store(factors)
         return root_of_factors(stored) if self.form in ROOTS else stored
 
-    def _check(self, z: Any) -> None:
+    @property
+    def x(self) -> FloatArray:
+        """The estimate, (n,)."""
+        return self._step.states[0]
+
+    @property
+    def P(self) -> FloatArray:
+        """The covariance, its factors or its root, (n, n)."""
+        return self._step.states[1]
+
+    def take(self, z: Any) -> None:
+        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
+        for _ in self._steps_taken(z):
+            pass
+
+    def states(self, z: Any) -> NDArray[np.float64]:
+        """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
+        found = [double_doubles_of(self.x) for _ in self._steps_taken(z)]
+        return np.array(found, dtype=np.float64).reshape(-1, self.model.n, 2)
+
+    def _steps_taken(self, z: Any) -> Iterator[int]:
+        """Take one step after the other, and give the number of those done."""
         self.model.noise.check_measurements(z, self.steps)
+        for measured in self._stored(z):
+            if self.stopped is not None:
+                return
+            try:
+                definite = self._take(self.steps, measured)
+            except (ZeroDivisionError, OverflowError, DomainError, WholeNumberError) as error:
+                self.stopped = self.steps + 1
+                self.reason = f"{_fault(error)} at step {self.stopped}"
+                return
+            self.steps += 1
+            if not definite and self.indefinite is None:
+                self.indefinite = self.steps
+            at = len(self._saved)
+            if at < len(self.checkpoint_steps) and self.checkpoint_steps[at] == self.steps:
+                self._saved.append((self.steps, self.x, self._step.gain, self.P))
+            yield self.steps
+
+    def checkpoints(self) -> Checkpoints:
+        """Return estimate, gain and covariance at the checkpoint steps that were reached."""
+        n, m = self.model.n, self.model.m
+        x, K, P = np.empty((len(self._saved), n), object), np.empty((len(self._saved), n, m), object), []
+        for at, (step, state, K_saved, covariance) in enumerate(self._saved):
+            x[at], K[at] = state.to_fractions(), self._whole_gain(step - 1, K_saved)
+            P.append(self.covariance(covariance))
+        steps = tuple(step for step, *_ in self._saved)
+        return Checkpoints(steps, x, K, np.array(P, dtype=object).reshape(-1, n, n))
+
+    def covariance(self, P: FloatArray) -> NDArray[Any]:
+        """Return the exact covariance, as Fractions, from a covariance, its factors or its root."""
+        given: NDArray[Any] = P.to_fractions()
+        if self.form in ROOTS:
+            return np.asarray(given @ given.T)
+        if self.form is Form.UD:
+            return covariance_of_factors(given)
+        return given
+
+    # -- one step ---------------------------------------------------------------------------------------
 
     def _take(self, k: int, z: FloatArray) -> bool:
         known = [] if self._u is None else [self._u[k]]
@@ -107,8 +173,7 @@ class NonlinearRun(SteppedRun):
 
     def _stepped(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
         each = [formats[i] for i in self._blocks_at]
-        stored = BlockStorage(*(fmt.array for fmt in each))
-        blocks = block_algebra(each, stored)
+        blocks = block_algebra(each)
         taken = (self._unscented if self.model.method == "unscented" else self._extended)(blocks, *states, *given)
         x, *others = taken.states
         return taken._replace(states=(self.model.normalized(x), *others))
@@ -180,6 +245,26 @@ class NonlinearRun(SteppedRun):
         return combined_gain([each.to_fractions() for each in columns], UR.to_fractions(), H.to_fractions())
 
 
+def _fault(error: Exception) -> str:
+    if isinstance(error, OverflowError):
+        return "overflow"
+    if isinstance(error, NegativeRootError):
+        return "the square root of a negative number"
+    if isinstance(error, WholeNumberError):
+        return "a whole number that the format does not hold exactly"
+    return "an argument outside the domain of a function" if isinstance(error, DomainError) else "a division by zero"
+
+
+def block_algebra(formats: Sequence[Any]) -> BlockAlgebra:
+    """Return how matrices of the formats of state, gain, covariance and innovation covariance are computed."""
+    state, gain, covariance, innovation = map(_algebra, formats)
+    return BlockAlgebra(state, gain, covariance, innovation, BlockStorage(*(fmt.array for fmt in formats)))
+
+
+def _algebra(fmt: Any) -> Algebra:
+    return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), operator.matmul)
+
+
 def check_form(model: NonlinearModel, form: AnyForm, blocks: bool = False) -> None:
     """Reject a form that a nonlinear filter, or its blocks, do not have."""
     if model.method == "unscented":
@@ -205,25 +290,13 @@ def opened(
     bounded: bool = False,
     sums: Sums = LEFT_TO_RIGHT,
     compensated: bool = False,
-) -> Run | ArrayRun | NonlinearRun:
-    """Return a run of a filter: in compiled loops if the form has them and a linear model has no inputs."""
+) -> Run | NonlinearRun:
+    """Return a run of a filter."""
     if isinstance(model, NonlinearModel):
         if compensated or sums != LEFT_TO_RIGHT:
             raise ValueError("got sums or compensated estimates for a nonlinear model; needed neither: it has no loops")
         return NonlinearRun(model, fmt, form, checkpoint_steps)
-    if not model.has_inputs and not isinstance(form, ArrayForm):
-        return Run(model, fmt, form, checkpoint_steps, sums, compensated, bounded)
-    if sums != LEFT_TO_RIGHT or compensated:
-        raise ValueError(
-            "got sums or compensated with known inputs or a form without compiled loops; needed neither; for "
-            'compensated summation write form="compensated"'
-        )
-    if isinstance(fmt, BlockFormats):
-        raise ValueError(
-            "got formats of blocks with known inputs or a form without compiled loops; needed neither; its forms are "
-            f"{', '.join(map(str, Form))}"
-        )
-    return ArrayRun(model, fmt, form, checkpoint_steps, bounded)
+    return Run(model, fmt, form, checkpoint_steps, sums, compensated, bounded)
 
 
 def true_states(model: AnyModel, z: Any) -> NDArray[np.float64]:

@@ -30,11 +30,13 @@ from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import digit_unit
+from gpbnb.filters.array_forms import ROOTS, AnyForm
 from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
-from gpbnb.filters.factoring import factors_of_each, inverses_of_each
+from gpbnb.filters.factoring import factors_of_each, inverses_of_each, roots_of_each
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.records import pairs_as_double_doubles
-from gpbnb.filters.model import LinearModel, remembered, stored_arrays
+from gpbnb.filters.model import INPUTS, LETTERS, LinearModel, remembered, stored_arrays
+from gpbnb.filters.recording import FACTORED
 
 #: Entries of a run's status: number of steps done, index of the next checkpoint, first step with a variance or pivot
 #: that is not positive, and step at which a number without a value ended the run.
@@ -48,8 +50,10 @@ class Opening(NamedTuple):
     ----------
     Phi, H, Q, R : (p, n, n), (p, m, n), (p, n, n) and (p, m, m), each with its own cycle of p members.
     x0, P0 : (n,) and (n, n).
-    UQ, UR, U0 : factors of Q, R and P0 in the UD form, with D on the diagonal; otherwise zeros.
+    UQ, UR, U0 : factors of Q, R and P0 in the UD form, with D on the diagonal; in forms with roots, factors of R, and
+        roots of Q and P0; otherwise zeros.
     RI : inverses of R in Hung's form with the second gain; otherwise zeros.
+    inputs : known inputs and offsets by their letters.
     raised : covariances whose variances were raised until their factors were definite.
     repairs : all changes of covariances, including those of the model.
     """
@@ -64,11 +68,12 @@ class Opening(NamedTuple):
     UR: NDArray[Any]
     U0: NDArray[Any]
     RI: NDArray[Any]
+    inputs: dict[str, NDArray[Any]]
     raised: tuple[Repair, ...]
     repairs: tuple[Repair, ...]
 
 
-def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -> Opening:
+def opening(model: LinearModel, fmt: FloatFormat | None, form: AnyForm, tag: Tag) -> Opening:
     """Return what a filter starts with; its arrays are new.
 
     Parameters
@@ -78,7 +83,8 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
     tag : arithmetic of the run, from which factors and inverses take their random numbers, too.
     """
     stored = model if fmt is None else model.definite_in(fmt)
-    Phi, H, Q, R, x0, P0 = (each.copy() for each in (_double_doubles(stored) if fmt is None else _packed(stored, fmt)))
+    given = _double_doubles(stored) if fmt is None else _packed(stored, fmt)
+    Phi, H, Q, R, x0, P0 = (given[letter].copy() for letter in LETTERS)
     UQ, UR, U0, RI = (np.zeros_like(each) for each in (Q, R, P0, R))
     raised: list[Repair] = []
 
@@ -109,9 +115,11 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
     try:
         if form is Form.HUNG_SECOND_GAIN:
             lost = "" if inverses_of_each(fmt, tag, R, RI) else "R"
-        elif form is Form.UD:
-            given = ("Q", Q, UQ), ("R", R, UR), ("P0", P0[np.newaxis], U0[np.newaxis])
-            lost = next((letter for letter, *arrays in given if not factored(letter, *arrays)), "")
+        elif form in FACTORED:
+            pairs = ("Q", Q, UQ), ("R", R, UR), ("P0", P0[np.newaxis], U0[np.newaxis])
+            lost = next((letter for letter, *arrays in pairs if not factored(letter, *arrays)), "")
+            if form in ROOTS and not lost:
+                UQ, U0 = roots_of_each(fmt, tag, UQ), roots_of_each(fmt, tag, U0[np.newaxis])[0]
     except ZeroDivisionError:
         lost = "R"
     except OverflowError as error:
@@ -125,7 +133,10 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
             f"got {model.name} in {words}, in which {lost} does not stay {kind} when its factors or inverse are "
             f"computed; needed a covariance that does; use more {unit}, or add a little to the diagonal of {lost}"
         )
-    return Opening(Phi, H, Q, R, x0, P0, UQ, UR, U0, RI, tuple(raised), (*stored.repairs, *raised))
+    inputs = {letter: each for letter, each in given.items() if letter in INPUTS}
+    if model.u is not None and model.u.ndim == 1:
+        inputs["u"] = inputs["u"][np.newaxis]
+    return Opening(Phi, H, Q, R, x0, P0, UQ, UR, U0, RI, inputs, tuple(raised), (*stored.repairs, *raised))
 
 
 def as_packed(fmt: FloatFormat | FixedFormat | None, values: Any) -> NDArray[Any]:
@@ -180,20 +191,18 @@ def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
     return out.reshape(packed.shape)
 
 
-_LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
-
-
 @remembered
-def _double_doubles(model: LinearModel) -> list[NDArray[np.float64]]:
-    return [double_doubles(getattr(model, letter)) for letter in _LETTERS]
+def _double_doubles(model: LinearModel) -> dict[str, NDArray[np.float64]]:
+    given = {letter: getattr(model, letter) for letter in (*LETTERS, *INPUTS)}
+    return {letter: double_doubles(each) for letter, each in given.items() if each is not None}
 
 
-def _packed(model: LinearModel, fmt: FloatFormat) -> list[NDArray[Any]]:
-    """Phi, H, Q, R, x0 and P0 as the compiled loops expect them."""
-    arrays, packed = stored_arrays(model, fmt), []
-    for letter in _LETTERS:
+def _packed(model: LinearModel, fmt: FloatFormat) -> dict[str, NDArray[Any]]:
+    """The matrices by their letters, as the compiled loops expect them."""
+    packed = {}
+    for letter, each in stored_arrays(model, fmt).items():
         try:
-            packed.append(packed_array(arrays[letter]))
+            packed[letter] = packed_array(each)
         except OverflowError as error:
             raise OverflowError(f"{letter}: {error}") from None
     return packed

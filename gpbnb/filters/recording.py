@@ -227,6 +227,7 @@ class LinearStep:
     def taken(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
         """Take a step from an estimate (n,), a covariance, factors or a root (n, n), and what compensation carries."""
         if "d" in self.given:
+            self.about("the measurement without its offset")
             z = z - self.given["d"]
         if self.form in FACTORED:
             return self._factored(x, P, carried, z)
@@ -242,8 +243,7 @@ class LinearStep:
         if form is Form.HUNG_SECOND_GAIN:
             about("the gain")
             of_gain = blocks.gain.times(stored.gain(P), stored.gain(H).T)
-            RI = given["RI"] if "RI" in given else blocks.gain.invert(given["R"], blocks.gain.identity(len(H))).matrix
-            K = blocks.gain.times(of_gain, stored.gain(RI))
+            K = blocks.gain.times(of_gain, stored.gain(given["RI"]))
         own = stored.state(K)
         about("the estimate")
         if form in HUNG_FORMS and not self.compensated:

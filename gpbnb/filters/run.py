@@ -15,18 +15,19 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
 from gpbnb.arithmetic.machine import OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT
 from gpbnb.arithmetic.named import format_text
-from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Limits, Order, Rounding
+from gpbnb.filters.array_forms import ROOTS, AnyForm, ArrayForm
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import DECAYED, Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
 from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import HUNG_FORMS
 from gpbnb.filters.kernels.records import pairs_as_floats
 from gpbnb.filters.kernels.widened import widen
 from gpbnb.filters.model import LinearModel, identity_in
-from gpbnb.filters.named import compiled_form
+from gpbnb.filters.named import form_named
 from gpbnb.filters.opening import (
     DONE,
     INDEFINITE,
@@ -37,7 +38,7 @@ from gpbnb.filters.opening import (
     opening,
     widened_array,
 )
-from gpbnb.filters.recording import recorded_step, step_kind
+from gpbnb.filters.recording import FACTORED, recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
 from gpbnb.filters.stepping import Stepper, Stop
 
@@ -89,21 +90,20 @@ class Run:
         its errors or, in double-double, of its distance from the exact filter.
     records : number of measurement records. Covariance and gain do not depend on the measurements and are computed
         once; the estimates of all records are the columns of one matrix, and have the same digits as in separate runs.
-        Many records need :meth:`carry` and a form other than UD, which computes gain and estimate together.
+        Many records need :meth:`carry` and a form without factors or roots, which compute gain and estimate together.
     """
 
     def __init__(
         self,
         model: LinearModel,
         fmt: FloatFormat | BlockFormats | None,
-        form: Form | str,
+        form: AnyForm | str,
         checkpoint_steps: Sequence[int],
         sums: Sums = LEFT_TO_RIGHT,
         compensated: bool = False,
         bounded: bool = False,
         records: int = 1,
     ) -> None:
-        model.refuse_inputs("a run in compiled loops")
         #: Formats of the blocks, if they have their own; `fmt` is then that of the model.
         self.block_formats = fmt if isinstance(fmt, BlockFormats) else None
         if self.block_formats is not None and (sums != LEFT_TO_RIGHT or compensated or bounded or records != 1):
@@ -111,9 +111,10 @@ class Run:
                 "got formats of blocks with sums, compensated, bounded or many records; needed none of them"
             )
         fmt = fmt.model if isinstance(fmt, BlockFormats) else fmt
-        self.model, self.fmt, self.form = model, fmt, compiled_form(form)
+        self.model, self.fmt, self.form = model, fmt, form_named(form)
         self.checkpoint_steps = _ascending(checkpoint_steps)
         self._check(sums, compensated, bounded, records)
+        compensated = compensated or self.form is ArrayForm.COMPENSATED
         self.sums = sums
         #: The arithmetic from which the run draws random numbers, if it has any.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(*sums)
@@ -125,7 +126,7 @@ class Run:
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
         self.records = records
         self.x = np.ascontiguousarray(np.repeat(start.x0[:, np.newaxis], records, axis=1))
-        self.P = start.U0 if self.form is Form.UD else start.P0
+        self.P = start.U0 if self.form in FACTORED else start.P0
         self.UQ, self.UR = start.UQ, start.UR
         self.X, self.G, self.C = (
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, records), (n, m), (n, n))
@@ -142,9 +143,9 @@ class Run:
         self.reason = ""
         self._carried: CarriedBound | None = None
         if bounded:
-            stored = model if fmt is None else model.rounded(fmt)
-            first = covariance_of_factors(self.exactly(self.P)) if self.form is Form.UD else None
-            self._carried = CarriedBound(stored, self.form, first, self.checkpoint_steps)
+            self._stored = model if fmt is None else model.rounded(fmt)
+            first = self.covariance(self.exactly(self.P)) if self.form in FACTORED else None
+            self._carried = CarriedBound(self._stored.without_inputs(), self.form, first, self.checkpoint_steps)
 
     def _check(self, sums: Sums, compensated: bool, bounded: bool, records: int) -> None:
         """Reject options that the format or the form does not have."""
@@ -157,16 +158,32 @@ class Run:
             raise TypeError(f"sums: got {sums!r}; needed gpbnb.filters.run.Sums(...), such as fmt=BINARY32")
         if sums.fmt is not None and not isinstance(sums.fmt, (FloatFormat, FixedFormat)):
             raise TypeError(f"sums: got {sums.fmt!r}; needed a FloatFormat or a FixedFormat")
-        if compensated and self.form not in (Form.INNOVATION, Form.JOSEPH):
+        form, inputs = self.form, self.model.has_inputs
+        if inputs and form in HUNG_FORMS:
             raise ValueError(
-                f"got compensated summation in the {self.form} form; needed the innovation form or Joseph's"
+                f"got known inputs in the {form} form, which is not defined with them; needed another "
+                'form, such as "innovation"'
             )
-        if sums.order != "left" and self.form is Form.UD:
+        if inputs or isinstance(form, ArrayForm):
+            if sums != LEFT_TO_RIGHT or compensated:
+                raise ValueError(
+                    f"got sums or compensated with {'known inputs' if inputs else f'the {form} form'}; needed neither; "
+                    'for compensated summation write form="compensated"'
+                )
+            if self.block_formats is not None:
+                raise ValueError(
+                    f"got formats of blocks with {'known inputs' if inputs else f'the {form} form'}; needed neither; "
+                    f"the forms of blocks are {', '.join(map(str, Form))}"
+                )
+        if compensated and form not in (Form.INNOVATION, Form.JOSEPH):
+            raise ValueError(f"got compensated summation in the {form} form; needed the innovation form or Joseph's")
+        if sums.order != "left" and form is Form.UD:
             raise ValueError(f"got {sums.order} sums in the UD form; needed another form")
-        if records != 1 and (records < 1 or self.form is Form.UD or bounded or len(self.checkpoint_steps)):
+        if records != 1 and (records < 1 or form in FACTORED or bounded or len(self.checkpoint_steps)):
             raise ValueError(
-                f"got the {self.form} form and {records} records; needed at least one record, and for many no "
-                "bound, no checkpoints, and a form whose gain does not depend on the measurements: any but UD"
+                f"got the {form} form and {records} records; needed at least one record, and for many no bound, no "
+                f"checkpoints, and a form whose gain does not depend on the measurements: any but "
+                f"{', '.join(map(str, FACTORED))}"
             )
 
     def _in_blocks(self, start: Opening, formats: BlockFormats) -> Opening:
@@ -234,9 +251,29 @@ class Run:
             x, K, P = self.take_block(z[begin:end])
             if done := len(x) - 1:
                 each = (widened(part) for part in (P, K[1:], self.UR))
-                carried.take(first, Taken(exact_z[begin : begin + done], widened_estimates(x), *each))
+                estimates, measured = widened_estimates(x), exact_z[begin : begin + done]
+                after = estimates[1:]
+                if self.model.has_inputs:
+                    after, measured = self._without_inputs(first, x[1:], z[begin : begin + done])
+                carried.take(first, Taken(measured, estimates[:-1], after, *each))
             if self.stopped:
                 return
+
+    def _without_inputs(
+        self, first: int, x: NDArray[Any], z: NDArray[Any]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return estimates after steps, and their measurements, as the same filter without inputs has them.
+
+        A known input c can be moved out of a step: the exact filter goes from x to :math:`E(x, z - d - Hc) + c`,
+        with the step E of the filter without inputs. Both differences are exact, then rounded to double-double, 2**-106
+        of them: less than the errors of the evaluation that the bound includes.
+        """
+        stored, estimates, measured = self._stored, self.exactly(x), self.exactly(z)
+        for k in range(len(estimates)):
+            state, offset = stored.known(first + k)
+            estimates[k, :, 0] -= state
+            measured[k, :, 0] -= offset + stored.H[(first + k) % len(stored.H)] @ state
+        return double_doubles(estimates), double_doubles(measured)
 
     def carry(self, z: NDArray[np.float64], states: int) -> NDArray[np.float64]:
         """Take the next measurements of all records.
@@ -399,16 +436,17 @@ class Run:
 
     def _made_stepper(self) -> Stepper:
         """Record a step, and make it ready to run in the run's formats."""
-        each, upper = self.matrices, self.form is Form.UD
+        each = self.matrices
         model = {"Phi": each.Phi, "H": each.H}
-        model |= {"UQ": self.UQ, "UR": self.UR} if upper else {"Q": each.Q, "R": each.R}
+        model |= {"UQ": self.UQ, "UR": self.UR} if self.form in FACTORED else {"Q": each.Q, "R": each.R}
         if self.form is Form.HUNG_SECOND_GAIN:
             model["RI"] = each.RI
         if self._increment is not None:
             model["increment"] = self._increment
         formats, blocks, sums = self._formats()
-        kind = step_kind(self.form, model, formats[0], blocks, sums, self._increment is not None)
         cycle = int(np.lcm.reduce([len(table) for table in model.values()]))
+        model |= each.inputs
+        kind = step_kind(self.form, model, formats[0], blocks, sums, self._increment is not None)
         repeats = self.fmt is None or self.fmt.rounding is not Rounding.STOCHASTIC
         return Stepper(recorded_step(kind), formats, model, self.records, cycle if repeats else 0, self.tag)
 
@@ -431,7 +469,7 @@ class Run:
         count = int(self.notes[NEXT_CHECKPOINT])
         steps = [int(step) for step in self.checkpoint_steps[:count]]
         x, K, P = (Packed(each[:count].copy(), self.fmt) for each in (self.X[:, :, 0], self.G, self.C))
-        if self.form is Form.UD:
+        if self.form in FACTORED:
             return Checkpoints(steps, x, *self._from_factors(K.exactly(), P.exactly()))
         return Checkpoints(steps, x, K, P)
 
@@ -441,8 +479,12 @@ class Run:
         H, UR = self.exactly(self.matrices.H), self.exactly(self.UR)
         for at, step in enumerate(self.checkpoint_steps[: len(K)] - 1):
             gains[at] = combined_gain(list(K[at].T), UR[step % len(UR)], H[step % len(H)])
-            covariances[at] = covariance_of_factors(U[at])
+            covariances[at] = self.covariance(U[at])
         return gains, covariances
+
+    def covariance(self, P: NDArray[Any]) -> NDArray[Any]:
+        """Return the covariance that factors or a root represent."""
+        return np.asarray(P @ P.T) if self.form in ROOTS else covariance_of_factors(P)
 
 
 def _nearest_floats(pairs: NDArray[np.int64], out: NDArray[np.float64]) -> None:
@@ -510,12 +552,9 @@ def reference(
     z : (steps, m), measurements; float64 or Fractions.
     checkpoint_steps : steps whose results are saved.
     """
-    run = Run(model.without_inputs(), None, form, checkpoint_steps)
+    run = Run(model, None, form, checkpoint_steps)
     start = run.P.copy()
-    if model.has_inputs:
-        _take_with_inputs(run, model, z)
-    else:
-        run.take(z)
+    run.take(z)
     if run.form is not Form.UD:
         count = int(run.notes[NEXT_CHECKPOINT])
         at = np.array([0, *run.checkpoint_steps[:count]])
@@ -548,16 +587,9 @@ def _loses_digits(model: LinearModel, at: NDArray[np.int64], P: NDArray[np.float
 
 def reference_states(model: LinearModel, z: Any) -> NDArray[np.float64]:
     """Run the filter as :func:`reference` does, and return the estimates after every step, (steps, n, 2)."""
-    run = Run(model.without_inputs(), None, Form.INNOVATION, range(1, len(z) + 1) if model.has_inputs else ())
-    if model.has_inputs:
-        start = run.x.copy()[np.newaxis], run.P.copy()[np.newaxis]
-        _take_with_inputs(run, model, z)
-        kept = run.X[: run.steps], run.C[: run.steps]
-        blocks = iter([(np.concatenate([start[0], kept[0]]), np.concatenate([start[1], kept[1]]))])
-    else:
-        blocks = run.blocks(z)
+    run = Run(model, None, Form.INNOVATION, ())
     found, done = [np.zeros((0, model.n, 2))], 0
-    for x, P in blocks:
+    for x, P in run.blocks(z):
         if run.stopped or _loses_digits(model, np.arange(done, done + len(P)), P):
             try:
                 return double_doubles(np.array([each for each, *_ in precise_steps(model, z)], dtype=object))
@@ -568,17 +600,3 @@ def reference_states(model: LinearModel, z: Any) -> NDArray[np.float64]:
         found.append(x[1:, :, 0])
         done += len(x) - 1
     return np.concatenate(found)
-
-
-def _take_with_inputs(run: Run, model: LinearModel, z: Any) -> None:
-    """Take steps with known inputs c: from x to E(x, z - d - Hc) + c, with the step E of a filter without inputs."""
-    model.check_steps(len(z))
-    for k, measured in enumerate(exact(z)):
-        state, measurement = model.known(k)
-        at = int(run.notes[NEXT_CHECKPOINT])
-        run.take((measured - measurement - model.H[k % len(model.H)] @ state)[np.newaxis])
-        if run.stopped:
-            return
-        run.x = as_packed(run.fmt, run.exactly(run.x) + state.reshape(-1, 1))
-        if run.notes[NEXT_CHECKPOINT] > at:
-            run.X[at] = run.x

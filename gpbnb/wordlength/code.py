@@ -35,7 +35,6 @@ from gpbnb.filters.forms import CONSTANT_GAIN, Form, plain_name
 from gpbnb.filters.kalman_step import HUNG_FORMS
 from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import compiled_form
-from gpbnb.filters.nonlinear_run import opened
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.run import Run
@@ -107,7 +106,7 @@ def write_code(
     fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; a :class:`~gpbnb.filters.words.WordFormats`; or the name
         of a format, such as "float32" or "Q15".
     folder : folder for the files, which is created if necessary. Files that gpbnb has written are replaced, others not.
-    form : for a Kalman filter, a form with compiled loops, or "constant gain"; for a
+    form : for a Kalman filter, "innovation", "Joseph", "UD", or one of Hung's, or "constant gain"; for a
         :class:`gpbnb.filters.design.FilterDesign`, its structure. The UD form accepts no words of more than 52 bits and
         no words that wrap around.
     name : name of the files, and prefix of every name that the header declares.
@@ -468,7 +467,7 @@ def _statuses(steps: int, indefinite: int | None) -> NDArray[np.int64]:
 
 
 def _model_vectors(model: LinearModel, z: Any, fmt: FloatFormat | FixedFormat, form: Form) -> Vectors:
-    run = Run(model.without_inputs(), fmt, form, ())  # type: ignore[arg-type]
+    run = Run(model, fmt, form, ())  # type: ignore[arg-type]
 
     def stored(numbers: NDArray[np.float64]) -> NDArray[Any]:
         """Return numbers, exact in float64, as the code stores them."""
@@ -477,10 +476,7 @@ def _model_vectors(model: LinearModel, z: Any, fmt: FloatFormat | FixedFormat, f
     start = stored(_flat(run.x[None], run.P[None], form))
     states = np.concatenate([start[:0], *(stored(_flat(x[1:], P[1:], form)) for x, P in run.blocks(z))])
     inputs = fmt.array(z).to_float()
-    if model.u is not None:  # the covariances are those without inputs
-        driven = opened(model, fmt, form).states(z)[..., 0]  # type: ignore[arg-type]
-        states = states[: len(driven)]
-        states[:, : model.n] = stored(driven[: len(states)])
+    if model.u is not None:
         u = np.broadcast_to(model.u, (len(z), model.u.shape[-1])) if model.u.ndim == 1 else model.u[: len(z)]
         inputs = np.hstack([inputs, fmt.array(u).to_float()])
     return _ended(stored(inputs), start[0], states, _statuses(len(states), run.indefinite))

@@ -13,7 +13,6 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.gains import schedule
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.array_forms import ArrayForm
-from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
 from gpbnb.report.wordlengths.study import companion_run
@@ -105,9 +104,7 @@ def test_companions_are_for_the_run_of_the_model_as_given(monkeypatch: Any) -> N
     ((UQ, P),) = opened
     assert np.array_equal(UQ, user.exactly(user.UQ))
     assert np.array_equal(P, user.exactly(user.P))
-    array = ArrayRun(model, NINE, Form.UD, ())
-    assert np.array_equal(array._given["UQ"][0].to_fractions(), user.exactly(user.UQ)[0])
-    assert array.repairs == user.repairs == ArrayRun(model, NINE, ArrayForm.POTTER, ()).repairs
+    assert user.repairs == Run(model, NINE, ArrayForm.POTTER, ()).repairs
 
 
 def test_a_covariance_that_must_not_be_raised_has_neither_run_nor_guarantee() -> None:

@@ -8,9 +8,9 @@ import pytest
 from small_filter import exact_steps
 
 from gpbnb import BINARY64, FloatFormat, LinearModel, Rounding, required_precision
+from gpbnb.bounds.gains import schedule
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.array_forms import ArrayForm
-from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.emulation import compare_runs, emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, Sums, reference
@@ -60,10 +60,10 @@ def test_the_bound_holds_with_inputs_and_is_not_vacuous(form):
     model, fmt = drawn(6), FloatFormat(2, 20)
     z = fmt.array(simulated_measurements(model, STEPS))
     steps = tuple(range(1, STEPS + 1))
-    run = ArrayRun(model, fmt, form, steps, bounded=True)
+    run = Run(model, fmt, form, steps, bounded=True)
     run.take(z)
     errors = np.abs(compare_runs(run, reference(model.rounded(fmt), z.to_fractions(), steps)).state)
-    (bound,) = run.bounds
+    bound = run.bounds.state
     assert (errors <= bound).all()
     assert errors.max() > 2.0**-24  # it does round
     assert bound.max() < 2000 * errors.max()
@@ -144,8 +144,7 @@ def test_inputs_are_refused_where_they_would_be_ignored():
     fmt, within = FloatFormat(2, 24), limits(state=1, innovation=1)
     z = np.zeros((5, 1))
     for call in (
-        lambda: Run(cart, fmt, Form.INNOVATION, ()),
-        lambda: Run(cart, fmt, Form.INNOVATION, (), bounded=True),
+        lambda: schedule(cart, fmt, Form.INNOVATION),
         lambda: Simulation(cart, (0.0, 0.0), 0, 0.1),
         lambda: guarantee(cart, fmt, within),
         lambda: required_precision(cart, z, 0.1, basis="guarantee", within=within),
@@ -190,8 +189,8 @@ def test_random_rounding_stores_one_model_whose_covariances_are_symmetric():
     model = replace(drawn(), P0=np.eye(3) + drawn().Q[0])
     assert np.any(fmt.array(model.P0) != fmt.array(model.P0).T)
     stored = model.rounded(fmt)
-    run = ArrayRun(model, fmt, Form.INNOVATION, range(1, STEPS + 1))
-    assert np.array_equal(run.x.to_fractions(), stored.x0)
-    assert np.array_equal(run.P.to_fractions(), stored.P0)
+    run = Run(model, fmt, Form.INNOVATION, range(1, STEPS + 1))
+    assert np.array_equal(run.exactly(run.x)[:, 0], stored.x0)
+    assert np.array_equal(run.exactly(run.P), stored.P0)
     z = simulated_measurements(model, STEPS, 1)
     assert 0 < emulate(model, z, fmt, "symmetrized").state.max() < 1

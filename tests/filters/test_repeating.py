@@ -7,10 +7,8 @@ import pytest
 
 from gpbnb import BINARY32, FixedFormat, FloatFormat, Form, NonlinearModel
 from gpbnb.filters.array_forms import ArrayForm
-from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.nonlinear_run import NonlinearRun
 from gpbnb.filters.repeating import RepeatedStep
-from gpbnb.wordlength.examples import tracker
 from gpbnb.wordlength.nonlinear_examples import tracked_motion, tracked_sight
 
 Z = [[5.0, 0.93], [5.6, 0.9], [None, 0.88], [6.9, 0.86], [7.5, None], [8.1, 0.83], [8.8, 0.81], [9.4, 0.8]]
@@ -66,12 +64,6 @@ def test_each_form(form, monkeypatch):
         states = run.states(z)
         assert np.array_equal(states, by_operations(monkeypatch, lambda fmt=fmt: NonlinearRun(model, fmt, form), z))
         assert repeats(run)
-    linear = tracker()
-    z = np.linspace(0, 1, 8 * linear.m).reshape(8, linear.m)
-    run = ArrayRun(linear, FloatFormat(2, 24), form, ())
-    states = run.states(z)
-    assert np.array_equal(states, by_operations(monkeypatch, lambda: ArrayRun(linear, FloatFormat(2, 24), form, ()), z))
-    assert repeats(run)
 
 
 def test_a_function_that_depends_on_more_than_its_arguments_is_called_in_each_step(monkeypatch):

@@ -16,7 +16,6 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters import bounded_steps
 from gpbnb.filters.array_forms import ArrayForm
-from gpbnb.filters.array_run import ArrayRun
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.factors import covariance_of_factors
 from gpbnb.filters.forms import Form
@@ -52,7 +51,7 @@ def test_every_model_can_be_stored_and_factored(fmt):
         assert list(stored.repairs) == run.repairs[: len(stored.repairs)]
         assert len(set(run.repairs)) == len(run.repairs)
         for form in (Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON):
-            assert ArrayRun(model, fmt, form, ()).repairs == run.repairs
+            assert Run(model, fmt, form, ()).repairs == run.repairs
     assert changed > len(MODELS) / 5
 
 
@@ -153,8 +152,8 @@ def test_a_bound_begins_with_the_distance_of_the_factors_from_the_covariance(for
     model = LinearModel(model.Phi, model.H, model.Q, model.R, model.x0, [["3", "1.1"], ["1.1", "0.7"]])
     start = bounded_steps.contraction_start
     monkeypatch.setattr(bounded_steps, "contraction_start", lambda P, x, off: asked.append(off) or start(P, x, off))
-    run = ArrayRun(model, fmt, form, (1,), bounded=True)
-    true = np.abs(run.covariance(run.P) - model.rounded(fmt).P0)
+    run = Run(model, fmt, form, (1,), bounded=True)
+    true = np.abs(run.covariance(run.exactly(run.P)) - model.rounded(fmt).P0)
     assert true.any()
     for off, exactly in zip(asked[0].flat, true.flat, strict=True):
         assert exactly <= Fraction(off) <= exactly * (1 + Fraction(1, 2**49))
