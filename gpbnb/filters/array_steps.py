@@ -76,7 +76,7 @@ def _share(W: Matrix, c: Matrix, d: Matrix) -> Callable[[], Matrix]:
 def if_nonzero(x: Any, changed: Callable[[], Any], unchanged: Any) -> Any:
     """Return changed numbers if x is not zero, else the unchanged ones.
 
-    A number that records its operations, see :mod:`gpbnb.filters.tracing`, records both.
+    A number that records its operations, see :mod:`gpbnb.arithmetic.traced`, records both.
     """
     if hasattr(type(x), "if_nonzero"):  # arrays would look for names that are spelled alike
         return x.if_nonzero(changed, unchanged)

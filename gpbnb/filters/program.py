@@ -12,9 +12,8 @@ several purposes, so that they cannot disagree:
 * :mod:`gpbnb.filters.words` runs it on integers, with formats of their own for coefficients, data and sums;
 * :mod:`gpbnb.wordlength.code` prints it as C.
 
-A step that also computes the covariance is not linear: it multiplies and divides values. :mod:`gpbnb.filters.tracing`
-lists its operations with the same codes, and :mod:`gpbnb.filters.nonlinear_system` those of a step of your own, for C
-code; the compiled loops take linear programs and limits.
+A step that also computes the covariance is not linear: it multiplies and divides values. :mod:`gpbnb.filters.listing`
+lists its recorded operations with the same codes, and those of a step of your own, for C code.
 
 The coefficients are arguments and not part of the program, because they may change from step to step. A product with a
 zero coefficient is exact, and so is a sum with this product; the compiled kernels omit both.
@@ -23,7 +22,7 @@ zero coefficient is exact, and so is a sum with this product; the compiled kerne
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -307,6 +306,111 @@ def sequential_program(n: int, m: int) -> Program:
             y = build.subtract(y, build.multiply(int(H[i, j]), x[j]))
         x = [build.add(x[j], build.multiply(int(K[j, i]), y)) for j in range(n)]
     return build.finish(x, count)
+
+
+def without_exact(program: Program, coefficients: NDArray[Any]) -> Program:
+    """Leave out operations that are exact and change nothing: a product with zero or one, and a sum with zero.
+
+    No digit changes. A value that nothing uses any more remains, and is noted as one that must stay in range: its
+    overflow ends a run of the step.
+
+    Parameters
+    ----------
+    coefficients : (p, c), exact stored coefficients of each step of a cycle.
+    """
+    return _Shortening(program, coefficients).finish()
+
+
+class _Shortening:
+    """A program whose values are replaced by others that equal them, where an operation changes nothing."""
+
+    def __init__(self, program: Program, coefficients: NDArray[Any]) -> None:
+        self.program, self.first = program, program.n + program.m
+        self.zeros, self.ones = (np.all(coefficients == each, axis=0) for each in (0, 1))
+        self.operations: list[tuple[int, int, int]] = program.operations.tolist()
+        self.guards = list(program.guards or (-1,) * len(self.operations))
+        self.same = list(range(self.first))
+        for o in range(len(self.operations)):
+            self._replace(o)
+
+    def _constant(self, value: int, found: NDArray[np.bool_]) -> bool:
+        if value < self.first:
+            return False
+        code, a, _ = self.operations[value - self.first]
+        return code == CONSTANT and bool(found[a])
+
+    def _replace(self, o: int) -> None:
+        """Find the value that operation o equals, with operands already replaced."""
+        code, a, b = self.operations[o]
+        if len(values_of(code, a, b)) == 2:
+            a = self.same[a]
+        b = self.same[b] if code != CONSTANT else b
+        guard = self.same[self.guards[o]] if self.guards[o] >= 0 else -1
+        self.operations[o], self.guards[o] = (code, a, b), guard
+        self.same.append(self._equal(self.first + o, code, a, b, guard))
+
+    def _equal(self, itself: int, code: int, a: int, b: int, guard: int) -> int:
+        def zero(value: int) -> bool:
+            return self._constant(value, self.zeros)
+
+        def one(value: int) -> bool:
+            return self._constant(value, self.ones)
+
+        if code == CHOOSE:
+            return a if a == b or (zero(a) and zero(b)) else b if zero(guard) else itself
+        if code == MULTIPLY and (self.zeros[a] or zero(b)):
+            self.operations[itself - self.first] = (CONSTANT, a if self.zeros[a] else self._coefficient(b), 0)
+            self.guards[itself - self.first] = -1
+        elif code == MULTIPLY and self.ones[a]:
+            return b
+        elif code in (ADD, SUBTRACT) and zero(b):
+            return a
+        elif code == ADD and zero(a):
+            return b
+        elif code == PRODUCT and (zero(a) or one(b)):
+            return a
+        elif code == PRODUCT and (zero(b) or one(a)):
+            return b
+        elif code == DIVIDE and (zero(a) or one(b)):
+            return a
+        return itself
+
+    def _coefficient(self, value: int) -> int:
+        return self.operations[value - self.first][1]
+
+    def _may_overflow(self, o: int) -> bool:
+        runs = self.guards[o] < 0 or not self._constant(self.guards[o], self.zeros)
+        return runs and self.same[self.first + o] == self.first + o and self.operations[o][0] not in NEVER_OVERFLOW
+
+    def finish(self) -> Program:
+        """Return the program; its states, inputs and coefficients keep their numbers."""
+        program, first = self.program, self.first
+        outputs = [self.same[each] for each in program.outputs.tolist()]
+        checks = [(self.same[value], kind) for value, kind in program.checks]
+        used = {*outputs, *(value for value, _ in checks)}
+        for o in range(len(self.operations) - 1, -1, -1):
+            if first + o not in used and self._may_overflow(o):
+                checks.append((first + o, IN_RANGE))
+                used.add(first + o)
+            if first + o in used:
+                used |= {*values_of(*self.operations[o])} | ({self.guards[o]} - {-1})
+        kept = [o for o in range(len(self.operations)) if first + o in used]
+        at = {value: value for value in range(first)} | {first + o: first + i for i, o in enumerate(kept)} | {-1: -1}
+        operations = []
+        for o in kept:
+            code, a, b = self.operations[o]
+            values = values_of(code, a, b)
+            operations.append((code, at[a] if len(values) == 2 else a, at[b] if values else 0))
+        guards = tuple(at[self.guards[o]] for o in kept)
+        return replace(
+            program,
+            operations=np.array(operations, dtype=np.int64).reshape(-1, 3),
+            outputs=np.array([at[each] for each in outputs], dtype=np.int64),
+            guards=guards if max(guards, default=-1) >= 0 else (),
+            checks=tuple((at[value], kind) for value, kind in dict.fromkeys(checks)),
+            groups=program.groups[kept],
+            wide=program.wide[kept],
+        )
 
 
 # -- linear functions -------------------------------------------------------------------------------------------------

@@ -149,7 +149,12 @@ class RecordedStep(NamedTuple):
 
 @lru_cache(maxsize=64)
 def recorded_step(kind: StepKind) -> RecordedStep:
-    """Record a step of a filter."""
+    """Record a step of a filter, divided into what depends on the measurements and what does not."""
+    return _divided(kind, *whole_step(kind))
+
+
+def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], LinearTaken]:
+    """Record a step of a filter; return its tape, the places of what it takes, and what it gives."""
     n, m = kind.n, kind.m
     sizes = [("x", (n,)), ("P", (n, n)), ("carried", (n,)), ("z", (m,)), *((e.letter, e.shape) for e in kind.model)]
     places, at = dict[str, NDArray[np.int64]](), 1
@@ -176,8 +181,7 @@ def recorded_step(kind: StepKind) -> RecordedStep:
         BlockStorage(state.array, gain.array, covariance.array, innovation.array),
     )
     step = LinearStep(kind.form, blocks, given, tape.about, kind.compensated)
-    found = step.taken(x, covariance.made(P), carried, z)
-    return _divided(kind, tape, places, found)
+    return tape, places, step.taken(x, covariance.made(P), carried, z)
 
 
 def _algebra(fmt: TracedFormat, formats: Sequence[TracedFormat], kind: StepKind) -> Algebra:

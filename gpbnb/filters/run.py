@@ -26,7 +26,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.kalman_step import HUNG_FORMS
 from gpbnb.filters.kernels.records import pairs_as_floats
 from gpbnb.filters.kernels.widened import widen
-from gpbnb.filters.model import LinearModel, identity_in
+from gpbnb.filters.model import INPUTS, LinearModel, identity_in
 from gpbnb.filters.named import form_named
 from gpbnb.filters.opening import (
     DONE,
@@ -434,8 +434,9 @@ class Run:
             reason += "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
         return reason
 
-    def _made_stepper(self) -> Stepper:
-        """Record a step, and make it ready to run in the run's formats."""
+    @property
+    def letters(self) -> dict[str, NDArray[Any]]:
+        """What a step takes of the model, packed, by letters: matrices with a cycle of their own, and inputs."""
         each = self.matrices
         model = {"Phi": each.Phi, "H": each.H}
         model |= {"UQ": self.UQ, "UR": self.UR} if self.form in FACTORED else {"Q": each.Q, "R": each.R}
@@ -443,9 +444,12 @@ class Run:
             model["RI"] = each.RI
         if self._increment is not None:
             model["increment"] = self._increment
-        formats, blocks, sums = self._formats()
-        cycle = int(np.lcm.reduce([len(table) for table in model.values()]))
-        model |= each.inputs
+        return model | each.inputs
+
+    def _made_stepper(self) -> Stepper:
+        """Record a step, and make it ready to run in the run's formats."""
+        model, (formats, blocks, sums) = self.letters, self._formats()
+        cycle = int(np.lcm.reduce([len(table) for letter, table in model.items() if letter not in INPUTS]))
         kind = step_kind(self.form, model, formats[0], blocks, sums, self._increment is not None)
         repeats = self.fmt is None or self.fmt.rounding is not Rounding.STOCHASTIC
         return Stepper(recorded_step(kind), formats, model, self.records, cycle if repeats else 0, self.tag)

@@ -144,6 +144,7 @@ class CodeFloats:
         program, first = step.program, step.program.n + step.program.m
         found = dict.fromkeys(program.outputs.tolist())
         found |= dict.fromkeys(value for value, kind in program.checks if kind == IN_RANGE)
+        found |= dict.fromkeys(each for each in program.guards if each >= 0)
         for code, a, b in program.operations.tolist():
             if code in (DIVIDE, MODULO, AT_LEAST, AT_MOST):
                 found[b] = None

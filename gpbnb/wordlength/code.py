@@ -1,9 +1,8 @@
 """C99 code of a filter that agrees with the emulation digit for digit: source, test vectors and a Makefile.
 
 The statements are those of the list of operations that is emulated and bounded, see :mod:`gpbnb.filters.program` and
-:mod:`gpbnb.filters.tracing`, or of the traced step of a nonlinear system, see :mod:`gpbnb.filters.nonlinear_system`:
-one for each operation, in the same order. So what is computed about a filter holds for the code, if the compiler keeps
-the order and rounds each operation, as C99 demands.
+:mod:`gpbnb.filters.listing`: one for each operation, in the same order. So what is computed about a filter holds for
+the code, if the compiler keeps the order and rounds each operation, as C99 demands.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.algebra import inverse_in_order
 from gpbnb.arithmetic.array import NegativeRootError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -33,15 +33,16 @@ from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, Form, plain_name
 from gpbnb.filters.kalman_step import HUNG_FORMS
+from gpbnb.filters.listing import kalman_program
 from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import compiled_form
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
+from gpbnb.filters.program import without_exact
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem, system_inputs
-from gpbnb.filters.tracing import kalman_program, without_exact
 from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_checked, run_words
 from gpbnb.wordlength.c_files import Described, Vectors, refuse_others, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeStep, checked_identifier, word_arithmetic
@@ -372,8 +373,10 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
     p = 0 if model.u is None else model.u.shape[-1]
     if p and chosen in HUNG_FORMS:
         raise ValueError(f"got known inputs in the {chosen} form, which is not defined with them; needed another form")
-    stored, start = _in_loops(model, fmt, chosen) if in_loops else _in_long_words(model, fmt, chosen)
-    step = CodeStep(without_exact(kalman_program(model.n, model.m, chosen, p), stored), stored, start)
+    given, start = _in_loops(model, fmt, chosen) if in_loops else _in_long_words(model, fmt, chosen)
+    stored = _coefficients([each for letter, each in given.items() if letter != "u"])
+    program = kalman_program(chosen, {letter: each.shape[1:] for letter, each in given.items()})
+    step = CodeStep(without_exact(program, stored), stored, start)
     arithmetic = word_arithmetic(step, _words(fmt)) if isinstance(fmt, FixedFormat) else CodeFloats(kind)
 
     def bound(within: FilterLimits) -> str:
@@ -400,30 +403,26 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
     )
 
 
-def model_coefficients(run: Run, B: Any = None) -> NDArray[Any]:
-    """Return the coefficients of each step of a cycle, (p, c), ordered as the program of a step expects."""
-    given = run.matrices
-    Q, R = (run.UQ, run.UR) if run.form is Form.UD else (given.Q, given.R)
-    fmt: Any = run.fmt
-    known = [] if B is None else [fmt.array(B).to_fractions()]
-    return _coefficients([*(run.exactly(each) for each in (given.Phi, given.H, Q, R)), *known])
-
-
 def _coefficients(members: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    """Return the coefficients of each step of a cycle from Phi, H, Q, R and B, each with a cycle of its own."""
+    """Return the coefficients of each step of a cycle, (p, c), from matrices that each have a cycle of their own."""
     period = lcm(*(len(each) for each in members))
     rows = [np.concatenate([each[k % len(each)].ravel() for each in members]) for k in range(period)]
     constants = np.full((period, 1), Fraction(0), dtype=object)
     return np.concatenate([np.array(rows, dtype=object), constants, constants + 1], axis=1)
 
 
-def _in_loops(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return coefficients and first states, exact, as a run in compiled loops stores them."""
-    run = Run(model.without_inputs(), fmt, form, ())
-    return model_coefficients(run, model.B), _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), form)[0]
+Letters = dict[str, NDArray[Any]]
+"""The matrices of a model and its known inputs, exact, each with a cycle of its own."""
 
 
-def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[Any], NDArray[Any]]:
+def _in_loops(model: LinearModel, fmt: Any, form: Form) -> tuple[Letters, NDArray[Any]]:
+    """Return the matrices and first states, as a run in compiled loops stores them."""
+    run = Run(model, fmt, form, ())
+    given = {letter: run.exactly(each) for letter, each in run.letters.items()}
+    return given, _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), form)[0]
+
+
+def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[Letters, NDArray[Any]]:
     """Return the same in words that are too long for compiled loops, or that wrap around."""
     if form is Form.UD:
         raise ValueError(
@@ -436,13 +435,16 @@ def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[NDArray[An
             "has no other loops with inputs"
         )
     identity_in(fmt, 1)
-    arrays = {letter: each.to_fractions() for letter, each in model.definite_in(fmt).arrays(fmt).items()}
-    stored = _coefficients([arrays[letter] for letter in ("Phi", "H", "Q", "R")])
-    return stored, np.concatenate([arrays["x0"], arrays["P0"].ravel()])
+    arrays = model.definite_in(fmt).arrays(fmt)
+    given = {letter: arrays[letter].to_fractions() for letter in ("Phi", "H", "Q", "R")}
+    if form is Form.HUNG_SECOND_GAIN:
+        identity = fmt.eye(model.m)
+        given["RI"] = np.stack([inverse_in_order(each, identity).matrix.to_fractions() for each in arrays["R"]])
+    return given, np.concatenate([arrays["x0"].to_fractions(), arrays["P0"].to_fractions().ravel()])
 
 
 def _flat(x: NDArray[Any], P: NDArray[Any], form: Form) -> NDArray[Any]:
-    """Return estimates and covariances, or factors, as :func:`gpbnb.filters.tracing.kalman_program` has its states."""
+    """Return estimates and covariances, or factors, as :func:`gpbnb.filters.listing.kalman_program` has its states."""
     n = x.shape[1]
     kept = [(i, j) for i in range(n) for j in range(n) if form is not Form.UD or i <= j]
     return np.concatenate([x[..., 0], np.stack([P[:, i, j] for i, j in kept], axis=-1)], axis=-1)
