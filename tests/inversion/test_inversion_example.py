@@ -105,7 +105,6 @@ class TestSearch:
         monkeypatch.setitem(PRINTED, column, tuple(f"{v:.3e}" for v in planted.values))
         found = example.search(column)
         assert found.agreements >= 3
-        assert planted.agreements == 3
         assert found.closest.distance < 1.001
 
 

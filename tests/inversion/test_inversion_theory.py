@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import oracles
-import pytest
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
@@ -64,15 +63,9 @@ def test_back_substitution_as_printed():
     assert rows(theory.back_substitution_weights(3)) == [[0, 4, 3], [0, 0, 3], [0, 0, 0]]
     assert rows(theory.back_substitution_weights(4)) == [[0, 5, 4, 3], [0, 0, 4, 3], [0, 0, 0, 3], [0, 0, 0, 0]]
     assert rows(theory.right_side_weights(4)) == [[4], [3], [2], [1]]
-    assert rows(theory.printed_weights_1982(4))[0] == [0, 6, 5, 4]
     change, right = theory.back_substitution_error(MADE_UP, BETA)
     assert rows(change / BETA) == [[0, 12, -15], [0, 0, 51], [0, 0, 0]]
     assert rows(right / BETA) == [[9, 15], [-16, 12], [-25, 31]]
-
-
-@pytest.mark.parametrize("n", range(2, 8))
-def test_1982_has_the_weights_of_three(n):
-    assert (rows(theory.printed_weights_1982(n)) == rows(theory.back_substitution_weights(n))) == (n == 3)
 
 
 def test_the_total_as_printed_and_corrected():

@@ -10,13 +10,12 @@ Source: hung1984, ch. II, section 11.4; hung1982, ch. III, section 11.4.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from itertools import product
-from typing import Any
+from itertools import pairwise, product
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,10 +54,6 @@ class Wordlength:
 
     kind: str
     rounding: Rounding
-
-    def __post_init__(self) -> None:
-        if not re.fullmatch(r"fixed point|t = places( \+ [1-9])?", self.kind):
-            raise ValueError(f"kind: got {self.kind!r}; needed 't = places', 't = places + 1' or 'fixed point'")
 
     def format(self, places: int) -> FloatFormat:
         """Floating-point format; for fixed point, the format with the same unit roundoff for numbers near 1."""
@@ -155,29 +150,15 @@ class PrintedColumn:
     values: tuple[float, ...]
 
     @property
-    def ratios(self) -> tuple[float, ...]:
-        """Ratio of each number to the printed one."""
-        return tuple(v / float(p) for v, p in zip(self.values, PRINTED[self.column], strict=True))
-
-    @property
     def distance(self) -> float:
         """Largest factor between a number and the printed one; 1 for equality."""
-        return max(max(r, 1 / r) if r else math.inf for r in self.ratios)
-
-    @property
-    def agreements(self) -> int:
-        """Number of values that agree with the print in all four digits."""
-        return sum(agree(v, p) for v, p in zip(self.values, PRINTED[self.column], strict=True))
+        ratios = [v / float(p) for v, p in zip(self.values, PRINTED[self.column], strict=True)]
+        return max(max(r, 1 / r) if r else math.inf for r in ratios)
 
     @property
     def same_digits(self) -> bool:
         """Whether all values have the same four digits and differ only in their exponents."""
         return len({f"{v:.3e}".split("e")[0] for v in self.values}) == 1
-
-    @property
-    def decreasing(self) -> bool:
-        """Whether more places give a smaller number."""
-        return all(p > q for p, q in zip(self.values, self.values[1:], strict=False))
 
 
 def agree(value: float | Fraction, printed: str) -> bool:
@@ -253,15 +234,8 @@ def error_readings() -> tuple[PrintedColumn, ...]:
     return tuple(result)
 
 
-@dataclass(frozen=True)
-class Agreements:
-    """Result of a search among readings.
-
-    Parameters
-    ----------
-    agreements : number of values that agree with the print in each digit.
-    closest : the reading with the smallest :attr:`PrintedColumn.distance`.
-    """
+class Agreements(NamedTuple):
+    """Result of a search: readings tried, values that agree with the print in each digit, and the closest reading."""
 
     column: str
     readings: int
@@ -272,26 +246,13 @@ class Agreements:
 def search(column: str) -> Agreements:
     """Compare every reading of a column, "bound" or "error", with the print."""
     found = bound_readings() if column == "bound" else error_readings()
-    return Agreements(
-        column,
-        len(found),
-        sum(one.agreements for one in found),
-        min(found, key=lambda one: one.distance),
-    )
+    agreements = sum(agree(v, p) for one in found for v, p in zip(one.values, PRINTED[column], strict=True))
+    return Agreements(column, len(found), agreements, min(found, key=lambda one: one.distance))
 
 
-@dataclass(frozen=True)
-class SectionClaim:
-    """A sentence of section 11.4 and the number of readings for which it holds."""
-
-    name: str
-    readings: int
-    holds: int
-    exception: str
-
-
-def claims() -> tuple[SectionClaim, ...]:
-    """Test each sentence about Table 1 in every reading.
+@cache
+def claims() -> dict[str, int]:
+    """Count the readings for which each sentence about Table 1 holds.
 
     Whether a bound is conservative is tested against the error of elimination with the same wordlength and norm, both
     absolute or both relative.
@@ -300,19 +261,12 @@ def claims() -> tuple[SectionClaim, ...]:
     for one in error_readings():
         if one.detail == "elimination, against the matrix as given":
             errors[one.wordlength, one.norm, one.relative] = one.values
-
-    def conservative(one: PrintedColumn) -> bool:
-        actual = errors[one.wordlength, one.norm, one.relative]
-        return all(v >= e for v, e in zip(one.values, actual, strict=True))
-
-    tests: dict[str, Callable[[PrintedColumn], bool]] = {
-        "the bound decreases with the wordlength": lambda one: one.decreasing,
-        "all bounds have the same digits": lambda one: one.same_digits,
-        "the bounds are above the errors": conservative,
+    conservative = (
+        all(v >= e for v, e in zip(one.values, errors[one.wordlength, one.norm, one.relative], strict=True))
+        for one in read
+    )
+    return {
+        "the bound decreases with the wordlength": sum(all(a > b for a, b in pairwise(one.values)) for one in read),
+        "all bounds have the same digits": sum(one.same_digits for one in read),
+        "the bounds are above the errors": sum(conservative),
     }
-    result = []
-    for name, test in tests.items():
-        failing = [one for one in read if not test(one)]
-        exception = f"{failing[0].wordlength}: {failing[0].detail}, {failing[0].norm}" if failing else ""
-        result.append(SectionClaim(name, len(read), len(read) - len(failing), exception))
-    return tuple(result)

@@ -5,6 +5,7 @@ Source: hung1984, ch. II, section 11.4; hung1982, ch. III, section 11.4.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -68,10 +69,6 @@ def possible(
     printed : an error norm as text; by default that of Table 1.
     reference : whose inverse defines the error, the matrix as "given" or as "stored" in the wordlength.
     """
-    if norm not in SEARCHED:
-        raise ValueError(f"norm: got {norm!r}; needed one of {', '.join(SEARCHED)}")
-    if reference not in ("given", "stored"):
-        raise ValueError(f"reference: got {reference!r}; needed 'given' or 'stored'")
     printed = printed or PRINTED["error"][PLACES.index(places)]
     true = inverse_of(matrix() if reference == "given" else each_rounded(matrix(), wordlength.rounder(places)))
     scale = Fraction(float(NORMS[norm](true))) if relative else Fraction(1)
@@ -127,38 +124,15 @@ def _near(
     x: Fraction, wordlength: Wordlength, places: int, most: Fraction, square: bool
 ) -> list[tuple[Fraction, Fraction]]:
     """List numbers of the wordlength near x, nearest first, whose distance (or its square) is below `most`."""
-    found = []
-    for step in (1, -1):
-        y = _toward(x, wordlength, places, step)
-        while (size := (y - x) ** 2 if square else abs(y - x)) < most:
-            found.append((size, y))
-            y = _next(y, wordlength, places, step)
-    return sorted(set(found))
-
-
-def _toward(x: Fraction, wordlength: Wordlength, places: int, step: int) -> Fraction:
-    """Return the nearest number of the wordlength on one side of x; the upper side includes x itself."""
-    chopped = Wordlength(wordlength.kind, Rounding.CHOP).rounder(places)(x)
-    if step > 0:
-        return chopped if chopped >= x else _next(chopped, wordlength, places, 1)
-    return chopped if chopped < x else _next(chopped, wordlength, places, -1)
-
-
-@cache
-def _next(y: Fraction, wordlength: Wordlength, places: int, step: int) -> Fraction:
-    """Return the neighbour of a number of the wordlength."""
-    if wordlength.kind == "fixed point":
-        return y + step * Fraction(1, 10**places)
-    if y == 0:
-        raise ValueError(
-            "got zero; needed a nonzero number, because zero has no neighbour when the exponent is unlimited"
-        )
-    fmt = wordlength.format(places)
-    _, _, e = fmt.split(y)
-    unit = Fraction(10) ** (e - fmt.precision)
-    if step * y < 0 and abs(y) == Fraction(10) ** (e - 1):  # towards zero at a power of ten
-        unit /= 10
-    return y + step * unit
+    reach = Fraction(math.sqrt(most) * 1.001) if square else most
+    unit = Fraction(1, 10**places)
+    if wordlength.kind != "fixed point":  # the spacing of the smallest numbers within reach
+        fmt = wordlength.format(places)
+        unit = Fraction(10) ** (fmt.split(abs(x) - reach)[2] - fmt.precision)
+    multiples = (k * unit for k in range(math.floor((x - reach) / unit), math.ceil((x + reach) / unit) + 1))
+    sizes = ((abs(y - x), y) for y in multiples if wordlength.rounder(places)(y) == y)
+    found = ((size**2 if square else size, y) for size, y in sizes)
+    return sorted((size, y) for size, y in found if size < most)
 
 
 def _fit(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -45,10 +45,6 @@ BETTER = (
 )
 
 
-#: Bounds that may not exist.
-MAY_BE_ABSENT = BETTER[1:]
-
-
 @dataclass(frozen=True)
 class InverseTrial(BoundedError):
     r"""One computed inverse: its matrix, its error and the bounds on that error, in the norm (22).
@@ -63,11 +59,6 @@ class InverseTrial(BoundedError):
     condition: float
     error: Fraction
     bounds: Mapping[str, float]
-
-    @property
-    def n(self) -> int:
-        """Rows of the matrix."""
-        return len(self.matrix)
 
     @property
     def regular(self) -> bool:
@@ -91,7 +82,7 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
         try:
             evaluated[name] = float(_BOUNDS[name](computing))
         except ValueError:  # the bound does not exist here
-            if name not in MAY_BE_ABSENT:
+            if name not in BETTER[1:]:
                 raise
     error = bounds.true_error(computing.x, inverse)
     condition = float(column_sum_norm(rationals(a))) * float(column_sum_norm(inverse))
@@ -237,11 +228,6 @@ class InverseCell:
                 except np.linalg.LinAlgError:
                     yield None
 
-    @property
-    def count(self) -> int:
-        """Return the number of trials."""
-        return len(self.sizes) * (1 if self.family in FIXED else self.repeats)
-
 
 SEED = 1984
 
@@ -278,170 +264,81 @@ SWEEPS: dict[str, tuple[Callable[[], list[InverseCell]], tuple[str, ...]]] = {
     "random": (random_cells, BETTER[2:]),
 }
 
-_FIELDS = ("family", "format", "pivot", "n", "bound")
 _COUNTS = ("trials", "failed", "exact", "absent", "violations", "regular", "violations_regular", "tight")
-_RATIOS = ("smallest", "smallest_regular", "median", "largest")
-
-#: Columns of the stored sweeps; a ratio is empty if no inverse had an error.
 COLUMNS = (
-    *(Column(name, "text") for name in _FIELDS),
+    *(Column(name, "text") for name in ("family", "format", "pivot", "n", "bound")),
     *(Column(name, "integer", 0) for name in _COUNTS),
-    *(Column(name, low=0, optional=True) for name in _RATIOS),
+    *(Column(name, low=0, optional=True) for name in ("smallest", "smallest_regular", "median", "largest")),
 )
+"""Columns of the stored sweeps; a ratio is empty if no inverse had an error.
 
-#: A bound is tight if it is at most this many times the error.
-TIGHT = 1.1
+`failed` counts matrices that are singular in the format. `exact` counts inverses without error, which have no ratio.
+"""
 
-#: Largest condition number times unit roundoff at which first-order analysis can be expected to hold.
-REGULAR = 0.01
-
-
-class InverseSample:
-    """Statistics of trials: how often each bound was absent or violated, and its ratios to the error.
-
-    `failed` counts matrices that are singular in the format. `exact` counts inverses without error, which have no
-    ratio. `regular` counts matrices whose condition number is at most :data:`REGULAR` over β.
-    """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self.trials = self.failed = self.exact = self.regular = 0
-        self.present = dict.fromkeys(names, 0)
-        self.violations = dict.fromkeys(names, 0)
-        self.violations_regular = dict.fromkeys(names, 0)
-        self.ratios: dict[str, list[float]] = {name: [] for name in names}
-        self.ratios_regular: dict[str, list[float]] = {name: [] for name in names}
-
-    def add(self, one: InverseTrial | None) -> None:
-        """Count a trial; None for a matrix that is singular in the format."""
-        if one is None:
-            self.failed += 1
-            return
-        regular = one.regular
-        self.trials += 1
-        self.exact += not one.error
-        self.regular += regular
-        for name in one.bounds:
-            self.present[name] += 1
-            self.violations[name] += one.violates(name)
-            self.violations_regular[name] += regular and one.violates(name)
-            if one.error:
-                self.ratios[name].append(one.overestimation(name))
-                if regular:
-                    self.ratios_regular[name].append(one.overestimation(name))
-
-    def merge(self, other: InverseSample) -> None:
-        """Count the trials of another sample."""
-        for name in ("trials", "failed", "exact", "regular"):
-            setattr(self, name, getattr(self, name) + getattr(other, name))
-        for counts in ("present", "violations", "violations_regular", "ratios", "ratios_regular"):
-            mine = getattr(self, counts)
-            for name, count in getattr(other, counts).items():
-                mine[name] = mine[name] + count
-
-    def rows(self, *where: str) -> list[dict[str, str]]:
-        """Return one row of text for each bound, with four digits of every ratio."""
-        result = []
-        for name, ratios in self.ratios.items():
-            counts = (
-                self.trials,
-                self.failed,
-                self.exact,
-                self.trials - self.present[name],
-                self.violations[name],
-                self.regular,
-                self.violations_regular[name],
-                sum(r <= TIGHT for r in ratios),
-            )
-            pairs = ((np.min, ratios), (np.min, self.ratios_regular[name]), (np.median, ratios), (np.max, ratios))
-            of = [f"{f(r):.4g}" if r else "" for f, r in pairs]
-            result.append(
-                dict(zip((*_FIELDS, *_COUNTS, *_RATIOS), (*where, name, *map(str, counts), *of), strict=True))
-            )
-        return result
+TIGHT, REGULAR = 1.1, 0.01
+"""A bound is tight if it is at most this many times the error; a matrix is regular, so that first-order analysis can be
+expected to hold, if its condition number times the unit roundoff is at most this."""
 
 
-def cell_sample(cell: InverseCell, names: Sequence[str]) -> InverseSample:
-    """Compute a cell."""
-    sample = InverseSample(names)
+Trials = list[list[Any] | None]
+"""Trials of a cell: None for a matrix that is singular in the format, otherwise whether it is regular, whether its
+inverse is exact, and for each bound that exists whether the error exceeds it, and bound / error."""
+
+
+def computed(cell: InverseCell, directory: Path | None = None, *, names: Sequence[str]) -> Trials:
+    """Compute the trials of a cell."""
+    found: Trials = []
     for one in cell.trials(names):
-        sample.add(one)
-    return sample
+        if one is None:
+            found.append(None)
+        else:
+            ratios = {name: one.overestimation(name) if one.error else 0.0 for name in one.bounds}
+            of_bounds = {name: [one.violates(name), ratio] for name, ratio in ratios.items()}
+            found.append([one.regular, not one.error, of_bounds])
+    return found
 
 
-def cell_rows(cell: InverseCell, sample: InverseSample) -> list[dict[str, str]]:
-    """Return the rows of one cell of a sweep, as stored."""
-    return sample.rows(*_where(cell).values())
+def lines(where: Sequence[str], trials: Trials, names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return one row of text for each bound: counts, and four digits of the least, median and largest bound / error."""
+    done, result = [one for one in trials if one is not None], []
+    for name in names:
+        present = [(regular, exact, *of[name]) for regular, exact, of in done if name in of]
+        ratios = [ratio for _, exact, _, ratio in present if not exact]
+        of_regular = [ratio for regular, exact, _, ratio in present if regular and not exact]
+        counts = (
+            len(done),
+            len(trials) - len(done),
+            sum(exact for _, exact, _ in done),
+            len(done) - len(present),
+            sum(violated for *_, violated, _ in present),
+            sum(regular for regular, *_ in done),
+            sum(regular and violated for regular, _, violated, _ in present),
+            sum(ratio <= TIGHT for ratio in ratios),
+        )
+        pairs = ((np.min, ratios), (np.min, of_regular), (np.median, ratios), (np.max, ratios))
+        result.append((*where, name, *map(str, counts), *(f"{f(given):.4g}" if given else "" for f, given in pairs)))
+    return result
 
 
-def _where(cell: InverseCell) -> dict[str, str]:
-    """Return the key of the rows of a cell."""
+def rows(cell: InverseCell, trials: Trials, *, names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the rows of a cell."""
     sizes = f"{cell.sizes[0]}-{cell.sizes[-1]}" if len(cell.sizes) > 1 else str(cell.sizes[0])
-    texts = (cell.family, format_name(cell.fmt), "yes" if cell.pivot else "no", sizes)
-    return dict(zip(_FIELDS, texts, strict=False))
+    where = cell.family, format_name(cell.fmt), "yes" if cell.pivot else "no", sizes
+    return lines(where, trials, names)
 
 
-def sum_rows(samples: Iterable[tuple[InverseCell, InverseSample]], names: Sequence[str]) -> list[dict[str, str]]:
+def sums(results: Sequence[tuple[InverseCell, Trials]], *, names: Sequence[str]) -> list[tuple[str, ...]]:
     """Return rows for each family, if there are several, and for all families together."""
-    rows, whole, families = [], InverseSample(names), dict[str, InverseSample]()
-    for cell, sample in samples:
-        families.setdefault(cell.family, InverseSample(names)).merge(sample)
-        whole.merge(sample)
-    if len(families) > 1:
-        for family, sample in families.items():
-            rows += sample.rows(family, "all", "all", "all")
-    return rows + whole.rows("all", "all", "all", "all")
+    families: dict[str, Trials] = {}
+    for cell, trials in results:
+        families.setdefault(cell.family, []).extend(trials)
+    groups = [*(families.items() if len(families) > 1 else ()), ("all", [one for _, each in results for one in each])]
+    return [row for family, trials in groups for row in lines((family, "all", "all", "all"), trials, names)]
 
 
 def format_name(fmt: FloatFormat) -> str:
     """Return base, precision and rounding in one word, as in "10:4:chop"."""
     return f"{fmt.base}:{fmt.precision}:{fmt.rounding.value}"
-
-
-@dataclass(frozen=True)
-class Frozen:
-    """Stored result of a sweep: its provenance and its rows."""
-
-    provenance: Mapping[str, str]
-    rows: tuple[Mapping[str, str], ...]
-
-    def select(self, **where: str) -> list[Mapping[str, str]]:
-        """Return the rows whose fields have these values."""
-        return [row for row in self.rows if all(row[name] == value for name, value in where.items())]
-
-
-@cache
-def frozen(sweep: str) -> Frozen:
-    """Read the stored result of a sweep, "variants" or "random"."""
-    if sweep not in SWEEPS:
-        raise ValueError(f"got sweep {sweep!r}; needed one of {', '.join(SWEEPS)}")
-    table = stored_sweep(sweep).load()
-    return Frozen(table.provenance, tuple(table.records()))
-
-
-# -- the stored sweeps ----------------------------------------------------------------------------
-
-
-def _computed(cell: InverseCell, directory: Path | None = None, *, names: Sequence[str]) -> dict[str, Any]:
-    """Compute a cell and return the attributes of its sample."""
-    return vars(cell_sample(cell, names))
-
-
-def _restored(result: dict[str, Any], names: Sequence[str]) -> InverseSample:
-    """Return the sample with these attributes."""
-    sample = InverseSample(names)
-    vars(sample).update(result)
-    return sample
-
-
-def _rows(cell: InverseCell, result: dict[str, Any], *, names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return the rows of a cell, one for each bound."""
-    return [tuple(row.values()) for row in cell_rows(cell, _restored(result, names))]
-
-
-def _sums(results: Sequence[tuple[InverseCell, dict[str, Any]]], *, names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Return the rows of all cells together and of each family."""
-    samples = [(cell, _restored(result, names)) for cell, result in results]
-    return [tuple(row.values()) for row in sum_rows(samples, names)]
 
 
 def stored_sweep(name: str) -> Sweep[InverseCell]:
@@ -453,10 +350,10 @@ def stored_sweep(name: str) -> Sweep[InverseCell]:
         columns=COLUMNS,
         key=5,
         cells=cells,
-        compute=partial(_computed, names=names),
-        rows=partial(_rows, names=names),
+        compute=partial(computed, names=names),
+        rows=partial(rows, names=names),
         command=f"python -m gpbnb.report.stored recompute inversion/{name}",
         seed=SEED,
-        summary=partial(_sums, names=names),
+        summary=partial(sums, names=names),
         packages=("numpy", "numba", "python-flint"),
     )

@@ -78,19 +78,15 @@ def actual_text(printed: Statement) -> str:
     )
 
 
-def _claim(word: str) -> example.SectionClaim:
-    (found,) = (claim for claim in _claims() if word in claim.name)
+def _claim(word: str) -> tuple[str, int]:
+    """Return the sentence with a word, and the number of readings for which it holds."""
+    (found,) = ((name, holds) for name, holds in example.claims().items() if word in name)
     return found
 
 
-@cache
-def _claims() -> tuple[example.SectionClaim, ...]:
-    return tuple(example.claims())
-
-
 def claim_text(word: str) -> str:
-    found = _claim(word)
-    return f"{found.name} in {found.holds} of {found.readings} ways of reading the procedure"
+    name, holds = _claim(word)
+    return f"{name} in {holds} of {len(readings('proposed'))} ways of reading the procedure"
 
 
 @cache
@@ -98,7 +94,7 @@ def claims() -> Names:
     """What is true of both columns of Table 1, as printed and in every reading."""
     printed = statement("hung1984.II.s11-4.table-1")
     columns = [[float(number) for number in _numbers(printed, column).values()] for column in ("proposed", "actual")]
-    above, decreases = (_claim(word).holds == _claim(word).readings for word in ("above", "decreases"))
+    above, decreases = (_claim(word)[1] == len(readings("proposed")) for word in ("above", "decreases"))
     above = above and all(bound > 10 * error for bound, error in zip(*columns, strict=True))
     falling = decreases and all(a > b > c for a, b, c in columns)
     mantissas = {number.split("e")[0] for number in _numbers(printed, "proposed").values()}
