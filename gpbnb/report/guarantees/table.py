@@ -277,24 +277,6 @@ def _bits(
     return str(fmt.precision) if fmt else ""
 
 
-def fixed_and_floating_bits() -> tuple[int, int]:
-    """Return the bits with which the output of FixIF's controller meets its target, in fixed and in floating point.
-
-    In fixed point, all states have the same number of bits and the coefficients that FixIF printed bound the output.
-    """
-    given = fixif_longitudinal()
-    target = 2.0**-6
-    case = next(case for case in CASES if case.make is _longitudinal)
-
-    def meets(fmt: FloatFormat) -> bool:
-        return bool(case_guarantee(case, _longitudinal(), fmt).bound[-1] <= target)
-
-    fmt = smallest_precision(meets, 2, Rounding.NEAREST, least=2, largest=LARGEST_PRECISION[2])
-    if fmt is None:
-        raise ArithmeticError(f"got no format whose guarantee is within {target}; needed one of at most 53 bits")
-    return math.ceil(math.log2(sum(given["published_E"]) / target)), fmt.precision
-
-
 # -- the stored table -------------------------------------------------------------------------------------------------
 
 
