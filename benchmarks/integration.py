@@ -25,7 +25,7 @@ def drawn() -> Iterator[Any]:
 
 def with_gpbnb(parts: Iterable[Any]) -> float:
     """The error in the end, from the compiled recursion."""
-    step, state, total = theory.exact_step(PROCESS, 1.0), np.zeros((1, 1)), 0.0
+    step, state, total = theory.exact_step(PROCESS, 1.0), np.zeros(1), 0.0
     for part in parts:
         _, d = experiment.advance(step, state, part)
         total += float(d.sum())

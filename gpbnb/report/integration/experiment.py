@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,42 +26,21 @@ BAR: dict[str, Any] = {"disable": None, "delay": 2, "leave": False}  # progress 
 @compiled
 def _advance(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> None:
     """Move all paths; x[k] and d[k] are the new sample and the error of the trapezoid that ends there."""
-    cycles, paths, size = normal.shape
-    m = size - 1
-    new = np.empty(size)
-    for k in range(cycles):
-        for path in range(paths):
-            for i in range(size):
-                total = 0.0
-                for j in range(m):
-                    total += a[i, j] * state[path, j]
-                for j in range(i + 1):
-                    total += b[i, j] * normal[k, path, j]
-                new[i] = total
-            for i in range(m):
-                state[path, i] = new[i]
-            x[k, path] = new[0]
-            d[k, path] = new[m]
-
-
-@compiled
-def _advance_one(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> None:
-    """Do the same for a first-order input, with identical digits."""
     phi, h, b00, b10, b11 = a[0, 0], a[1, 0], b[0, 0], b[1, 0], b[1, 1]
     cycles, paths, _ = normal.shape
     for k in range(cycles):
         for path in range(paths):
-            old, first = state[path, 0], normal[k, path, 0]
+            old, first = state[path], normal[k, path, 0]
             new = phi * old + b00 * first
             d[k, path] = h * old + b10 * first + b11 * normal[k, path, 1]
             x[k, path] = new
-            state[path, 0] = new
+            state[path] = new
 
 
 def advance(step: Cycle, state: Floats, normal: Floats) -> tuple[Floats, Floats]:
-    """Compute samples and trapezoid errors, cycle by cycle, from standard normal numbers."""
+    """Compute samples and trapezoid errors of a first-order input, cycle by cycle, from standard normal numbers."""
     x, d = np.empty(normal.shape[:2]), np.empty(normal.shape[:2])
-    (_advance_one if state.shape[1] == 1 else _advance)(step.a, step.b, state, normal, x, d)
+    _advance(step.a, step.b, state, normal, x, d)
     return x, d
 
 
@@ -78,99 +56,51 @@ class Chunk(NamedTuple):
 
 
 def chunks(process: Process, f_c: float, cycles: int, rng: np.random.Generator, paths: int = 1) -> Iterator[Chunk]:
-    """Simulate a process and the error of the trapezoidal rule, exact in distribution at the sampling times.
+    """Simulate a first-order input and the error of the trapezoidal rule, exact in distribution at the sampling times.
 
     No step is subdivided: the sample and the integral over a cycle are drawn from their joint distribution, given the
     previous sample. The simulation starts in the steady state. Its memory is bounded for any number of cycles, and its
     numbers do not depend on the size of the chunks.
     """
     step = theory.exact_step(process, f_c)
-    m = len(process.drift)
-    state = process.sigma * rng.standard_normal((paths, m))
-    past = state[np.newaxis, :, 0].copy()
-    length = max(1, CHUNK // (paths * (m + 1)))
+    state = process.sigma * rng.standard_normal((paths, 1))[:, 0]
+    past = state[np.newaxis].copy()
+    length = max(1, CHUNK // (paths * 2))
     for first in range(1, cycles + 1, length):
-        x, d = advance(step, state, rng.standard_normal((min(length, cycles + 1 - first), paths, m + 1)))
+        x, d = advance(step, state, rng.standard_normal((min(length, cycles + 1 - first), paths, 2)))
         x = np.concatenate([past, x])
         past = x[-1:]
         yield Chunk(first, x, d)
 
 
-@dataclass(frozen=True)
-class IntegrationErrors:
-    """Errors of an integrator after `n` cycles: `errors` is (len(n), paths), in the unit of the input times seconds."""
-
-    process: Process
-    f_c: float
-    n: tuple[int, ...]
-    errors: Floats
-
-    @property
-    def variance(self) -> Floats:
-        """Mean square of the errors; their mean is known to be zero."""
-        return np.asarray(np.mean(self.errors**2, axis=1))
-
-    @property
-    def relative_standard_error(self) -> float:
-        r"""Relative standard error of :attr:`variance`, :math:`\sqrt{2/\mathrm{paths}}` for normal errors."""
-        return math.sqrt(2 / self.errors.shape[1])
-
-    def deviations(self, variance: ArrayLike) -> Floats:
-        """Return the deviation of the observed variance from a theoretical one, in standard errors."""
-        expected = np.asarray(variance, dtype=np.float64)
-        return np.asarray((self.variance / expected - 1) / self.relative_standard_error)
-
-
-def simulate(
-    process: Process,
-    f_c: float,
-    n: Sequence[int],
-    rng: np.random.Generator,
-    paths: int = 1,
-) -> IntegrationErrors:
-    """Simulate the error of the trapezoidal rule, and record it after increasing numbers of cycles."""
-    wanted = tuple(int(k) for k in n)
+def simulate(process: Process, f_c: float, n: Sequence[int], rng: np.random.Generator, paths: int = 1) -> Floats:
+    """Return the errors of the trapezoidal rule after increasing numbers of cycles, (len(n), paths)."""
     total, kept = np.zeros(paths), []
-    bar = tqdm(total=wanted[-1], desc="cycles", unit_scale=True, **BAR)
-    for chunk in chunks(process, f_c, wanted[-1], rng, paths):
+    bar = tqdm(total=n[-1], desc="cycles", unit_scale=True, **BAR)
+    for chunk in chunks(process, f_c, n[-1], rng, paths):
         bar.update(len(chunk.d))
-        added = chunk.d
-        last = chunk.first + len(added) - 1
-        cuts = [k for k in wanted if chunk.first <= k <= last]
         begin = 0
-        for k in cuts:
-            end = k - chunk.first + 1
-            total = total + added[begin:end].sum(axis=0)
-            kept.append(total)
-            begin = end
-        total = total + added[begin:].sum(axis=0)
+        for k in n:
+            if chunk.first <= k < chunk.first + len(chunk.d):
+                end = k - chunk.first + 1
+                total = total + chunk.d[begin:end].sum(axis=0)
+                kept.append(total)
+                begin = end
+        total = total + chunk.d[begin:].sum(axis=0)
     bar.close()
-    return IntegrationErrors(process, f_c, wanted, np.array(kept))
+    return np.array(kept)
 
 
-@dataclass(frozen=True)
-class WalkSweep:
-    r"""Simulated random walks at many :math:`\mu`: variance per cycle, divided by :math:`\sigma_x^2T^2`."""
+def deviations(errors: Floats, variance: ArrayLike) -> Floats:
+    r"""Return how far the mean square of errors (k, paths) is from a variance, in standard errors √(2/paths).
 
-    mu: Floats
-    cycles: int
-    paths: int
-    walk: Floats
-
-    @property
-    def standard_error(self) -> float:
-        """Relative standard error of `walk`."""
-        return math.sqrt(2 / self.paths)
-
-    def deviations(self) -> Floats:
-        """Return deviations from the exact variance after the same number of cycles, in standard errors."""
-        exact = np.array([float(theory.error_variance(self.cycles, mu)) for mu in self.mu.tolist()]) / self.cycles
-        return np.asarray((self.walk / exact - 1) / self.standard_error)
+    The errors are normal, and their mean is known to be zero.
+    """
+    observed = np.mean(errors**2, axis=-1)
+    return np.asarray((observed / np.asarray(variance) - 1) / math.sqrt(2 / errors.shape[-1]))
 
 
-def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> WalkSweep:
-    """Simulate the random walk of the trapezoidal rule at many ratios of bandwidth to iteration rate."""
-    values = np.atleast_1d(np.asarray(mu, dtype=np.float64))
-    bar = tqdm(values.tolist(), desc="sweep", **BAR)
-    runs = [simulate(theory.first_order(1.0, one), 1.0, [cycles], rng, paths) for one in bar]
-    return WalkSweep(values, cycles, paths, np.array([run.variance[0] for run in runs]) / cycles)
+def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> Floats:
+    """Simulate the trapezoidal rule at many ratios of bandwidth to iteration rate; return the errors, (k, paths)."""
+    runs = [simulate(theory.first_order(1.0, one), 1.0, [cycles], rng, paths)[0] for one in np.asarray(mu).tolist()]
+    return np.array(runs)

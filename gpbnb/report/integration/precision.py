@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text, rounding_named
 from gpbnb.arithmetic.search import smallest_precision
-from gpbnb.report.integration.arguments import Floats, bandwidth_ratio, positive_array, positive_number
-from gpbnb.report.integration.walk import discretize, error_variance
+from gpbnb.report.integration.theory import Floats, discretize, error_variance, positive
 
 # -- both errors, in t-digit arithmetic ----------------------------------------------------------
 
@@ -60,7 +59,7 @@ def correlation_factor(change: ArrayLike) -> Floats:
     If p changes little from cycle to cycle, so does the error. s is the rms change of p from one cycle to the
     next, in spacings; F is 1.05 at s = 0.5, and close to :math:`1/(30s^2)` for smaller s.
     """
-    s = positive_array("change", change)[..., np.newaxis]
+    s = positive("change", change)[..., np.newaxis]
     k = np.arange(1, 65)
     with np.errstate(over="ignore"):
         return np.asarray(1 + np.sum(6 / (np.pi**2 * k**2 * np.sinh(2 * np.pi**2 * k**2 * s**2)), axis=-1))
@@ -90,8 +89,7 @@ def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt
         raise ValueError(
             f"got rounding {fmt.rounding.value!r}; needed 'nearest' or 'chop', which the formulas describe"
         )
-    sigma_x, mu = positive_number("sigma_x", sigma_x), bandwidth_ratio(omega_bw, f_c)
-    period, n = 1 / f_c, positive_number("duration", duration) * f_c
+    mu, period, n = float(positive("omega_bw", omega_bw) / positive("f_c", f_c)), 1 / f_c, duration * f_c
     if n < 2:
         raise ValueError(f"got a duration of {n:.3g} cycles; needed at least 2")
     discretization = sigma_x * period * math.sqrt(float(error_variance(n, mu)))
@@ -134,10 +132,9 @@ def independent_best_rate(omega_bw: float, duration: float, fmt: FloatFormat) ->
     variances are equal at the best rate, :math:`f_c = (\omega_{bw}^2/4\kappa_1^2t^2)^{1/4}`. The rms of the input does
     not matter.
     """
-    omega_bw, duration = positive_number("omega_bw", omega_bw), positive_number("duration", duration)
     if fmt.rounding is Rounding.CHOP:
         return math.sqrt(omega_bw / (2 * mean_chopping(fmt) * duration))
-    return float((omega_bw**2 / (3 * mean_square_rounding(fmt) * duration)) ** (1 / 3))
+    return float((positive("omega_bw", omega_bw) ** 2 / (3 * mean_square_rounding(fmt) * duration)) ** (1 / 3))
 
 
 def best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
@@ -171,7 +168,7 @@ def needed_precision(
     share: float = 0.1,
 ) -> int:
     """Return the fewest digits for which the rounding error is at most `share` of the discretization error."""
-    share, like = positive_number("share", share), FloatFormat(base, 2, rounding_named(rounding))
+    like = FloatFormat(base, 2, rounding_named(rounding))
 
     def enough(fmt: FloatFormat) -> bool:
         errors = two_errors(1.0, omega_bw, f_c, duration, fmt)
@@ -192,6 +189,5 @@ def stall_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
 
     At this rate and above, additions are lost, the integral stops changing, and :func:`two_errors` no longer holds.
     """
-    omega_bw, duration = positive_number("omega_bw", omega_bw), positive_number("duration", duration)
     spacing = math.sqrt(12 * mean_square_rounding(fmt) * 2 * duration / omega_bw)
     return 2 / spacing
