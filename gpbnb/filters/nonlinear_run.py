@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -10,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.algebra import Algebra
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError, WholeNumberError
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import stays
@@ -18,7 +16,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.array_forms import ROOTS, AnyForm, ArrayForm
-from gpbnb.filters.array_steps import BlockStorage, observed, root_of_factors
+from gpbnb.filters.array_steps import observed, root_of_factors
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.factors import combined_gain, covariance_of_factors, upper_factors
@@ -27,7 +25,7 @@ from gpbnb.filters.kalman_step import BlockAlgebra, corrected_by, measured_in, p
 from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.opening import double_doubles_of
-from gpbnb.filters.recording import FACTORED
+from gpbnb.filters.recording import FACTORED, block_algebra
 from gpbnb.filters.reference import Step, agreed
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, reference_states
@@ -253,16 +251,6 @@ def _fault(error: Exception) -> str:
     if isinstance(error, WholeNumberError):
         return "a whole number that the format does not hold exactly"
     return "an argument outside the domain of a function" if isinstance(error, DomainError) else "a division by zero"
-
-
-def block_algebra(formats: Sequence[Any]) -> BlockAlgebra:
-    """Return how matrices of the formats of state, gain, covariance and innovation covariance are computed."""
-    state, gain, covariance, innovation = map(_algebra, formats)
-    return BlockAlgebra(state, gain, covariance, innovation, BlockStorage(*(fmt.array for fmt in formats)))
-
-
-def _algebra(fmt: Any) -> Algebra:
-    return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), operator.matmul)
 
 
 def check_form(model: NonlinearModel, form: AnyForm, blocks: bool = False) -> None:

@@ -18,6 +18,7 @@ from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
 from gpbnb.arithmetic.interpreting import Constants
 from gpbnb.arithmetic.machine import CODES, NAMES, operands_of, packed_one
+from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
@@ -172,23 +173,30 @@ def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], Line
         given[known.letter] = stored.made(seen)
     P = np.triu(places["P"]) if kind.form in (Form.UD, ArrayForm.CARLSON) else places["P"]
     x, z, carried = (state.made(places[letter]) for letter in ("x", "z", "carried"))
-    algebra = [_algebra(each, formats, kind) for each in (state, gain, covariance, innovation)]
-    blocks = BlockAlgebra(
-        algebra[0],
-        algebra[1],
-        algebra[2],
-        algebra[3],
-        BlockStorage(state.array, gain.array, covariance.array, innovation.array),
-    )
+    fused, order, block, number = kind.sums
+    sums = formats[number] if number >= 0 else None
+    blocks = block_algebra((state, gain, covariance, innovation), fused, order, block, sums)
     step = LinearStep(kind.form, blocks, given, tape.about, kind.compensated)
     return tape, places, step.taken(x, covariance.made(P), carried, z)
 
 
-def _algebra(fmt: TracedFormat, formats: Sequence[TracedFormat], kind: StepKind) -> Algebra:
-    fused, order, block, number = kind.sums
+def block_algebra(
+    formats: Sequence[Any], fused: bool = False, order: Order = "left", block: int = 32, sums: Any = None
+) -> BlockAlgebra:
+    """Return how matrices of the formats of state, gain, covariance and innovation covariance are computed.
+
+    Parameters
+    ----------
+    fused, order, block : how products are added, see :func:`gpbnb.arithmetic.linalg.matmul`.
+    sums : the format that keeps a sum until it is stored; by default that of the block.
+    """
+    state, gain, covariance, innovation = (_algebra(fmt, fused, order, block, sums) for fmt in formats)
+    return BlockAlgebra(state, gain, covariance, innovation, BlockStorage(*(fmt.array for fmt in formats)))
+
+
+def _algebra(fmt: Any, fused: bool, order: Order, block: int, sums: Any) -> Algebra:
     times: Callable[[Any, Any], Any] = partial(linalg.matmul, order=order, fused=fused, block=block)
-    if number >= 0:
-        sums = formats[number]
+    if sums is not None:
 
         def times(a: Any, b: Any) -> Any:
             return fmt.array(linalg.matmul(sums.array(a), sums.array(b), order, fused, block))

@@ -6,21 +6,22 @@ The innovation form subtracts most of a large variance when a sensor is precise.
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from flint import arb, arb_mat, ctx, fmpq
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.algebra import Algebra, Inverse
-from gpbnb.arithmetic.conversion import exact_fraction
+from gpbnb.arithmetic.algebra import inverse_in_order
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import StepModel, corrected, gain, predicted, updated
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.recording import LinearStep, block_algebra
+from gpbnb.filters.repeating import RepeatedStep, StepTaken
 
 BITS = 256
 """Bits of the first run; each further run has twice as many."""
@@ -94,58 +95,53 @@ def _agree(some: list[Step], others: list[Step]) -> bool:
 
 def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> list[Step] | str:
     """Return all steps in some bits, or why there are none: an innovation covariance is singular in them."""
-    found: list[Step] = []
-    with ctx.workprec(bits):
-        cycles = [[_Balls.of(each) for each in cycle] for cycle in (model.Phi, model.H, model.Q, model.R)]
-        x, P = _Balls.of(model.x0[:, None]), _Balls.of(model.P0)
-        for k, measured in enumerate(z):
-            Phi, H, Q, R = (cycle[k % len(cycle)] for cycle in cycles)
-            state, offset = model.known(k)
-            V = predicted(_ALGEBRA, Phi, P, Q)
-            try:
-                K = gain(_ALGEBRA, H, R, V).K
-            except ZeroDivisionError:
-                return SINGULAR
-            P = updated(_ALGEBRA, Form.INNOVATION, StepModel(Phi, H, Q, R), V, K)
-            ahead = Phi @ x + _Balls.of(state[:, None])
-            x = corrected(_ALGEBRA, H, K, ahead, _Balls.of((measured - offset)[:, None]))
-            found.append((_fractions(x.matrix)[:, 0], _fractions(K.matrix), _fractions(P.matrix)))
+    try:
+        found = [taken[:3] for taken in steps_in(FloatFormat(2, bits), model, Form.INNOVATION, z)]
+    except ZeroDivisionError:
+        return SINGULAR
+    x, K, P = ([each.to_fractions() for each in part] for part in zip(*found, strict=True))
+    return list(zip(x, K, P, strict=True))
+
+
+def steps_in(
+    fmt: FloatFormat | FixedFormat, model: LinearModel, form: Form, z: Any
+) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, bool]]:
+    """Take steps in any format, also in one without compiled loops.
+
+    Parameters
+    ----------
+    model : its entries are stored in the format.
+    form : any form except UD.
+    z : (steps, m), measurements.
+
+    Yields
+    ------
+    x, K, P : estimate (n,), gain (n, m) and covariance (n, n) after a step.
+    definite : whether all variances and pivots are positive.
+
+    Raises
+    ------
+    OverflowError, ZeroDivisionError : a step has no result.
+    """
+    given = {letter: each[np.newaxis] if each.ndim == 1 else each for letter, each in model.arrays(fmt).items()}
+    x, P = given.pop("x0")[0], given.pop("P0")
+    if form is Form.HUNG_SECOND_GAIN:
+        given["RI"] = inverses_in(fmt, given["R"])
+
+    def take(formats: Sequence[Any], states: tuple[Any, ...], matrices: Sequence[Any]) -> StepTaken:
+        (x, P, carried), (measured, *rest) = states, matrices
+        step = LinearStep(form, block_algebra([*formats] * 4), dict(zip(given, rest, strict=True)))
+        found = step.taken(x, P, carried, measured)
+        return StepTaken((found.x, found.P, found.carried), found.K, found.definite)
+
+    step = RepeatedStep(take, [fmt], (x, P, x * 0))
+    members = [list(each) for each in given.values()]
+    for k, measured in enumerate(fmt.array(z)):
+        definite = step.take([measured, *(each[k % len(each)] for each in members)])
+        yield step.states[0], step.gain, step.states[1], definite
+
+
+def inverses_in(fmt: FloatFormat | FixedFormat, matrices: FloatArray) -> FloatArray:
+    """Return the inverses of matrices (p, m, m), as the form with the second gain takes them."""
+    found: Any = np.stack([inverse_in_order(each, fmt.eye(len(each))).matrix for each in matrices])
     return found
-
-
-class _Balls:
-    """A matrix of python-flint's numbers; only the midpoint of each result is kept."""
-
-    def __init__(self, matrix: arb_mat) -> None:
-        self.matrix, self.shape = matrix, (matrix.nrows(), matrix.ncols())
-
-    @classmethod
-    def of(cls, entries: NDArray[Any]) -> _Balls:
-        return cls(arb_mat([[arb(fmpq(each.numerator, each.denominator)) for each in row] for row in entries]))
-
-    def __len__(self) -> int:
-        return int(self.shape[0])
-
-    @property
-    def T(self) -> _Balls:
-        return _Balls(self.matrix.transpose())
-
-    def __add__(self, other: _Balls) -> _Balls:
-        return _Balls((self.matrix + other.matrix).mid())
-
-    def __sub__(self, other: _Balls) -> _Balls:
-        return _Balls((self.matrix - other.matrix).mid())
-
-    def __matmul__(self, other: _Balls) -> _Balls:
-        return _Balls((self.matrix * other.matrix).mid())
-
-
-_ALGEBRA = Algebra(
-    lambda n: _Balls(arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])),
-    operator.matmul,
-    lambda a, identity: Inverse(_Balls(a.matrix.inv().mid()), []),
-)
-
-
-def _fractions(matrix: arb_mat) -> NDArray[Any]:
-    return np.array([[exact_fraction(value.mid()) for value in row] for row in matrix.tolist()], dtype=object)

@@ -31,15 +31,7 @@ from gpbnb.filters.kernels.linear import execute
 from gpbnb.filters.program import (
     ADD,
     AT_LEAST,
-    AT_MOST,
-    CHOOSE,
-    CONSTANT,
-    DIVIDE,
-    DIVISOR,
     MULTIPLY,
-    NOT_NEGATIVE,
-    POSITIVE,
-    PRODUCT,
     SUBTRACT,
     Program,
 )
@@ -541,81 +533,3 @@ def _advance_in_python(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -
         state = [values[i] for i in program.outputs.tolist()]
         states[k] = state
     return states, -1, -1
-
-
-# -- filters that divide ----------------------------------------------------------------------------------------------
-
-
-class CheckedRun(NamedTuple):
-    """A run of a filter that computes its covariance.
-
-    Parameters
-    ----------
-    states : (steps done, n), integers in units of the format; fewer steps than inputs if one overflows or has a zero
-        divisor.
-    indefinite : the first step, counted from 1, after which a variance is not positive; None if there is none.
-    """
-
-    states: NDArray[Any]
-    indefinite: int | None
-
-
-def run_checked(program: Program, fmt: FixedFormat, coefficients: NDArray[Any], x: Any, z: NDArray[Any]) -> CheckedRun:
-    """Run a program with any operations in one fixed-point format, on Python's integers of any length.
-
-    Parameters
-    ----------
-    coefficients : (p, c), exact stored coefficients of each step of a cycle.
-    x, z : (n,) and (steps, m), first state and inputs in units of the format.
-    """
-    store, guards = _store(fmt), program.guards or (-1,) * len(program.operations)
-    operations = list(zip(program.operations.tolist(), guards, strict=True))
-    cycle = [[int(each / fmt.unit) for each in row] for row in coefficients]
-    divisors = [value for value, kind in program.checks if kind == DIVISOR]
-    signs = [(value, int(kind == POSITIVE)) for value, kind in program.checks if kind in (POSITIVE, NOT_NEGATIVE)]
-    states, state, indefinite = list[list[int]](), [int(each) for each in x], None
-    for k, row in enumerate(z.tolist()):
-        values = [*state, *map(int, row)]
-        done = _checked_step(operations, cycle[k % len(cycle)], store, fmt.fraction_bits, values)
-        if not done or not all(values[each] for each in divisors):
-            break
-        if indefinite is None and any(values[value] < least for value, least in signs):
-            indefinite = k + 1
-        state = [values[i] for i in program.outputs.tolist()]
-        states.append(state)
-    return CheckedRun(np.array(states, np.int64).reshape(-1, program.n), indefinite)
-
-
-def _checked_step(operations: Any, factors: Any, store: _Store, point: int, values: list[int]) -> bool:
-    """Append the result of each operation to the values; return False at an overflow or a zero divisor."""
-    shifted, kept, mode = _shifted.py_func, _kept_in_python, store.mode
-    for (code, a, b), guard in operations:
-        chosen = guard < 0 or values[guard] != 0
-        if code == CHOOSE:
-            values.append(values[a] if chosen else values[b])
-        elif not chosen:
-            values.append(0)
-        elif code == CONSTANT:
-            values.append(factors[a])
-        elif code in (AT_LEAST, AT_MOST):
-            values.append(max(factors[a], values[b]) if code == AT_LEAST else min(factors[a], values[b]))
-        else:
-            if code in (MULTIPLY, PRODUCT):
-                value = shifted((factors if code == MULTIPLY else values)[a] * values[b], point, mode)
-            elif code == DIVIDE:
-                if not values[b]:
-                    return False
-                value = _quotient(values[a] << max(point, 0), values[b] << max(-point, 0), mode)
-            else:
-                value = values[a] + values[b] if code == ADD else values[a] - values[b]
-            value, bad = kept(value, store)
-            if bad:
-                return False
-            values.append(value)
-    return True
-
-
-def _quotient(a: int, b: int, mode: int) -> int:
-    """Return a / b, rounded: two more bits, the last of which notes any rest, decide as all bits would."""
-    found, rest = divmod(4 * a, b)
-    return int(_shifted.py_func(found | (rest != 0), 2, mode))

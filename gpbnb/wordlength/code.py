@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.algebra import inverse_in_order
 from gpbnb.arithmetic.array import NegativeRootError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -39,11 +38,12 @@ from gpbnb.filters.named import compiled_form
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.program import without_exact
+from gpbnb.filters.reference import inverses_in, steps_in
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem, system_inputs
-from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_checked, run_words
+from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_words
 from gpbnb.wordlength.c_files import Described, Vectors, refuse_others, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeStep, checked_identifier, word_arithmetic
 from gpbnb.wordlength.emulation import longest
@@ -397,7 +397,7 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
         arithmetic,
         model.name,
         f"{chosen} form" + (", whose input holds the measurements, then the known inputs" if p else ""),
-        lambda z: _model_vectors(model, z, fmt, chosen) if in_loops else _long_vectors(model, z, fmt, step),
+        lambda z: _model_vectors(model, z, fmt, chosen) if in_loops else _long_vectors(model, z, fmt, step, chosen),
         lambda steps: simulated_measurements(model, min(steps, model.steps or steps)),
         bound,
     )
@@ -438,8 +438,7 @@ def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[Letters, N
     arrays = model.definite_in(fmt).arrays(fmt)
     given = {letter: arrays[letter].to_fractions() for letter in ("Phi", "H", "Q", "R")}
     if form is Form.HUNG_SECOND_GAIN:
-        identity = fmt.eye(model.m)
-        given["RI"] = np.stack([inverse_in_order(each, identity).matrix.to_fractions() for each in arrays["R"]])
+        given["RI"] = inverses_in(fmt, arrays["R"]).to_fractions()
     return given, np.concatenate([arrays["x0"].to_fractions(), arrays["P0"].to_fractions().ravel()])
 
 
@@ -450,13 +449,16 @@ def _flat(x: NDArray[Any], P: NDArray[Any], form: Form) -> NDArray[Any]:
     return np.concatenate([x[..., 0], np.stack([P[:, i, j] for i, j in kept], axis=-1)], axis=-1)
 
 
-def _long_vectors(model: LinearModel, z: Any, fmt: Any, step: CodeStep) -> Vectors:
+def _long_vectors(model: LinearModel, z: Any, fmt: Any, step: CodeStep, form: Form) -> Vectors:
     model.check_measurements(z, 0)
-    inputs, start = integers_of(z, fmt), integers_of(step.start[None], fmt)[0]
-    run = run_checked(step.program, fmt, step.coefficients, start, inputs)
-    return _ended(
-        inputs.astype(np.int64), start.astype(np.int64), run.states, _statuses(len(run.states), run.indefinite)
-    )
+    start = integers_of(step.start[None], fmt)[0].astype(np.int64)
+    states, indefinite = list[NDArray[Any]](), None
+    with suppress(*STOPS):
+        for x, _, P, definite in steps_in(fmt, model.definite_in(fmt), form, z):
+            states.append(np.concatenate([x.to_fractions(), P.to_fractions().ravel()]))
+            indefinite = len(states) if indefinite is None and not definite else indefinite
+    whole = (np.array(states, dtype=object).reshape(-1, len(start)) / fmt.unit).astype(np.int64)
+    return _ended(integers_of(z, fmt).astype(np.int64), start, whole, _statuses(len(states), indefinite))
 
 
 def _statuses(steps: int, indefinite: int | None) -> NDArray[np.int64]:
