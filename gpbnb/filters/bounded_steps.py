@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.lanes import Lanes, recorded
-from gpbnb.filters.array_forms import ROOTS, AnyForm
-from gpbnb.filters.array_steps import decorrelated
 from gpbnb.filters.contraction import (
     Contraction,
     Repeated,
@@ -22,11 +20,11 @@ from gpbnb.filters.contraction import (
     gain_error_bound,
     state_error_bound,
 )
-from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import StepModel
+from gpbnb.filters.forms import ROOTS, AnyForm, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import Opening, opening
-from gpbnb.filters.recording import FACTORED, recorded_step, step_kind
+from gpbnb.filters.recording import recorded_step, step_kind
+from gpbnb.filters.steps import FACTORED, StepModel, decorrelated
 
 Array = NDArray[np.float64]
 

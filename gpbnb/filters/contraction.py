@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.compiling import borrowing, compiled
-from gpbnb.filters.kalman_step import StepModel
+from gpbnb.filters.steps import StepModel
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from gpbnb.arithmetic.kernels.exact import size_text
-from gpbnb.filters.array_forms import ALIASES, AnyForm, ArrayForm
-from gpbnb.filters.forms import Form, plain_name
+from gpbnb.filters.forms import ALIASES, AnyForm, ArrayForm, Form, plain_name
 
 
 def form_named(form: AnyForm | str) -> AnyForm:

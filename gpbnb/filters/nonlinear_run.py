@@ -15,22 +15,29 @@ from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.rational import exact
-from gpbnb.filters.array_forms import ROOTS, AnyForm, ArrayForm
-from gpbnb.filters.array_steps import observed, root_of_factors
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.factors import combined_gain, covariance_of_factors, upper_factors
-from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import BlockAlgebra, corrected_by, measured_in, predicted_in
+from gpbnb.filters.forms import ROOTS, AnyForm, ArrayForm, Form
 from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.opening import double_doubles_of
-from gpbnb.filters.recording import FACTORED, block_algebra
+from gpbnb.filters.recording import block_algebra
 from gpbnb.filters.reference import Step, agreed
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
-from gpbnb.filters.unscented import UnscentedModel, unscented_step
+from gpbnb.filters.steps import (
+    FACTORED,
+    BlockAlgebra,
+    UnscentedModel,
+    corrected_by,
+    measured_in,
+    observed,
+    predicted_in,
+    root_of_factors,
+    unscented_step,
+)
 
 NONLINEAR_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD, ArrayForm.SYMMETRIZED, *ROOTS)
 """Forms of an extended filter. An unscented one has the innovation form only."""

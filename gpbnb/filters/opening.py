@@ -30,13 +30,12 @@ from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import digit_unit
-from gpbnb.filters.array_forms import ROOTS, AnyForm
 from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
-from gpbnb.filters.factoring import factors_of_each, inverses_of_each, roots_of_each
-from gpbnb.filters.forms import Form
+from gpbnb.filters.factors import factors_of_each, inverses_of_each, roots_of_each
+from gpbnb.filters.forms import ROOTS, AnyForm, Form
 from gpbnb.filters.kernels.records import pairs_as_double_doubles
 from gpbnb.filters.model import INPUTS, LETTERS, LinearModel, remembered, stored_arrays
-from gpbnb.filters.recording import FACTORED
+from gpbnb.filters.steps import FACTORED
 
 #: Entries of a run's status: number of steps done, index of the next checkpoint, first step with a variance or pivot
 #: that is not positive, and step at which a number without a value ended the run.

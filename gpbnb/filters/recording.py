@@ -1,8 +1,8 @@
 """A step of a linear filter as a program, recorded once from the step as it is written for arrays.
 
-:mod:`gpbnb.filters.kalman_step` and :mod:`gpbnb.filters.array_steps` take arrays of any kind, also arrays that record
-their operations, see :mod:`gpbnb.arithmetic.traced`. What does not depend on the measurements, the covariance and the
-gain, stands in a program of its own, which runs once for all records and whose results may repeat.
+:mod:`gpbnb.filters.steps` takes arrays of any kind, also arrays that record their operations, see
+:mod:`gpbnb.arithmetic.traced`. What does not depend on the measurements, the covariance and the gain, stands in a
+program of its own, which runs once for all records and whose results may repeat.
 """
 
 from __future__ import annotations
@@ -21,26 +21,10 @@ from gpbnb.arithmetic.machine import CODES, NAMES, operands_of, packed_one
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
-from gpbnb.filters.array_forms import AnyForm, ArrayForm
-from gpbnb.filters.array_steps import (
-    BlockStorage,
-    observe_carlson,
-    observe_potter,
-    observe_ud,
-    observed,
-    predict_root,
-    predict_ud,
-)
-from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import HUNG_FORMS, BlockAlgebra, corrected, measured_in, predicted_in, unnamed
+from gpbnb.filters.forms import AnyForm, ArrayForm, Form
+from gpbnb.filters.steps import FACTORED, BlockAlgebra, BlockStorage, LinearStep, LinearTaken
 
 _TRUTHS = (CODES["compare"], CODES["combine"])
-FACTORED: dict[AnyForm, tuple[Callable[..., Any], Callable[..., Any]]] = {
-    Form.UD: (predict_ud, observe_ud),
-    ArrayForm.POTTER: (predict_root, observe_potter),
-    ArrayForm.CARLSON: (predict_root, observe_carlson),
-}
-"""How a form with factors or roots predicts them, and updates them by one measurement."""
 
 
 class Known(NamedTuple):
@@ -202,104 +186,6 @@ def _algebra(fmt: Any, fused: bool, order: Order, block: int, sums: Any) -> Alge
             return fmt.array(linalg.matmul(sums.array(a), sums.array(b), order, fused, block))
 
     return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), times, inverse_in_order)
-
-
-class LinearTaken(NamedTuple):
-    """What a step gives; in the forms with factors and roots, column i of K is the gain of measurement i."""
-
-    x: Any
-    carried: Any
-    P: Any
-    K: Any
-    S: Any | None
-    definite: Any
-
-
-class LinearStep:
-    """A step on arrays of any kind, also of those that record their operations.
-
-    Parameters
-    ----------
-    given : matrices and known inputs of the step, by their letters.
-    about : takes the name of each quantity before it is computed.
-    compensated : whether the estimate is updated by compensated summation in a form that usually is not.
-    """
-
-    def __init__(
-        self,
-        form: AnyForm,
-        blocks: BlockAlgebra,
-        given: dict[str, Any],
-        about: Callable[[str], None] = unnamed,
-        compensated: bool = False,
-    ) -> None:
-        self.form, self.blocks, self.given, self.about = form, blocks, given, about
-        self.compensated = compensated or form is ArrayForm.COMPENSATED
-
-    def taken(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
-        """Take a step from an estimate (n,), a covariance, factors or a root (n, n), and what compensation carries."""
-        if "d" in self.given:
-            self.about("the measurement without its offset")
-            z = z - self.given["d"]
-        if self.form in FACTORED:
-            return self._factored(x, P, carried, z)
-        return self._covariance(x, P, carried, z)
-
-    def _covariance(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
-        blocks, given, form, about = self.blocks, self.given, self.form, self.about
-        stored = blocks.stored
-        about("the predicted covariance")
-        V = predicted_in(blocks, given["Phi"], P, given["Q"])
-        K, P, S, definite = measured_in(blocks, form, given["H"], given["R"], V, about)
-        H = given["H"]
-        if form is Form.HUNG_SECOND_GAIN:
-            about("the gain")
-            of_gain = blocks.gain.times(stored.gain(P), stored.gain(H).T)
-            K = blocks.gain.times(of_gain, stored.gain(given["RI"]))
-        own = stored.state(K)
-        about("the estimate")
-        if form in HUNG_FORMS and not self.compensated:
-            W = blocks.covariance.identity(len(P)) - blocks.covariance.times(stored.covariance(K), stored.covariance(H))
-            loop = blocks.state.times(stored.state(W), stored.state(given["Phi"]))
-            x = (blocks.state.times(loop, x[:, None]) + blocks.state.times(own, z[:, None]))[:, 0]
-        elif self.compensated:
-            x, carried = self._compensated(x, carried, own, z)
-        else:
-            x = corrected(blocks.state, stored.state(H), own, self._ahead(x)[:, None], z[:, None])[:, 0]
-        return LinearTaken(x, carried, P, K, S, definite)
-
-    def _ahead(self, x: Any) -> Any:
-        return self._with_inputs(self._times(self.blocks.stored.state(self.given["Phi"]), x))
-
-    def _times(self, a: Any, x: Any) -> Any:
-        return self.blocks.state.times(a, x[:, None])[:, 0]
-
-    def _with_inputs(self, x: Any) -> Any:
-        if "B" in self.given:
-            x = x + self._times(self.given["B"], self.given["u"])
-        return x + self.given["b"] if "b" in self.given else x
-
-    def _compensated(self, x: Any, carried: Any, K: Any, z: Any) -> tuple[Any, Any]:
-        change = self._with_inputs(self._times(self.given["increment"], x))
-        change = change + self._times(K, z - self._times(self.given["H"], x + change))
-        change = change - carried
-        after = x + change
-        return after, (after - x) - change
-
-    def _factored(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
-        stored, given, about = self.blocks.stored, self.given, self.about
-        predict, observe = FACTORED[self.form]
-        about("the predicted covariance")
-        P, definite = predict(
-            stored.covariance(given["Phi"]), P, stored.covariance(given["UQ"]), self.blocks.covariance.times
-        )
-        about("the update of factors and estimate")
-        ahead = self._ahead(x)
-        if self.form is Form.UD:
-            observe = partial(observe, stored=stored)
-        found = observed(observe, given["H"], given["UR"], z, ahead, P, stored)
-        K: Any = np.stack(found.gains, axis=1)
-        return LinearTaken(found.x, carried, found.P, K, None, definite & found.definite)
 
 
 def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], found: LinearTaken) -> RecordedStep:

@@ -20,8 +20,9 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.recording import LinearStep, block_algebra
+from gpbnb.filters.recording import block_algebra
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
+from gpbnb.filters.steps import LinearStep
 
 BITS = 256
 """Bits of the first run; each further run has twice as many."""

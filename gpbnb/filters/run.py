@@ -16,14 +16,12 @@ from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
 from gpbnb.arithmetic.machine import OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Limits, Order, Rounding
-from gpbnb.filters.array_forms import ROOTS, AnyForm, ArrayForm
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import DECAYED, Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
-from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import HUNG_FORMS
+from gpbnb.filters.forms import ROOTS, AnyForm, ArrayForm, Form
 from gpbnb.filters.kernels.records import pairs_as_floats
 from gpbnb.filters.kernels.widened import widen
 from gpbnb.filters.model import INPUTS, LinearModel, identity_in
@@ -38,9 +36,10 @@ from gpbnb.filters.opening import (
     opening,
     widened_array,
 )
-from gpbnb.filters.recording import FACTORED, recorded_step, step_kind
+from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
 from gpbnb.filters.stepping import Stepper, Stop
+from gpbnb.filters.steps import FACTORED, HUNG_FORMS
 
 LEAST_SHARE = 2.0**-60
 """Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""

@@ -39,13 +39,21 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import digit_unit
-from gpbnb.filters.array_forms import AnyForm, ArrayForm
-from gpbnb.filters.array_steps import observe_carlson, observed, predict_root, root_of_factors
 from gpbnb.filters.factors import upper_factors
-from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import StepModel, corrected, gain, predicted, updated
+from gpbnb.filters.forms import AnyForm, ArrayForm, Form
 from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import form_named
+from gpbnb.filters.steps import (
+    StepModel,
+    corrected,
+    gain,
+    observe_carlson,
+    observed,
+    predict_root,
+    predicted,
+    root_of_factors,
+    updated,
+)
 
 SMOOTHER_FORMS = (Form.INNOVATION, Form.JOSEPH, ArrayForm.CARLSON)
 """Forms of the filter that a smoother has; the last one computes square roots, forwards and backwards."""

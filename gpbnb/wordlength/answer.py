@@ -12,8 +12,8 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text, rounding_text
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.forms import AnyForm
 from gpbnb.filters.words import WordFormats
 
 Basis = Literal["emulation", "bound", "guarantee", "probable"]

@@ -10,8 +10,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.gains import check_deterministic
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.filters.array_forms import AnyForm
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.wordlength.answer import (

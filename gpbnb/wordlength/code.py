@@ -28,10 +28,8 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.system import output_errors
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.files import replace_file
-from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.design import FilterDesign
-from gpbnb.filters.forms import CONSTANT_GAIN, Form, plain_name
-from gpbnb.filters.kalman_step import HUNG_FORMS
+from gpbnb.filters.forms import CONSTANT_GAIN, AnyForm, Form, plain_name
 from gpbnb.filters.listing import kalman_program
 from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.named import compiled_form
@@ -42,6 +40,7 @@ from gpbnb.filters.reference import inverses_in, steps_in
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_measurements
+from gpbnb.filters.steps import HUNG_FORMS
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_words
 from gpbnb.wordlength.c_files import Described, Vectors, refuse_others, written_files

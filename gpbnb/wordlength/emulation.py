@@ -16,9 +16,8 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_named
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import NonlinearModel

@@ -19,8 +19,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_named, format_text
 from gpbnb.arithmetic.search import Outcome, least_from_which_on
-from gpbnb.filters.array_forms import AnyForm
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named, whole_number
 from gpbnb.filters.nonlinear import NonlinearModel

@@ -16,9 +16,8 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named, whole_number
 from gpbnb.filters.poles import stored_response

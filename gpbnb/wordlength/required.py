@@ -18,9 +18,8 @@ from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text, roundin
 from gpbnb.arithmetic.search import CHECKED, Search, largest_by_default, largest_compiled
 from gpbnb.bounds.guarantee import check_within
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form, form_named, whole_number
 from gpbnb.filters.nonlinear import NonlinearModel

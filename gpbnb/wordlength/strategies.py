@@ -21,8 +21,7 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.probable import probable_error, probable_output_errors
 from gpbnb.bounds.system import guessed_errors, output_errors
 from gpbnb.bounds.words import WordGuarantee
-from gpbnb.filters.array_forms import AnyForm, ArrayForm
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import AnyForm, ArrayForm, Form
 from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel

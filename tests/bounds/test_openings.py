@@ -12,8 +12,7 @@ from gpbnb import FixedFormat, FloatFormat, LinearModel, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.gains import schedule
 from gpbnb.bounds.guarantee import guarantee, limits
-from gpbnb.filters.array_forms import ArrayForm
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import ArrayForm, Form
 from gpbnb.filters.run import Run
 from gpbnb.report.wordlengths.study import companion_run
 

@@ -9,7 +9,7 @@ import pytest
 
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters import contraction
-from gpbnb.filters.kalman_step import StepModel
+from gpbnb.filters.steps import StepModel
 from gpbnb.report.kalman import exact_step
 
 UNIT = 2.0**-102

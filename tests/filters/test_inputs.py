@@ -10,9 +10,8 @@ from small_filter import exact_steps
 from gpbnb import BINARY64, FloatFormat, LinearModel, Rounding, required_precision
 from gpbnb.bounds.gains import schedule
 from gpbnb.bounds.guarantee import guarantee, limits
-from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.emulation import compare_runs, emulate
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import ArrayForm, Form
 from gpbnb.filters.run import Run, Sums, reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gpbnb.filters.array_forms import ArrayForm
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import ArrayForm, Form
 from gpbnb.filters.named import form_named
 
 NAMES = {

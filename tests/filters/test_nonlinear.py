@@ -15,7 +15,7 @@ from gpbnb import (
     NonlinearModel,
     required_precision,
 )
-from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.forms import ArrayForm
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, opened, simulated, true_states
 from gpbnb.wordlength.records import survey_records
 from tests.plain_nonlinear import (

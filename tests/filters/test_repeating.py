@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpbnb import BINARY32, FixedFormat, FloatFormat, Form, NonlinearModel
-from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.forms import ArrayForm
 from gpbnb.filters.nonlinear_run import NonlinearRun
 from gpbnb.filters.repeating import RepeatedStep
 from gpbnb.wordlength.nonlinear_examples import tracked_motion, tracked_sight

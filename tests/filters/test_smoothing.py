@@ -14,9 +14,9 @@ from gpbnb import FixedFormat, FixedIntervalSmoother, FloatFormat, LinearModel, 
 from gpbnb.arithmetic.algebra import EXACT
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import StepModel
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.smoothing import smooth_covariances
+from gpbnb.filters.steps import StepModel
 
 FORMS = ("innovation", "Joseph", "square root")
 

@@ -15,10 +15,9 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters import bounded_steps
-from gpbnb.filters.array_forms import ArrayForm
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.factors import covariance_of_factors
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import ArrayForm, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import simulated_measurements

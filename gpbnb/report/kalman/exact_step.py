@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.algebra import EXACT, product_in_order
 from gpbnb.arithmetic.rational import exact
-from gpbnb.filters.kalman_step import gain, predicted, reduction
+from gpbnb.filters.steps import gain, predicted, reduction
 
 
 class ExactStep(NamedTuple):

@@ -16,7 +16,7 @@ from gpbnb.arithmetic.algebra import rounded_algebra
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, max_norm
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import StepModel, kalman_step
+from gpbnb.filters.steps import BlockAlgebra, LinearStep
 from gpbnb.report.kalman import exact_step, report_bounds
 
 
@@ -82,9 +82,14 @@ def rounded_step(
     """
     Phi, H, Q, R, x, P, z = case
     algebra = rounded_algebra(exact, np.vectorize(fmt.round, otypes=[object]))
-    form = Form.HUNG_SECOND_GAIN if second else Form.HUNG
-    x, K, P = kalman_step(algebra, form, StepModel(Phi, H, Q, R), x[:, None], P, z[:, None])
-    return x[:, 0], K, P
+    given = {"Phi": Phi, "H": H, "Q": Q, "R": R}
+    if second:
+        given["RI"] = algebra.invert(R, algebra.identity(len(R))).matrix
+    step = LinearStep(
+        Form.HUNG_SECOND_GAIN if second else Form.HUNG, BlockAlgebra(algebra, algebra, algebra, algebra), given
+    )
+    x, _, P, K, *_ = step.taken(x, P, x * 0, z)
+    return x, K, P
 
 
 def ratios(fmt: FloatFormat, case: FilterCase, second: bool = False, steps: int = 1) -> Ratios:

@@ -20,7 +20,7 @@ from gpbnb.arithmetic.algebra import EXACT, Algebra, rounded_algebra
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, inverse_of, row_sum_norm
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kalman_step import StepModel, gain, predicted, reduction, second_gain, updated
+from gpbnb.filters.steps import StepModel, gain, predicted, reduction, second_gain, updated
 from gpbnb.report.kalman import report_bounds, smallest
 from gpbnb.report.kalman.smallest import FilterCase
 from gpbnb.report.ledger.first_order import FirstOrder

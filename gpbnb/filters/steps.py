@@ -1,0 +1,642 @@
+r"""One step of a filter in every form, over numbers of any kind, also over numbers that record their operations.
+
+With covariances, the order of operations is that of hung1984: predicted covariance (100), gain (99), covariance (101),
+then the estimate by the innovation (98) or by the closed loop (109)-(111). Forms with factors or square roots take one
+measurement after the other; roots need ``sqrt``. Only :func:`predicted` to :func:`corrected` take states and
+measurements as columns.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gpbnb.arithmetic.algebra import Algebra, Matrix, as_computed
+from gpbnb.filters.forms import AnyForm, ArrayForm, Form
+
+
+class BlockStorage(NamedTuple):
+    """How each block of a filter takes numbers from the model or from another block; by default as they are."""
+
+    state: Callable[[Matrix], Matrix] = as_computed
+    gain: Callable[[Matrix], Matrix] = as_computed
+    covariance: Callable[[Matrix], Matrix] = as_computed
+    innovation: Callable[[Matrix], Matrix] = as_computed
+
+
+ONE_FORMAT = BlockStorage()
+"""All blocks compute with the same numbers."""
+
+
+# -- with covariances --------------------------------------------------------------------------------------------------
+
+
+HUNG_FORMS = (Form.HUNG, Form.HUNG_SECOND_GAIN)
+"""Forms that compute the estimate by the closed loop."""
+
+
+class StepModel(NamedTuple):
+    """The matrices of one step: Phi (n, n), H (m, n), Q (n, n), R (m, m)."""
+
+    Phi: Matrix
+    H: Matrix
+    Q: Matrix
+    R: Matrix
+
+
+def unnamed(quantity: str) -> None:
+    """Take no note of the quantity that is computed next."""
+
+
+class Innovation(NamedTuple):
+    """:math:`VH^T` (n, m), the innovation covariance (m, m), its inverse, and the pivots of its elimination."""
+
+    VH: Matrix
+    covariance: Matrix
+    inverse: Matrix
+    pivots: list[Any]
+
+
+class Gain(NamedTuple):
+    """A gain (n, m), the innovation covariance (m, m) and the pivots of its elimination."""
+
+    K: Matrix
+    innovation_covariance: Matrix
+    pivots: list[Any]
+
+
+def predicted(algebra: Algebra, Phi: Matrix, P: Matrix, Q: Matrix) -> Matrix:
+    r"""Return :math:`(\Phi P)\Phi^T + Q`; (100)."""
+    times = algebra.times
+    return algebra.rounded(times(times(Phi, P), Phi.T) + Q)
+
+
+def innovation(algebra: Algebra, H: Matrix, R: Matrix, V: Matrix, about: Callable[[str], None] = unnamed) -> Innovation:
+    """Return :math:`VH^T`, the innovation covariance :math:`H(VH^T) + R` and its inverse."""
+    times = algebra.times
+    VH = times(V, H.T)
+    S = algebra.rounded(times(H, VH) + R)
+    about("its inverse")
+    return Innovation(VH, S, *algebra.invert(S, algebra.identity(len(S))))
+
+
+def gain(algebra: Algebra, H: Matrix, R: Matrix, V: Matrix) -> Gain:
+    """Return :math:`(VH^T)(H(VH^T) + R)^{-1}` for the predicted covariance V; the first form of (99)."""
+    found = innovation(algebra, H, R, V)
+    return Gain(algebra.times(found.VH, found.inverse), found.covariance, found.pivots)
+
+
+def second_gain(algebra: Algebra, H: Matrix, R: Matrix, P: Matrix) -> Matrix:
+    """Return :math:`(PH^T)R^{-1}` for the new covariance P; the second form of (99)."""
+    return algebra.times(algebra.times(P, H.T), algebra.invert(R, algebra.identity(len(R))).matrix)
+
+
+def reduction(algebra: Algebra, K: Matrix, H: Matrix) -> Matrix:
+    """Return :math:`I - KH`."""
+    return algebra.rounded(algebra.identity(H.shape[1]) - algebra.times(K, H))
+
+
+def updated(algebra: Algebra, form: AnyForm, model: StepModel, V: Matrix, K: Matrix) -> Matrix:
+    r"""Return :math:`(I - KH)V`, (101), or in Joseph's form :math:`((I - KH)V)(I - KH)^T + (KR)K^T`."""
+    times, W = algebra.times, reduction(algebra, K, model.H)
+    P = times(W, V)
+    if form is not Form.JOSEPH:
+        return P
+    return algebra.rounded(times(P, W.T) + times(times(K, model.R), K.T))
+
+
+class BlockAlgebra(NamedTuple):
+    """How each block of a filter computes, and how it takes numbers from the model or from another block."""
+
+    state: Algebra
+    gain: Algebra
+    covariance: Algebra
+    innovation: Algebra
+    stored: BlockStorage = ONE_FORMAT
+
+
+class Measured(NamedTuple):
+    """A gain (n, m), the covariance (n, n) after a measurement, the innovation covariance, and whether all is definite.
+
+    That is so if all variances, and all pivots of the innovation covariance, are positive.
+    """
+
+    K: Matrix
+    P: Matrix
+    S: Matrix
+    definite: Any
+
+
+def predicted_in(blocks: BlockAlgebra, Phi: Matrix, P: Matrix, Q: Matrix) -> Matrix:
+    """Return the predicted covariance, computed in the covariance block."""
+    taken = blocks.stored.covariance
+    return predicted(blocks.covariance, taken(Phi), P, taken(Q))
+
+
+def measured_in(
+    blocks: BlockAlgebra,
+    form: AnyForm,
+    H: Matrix,
+    R: Matrix,
+    V: Matrix,
+    about: Callable[[str], None] = unnamed,
+) -> Measured:
+    """Return the gain, and the covariance after a measurement, each computed in its own block.
+
+    Parameters
+    ----------
+    about : takes the name of each quantity before it is computed.
+    """
+    stored = blocks.stored
+    about("the innovation covariance")
+    own_H, own_R, own_V = map(stored.innovation, (H, R, V))
+    found = innovation(blocks.innovation, own_H, own_R, own_V, about)
+    about("the gain")
+    K = blocks.gain.times(stored.gain(found.inverse).T, stored.gain(found.VH).T).T
+    about("the covariance")
+    own = StepModel(None, stored.covariance(H), None, stored.covariance(R))
+    P = updated(blocks.covariance, form, own, V, stored.covariance(K))
+    if form is ArrayForm.SYMMETRIZED:
+        P = (P + P.T) / 2
+    definite = np.all(np.diagonal(P) > 0)
+    for pivot in found.pivots:
+        definite = definite & np.all(pivot > 0)
+    return Measured(K, P, found.covariance, definite)
+
+
+def corrected(algebra: Algebra, H: Matrix, K: Matrix, ahead: Matrix, z: Matrix) -> Matrix:
+    """Return :math:`x_p + K(z - Hx_p)` for the predicted estimate; (98)."""
+    return corrected_by(algebra, K, ahead, algebra.rounded(z - algebra.times(H, ahead)))
+
+
+def corrected_by(algebra: Algebra, K: Matrix, ahead: Matrix, difference: Matrix) -> Matrix:
+    """Return :math:`x_p + Ky` for the predicted estimate and an innovation y, as a nonlinear filter has it."""
+    return algebra.rounded(ahead + algebra.times(K, difference))
+
+
+# -- with factors and roots --------------------------------------------------------------------------------------------
+
+
+Times = Callable[[Matrix, Matrix], Matrix]
+"""A product of matrices."""
+
+
+def predict_ud(Phi: Matrix, U: Matrix, UQ: Matrix, times: Times = operator.matmul) -> tuple[Matrix, Any]:
+    """Predict UD factors by Thornton's modified weighted Gram-Schmidt; the diagonals hold D, which may have zeros.
+
+    Also return whether no entry of D is negative, and the variance of each state positive.
+    """
+    n = len(U)
+    W = np.concatenate([times(Phi, _unit(U)), _unit(UQ)], axis=1)
+    D = np.concatenate([np.diagonal(U), np.diagonal(UQ)])
+    found: list[list[Matrix]] = _entries(U * 0)
+    definite: Any = True
+    for j in range(n - 1, -1, -1):
+        c = D * W[j]
+        d = (W[j] * c).sum()
+        found[j][j] = d
+        definite = definite & np.logical_not(d < 0)
+        if j:
+            s = if_nonzero(d, _share(W[:j], c, d), U[:j, j] * 0)
+            W = np.concatenate([W[:j] - s[:, None] * W[j], W[j:]])
+            for i in range(j):
+                found[i][j] = s[i]
+    for i in range(n):
+        definite = definite & (_one_of_variance(found, i) > 0)
+    return _matrix(found), definite
+
+
+def _one_of_variance(factors: list[list[Matrix]], i: int) -> Any:
+    """Return an entry of D that adds to the variance of state i, or zero if none does."""
+    found = factors[i][i]
+    for u, d in ((factors[i][j], factors[j][j]) for j in range(i + 1, len(factors))):
+        found = _chosen(found, found, _chosen(u, d, found))
+    return found
+
+
+def _chosen(x: Any, a: Any, b: Any) -> Any:
+    return if_nonzero(x, lambda: [a], [b])[0]
+
+
+def _share(W: Matrix, c: Matrix, d: Matrix) -> Callable[[], Matrix]:
+    return lambda: (W * c).sum(1) / d
+
+
+def if_nonzero(x: Any, changed: Callable[[], Any], unchanged: Any) -> Any:
+    """Return changed numbers if x is not zero, else the unchanged ones.
+
+    A number that records its operations, see :mod:`gpbnb.arithmetic.traced`, records both.
+    """
+    if hasattr(type(x), "if_nonzero"):  # arrays would look for names that are spelled alike
+        return x.if_nonzero(changed, unchanged)
+    return changed() if x != 0 else unchanged
+
+
+def check_nonzero(a: Any) -> None:
+    """Refuse a variance of the innovation that is zero; a number that records its operations records the check."""
+    if hasattr(type(a), "check_nonzero"):
+        a.check_nonzero()
+    elif a == 0:
+        raise ZeroDivisionError("a zero pivot in the innovation covariance")
+
+
+def observe_ud(
+    h: Matrix, z: Matrix, r: Matrix, x: Matrix, U: Matrix, stored: BlockStorage = ONE_FORMAT
+) -> tuple[Matrix, Matrix, Matrix, bool]:
+    """Update UD factors by Bierman's method, for one measurement z of h'x with variance r.
+
+    Parameters
+    ----------
+    h (n,), r : in the innovation block. z, x (n,) : in the state block. U (n, n) : in the covariance block.
+    stored : how a block takes numbers from another one.
+
+    Returns
+    -------
+    x, U, gain : values after the update.
+    definite : whether variances stay positive.
+    """
+    n = len(x)
+    y, c = z, stored.state(h)
+    for j in range(n):
+        y = y - c[j] * x[j]
+    seen = stored.innovation(U)
+    f = _unit(seen).T @ h
+    g = np.diagonal(seen) * f
+    taken, moved = stored.gain(g), stored.covariance(f)
+    factors, gain = _entries(U), [stored.gain(h[0] * 0) for _ in range(n)]
+    a, observed, definite = r, h[0] * 0, True
+    for j in range(n):
+        before, a = a, a + f[j] * g[j]
+        check_nonzero(a)
+        definite = definite & (a > 0)
+        column = [factors[k][j] for k in range(j + 1)]
+        known = [stored.covariance(each) for each in gain[:j]]
+        change = _updated(column, known, moved[j], stored.covariance(before), stored.covariance(a), observed)
+        updated, observed = if_nonzero(g[j], change, column), _chosen(g[j], g[j], observed)
+        for k in range(j):
+            gain[k] = gain[k] + taken[j] * stored.gain(column[k])
+        for k in range(j + 1):
+            factors[k][j] = updated[k]
+        definite = definite & np.logical_not(factors[j][j] < 0)
+        gain[j] = taken[j]
+    K = _stacked(gain) / stored.gain(a)
+    return x + stored.state(K) * y, _matrix(factors), K, definite
+
+
+def _updated(
+    column: list[Matrix], gain: list[Matrix], f: Matrix, before: Matrix, a: Matrix, observed: Any
+) -> Callable[[], Any]:
+    """Return a function that updates a column of U, whose last entry is a variance.
+
+    Entries above it change only if `observed`, an entry of an earlier column, is not zero; otherwise the gain is zero.
+    """
+
+    def moved() -> list[Matrix]:
+        factor = -(f / before)
+        return [u + factor * c for u, c in zip(column, gain, strict=False)]
+
+    return lambda: [*if_nonzero(observed, moved, column[:-1]), column[-1] * before / a]
+
+
+def predict_root(Phi: Matrix, S: Matrix, SQ: Matrix, times: Times = operator.matmul) -> tuple[Matrix, Any]:
+    """Return the upper triangular root of the predicted covariance, by modified Gram-Schmidt on (Phi S, SQ)."""
+    n = len(S)
+    W = np.concatenate([times(Phi, S), SQ], axis=1)
+    found = _entries(S * 0)
+    for j in range(n - 1, -1, -1):
+        size = (W[j] * W[j]).sum().sqrt()
+        found[j][j] = size
+        if j:
+            s, above = if_nonzero(size, partial(_projected, W, j, size), [W[:j, 0] * 0, W[:j]])
+            W = np.concatenate([above, W[j:]])
+            for i in range(j):
+                found[i][j] = s[i]
+    root = _matrix(found)
+    return root, np.all(np.any(root != 0, axis=1))
+
+
+def _projected(W: Matrix, j: int, size: Matrix) -> list[Matrix]:
+    """Return the shares of the first rows in the direction of row j, and these rows without them."""
+    direction = W[j] / size
+    s = (W[:j] * direction).sum(1)
+    return [s, W[:j] - s[:, None] * direction]
+
+
+def observe_potter(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tuple[Matrix, Matrix, Matrix, bool]:
+    r"""Update a square root by Potter's method, for one measurement; see :func:`observe_ud`.
+
+    .. math:: f = S^Th, \quad a = f^Tf + r, \quad K = Sf/a, \quad S^+ = S - \frac{(Sf) f^T}{a + \sqrt{ra}}
+    """
+    f = S.T @ h
+    a = (f * f).sum() + r
+    Sf = S @ f
+    K = Sf / a
+    S = S - (Sf / (a + (r * a).sqrt()))[:, None] * f
+    return x + K * (z - h @ x), S, K, a > 0
+
+
+def observe_carlson(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tuple[Matrix, Matrix, Matrix, bool]:
+    r"""Update an upper triangular root by Carlson's method, for one measurement; see :func:`observe_ud`.
+
+    With :math:`f = S^Th` and :math:`a_j = a_{j-1} + f_j^2`, :math:`a_0 = r`, column j becomes
+    :math:`\sqrt{a_{j-1}/a_j}\,S_j - f_j\,k_{j-1}/\sqrt{a_{j-1}a_j}`, and :math:`k_j = k_{j-1} + f_jS_j`; K is
+    :math:`k_n/a_n`.
+    """
+    n = len(x)
+    f = S.T @ h
+    a, k = r, x * 0
+    columns: list[Matrix] = []
+    for j in range(n):
+        a, column, k = if_nonzero(f[j], partial(_carlson, a, f[j], S[:, j], k), [a, S[:, j], k])
+        columns.append(column)
+    K = k / a
+    return x + K * (z - h @ x), _stacked(columns).T, K, a > 0
+
+
+def _carlson(before: Matrix, f: Matrix, column: Matrix, k: Matrix) -> list[Matrix]:
+    a = before + f * f
+    return [a, (before / a).sqrt() * column - f / (before * a).sqrt() * k, k + f * column]
+
+
+def decorrelated(UR: Matrix, a: Matrix) -> Matrix:
+    """Return the inverse of the unit upper triangle of R = U D U' times a, by back substitution."""
+    m = len(UR)
+    rows = [a[i] for i in range(m)]
+    for i in range(m - 1, -1, -1):
+        for k in range(i + 1, m):
+            rows[i] = rows[i] - UR[i, k] * rows[k]
+    return _stacked(rows)
+
+
+class FactoredStep(NamedTuple):
+    """The estimate (n,), the factors or root (n, n), the gains (n,) one by one, and whether variances stay positive."""
+
+    x: Matrix
+    P: Matrix
+    gains: list[Matrix]
+    definite: bool
+
+
+Observe = Callable[[Matrix, Matrix, Matrix, Matrix, Matrix], tuple[Matrix, Matrix, Matrix, bool]]
+"""An update by one measurement, such as :func:`observe_ud`."""
+
+
+def observed(
+    observe: Observe,
+    H: Matrix,
+    UR: Matrix,
+    z: Sequence[Any] | Matrix,
+    ahead: Matrix,
+    P: Matrix,
+    stored: BlockStorage = ONE_FORMAT,
+) -> FactoredStep:
+    """Update a predicted estimate and its factors or root by measurements, decorrelated and one by one.
+
+    Parameters
+    ----------
+    H (m, n), UR (m, m) : measurement matrix, and factors of R. z (m,), ahead (n,), P (n, n) : measurements, predicted
+        estimate, and its factors or root.
+    stored : how a block takes numbers from the model.
+    """
+    UR, of_state = stored.innovation(UR), stored.state(UR)
+    rows, values, gains, x, definite = (
+        decorrelated(UR, stored.innovation(H)),
+        decorrelated(of_state, z),
+        [],
+        ahead,
+        True,
+    )
+    for i in range(len(UR)):
+        x, P, K, positive = observe(rows[i], values[i], UR[i, i], x, P)
+        gains.append(K)
+        definite = definite & positive
+    return FactoredStep(x, P, gains, definite)
+
+
+def root_of_factors(U: Matrix) -> Matrix:
+    r"""Return :math:`U\sqrt{D}` for the factors of U D U'."""
+    return _unit(U) * np.sqrt(np.diagonal(U))
+
+
+def _unit(U: Matrix) -> Any:
+    """Return the upper triangle with ones on its diagonal."""
+    return np.where(np.eye(len(U), dtype=bool), 1, U)
+
+
+def _entries(a: Matrix) -> list[list[Matrix]]:
+    return [[a[i, j] for j in range(a.shape[1])] for i in range(a.shape[0])]
+
+
+def _matrix(entries: list[list[Matrix]]) -> Matrix:
+    return _stacked([_stacked(row) for row in entries])
+
+
+def _stacked(parts: list[Matrix]) -> Any:
+    return np.stack(parts)
+
+
+FACTORED: dict[AnyForm, tuple[Callable[..., Any], Callable[..., Any]]] = {
+    Form.UD: (predict_ud, observe_ud),
+    ArrayForm.POTTER: (predict_root, observe_potter),
+    ArrayForm.CARLSON: (predict_root, observe_carlson),
+}
+"""How a form with factors or roots predicts them, and updates them by one measurement."""
+
+
+# -- whole steps -------------------------------------------------------------------------------------------------------
+
+
+class LinearTaken(NamedTuple):
+    """What a step gives; in the forms with factors and roots, column i of K is the gain of measurement i."""
+
+    x: Any
+    carried: Any
+    P: Any
+    K: Any
+    S: Any | None
+    definite: Any
+
+
+class LinearStep:
+    """A step on arrays of any kind, also of those that record their operations.
+
+    Parameters
+    ----------
+    given : matrices and known inputs of the step, by their letters.
+    about : takes the name of each quantity before it is computed.
+    compensated : whether the estimate is updated by compensated summation in a form that usually is not.
+    """
+
+    def __init__(
+        self,
+        form: AnyForm,
+        blocks: BlockAlgebra,
+        given: dict[str, Any],
+        about: Callable[[str], None] = unnamed,
+        compensated: bool = False,
+    ) -> None:
+        self.form, self.blocks, self.given, self.about = form, blocks, given, about
+        self.compensated = compensated or form is ArrayForm.COMPENSATED
+
+    def taken(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
+        """Take a step from an estimate (n,), a covariance, factors or a root (n, n), and what compensation carries."""
+        if "d" in self.given:
+            self.about("the measurement without its offset")
+            z = z - self.given["d"]
+        if self.form in FACTORED:
+            return self._factored(x, P, carried, z)
+        return self._covariance(x, P, carried, z)
+
+    def _covariance(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
+        blocks, given, form, about = self.blocks, self.given, self.form, self.about
+        stored = blocks.stored
+        about("the predicted covariance")
+        V = predicted_in(blocks, given["Phi"], P, given["Q"])
+        K, P, S, definite = measured_in(blocks, form, given["H"], given["R"], V, about)
+        H = given["H"]
+        if form is Form.HUNG_SECOND_GAIN:
+            about("the gain")
+            of_gain = blocks.gain.times(stored.gain(P), stored.gain(H).T)
+            K = blocks.gain.times(of_gain, stored.gain(given["RI"]))
+        own = stored.state(K)
+        about("the estimate")
+        if form in HUNG_FORMS and not self.compensated:
+            W = reduction(blocks.covariance, stored.covariance(K), stored.covariance(H))
+            loop = blocks.state.times(stored.state(W), stored.state(given["Phi"]))
+            x = blocks.state.rounded(self._times(loop, x) + self._times(own, z))
+        elif self.compensated:
+            x, carried = self._compensated(x, carried, own, z)
+        else:
+            x = corrected(blocks.state, stored.state(H), own, self._ahead(x)[:, None], z[:, None])[:, 0]
+        return LinearTaken(x, carried, P, K, S, definite)
+
+    def _ahead(self, x: Any) -> Any:
+        return self._with_inputs(self._times(self.blocks.stored.state(self.given["Phi"]), x))
+
+    def _times(self, a: Any, x: Any) -> Any:
+        return self.blocks.state.times(a, x[:, None])[:, 0]
+
+    def _with_inputs(self, x: Any) -> Any:
+        if "B" in self.given:
+            x = x + self._times(self.given["B"], self.given["u"])
+        return x + self.given["b"] if "b" in self.given else x
+
+    def _compensated(self, x: Any, carried: Any, K: Any, z: Any) -> tuple[Any, Any]:
+        change = self._with_inputs(self._times(self.given["increment"], x))
+        change = change + self._times(K, z - self._times(self.given["H"], x + change))
+        change = change - carried
+        after = x + change
+        return after, (after - x) - change
+
+    def _factored(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
+        stored, given, about = self.blocks.stored, self.given, self.about
+        predict, observe = FACTORED[self.form]
+        about("the predicted covariance")
+        P, definite = predict(
+            stored.covariance(given["Phi"]), P, stored.covariance(given["UQ"]), self.blocks.covariance.times
+        )
+        about("the update of factors and estimate")
+        ahead = self._ahead(x)
+        if self.form is Form.UD:
+            observe = partial(observe, stored=stored)
+        found = observed(observe, given["H"], given["UR"], z, ahead, P, stored)
+        K: Any = np.stack(found.gains, axis=1)
+        return LinearTaken(found.x, carried, found.P, K, None, definite & found.definite)
+
+
+class UnscentedModel(NamedTuple):
+    r"""What one step uses.
+
+    Parameters
+    ----------
+    f, h : functions of a state (n,).
+    difference : function of two measurements (m,).
+    scale : :math:`n + \lambda`.
+    means, covariances : weights, (2n + 1,).
+    Q, R : (n, n) and (m, m).
+    """
+
+    f: Callable[[Matrix], Matrix]
+    h: Callable[[Matrix], Matrix]
+    difference: Callable[[Matrix, Matrix], Matrix]
+    scale: Any
+    means: Matrix
+    covariances: Matrix
+    Q: Matrix
+    R: Matrix
+
+
+class UnscentedStep(NamedTuple):
+    """Estimate (n,), gain (n, m) and covariance (n, n) after a step, and whether variances and pivots are positive."""
+
+    x: Matrix
+    K: Matrix
+    P: Matrix
+    definite: Any
+
+
+def unscented_step(algebra: Algebra, model: UnscentedModel, x: Matrix, P: Matrix, z: Matrix) -> UnscentedStep:
+    r"""Take one step of an unscented filter.
+
+    The points are :math:`x` and :math:`x \pm` the columns of the lower Cholesky factor of :math:`(n + \lambda)P`. With
+    weights W in means and W' in covariances, and :math:`Y_i = f(X_i)`, :math:`Z_i = h(Y_i)`,
+
+    .. math::
+        \bar x &= Y_0 + \sum_{i\ge1} W_i (Y_i - Y_0), \quad V = \sum_i W'_i d_i d_i^T + Q, \quad d_i = Y_i - \bar x \\
+        \bar z &= Z_0 + \sum_{i\ge1} W_i (Z_i - Z_0), \quad S = \sum_i W'_i e_i e_i^T + R, \quad e_i = Z_i - \bar z \\
+        K &= \Big(\sum_i W'_i d_i e_i^T\Big)S^{-1}, \quad x^+ = \bar x + K(z - \bar z), \quad P^+ = V - (KS)K^T
+
+    Differences of measurements are those of the model, so that angles wrap. Means are formed from differences to the
+    central point because the weight of this point may be large and negative.
+
+    References
+    ----------
+    Julier & Uhlmann 2004; Wan & van der Merwe 2000.
+    """
+    root = lower_root(model.scale * P).T
+    Y = [model.f(each) for each in (x, *(x + column for column in root), *(x - column for column in root))]
+    Z = [model.h(each) for each in Y]
+    ahead, D = _mean(model.means, Y, lambda a, b: a - b)
+    expected, E = _mean(model.means, Z, model.difference)
+    weighted = D.T * model.covariances
+    V = weighted @ D + model.Q
+    S = (E.T * model.covariances) @ E + model.R
+    inverse, pivots = algebra.invert(S, algebra.identity(len(S)))
+    K = (weighted @ E) @ inverse
+    P = V - (K @ S) @ K.T
+    definite = np.all(np.diagonal(P) > 0)
+    for each in pivots:
+        definite = definite & np.all(each > 0)
+    return UnscentedStep(corrected_by(algebra, K, ahead, model.difference(z, expected)), K, P, definite)
+
+
+def _mean(weights: Matrix, points: list[Matrix], difference: Callable[[Matrix, Matrix], Matrix]) -> Any:
+    """Return the mean of points, and the difference of each point from it, (2n + 1, n)."""
+    change = None
+    for weight, point in zip(weights[1:], points[1:], strict=True):
+        part = weight * difference(point, points[0])
+        change = part if change is None else change + part
+    mean = points[0] + change
+    return mean, np.stack([difference(each, mean) for each in points])
+
+
+def lower_root(P: Matrix) -> Any:
+    """Return the lower Cholesky factor of a covariance (n, n), column by column; a zero pivot gives a zero column."""
+    columns: list[Matrix] = []
+    n = len(P)
+    for j in range(n):
+        rest = P[:, j]
+        for column in columns:
+            rest = rest - column * column[j]
+        pivot = rest[j].sqrt()
+        columns.append(if_nonzero(pivot, partial(_column, rest, pivot, j), rest * 0))
+    return np.stack(columns).T
+
+
+def _column(rest: Matrix, pivot: Any, j: int) -> Any:
+    at = np.arange(len(rest))
+    return np.where(at == j, pivot, np.where(at > j, rest / pivot, rest * 0))
