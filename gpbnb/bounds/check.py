@@ -569,7 +569,7 @@ class Linear:
         caps = {tuple(r): Fraction(s, 1 << PEAK) * w for r, s, w in zip(different, shares[n:], wholes, strict=True)}
         found = []
         for row, whole in split:
-            seen = size([whole.get(n + j, 0) for j in range(self.m)], self.kept)
+            seen = sum([abs(c) * self.kept[j - n] for j, c in whole.items() if j >= n])
             found.append(caps.get(tuple(row), size(row, self.X)) + size(row, self.b) + seen)
         return found
 
