@@ -1,0 +1,151 @@
+"""A program that takes steps on the machine, from numbers that each step takes."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.machine import Memory, advance, code_of, first_without_result, is_far
+
+
+class Loop:
+    """A program whose steps replace its states by their next values.
+
+    Parameters
+    ----------
+    loaded : kind and columns of the formats, from :func:`gpbnb.arithmetic.machine.tables`.
+    rows, formats : operations, (o, 5), and the number of the format of each, (o,).
+    sizes : numbers of places, and of truth values.
+    dtype : type of the machine's numbers.
+    lanes : lengths of the axes behind the places.
+    states, after : places of the states, and of their next values.
+    truth : the truth value that is kept of each step.
+    """
+
+    def __init__(
+        self,
+        loaded: tuple[Any, Any],
+        rows: NDArray[np.int64],
+        formats: NDArray[np.int64],
+        sizes: tuple[int, int],
+        dtype: Any,
+        lanes: tuple[int, ...],
+        states: NDArray[np.int64],
+        after: NDArray[np.int64],
+        truth: int = 1,
+    ) -> None:
+        from gpbnb.arithmetic.kernels import machine
+
+        self._machine, (self._kind, self._formats) = machine, loaded
+        self.rows, self.formats, self._code = rows, formats, code_of(rows, formats)
+        self.values = np.zeros((sizes[0], *lanes), dtype)
+        self._truths = np.zeros((sizes[1], *lanes[:1]), np.uint8)
+        self._truths[1] = 1
+        self._memory, self._distant = Memory(self.values, self._truths), {"held": False, "fed": False}
+        self._states, self.after, self._truth = states, after, truth
+        self._before = np.full(len(states) * self._memory.width, -1, self.values.dtype)
+        self._notes = np.zeros(5, np.int64)
+        self._table, self._feeds = np.zeros((0, 1), self.values.dtype), np.zeros((0, 4), np.int64)
+
+    def hold(self, places: Any, numbers: NDArray[Any]) -> None:
+        """Set numbers that stay as they are, the same in all lanes, (count, ...)."""
+        lanes = self.values.ndim - numbers.ndim
+        self.values[places] = numbers[(slice(None), *(np.newaxis,) * lanes)]
+        self._distant["held"] |= self._far(numbers)
+
+    def feed(self, groups: Sequence[tuple[NDArray[np.int64], NDArray[Any]]]) -> None:
+        """Take numbers (members, count, ...) of which each step has one member, at places (count,)."""
+        flat, rows, at = [], [], 0
+        for places, table in groups:
+            members, count = table.shape[:2]
+            rows.append((places[0], count, members, at))
+            flat.append(table.reshape(members * count, *table.shape[2:]))
+            at += members * count
+        if flat:
+            table = np.concatenate(flat)
+            self._table, self._feeds = table.reshape(len(table), -1), np.array(rows, np.int64)
+        self._distant["fed"] = self._far(self._table)
+
+    def _far(self, numbers: NDArray[Any]) -> bool:
+        """Whether numbers may be too small or too large for quick computation."""
+        return isinstance(self._kind, self._machine.Quick) and is_far(numbers)
+
+    def compare_from(self, states: NDArray[Any], cycle: int) -> None:
+        """Begin to look for states that repeat."""
+        self._notes[:] = 0
+        self._notes[self._machine.LASTS] = cycle
+        self._before[:] = states.reshape(-1)
+
+    @property
+    def period(self) -> int:
+        """The number of steps after which the states repeat, once they do."""
+        return int(self._notes[self._machine.CYCLE])
+
+    @property
+    def states(self) -> NDArray[Any]:
+        """The states, (count, ...)."""
+        return self.values[self._states]
+
+    @states.setter
+    def states(self, states: NDArray[Any]) -> None:
+        self.values[self._states] = states.reshape(-1, *self.values.shape[1:])
+
+    def take(
+        self, first: int, own: NDArray[Any], at: int, kept_at: NDArray[np.int64], cycle: int = 0
+    ) -> tuple[NDArray[Any], NDArray[np.bool_], int]:
+        """Take steps, as far as they have results and until states repeat.
+
+        Parameters
+        ----------
+        first : number of steps taken before.
+        own, at : (steps, count, ...), numbers of each step, and the place of the first.
+        kept_at : places of results to return.
+        cycle : number of steps after which the model repeats; 0 if states are not compared.
+
+        Returns
+        -------
+        kept, held : the results of each step, and whether the truth value holds in all lanes, (steps,).
+        row : the row without a result that ended the steps, or -1.
+        """
+        steps, lanes, machine, memory = len(own), self.values.shape[1:], self._machine, self._memory
+        kept = np.empty((steps, len(kept_at), *lanes), self.values.dtype)
+        held, row = np.ones((steps, *lanes[:1]), np.uint8), 0
+        results = machine.Kept(
+            kept.reshape(steps, len(kept_at) * memory.width),
+            held.reshape(steps, memory.truths.shape[1]),
+            self._before,
+            np.empty_like(self._before),
+        )
+        far = any(self._distant.values()) or self._far(own) or self._far(self.states)
+        with contextlib.suppress(OverflowError, ZeroDivisionError):
+            advance(
+                self._kind,
+                self._formats,
+                self._code,
+                memory,
+                far,
+                self._notes,
+                machine.Feeds(own.reshape(steps, own.shape[1] * memory.width), self._table, self._feeds),
+                machine.Places(
+                    at * memory.width, *map(memory.places, (self._states, self.after, kept_at)), self._truth
+                ),
+                results,
+                first,
+                cycle,
+            )
+            row = int(self._notes[machine.ROW])
+        done = int(self._notes[machine.DONE])
+        if done == steps or self.period:
+            row = -1
+        elif row == 0:  # operations on integers do not tell which one it was
+            row = self.first_without_result(self.rows)
+        held = held[:done].reshape(done, lanes[0] if lanes else 1)
+        return kept[:done], np.asarray(np.all(held != 0, axis=1)), row
+
+    def first_without_result(self, rows: NDArray[np.int64]) -> int:
+        """Return the first of some operations that has no result in the step that ended the last ones."""
+        return first_without_result(self._kind, self._formats, rows, self.formats, self.values, self._truths)
