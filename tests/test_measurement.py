@@ -120,17 +120,16 @@ def readings(signal, phase, values, theta, alpha):
     return {"gyro": gyro, "telescope": telescope, "difference": gyro - telescope}[signal]
 
 
-@pytest.mark.parametrize("signal", ["gyro", "telescope", "difference"])
 @pytest.mark.parametrize("state", m.STATES)
 @settings(SEEDED, max_examples=20)
 @given(phase=st.floats(-7, 7), theta=three, alpha=three)
-def test_each_column_is_the_derivative_of_the_printed_chain(signal, state, phase, theta, alpha):
-    # each state enters the chain in one factor, and linearly: half the difference over -1 and 1 is the derivative
-    H = m.measurement_matrix(
-        phase, signal=signal, states=[state], derolled=False, nominal_theta=theta, nominal_alpha=alpha
-    )
-    up, down = (readings(signal, phase, {state: s}, theta, alpha) for s in (1.0, -1.0))
-    assert np.allclose(H[:, 0], (up - down) / 2, atol=40 * EPS, rtol=0)
+def test_each_column_is_the_derivative_of_the_printed_chain(state, phase, theta, alpha):
+    for signal in ["gyro", "telescope", "difference"]:
+        H = m.measurement_matrix(
+            phase, signal=signal, states=[state], derolled=False, nominal_theta=theta, nominal_alpha=alpha
+        )
+        up, down = (readings(signal, phase, {state: s}, theta, alpha) for s in (1.0, -1.0))
+        assert np.allclose(H[:, 0], (up - down) / 2, atol=40 * EPS, rtol=0)
 
 
 @settings(SEEDED)

@@ -9,7 +9,6 @@ import operator
 import pickle
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import oracles
@@ -71,14 +70,21 @@ class TestConversion:
         assert f"{x[0, 0]:.3f}" == "1.500"
         assert f"{x[0, 0]}" == "1.5"
 
-    @pytest.mark.parametrize(
-        "values",
-        [[1, 2], (1, 2), range(1, 3), np.array([1, 2]), np.array([1.0, 2.0]), np.array(["1", "2"]), ["1", Decimal(2)],
-         np.array([1, Fraction(2)], dtype=object), [np.array(1), np.float32(2)], np.array([1, 2], dtype=np.longdouble),
-         np.array(["1", "2"], dtype=np.dtypes.StringDType())],
-    )  # fmt: skip
-    def test_containers(self, values: Any) -> None:
-        assert np.array_equal(D4.array(values), D4.array(["1", "2"]))
+    def test_containers(self) -> None:
+        for values in [
+            [1, 2],
+            (1, 2),
+            range(1, 3),
+            np.array([1, 2]),
+            np.array([1.0, 2.0]),
+            np.array(["1", "2"]),
+            ["1", Decimal(2)],
+            np.array([1, Fraction(2)], dtype=object),
+            [np.array(1), np.float32(2)],
+            np.array([1, 2], dtype=np.longdouble),
+            np.array(["1", "2"], dtype=np.dtypes.StringDType()),
+        ]:
+            assert np.array_equal(D4.array(values), D4.array(["1", "2"]))
 
     def test_shapes(self) -> None:
         assert D4.array(1).shape == ()
@@ -112,25 +118,35 @@ class TestText:
 class TestArithmetic:
     X = D4.array([["1.5", "-2", "0.25"], ["3", "4", "-0.5"]])
 
-    @pytest.mark.parametrize(
-        "other",
-        [2, 0.5, "0.5", Decimal("0.5"), Fraction(1, 2), np.float64(2), np.int64(2), np.array(2), [2, "4", 0.5],
-         np.array([2, 4, 8]), np.array([[2.0], [0.5]]), [[1], [2]], (4, 2, 1)],
-    )  # fmt: skip
-    def test_plain_operands_on_either_side(self, other: Any) -> None:
-        y = D4.array(other)
-        for operation in OPERATIONS.values():
-            for found, expected in (
-                (operation(self.X, other), operation(self.X, y)),
-                (operation(other, self.X), operation(y, self.X)),
-            ):
-                assert isinstance(found, FloatArray)
-                assert found.format == D4
-                assert found.shape == expected.shape == (2, 3)
-                assert np.all(found == expected)
-        for comparison in (operator.eq, operator.ne, operator.lt, operator.le, operator.gt, operator.ge):
-            assert np.array_equal(comparison(self.X, other), comparison(self.X, y))
-            assert np.array_equal(comparison(other, self.X), comparison(y, self.X))
+    def test_plain_operands_on_either_side(self) -> None:
+        for other in [
+            2,
+            0.5,
+            "0.5",
+            Decimal("0.5"),
+            Fraction(1, 2),
+            np.float64(2),
+            np.int64(2),
+            np.array(2),
+            [2, "4", 0.5],
+            np.array([2, 4, 8]),
+            np.array([[2.0], [0.5]]),
+            [[1], [2]],
+            (4, 2, 1),
+        ]:
+            y = D4.array(other)
+            for operation in OPERATIONS.values():
+                for found, expected in (
+                    (operation(self.X, other), operation(self.X, y)),
+                    (operation(other, self.X), operation(y, self.X)),
+                ):
+                    assert isinstance(found, FloatArray)
+                    assert found.format == D4
+                    assert found.shape == expected.shape == (2, 3)
+                    assert np.all(found == expected)
+            for comparison in (operator.eq, operator.ne, operator.lt, operator.le, operator.gt, operator.ge):
+                assert np.array_equal(comparison(self.X, other), comparison(self.X, y))
+                assert np.array_equal(comparison(other, self.X), comparison(y, self.X))
 
     def test_numpy_functions(self) -> None:
         x, y = self.X, self.X * 2
@@ -172,17 +188,30 @@ class TestArithmetic:
             assert found.format == D4
             assert np.array_equal(found.to_float(), expected)
 
-    @pytest.mark.parametrize(
-        "index",
-        [0, -1, (0, 1), slice(None, None, 2), (slice(None), 1), (..., 0), None, (np.newaxis, 0), [1, 0], [0, 0],
-         ([0, 1], [2, 0]), np.array([True, False]), [[True, False, True], [False, True, False]], slice(0, 0), (), ...],
-    )  # fmt: skip
-    def test_indexing(self, index: Any) -> None:
-        if isinstance(index, list) and isinstance(index[0], list):
-            index = np.array(index)
-        found = self.X[index]
-        assert isinstance(found, FloatArray)
-        assert np.array_equal(found.to_float(), self.X.to_float()[index])
+    def test_indexing(self) -> None:
+        for index in [
+            0,
+            -1,
+            (0, 1),
+            slice(None, None, 2),
+            (slice(None), 1),
+            (..., 0),
+            None,
+            (np.newaxis, 0),
+            [1, 0],
+            [0, 0],
+            ([0, 1], [2, 0]),
+            np.array([True, False]),
+            [[True, False, True], [False, True, False]],
+            slice(0, 0),
+            (),
+            ...,
+        ]:
+            if isinstance(index, list) and isinstance(index[0], list):
+                index = np.array(index)
+            found = self.X[index]
+            assert isinstance(found, FloatArray)
+            assert np.array_equal(found.to_float(), self.X.to_float()[index])
 
     def test_sums_run_from_left_to_right(self) -> None:
         # In another order: 1000 + (0.4 + 0.4) = 1001.
@@ -272,24 +301,21 @@ class TestLeavingTheFormat:
     TENTH, HALF = D4.array(["0.1", "0.5"]), D4.array(["0.5", "-2", "0"])
     LONG = FloatFormat(2, 113).array(["0.1", "0.5"])
 
-    @pytest.mark.parametrize("x", [TENTH, LONG], ids=str)
-    @pytest.mark.parametrize(
-        ("name", "leave"),
-        [
-            ("asarray", np.asarray),
-            ("array", lambda x: np.array(x, dtype=float)),
-            ("float", lambda x: float(x[0])),
-            ("sqrt", lambda x: math.sqrt(x[0])),
-            ("save", lambda x: np.save(io.BytesIO(), x)),
-            ("solve", lambda x: scipy.linalg.solve(np.eye(2), x)),
-            ("fft", lambda x: scipy.fft.fft(x)),
-        ],
-    )
-    def test_no_entry_is_rounded_unseen(self, name, leave, x) -> None:
-        with pytest.raises(
-            ValueError, match=r"got (an array|float\(\)) of a FloatArray in .*; needed an explicit conv"
-        ):
-            leave(x)
+    def test_no_entry_is_rounded_unseen(self) -> None:
+        for x in (self.TENTH, self.LONG):
+            for leave in [
+                np.asarray,
+                lambda x: np.array(x, dtype=float),
+                lambda x: float(x[0]),
+                lambda x: math.sqrt(x[0]),
+                lambda x: np.save(io.BytesIO(), x),
+                lambda x: scipy.linalg.solve(np.eye(2), x),
+                lambda x: scipy.fft.fft(x),
+            ]:
+                with pytest.raises(
+                    ValueError, match=r"got (an array|float\(\)) of a FloatArray in .*; needed an explicit conv"
+                ):
+                    leave(x)
 
     def test_what_is_exact_passes(self) -> None:
         assert np.asarray(self.HALF).tolist() == [0.5, -2.0, 0.0]
@@ -308,9 +334,8 @@ class TestLeavingTheFormat:
         assert f"{self.TENTH[0]:.3f}" == "0.100"
         assert self.TENTH.to_fractions().tolist() == [Fraction(1, 10), Fraction(1, 2)]
 
-    @pytest.mark.parametrize(
-        ("wrong", "near"),
-        [
+    def test_unknown_names_have_a_hint(self) -> None:
+        for wrong, near in [
             (lambda x: x.summ(), "the nearest is x.sum"),
             (lambda x: x.dtype, "the nearest is x.format"),
             (lambda x: x.sort(), r"write np\.sort\(x\)"),
@@ -319,11 +344,9 @@ class TestLeavingTheFormat:
             (lambda x: np.nanmin(x), r"the nearest is np\.min"),
             (lambda x: np.average(x), "the nearest is np.mean"),
             (lambda x: np.cumprod(x), "the nearest is np.prod"),
-        ],
-    )
-    def test_unknown_names_have_a_hint(self, wrong, near) -> None:
-        with pytest.raises((AttributeError, TypeError), match=near):
-            wrong(self.HALF)
+        ]:
+            with pytest.raises((AttributeError, TypeError), match=near):
+                wrong(self.HALF)
 
     @pytest.mark.parametrize(
         "wrong", [lambda x: x.strides, lambda x: x.str, lambda x: x.zzz, lambda x: np.logaddexp(x, x), np.unwrap]

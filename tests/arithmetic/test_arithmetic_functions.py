@@ -60,20 +60,23 @@ def test_interpolation_rounds_each_of_five_operations(fmt):
         assert np.interp(fmt.array(at), nodes, values).item() == expected
 
 
-@pytest.mark.parametrize("mode", ["full", "same", "valid"])
-@pytest.mark.parametrize("lengths", [(7, 3), (3, 7), (6, 4), (4, 4), (5, 1)])
-def test_convolutions_sum_from_left_to_right(fmt, mode, lengths):
-    a, v = (drawn(fmt, n) for n in lengths)
-    first, second = a.to_fractions(), v.to_fractions()
-    full = [
-        from_left(fmt, [fmt.round(first[i] * second[k - i]) for i in range(len(a)) if 0 <= k - i < len(v)])
-        for k in range(len(a) + len(v) - 1)
-    ]
-    start = {"full": 0, "same": (min(lengths) - 1) // 2, "valid": min(lengths) - 1}[mode]
-    assert np.convolve(a, v, mode).tolist() == full[start : start + len(np.convolve(a.to_float(), v.to_float(), mode))]
-    exactly = [int(each) for each in np.convolve(range(1, len(a) + 1), range(1, len(v) + 1), mode)]
-    whole = FloatFormat(2, 53)
-    assert np.convolve(whole.array(range(1, len(a) + 1)), list(range(1, len(v) + 1)), mode).tolist() == exactly
+def test_convolutions_sum_from_left_to_right(fmt):
+    for mode in ["full", "same", "valid"]:
+        for lengths in [(7, 3), (3, 7), (6, 4), (4, 4), (5, 1)]:
+            a, v = (drawn(fmt, n) for n in lengths)
+            first, second = a.to_fractions(), v.to_fractions()
+            full = [
+                from_left(fmt, [fmt.round(first[i] * second[k - i]) for i in range(len(a)) if 0 <= k - i < len(v)])
+                for k in range(len(a) + len(v) - 1)
+            ]
+            start = {"full": 0, "same": (min(lengths) - 1) // 2, "valid": min(lengths) - 1}[mode]
+            assert (
+                np.convolve(a, v, mode).tolist()
+                == full[start : start + len(np.convolve(a.to_float(), v.to_float(), mode))]
+            )
+            exactly = [int(each) for each in np.convolve(range(1, len(a) + 1), range(1, len(v) + 1), mode)]
+            whole = FloatFormat(2, 53)
+            assert np.convolve(whole.array(range(1, len(a) + 1)), list(range(1, len(v) + 1)), mode).tolist() == exactly
 
 
 def test_choosing_and_moving_rounds_nothing(fmt):
@@ -99,18 +102,18 @@ def test_choosing_and_moving_rounds_nothing(fmt):
     assert pickle.loads(pickle.dumps(x)).tolist() == x.tolist()
 
 
-@pytest.mark.parametrize("name", ["sum", "prod", "mean", "max", "min", "argmax", "argmin", "any", "all", "norm"])
-def test_reductions_keep_dimensions(name, fmt):
+def test_reductions_keep_dimensions(fmt):
     """The entries are those without keepdims, and the shape is NumPy's; methods and functions agree."""
-    x = drawn(fmt, 3, 4)
-    function = np.linalg.norm if name == "norm" else getattr(np, name)
-    for axis in (None, 0, 1, -1):
-        flat, kept = function(x, axis=axis), function(x, axis=axis, keepdims=True)
-        assert kept.shape == function(x.to_float(), axis=axis, keepdims=True).shape, axis
-        assert np.array_equal(kept.reshape(flat.shape), flat), axis
-        if name != "norm":
-            assert np.array_equal(getattr(x, name)(axis=axis, keepdims=True), kept), axis
-            assert np.array_equal(getattr(x, name)(axis), flat), axis
+    for name in ["sum", "prod", "mean", "max", "min", "argmax", "argmin", "any", "all", "norm"]:
+        x = drawn(fmt, 3, 4)
+        function = np.linalg.norm if name == "norm" else getattr(np, name)
+        for axis in (None, 0, 1, -1):
+            flat, kept = function(x, axis=axis), function(x, axis=axis, keepdims=True)
+            assert kept.shape == function(x.to_float(), axis=axis, keepdims=True).shape, axis
+            assert np.array_equal(kept.reshape(flat.shape), flat), axis
+            if name != "norm":
+                assert np.array_equal(getattr(x, name)(axis=axis, keepdims=True), kept), axis
+                assert np.array_equal(getattr(x, name)(axis), flat), axis
 
 
 def test_finding_and_comparing_rounds_nothing(fmt):
@@ -196,9 +199,8 @@ def test_stochastic_rounding_of_elementary_functions_has_the_exact_mean():
     assert abs(np.mean(found == 2.75) - up) < 4 * math.sqrt(up * (1 - up) / count)  # four standard errors
 
 
-@pytest.mark.parametrize(
-    ("call", "error"),
-    [
+def test_what_is_refused():
+    for call, error in [
         (lambda x: np.einsum("ii->ii", x), ValueError),
         (lambda x: np.einsum("ii", x[:1]), ValueError),
         (lambda x: np.einsum("ij...", x), ValueError),
@@ -215,11 +217,9 @@ def test_stochastic_rounding_of_elementary_functions_has_the_exact_mean():
         (lambda x: np.max(x[:0]), ValueError),
         (lambda x: np.trace(x[0]), ValueError),
         (lambda x: x**1001, ValueError),
-    ],
-)
-def test_what_is_refused(call, error):
-    with pytest.raises(error, match="needed"):
-        call(FloatFormat(2, 24).array([[1, 2], [3, 4]]))
+    ]:
+        with pytest.raises(error, match="needed"):
+            call(FloatFormat(2, 24).array([[1, 2], [3, 4]]))
 
 
 def arguments(name: str, count: int) -> np.ndarray:
@@ -230,26 +230,26 @@ def arguments(name: str, count: int) -> np.ndarray:
     return abs(values) + (1 if name == "arccosh" else 0.01) if name in ("log", "log2", "log10", "arccosh") else values
 
 
-@pytest.mark.parametrize("name", ELEMENTARY)
-def test_results_by_float64_are_those_of_arb(name: str) -> None:
-    decided = 0
-    for fmt in (BINARY32, BFLOAT16, FloatFormat(2, 24, "chop"), FloatFormat(16, 6), FloatFormat(2, 44)):
-        x = fmt.array(arguments(name, 40))
-        found = elementary._by_float64(name, x)
-        assert found is not None
-        decided += np.count_nonzero(~found[1])
-        exact = elementary._by_arb(name, [x], np.ndindex(x.shape))
-        assert np.array_equal(getattr(np, name)(x), exact)
-    assert decided > 100
+def test_results_by_float64_are_those_of_arb() -> None:
+    for name in ELEMENTARY:
+        decided = 0
+        for fmt in (BINARY32, BFLOAT16, FloatFormat(2, 24, "chop"), FloatFormat(16, 6), FloatFormat(2, 44)):
+            x = fmt.array(arguments(name, 40))
+            found = elementary._by_float64(name, x)
+            assert found is not None
+            decided += np.count_nonzero(~found[1])
+            exact = elementary._by_arb(name, [x], np.ndindex(x.shape))
+            assert np.array_equal(getattr(np, name)(x), exact)
+        assert decided > 100
 
 
-@pytest.mark.parametrize("name", ELEMENTARY)
-def test_numpys_functions_are_closer_than_the_doubt_about_them(name: str) -> None:
-    wide = FloatFormat(2, 120)
-    x = arguments(name, 200)
-    exact = wide.array(elementary._by_arb(name, [wide.array(x)], np.ndindex(x.shape)))
-    for found, expected in zip(getattr(np, name)(x).tolist(), exact.to_fractions().tolist(), strict=True):
-        assert abs(Fraction(found) - expected) <= abs(expected) * Fraction(elementary._DOUBT) / 4
+def test_numpys_functions_are_closer_than_the_doubt_about_them() -> None:
+    for name in ELEMENTARY:
+        wide = FloatFormat(2, 120)
+        x = arguments(name, 200)
+        exact = wide.array(elementary._by_arb(name, [wide.array(x)], np.ndindex(x.shape)))
+        for found, expected in zip(getattr(np, name)(x).tolist(), exact.to_fractions().tolist(), strict=True):
+            assert abs(Fraction(found) - expected) <= abs(expected) * Fraction(elementary._DOUBT) / 4
 
 
 def test_a_result_in_doubt_is_left_to_arb(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -124,56 +124,56 @@ def same(found: Any, m: Any, e: Any) -> bool:
     return all(np.array_equal(*parts) for parts in zip(found.to_pairs(), (m, e), strict=True))
 
 
-@pytest.mark.parametrize("mode", DETERMINISTIC)
 @pytest.mark.parametrize("tiny", TINY, ids=str)
-def test_every_pair_of_a_small_format(tiny: FloatFormat, mode: Rounding) -> None:
-    fmt, every = replace(tiny, rounding=mode), small(tiny)
-    assert len(set(every.counts)) == len(every.counts)
-    x = fmt.array(every.fractions())
-    assert x.to_fractions().tolist() == every.fractions()
-    overflows = 0
-    for operation in BINARY:
-        i, j, p, q = pairs(operation, every.counts, Fraction(every.scale))
-        m, e, held = every.rounded(p, q, mode)
-        assert same(operation(x[i[held]], x[j[held]]), m[held], e[held])
-        exactly = held & (every.counts[i] >= 0)  # which gives results of either sign
-        found = operation(x[i[exactly]].on_exact_backend(), x[j[exactly]].on_exact_backend())
-        assert same(found, m[exactly], e[exactly])
-        overflows += int(np.count_nonzero(~held))
-        for k in some(~held, p, q):
-            with pytest.raises(OverflowError):
-                operation(x[i[k]], x[j[k]])
-    assert (overflows > 0) is (fmt.emin is not None)
+def test_every_pair_of_a_small_format(tiny: FloatFormat) -> None:
+    for mode in DETERMINISTIC:
+        fmt, every = replace(tiny, rounding=mode), small(tiny)
+        assert len(set(every.counts)) == len(every.counts)
+        x = fmt.array(every.fractions())
+        assert x.to_fractions().tolist() == every.fractions()
+        overflows = 0
+        for operation in BINARY:
+            i, j, p, q = pairs(operation, every.counts, Fraction(every.scale))
+            m, e, held = every.rounded(p, q, mode)
+            assert same(operation(x[i[held]], x[j[held]]), m[held], e[held])
+            exactly = held & (every.counts[i] >= 0)  # which gives results of either sign
+            found = operation(x[i[exactly]].on_exact_backend(), x[j[exactly]].on_exact_backend())
+            assert same(found, m[exactly], e[exactly])
+            overflows += int(np.count_nonzero(~held))
+            for k in some(~held, p, q):
+                with pytest.raises(OverflowError):
+                    operation(x[i[k]], x[j[k]])
+        assert (overflows > 0) is (fmt.emin is not None)
 
 
-@pytest.mark.parametrize("mode", DETERMINISTIC)
 @pytest.mark.parametrize("tiny", [TINY[0], TINY[3], TINY[6]], ids=str)
-def test_fused_multiply_add_of_every_triple(tiny: FloatFormat, mode: Rounding) -> None:
-    fmt, every = replace(tiny, rounding=mode), small(tiny)
-    kept = slice(None, None, 1 if fmt.base == 10 else 3)
-    x, counts = fmt.array(every.fractions()[kept]), every.counts[kept]
-    # In base 10 on Python integers; there a product of either sign needs no first factor of either sign.
-    first = counts >= 0 if fmt.base == 10 else counts == counts
-    a, b, c = (part.ravel() for part in np.meshgrid(*map(np.arange, [len(x)] * 3), indexing="ij"))
-    a, b, c = a[first[a]], b[first[a]], c[first[a]]
-    p = counts[a] * counts[b] + counts[c] * every.scale
-    m, e, held = every.rounded(p, np.full(p.shape, every.scale), mode)
-    assert same(x[a[held]].multiply_add(x[b[held]], x[c[held]]), m[held], e[held])
+def test_fused_multiply_add_of_every_triple(tiny: FloatFormat) -> None:
+    for mode in DETERMINISTIC:
+        fmt, every = replace(tiny, rounding=mode), small(tiny)
+        kept = slice(None, None, 1 if fmt.base == 10 else 3)
+        x, counts = fmt.array(every.fractions()[kept]), every.counts[kept]
+        # In base 10 on Python integers; there a product of either sign needs no first factor of either sign.
+        first = counts >= 0 if fmt.base == 10 else counts == counts
+        a, b, c = (part.ravel() for part in np.meshgrid(*map(np.arange, [len(x)] * 3), indexing="ij"))
+        a, b, c = a[first[a]], b[first[a]], c[first[a]]
+        p = counts[a] * counts[b] + counts[c] * every.scale
+        m, e, held = every.rounded(p, np.full(p.shape, every.scale), mode)
+        assert same(x[a[held]].multiply_add(x[b[held]], x[c[held]]), m[held], e[held])
 
 
-@pytest.mark.parametrize("mode", DETERMINISTIC)
-@pytest.mark.parametrize("subnormal", [True, False])
 @pytest.mark.parametrize("base", [2, 3, 10])
-def test_numbers_far_below_the_smallest(base: int, subnormal: bool, mode: Rounding) -> None:
+def test_numbers_far_below_the_smallest(base: int) -> None:
     """They become zero or the smallest number, as texts, quotients and integers times a power of the base."""
-    fmt = FloatFormat(base, 3, mode, emin=-3, emax=3, subnormal=subnormal)
-    for digits, power in itertools.product((-3, 2, 11), (5, 12, 25, 26, 27, 28, 29, 31, 40, 400)):
-        exact = digits * Fraction(1, base) ** power
-        assert fmt.round(exact) == expected(exact, fmt)
-        pair = fmt.kernel.from_ratio(digits, 1, -power)
-        assert fmt.kernel.to_fraction(*pair) == expected(exact, fmt)
-        if base == 10:
-            assert fmt.array(f"{digits}e-{power}").to_fractions() == expected(exact, fmt)
+    for subnormal in [True, False]:
+        for mode in DETERMINISTIC:
+            fmt = FloatFormat(base, 3, mode, emin=-3, emax=3, subnormal=subnormal)
+            for digits, power in itertools.product((-3, 2, 11), (5, 12, 25, 26, 27, 28, 29, 31, 40, 400)):
+                exact = digits * Fraction(1, base) ** power
+                assert fmt.round(exact) == expected(exact, fmt)
+                pair = fmt.kernel.from_ratio(digits, 1, -power)
+                assert fmt.kernel.to_fraction(*pair) == expected(exact, fmt)
+                if base == 10:
+                    assert fmt.array(f"{digits}e-{power}").to_fractions() == expected(exact, fmt)
 
 
 CONVERTED = [named.BINARY16, named.BFLOAT16, named.TF32, named.FP8_E4M3, FloatFormat(2, 11), FloatFormat(2, 52)]
@@ -285,31 +285,31 @@ class TestSums:
 
 
 class TestFixed:
-    @pytest.mark.parametrize("overflow", ["raise", "saturate", "wrap"])
-    @pytest.mark.parametrize("mode", DETERMINISTIC)
     @pytest.mark.parametrize("bits", [(1, 3), (0, 4), (3, 0), (-1, 5)])
-    def test_every_pair(self, bits: tuple[int, int], mode: Rounding, overflow: str) -> None:
-        fmt = FixedFormat(*bits, mode, overflow)
-        count = 2 ** (sum(bits) + 1)
-        counts = np.arange(count) - count // 2
-        every = [int(k) * fmt.unit for k in counts]
-        assert (every[0], every[-1]) == (fmt.lowest, fmt.largest)
-        x = fmt.array(every)
-        assert x.to_fractions().tolist() == every
-        for operation in BINARY:
-            i, j, p, q = pairs(operation, counts, 1 / fmt.unit)
-            size, rest = np.divmod(abs(p), q)
-            result = np.sign(p) * (size + up(mode, p < 0, size % 2 == 1, rest > 0, 2 * rest - q))
-            held = (result >= counts[0]) & (result <= counts[-1])
-            if overflow == "raise":
-                for k in some(~held, p, q):
-                    with pytest.raises(OverflowError):
-                        operation(x[i[k]], x[j[k]])
-                i, j, result = i[held], j[held], result[held]
-            elif overflow == "saturate":
-                result = np.clip(result, counts[0], counts[-1])
-            else:
-                result = (result - counts[0]) % count + counts[0]
-            found = operation(x[i], x[j])
-            assert type(found) is type(x)
-            assert np.array_equal(found.to_float(), result * float(fmt.unit))
+    def test_every_pair(self, bits: tuple[int, int]) -> None:
+        for mode in DETERMINISTIC:
+            for overflow in ["raise", "saturate", "wrap"]:
+                fmt = FixedFormat(*bits, mode, overflow)
+                count = 2 ** (sum(bits) + 1)
+                counts = np.arange(count) - count // 2
+                every = [int(k) * fmt.unit for k in counts]
+                assert (every[0], every[-1]) == (fmt.lowest, fmt.largest)
+                x = fmt.array(every)
+                assert x.to_fractions().tolist() == every
+                for operation in BINARY:
+                    i, j, p, q = pairs(operation, counts, 1 / fmt.unit)
+                    size, rest = np.divmod(abs(p), q)
+                    result = np.sign(p) * (size + up(mode, p < 0, size % 2 == 1, rest > 0, 2 * rest - q))
+                    held = (result >= counts[0]) & (result <= counts[-1])
+                    if overflow == "raise":
+                        for k in some(~held, p, q):
+                            with pytest.raises(OverflowError):
+                                operation(x[i[k]], x[j[k]])
+                        i, j, result = i[held], j[held], result[held]
+                    elif overflow == "saturate":
+                        result = np.clip(result, counts[0], counts[-1])
+                    else:
+                        result = (result - counts[0]) % count + counts[0]
+                    found = operation(x[i], x[j])
+                    assert type(found) is type(x)
+                    assert np.array_equal(found.to_float(), result * float(fmt.unit))

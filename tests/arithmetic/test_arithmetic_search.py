@@ -22,16 +22,18 @@ def among(good, calls=None):
     return meets
 
 
-@pytest.mark.parametrize("least", [1, 2, 5])
-@pytest.mark.parametrize("largest", [5, 8, 13])
-@pytest.mark.parametrize("monotone", [True, False])
-def test_a_monotone_requirement_is_found_in_every_range(least, largest, monotone):
-    for first in range(least, largest + 2):
-        calls: list[int] = []
-        found = smallest_precision(among(range(first, 99), calls), 2, least=least, largest=largest, monotone=monotone)
-        assert found == (FloatFormat(2, first) if first <= largest else None)
-        assert len(calls) == len(set(calls))
-        assert set(calls) <= set(range(least, largest + 1))
+def test_a_monotone_requirement_is_found_in_every_range():
+    for least in [1, 2, 5]:
+        for largest in [5, 8, 13]:
+            for monotone in [True, False]:
+                for first in range(least, largest + 2):
+                    calls: list[int] = []
+                    found = smallest_precision(
+                        among(range(first, 99), calls), 2, least=least, largest=largest, monotone=monotone
+                    )
+                    assert found == (FloatFormat(2, first) if first <= largest else None)
+                    assert len(calls) == len(set(calls))
+                    assert set(calls) <= set(range(least, largest + 1))
 
 
 def test_whatever_meets_the_requirement_the_answer_qualifies_and_the_next_lower_one_does_not():

@@ -400,27 +400,23 @@ ALTERED: dict[str, tuple[tuple[str, ...], Callable[[Content], None]]] = {
 }
 
 
-@pytest.mark.parametrize(
-    ("name", "alteration"), [(name, each) for each, (names, _) in ALTERED.items() for name in names]
-)
-def test_altered_certificates_are_rejected(name: str, alteration: str) -> None:
-    """Where a smaller bound might hold, the rows do not prove it."""
-    content: Content = json.loads(original(name))
-    ALTERED[alteration][1](content)
-    assert json.dumps(content) != original(name)
-    refused(content)
-
-
 @pytest.mark.parametrize("name", [*EVERY, "cycle", "words"])
-def test_the_originals_are_proved(name: str) -> None:
+def test_originals_are_proved_and_altered_certificates_are_rejected(name: str) -> None:
+    """Where a smaller bound might hold, the rows do not prove it."""
     prove(json.loads(original(name)))
+    for names, alter in ALTERED.values():
+        if name in names:
+            content: Content = json.loads(original(name))
+            alter(content)
+            assert json.dumps(content) != original(name)
+            refused(content)
 
 
-@pytest.mark.parametrize("key", ["filter", "format", "limits", "bound", "back", "steps", "keep", "derived", "width"])
-def test_incomplete_certificates_are_rejected(key: str) -> None:
-    content = json.loads(original("joseph"))
-    del content[key]
-    assert "no certificate" in refused(content)
+def test_incomplete_certificates_are_rejected() -> None:
+    for key in ("filter", "format", "limits", "bound", "back", "steps", "keep", "derived", "width"):
+        content = json.loads(original("joseph"))
+        del content[key]
+        assert "no certificate" in refused(content)
 
 
 # -- what is forged is rejected ---------------------------------------------------------------------------------------
@@ -485,15 +481,15 @@ NOT_COVERED = (
 )
 
 
-@pytest.mark.parametrize("forgery", FORGED)
-def test_forged_certificates_are_rejected(forgery: str) -> None:
-    name, forge = FORGED[forgery]
-    content: Content = json.loads(original(name))
-    forge(content)
-    with pytest.raises((NotProvedError, NotImplementedError)) as error:
-        prove(content)
-    covered = not isinstance(error.value, NotImplementedError)
-    assert covered == (forgery not in (*NOT_COVERED, "a million digits"))
+def test_forged_certificates_are_rejected() -> None:
+    for forgery in FORGED:
+        name, forge = FORGED[forgery]
+        content: Content = json.loads(original(name))
+        forge(content)
+        with pytest.raises((NotProvedError, NotImplementedError)) as error:
+            prove(content)
+        covered = not isinstance(error.value, NotImplementedError)
+        assert covered == (forgery not in (*NOT_COVERED, "a million digits"))
 
 
 def test_a_key_that_occurs_twice_is_rejected(tmp_path: Path) -> None:

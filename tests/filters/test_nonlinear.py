@@ -195,9 +195,8 @@ def without_rule(x):
     return np.floor(x)
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "message"),
-    [
+def test_a_model_that_is_none_is_refused():
+    for options, error, message in [
         ({"f": 3}, TypeError, "got f 3; needed a function"),
         ({"H": [[1, 0]]}, TypeError, r"got H \[\[1, 0\]\]; needed .*, or None to differentiate"),
         ({"normalize": 1}, TypeError, "got normalize 1"),
@@ -224,12 +223,10 @@ def without_rule(x):
         ({"R": [[0, 0], [0, 1]]}, ValueError, "R"),
         ({"x0": [[0], [1]]}, ValueError, "x0"),
         ({"Q": [[1]]}, ValueError, "Q"),
-    ],
-)
-def test_a_model_that_is_none_is_refused(options, error, message):
-    given = {"f": lambda x: x, "F": None, "h": lambda x: x, "H": None, **NOISE, **options}
-    with pytest.raises(error, match=message):
-        NonlinearModel(**given)
+    ]:
+        given = {"f": lambda x: x, "F": None, "h": lambda x: x, "H": None, **NOISE, **options}
+        with pytest.raises(error, match=message):
+            NonlinearModel(**given)
 
 
 @pytest.mark.parametrize(

@@ -38,18 +38,20 @@ def ramp_leak(rate):
     return rate * PERIOD / 5 * abs(np.mean(k * np.exp(2j * np.pi * k / 5)))
 
 
-@pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("period", [None, PERIOD])
-def test_a_year_agrees_with_the_analysis(name, period):
-    case = CASES[name]
-    result, analysed = experiment.year(case, period, STEP).error, theory.effect(case, period is not None)
-    # an angle that grows by SIZE in the year leaves a constant in the mean of a roll
-    rate = np.hypot(*case.gamma_rate[1:]) / theory.YEAR
-    leak = ramp_leak(rate) if period else 0.0
-    assert np.hypot(*np.subtract(result.drift, analysed.drift)) <= third_order(case)
-    assert np.hypot(*np.subtract(result.angle, analysed.angle)) <= 1.001 * leak + third_order(case)
-    # the drift itself turns within a roll, too
-    assert result.line == pytest.approx(analysed.line, abs=ramp_leak(theory.GEODETIC / theory.YEAR) * 2 + 1e-3 * SIZE)
+def test_a_year_agrees_with_the_analysis(period):
+    for name in CASES:
+        case = CASES[name]
+        result, analysed = experiment.year(case, period, STEP).error, theory.effect(case, period is not None)
+        # an angle that grows by SIZE in the year leaves a constant in the mean of a roll
+        rate = np.hypot(*case.gamma_rate[1:]) / theory.YEAR
+        leak = ramp_leak(rate) if period else 0.0
+        assert np.hypot(*np.subtract(result.drift, analysed.drift)) <= third_order(case)
+        assert np.hypot(*np.subtract(result.angle, analysed.angle)) <= 1.001 * leak + third_order(case)
+        # the drift itself turns within a roll, too
+        assert result.line == pytest.approx(
+            analysed.line, abs=ramp_leak(theory.GEODETIC / theory.YEAR) * 2 + 1e-3 * SIZE
+        )
 
 
 @settings(SEEDED, max_examples=15)

@@ -73,14 +73,14 @@ def test_each_stage_comes_from_the_one_before(pivot):
             assert stages[0].to_fractions().tolist() != a.to_fractions().tolist()
 
 
-@pytest.mark.parametrize("reading", list(procedure.readings()), ids=str)
-def test_float64_is_near_the_exact_value(reading):
-    for a in samples(FloatFormat(2, 24), (1, 2, 4)):
-        floats, beta = procedure.as_floats(procedure.reduce(a, pivot=True)), float(a.format.unit_roundoff)
-        exact = float(evaluated(a, True, reading).bound)
-        quick = float(next(procedure.evaluate_all(floats, beta, [reading])).bound)
-        # Some hundred operations on numbers that cancel by less than a thousand: 1e5 units of 1e-16.
-        assert quick == pytest.approx(exact, rel=1e-11, abs=0)
+def test_float64_is_near_the_exact_value():
+    for reading in list(procedure.readings()):
+        for a in samples(FloatFormat(2, 24), (1, 2, 4)):
+            floats, beta = procedure.as_floats(procedure.reduce(a, pivot=True)), float(a.format.unit_roundoff)
+            exact = float(evaluated(a, True, reading).bound)
+            quick = float(next(procedure.evaluate_all(floats, beta, [reading])).bound)
+            # Some hundred operations on numbers that cancel by less than a thousand: 1e5 units of 1e-16.
+            assert quick == pytest.approx(exact, rel=1e-11, abs=0)
 
 
 class TestInvariance:

@@ -25,20 +25,20 @@ def test_verdicts_are_those_of_the_contract():
     assert {verdict.value for verdict in Verdict} == {verdict for verdict, _ in ALLOWED}
 
 
-@pytest.mark.parametrize("agrees", [True, False, None])
-@pytest.mark.parametrize("verdict", list(Verdict))
-def test_verdict_must_fit_agreement(verdict, agrees):
-    if (verdict.value, agrees) in ALLOWED:
-        finding = Finding("$1$", agrees, verdict, "see (20)")
-        assert (finding.recomputed, finding.agrees, finding.verdict, finding.note) == (
-            "$1$",
-            agrees,
-            verdict,
-            "see (20)",
-        )
-    else:
-        with pytest.raises(ValueError, match=f"verdict '{verdict.value}' with agrees={agrees}; needed"):
-            Finding("$1$", agrees, verdict, "see (20)")
+def test_verdict_must_fit_agreement():
+    for agrees in [True, False, None]:
+        for verdict in list(Verdict):
+            if (verdict.value, agrees) in ALLOWED:
+                finding = Finding("$1$", agrees, verdict, "see (20)")
+                assert (finding.recomputed, finding.agrees, finding.verdict, finding.note) == (
+                    "$1$",
+                    agrees,
+                    verdict,
+                    "see (20)",
+                )
+            else:
+                with pytest.raises(ValueError, match=f"verdict '{verdict.value}' with agrees={agrees}; needed"):
+                    Finding("$1$", agrees, verdict, "see (20)")
 
 
 @pytest.mark.parametrize(

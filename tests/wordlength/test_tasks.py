@@ -180,36 +180,35 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("name", MODELS)
-def test_a_task_works_or_names_its_way(name, task, tmp_path):
-    model, (needs, does) = MODELS[name], TASKS[task]
-    kind = kind_of(admitted(model))
-    needs = next((each for each in ([needs] if isinstance(needs, str) else needs) if kind in CANNOT.get(each, ())), "")
-    if needs:
-        why = WHY.get(needs, {}).get(kind, "")
-        with pytest.raises(ValueError, match=rf"{kind},? cannot {needs}{why and f', {why}'}; ") as refused:
-            does(model, tmp_path / "c")
-        assert str(refused.value).endswith(CANNOT[needs][kind])
-    elif (task, name) in FURTHER:
-        with pytest.raises(ValueError, match=FURTHER[task, name]):
-            does(model, tmp_path / "c")
-    else:
-        assert does(model, tmp_path / "c")
+def test_a_task_works_or_names_its_way(task, tmp_path):
+    ways, does = TASKS[task]
+    for name, model in MODELS.items():
+        kind = kind_of(admitted(model))
+        needs = next((each for each in ([ways] if isinstance(ways, str) else ways) if kind in CANNOT.get(each, ())), "")
+        if needs:
+            why = WHY.get(needs, {}).get(kind, "")
+            with pytest.raises(ValueError, match=rf"{kind},? cannot {needs}{why and f', {why}'}; ") as refused:
+                does(model, tmp_path / name)
+            assert str(refused.value).endswith(CANNOT[needs][kind]), name
+        elif (task, name) in FURTHER:
+            with pytest.raises(ValueError, match=FURTHER[task, name]):
+                does(model, tmp_path / name)
+        else:
+            assert does(model, tmp_path / name), name
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_a_number_of_steps_simulates_a_filter_and_is_refused_with_the_way_for_others(name):
-    model = MODELS[name]
-    if name in (*FILTERS, "smoother"):
-        assert required_precision(model, STEPS, 0.1).met
-    else:
-        with pytest.raises((ValueError, TypeError), match=r"needed (its )?inputs|needed f.fmt., or inputs"):
-            required_precision(model, STEPS, 0.1)
+def test_a_number_of_steps_simulates_a_filter_and_is_refused_with_the_way_for_others():
+    for name, model in MODELS.items():
+        if name in (*FILTERS, "smoother"):
+            assert required_precision(model, STEPS, 0.1).met
+        else:
+            with pytest.raises((ValueError, TypeError), match=r"needed (its )?inputs|needed f.fmt., or inputs"):
+                required_precision(model, STEPS, 0.1)
 
 
-@pytest.mark.parametrize("name", ["filter", "driven", "cyclic", "extended", "system", "pid", "step"])
-def test_what_is_read_is_itself(name):
-    assert read_model(MODELS[name]) is MODELS[name]
+def test_what_is_read_is_itself():
+    for name in ("filter", "driven", "cyclic", "extended", "system", "pid", "step"):
+        assert read_model(MODELS[name]) is MODELS[name]
 
 
 def test_most_cells_work():

@@ -103,9 +103,8 @@ def test_a_model_is_refused(given, message):
         read_model({name: each for name, each in {**entries, **given}.items() if each is not None})
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
+def test_a_call_is_refused():
+    for call, message in [
         (lambda: guarantee(None, BINARY32, limits(state=1, innovation=1)), "got a NoneType; needed the path"),
         (lambda: guarantee(SYSTEM, 32, limits(measurement=1)), "got the format 32; needed a FloatFormat"),
         (lambda: guarantee(WALK, BINARY32, limits(measurement=1), horizon=0), "got 0 horizon; needed a whole number"),
@@ -172,11 +171,9 @@ def test_a_model_is_refused(given, message):
         ),
         (lambda: read_measurements("/dev/zero"), "zero: got more than 268,435,456 bytes; needed a shorter file"),
         (lambda: FloatFormat(2, 8, emin=-5, emax=5, subnormal="no"), "subnormal: got 'no'; needed True or False"),
-    ],
-)
-def test_a_call_is_refused(call, message):
-    with pytest.raises((ValueError, TypeError), match=message):
-        call()
+    ]:
+        with pytest.raises((ValueError, TypeError), match=message):
+            call()
 
 
 def test_an_answer_is_true_if_it_meets_the_tolerance():
