@@ -10,7 +10,6 @@ import pytest
 from gpbnb.report.gravity_probe_b import summary
 from gpbnb.report.ledger import correction
 from gpbnb.report.ledger.corrections import intended
-from gpbnb.report.ledger.formula import Relation
 from gpbnb.report.ledger.statements import statement
 
 
@@ -40,15 +39,6 @@ def test_without_its_braces_the_formula_is_that_of_the_ledger(shown, marks, lett
     left, found = without_braces(correction.marked(shown.relation(), marks))
     assert left == shown.relation().latex()
     assert found == [*letters]
-
-
-def test_what_cannot_be_marked_is_refused():
-    relation = Relation("x == (a + b)*c")
-    assert correction.marked(relation, {"c": "a"}) == r"x=\left(a+b\right)\underbrace{c}_{\text{(a)}}"
-    with pytest.raises(ValueError, match=r"got the parts \['d'\]; needed parts of x =="):
-        correction.marked(relation, {"d": "a"})
-    with pytest.raises(ValueError, match=r"got the sum a \+ b, .*; needed one of its terms"):
-        correction.marked(relation, {"a+b": "a"})
 
 
 def test_the_digits_follow_from_counting_step_by_step():

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from gpbnb.report.ledger import Row, counts, examine, load_statements, select
+from gpbnb.report.ledger import Row, examine, load_statements, select
 from gpbnb.report.ledger.checking import TOPICS, in_reading_order
 from gpbnb.report.ledger.finding import Verdict, compare
 from gpbnb.report.ledger.statements import Statement
@@ -29,11 +29,6 @@ def test_each_topic_has_the_checks_of_its_own_module():
         assert checks is importlib.import_module(f"gpbnb.report.ledger.checks.{name}").CHECKS
 
 
-def test_the_rows_are_those_of_the_entries_in_order():
-    some = [each for each in INVENTORY if each.document == "savage2016"][:2] + list(select(INVENTORY, "hung1984", "I"))
-    assert [row.statement for row in examine(iter(some))] == some
-
-
 def test_an_error_names_the_statement_whose_check_raised_it(monkeypatch):
     monkeypatch.setattr(TOPICS["kalman"], "run", lambda statement: 1 / 0)
     with pytest.raises(ZeroDivisionError) as raised:
@@ -44,14 +39,6 @@ def test_an_error_names_the_statement_whose_check_raised_it(monkeypatch):
 def made(verdict, number, section="2", **place):
     finding = compare(verdict is Verdict.VERIFIED, "1", verdict)
     return Row(entry(number, section, **place), finding)
-
-
-def test_counts_are_in_the_order_of_the_verdicts():
-    some = [made(Verdict.OCR, 1), made(Verdict.VERIFIED, 2), made(Verdict.WRONG, 3), made(Verdict.OCR, 4)]
-    expected = {"verified": 1, "wrong": 1, "ocr": 2}
-    assert counts(some) == expected
-    assert list(counts(some)) == list(expected)
-    assert counts([]) == {}
 
 
 def test_reading_order_sorts_sections_by_number_and_keeps_the_rest():

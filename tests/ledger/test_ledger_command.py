@@ -82,14 +82,6 @@ def test_one_record_an_entry(ledger):
     assert "zᵣ" in done.stdout.decode("utf-8")
 
 
-def test_sections(ledger):
-    done = ledger("--document", "hung1984", "--chapter", "II", "--section", "1", "9")
-    assert {record["id"].split(".")[2][:2] for record in records(done.stdout)} >= {"s1", "eq", "s9"}
-    assert len(records(done.stdout)) == sum(
-        entry.id.startswith("hung1984.II.") and entry.section in {"1", "9", "9.1", "9.2"} for entry in INVENTORY
-    )
-
-
 def test_formats(ledger):
     part = stored(select(INVENTORY, "hung1984", "I"))
     assert ledger(*CHOSEN).stdout.decode() == to_csv(part)

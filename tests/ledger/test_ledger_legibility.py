@@ -1,17 +1,13 @@
 """Author or scan: the rule, and the data to which it is applied."""
 
-import ast
-from pathlib import Path
-
 import pytest
 
 from gpbnb.report import ledger
 from gpbnb.report.ledger import legibility
-from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, compare
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict, compare
 from gpbnb.report.ledger.legibility import Damage, charged, load_legibility
 
 DAMAGES = load_legibility()
-PACKAGE = Path(legibility.__file__).parent
 
 
 @pytest.fixture(scope="module")
@@ -34,22 +30,6 @@ def test_a_witness_charges_the_scan(damaged, verdict):
     assert (found.recomputed, found.note, found.agrees) == ("1", "why", False)
 
 
-@pytest.mark.parametrize("key", ["b", "c"])
-def test_without_a_witness_the_author_is_charged(damaged, key):
-    author = compare(False, "1", Verdict.MISPRINT, "why")
-    assert charged(key, author) is author
-
-
-def test_a_statement_that_is_right_needs_nobody_to_charge(damaged):
-    for right in (compare(True, "1"), Finding("", None, Verdict.GIVEN, "a definition")):
-        assert charged("a", right) is right
-
-
-def test_a_damage_shows_characters():
-    with pytest.raises(ValueError, match="got a blank scan for a; needed the characters"):
-        Damage("a", " ")
-
-
 def test_each_damage_belongs_to_a_statement_and_each_witness_is_right(rows):
     assert set(DAMAGES) <= set(rows)
     for damage in DAMAGES.values():
@@ -60,13 +40,6 @@ def test_each_damage_belongs_to_a_statement_and_each_witness_is_right(rows):
 def test_the_scan_is_charged_exactly_where_there_is_a_witness(rows):
     charged_to_scan = {key for key, row in rows.items() if row.finding.verdict is Verdict.OCR}
     assert charged_to_scan == {damage.id for damage in DAMAGES.values() if damage.witness}
-
-
-def test_no_check_charges_the_scan_by_itself():
-    def names(path):
-        return {ast.unparse(n) for n in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(n, ast.Attribute)}
-
-    assert [path.name for path in (PACKAGE / "checks").rglob("*.py") if "Verdict.OCR" in names(path)] == []
 
 
 def test_an_entry_shows_the_characters_of_a_damaged_scan(rows):

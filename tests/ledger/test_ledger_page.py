@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import replace
-from html import escape
 from pathlib import Path
 
 import pytest
@@ -39,13 +38,6 @@ def test_every_statement_is_on_exactly_one_page():
     ]
     ids = [row["id"] for row in Elements(EVERY_PAGE).all("tr") if "id" in row]
     assert sorted(ids) == sorted(statement.id for statement in STATEMENTS)
-
-
-def test_the_errata_count_each_verdict_once():
-    """The counts at the head of the page add up to the number of statements."""
-    head = (BOOK / "errata.md").read_text(encoding="utf-8").partition("\n## ")[0]
-    named = re.findall(r"\{ledger-count\}`([^`]+)`", head)
-    assert sorted(named) == sorted(["statements", "roots", *(verdict.value for verdict in Verdict)])
 
 
 @pytest.mark.parametrize("each", ledger.PAGES, ids=lambda each: each.name)
@@ -103,15 +95,6 @@ def test_the_options_of_each_filter_count_its_rows():
             assert select.count('<option value="">all</option>') == 1
 
 
-def test_the_form_waits_for_the_script_and_every_control_has_a_label():
-    form = re.search(r"<form.*?</form>", EVERY_PAGE, re.DOTALL)[0]
-    assert re.match(r"<form [^>]*hidden>", form)
-    labels = re.findall(r"<label>(.*?)</label>", form, re.DOTALL)
-    assert len(labels) == 4
-    assert all(re.match(r"\w[\w ]* <(input|select) ", label) for label in labels)
-    assert 'aria-live="polite"' in form
-
-
 def test_the_error_table_lists_disagreements_with_the_most_serious_first():
     table = ledger.error_table(ROWS)
     found = re.findall(r'class="verdict verdict-([\w-]+)"', table.html)
@@ -134,30 +117,6 @@ def test_the_error_table_has_a_row_for_each_root_error_with_all_its_statements()
     assert all(page.address(row.statement) in lines[0] and f"note {i}" in lines[0] for i, row in enumerate(shared))
     assert "a note of its own" in lines[1]
     assert "<details>" not in lines[1]
-
-
-def test_of_equally_serious_errors_the_one_with_more_statements_comes_first():
-    notes = ["one", "three", "three", "two", "three", "two"]
-    rows = [Row(s, compare(False, "1", Verdict.WRONG, note)) for s, note in zip(STATEMENTS, notes, strict=False)]
-    rows.append(Row(STATEMENTS[6], compare(False, "1", Verdict.MISPRINT, "last")))
-    rows += [Row(s, compare(False, "1", Verdict.MISPRINT, "four")) for s in STATEMENTS[7:11]]
-    html = ledger.error_table(rows).html
-    assert re.findall(r'<tr><th scope="row">(\w+)<', html) == ["three", "two", "one", "four", "last"]
-
-
-def test_errors_list_the_statements_of_each_document_under_its_year():
-    ones = [next(each for each in STATEMENTS if each.document == document) for document in DOCUMENTS]
-    rows = [Row(each, compare(False, "1", Verdict.WRONG, "the same")) for each in ones]
-    places = re.findall(r"<p>(\d+): ", ledger.error_table(rows).html)
-    assert sorted(places) == ["1982", "1984", "2016"]
-
-
-def test_root_errors_begin_with_the_one_that_spoils_most():
-    first, second, third = list(ledger.load_roots())[:3]
-    roots = [first, second, second, second, third, third]
-    rows = [Row(s, compare(False, "1", Verdict.WRONG, root=r)) for s, r in zip(STATEMENTS, roots, strict=False)]
-    shown = [a["id"] for a in Elements(ledger.root_table(rows).html).all("tr") if "id" in a]
-    assert shown == [f"root-{each}" for each in (second, third, first)]
 
 
 @pytest.mark.parametrize(
@@ -192,57 +151,11 @@ def test_where_no_text_is_right_the_reason_is_shown():
     assert f'<p class="uncorrected">{CORRECTIONS[printed.id].reason}</p>' in html
 
 
-@pytest.mark.parametrize("root", ["", next(iter(ledger.load_roots()))])
-def test_the_errata_show_what_is_right(root):
-    printed = next(each for each in STATEMENTS if each.id == "hung1984.II.eq92")
-    html = ledger.error_table([Row(printed, compare(False, "1", Verdict.WRONG, "n", root=root))] * 2).html
-    assert html.count(r"\tilde b+L\Delta b") == (2 if root else 1)  # once for each statement, or for the shared note
-
-
 def test_quotation_marks_stay_and_what_would_be_markup_does_not():
     shown = typeset('"less" than it\'s, $a<b$ & more <b>')
     assert shown == (
         '"less" than it\'s, <span class="math notranslate nohighlight">\\(a&lt;b\\)</span> &amp; more &lt;b&gt;'
     )
-
-
-def test_each_table_has_a_title_and_names_its_columns():
-    root = next(iter(ledger.load_roots()))
-    spoiled = Row(STATEMENTS[0], compare(False, "1", Verdict.WRONG, root=root))
-    expected = {
-        ledger.error_table(ROWS[:3]): ("2 statements that disagree", ["Error", "Verdict", "Statements affected"]),
-        ledger.root_table([spoiled]): (
-            "1 root errors",
-            ["Root error", "Statements", "Explanation and affected statements"],
-        ),
-        ledger.claim_table([Row(statement, FINDINGS[0]) for statement in STATEMENTS]): (
-            f"{len(page.CLAIMS)} claims",
-            ["Claim", "Outcome", "What follows"],
-        ),
-    }
-    for table, (title, header) in expected.items():
-        assert repr(table) == f"<{title}>"
-        assert re.findall(r'<th scope="col">(.*?)</th>', table.html) == header
-        assert Elements(table.html).cells[: len(header)] == header
-
-
-@pytest.mark.parametrize("count", [12, 13])
-def test_a_table_of_many_statements_is_folded_below_its_title(count):
-    html = ledger.note_table(ROWS[:count]).html
-    folded = f'<details class="long-table"><summary>{count} statements</summary>\n<div class="ledger">'
-    assert html.startswith(folded) == (count > 12)
-    assert html.count("<details") == html.count("</details>")
-
-
-def test_root_errors_list_the_statements_that_they_spoil(monkeypatch):
-    root = next(iter(ledger.load_roots()), None)
-    if root is None:
-        pytest.skip("roots.csv is empty")
-    spoiled = [Row(s, compare(False, "1", Verdict.WRONG, root=root)) for s in STATEMENTS[:3]]
-    html = ledger.root_table([*spoiled, *ROWS[3:]]).html
-    assert [a["id"] for a in Elements(html).all("tr") if "id" in a] == [f"root-{root}"]
-    assert [a["href"] for a in Elements(html).all("a")] == [page.address(row.statement) for row in spoiled]
-    assert "<td>3</td>" in html
 
 
 def test_every_verdict_that_a_claim_can_have_has_an_outcome():
@@ -267,27 +180,6 @@ def test_every_verdict_that_a_claim_can_have_has_an_outcome():
     assert Elements(html).cells[:3] == ["Claim", "Outcome", "What follows"]
 
 
-def test_each_claim_says_what_follows_and_shows_what_is_printed():
-    html = ledger.claim_table([Row(statement, FINDINGS[0]) for statement in STATEMENTS]).html
-    for claim in page.CLAIMS.values():
-        assert escape(claim.consequence) in html
-    assert html.count("<summary>As printed</summary>") == len(page.CLAIMS)
-
-
-def test_outcomes_of_claims_are_counted():
-    rows = [Row(statement, FINDINGS[0]) for statement in STATEMENTS]
-    outcomes = ledger.claim_outcomes(rows)
-    assert list(outcomes) == list(page.CLAIMS)
-    assert set(outcomes.values()) == {"replicated"}
-
-
-def test_note_table_labels_what_was_left_undone():
-    table = ledger.note_table(ROWS[:6], left_undone=True)
-    assert 'class="ledger-table ledger-undone"' in table.html
-    assert Elements(table.html).cells[:3] == ["Statement", "Verdict", "Evidence"]
-    assert repr(table) == "<6 statements>"
-
-
 @pytest.mark.parametrize("by", ["document", "chapter", "kind"])
 def test_counts_add_up(by):
     found = ledger.count_table(ROWS, by)
@@ -302,11 +194,6 @@ def test_counts_add_up(by):
         assert number == sum(row.outcome == outcome for row in ROWS)
     if by == "document":
         assert [line[0] for line in body] == [*DOCUMENTS, "all"]
-
-
-def test_counts_by_something_else_are_refused():
-    with pytest.raises(ValueError, match="by='colour'; needed one of document, chapter, kind"):
-        ledger.count_table(ROWS, "colour")
 
 
 def test_select_topic():

@@ -13,7 +13,7 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 from gpbnb.report.ledger import Row, load_statements, table
 from gpbnb.report.ledger.finding import Finding, Verdict, compare
-from gpbnb.report.ledger.render import to_csv, to_json, to_markdown, to_text
+from gpbnb.report.ledger.render import to_csv, to_json
 from gpbnb.report.ledger.statements import Statement
 
 ENTRY = Statement("hung1984.II.eq20", "hung1984", "II", "6", "eq (20)", "equation", r"$|\tilde Q/Q|\le(n+m+1)\beta$")
@@ -58,15 +58,6 @@ def test_json_says_the_same():
     }
     assert to_json(()) == "[]\n"
     assert to_json(ROWS).endswith("\n]\n")
-
-
-def test_text_is_a_line_an_entry():
-    assert to_text(ROWS).splitlines() == [
-        r'misprint      hung1984.II.eq20  $(n+m-1)\beta$  one "sign", as |(20)| of 1982',
-        "verified      hung1984.II.eq20  yes",
-        "unverifiable  hung1984.II.eq20  no data",
-        "answered      hung1984.II.eq20  done  here",
-    ]
 
 
 def cells(line):
@@ -141,15 +132,3 @@ def test_the_whole_inventory_makes_a_sound_table():
     assert sorted(row[2][1] for row in body) == prose
     assert sum(len(row[2][0]) for row in body) == sum(text.count("$") // 2 for _, text in printed)
     assert not any("|" in math for row in body for math in row[2][0])
-
-
-def test_rows_may_be_an_iterator():
-    assert table(iter(ROWS)) == table(ROWS)
-
-
-def test_representations_are_short_and_stable():
-    title = "Ledger of 4 statements: 1 verified, 1 misprint, 1 unverifiable, 1 answered"
-    assert repr(table(ROWS)) == f"<{title}>"
-    assert repr(table(())) == "<Ledger of 0 statements: none>"
-    assert table(ROWS)._repr_markdown_() == table(ROWS).page()
-    assert table(ROWS).markdown() == to_markdown(ROWS)[:-1]

@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 import pytest
 
-from gpbnb.report.ledger import load_statements, quote, select
+from gpbnb.report.ledger import load_statements, select
 from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.statements import DOCUMENTS, statement
 
@@ -31,17 +31,6 @@ def test_each_text_has_places_for_parts_of_its_form():
 
 def sections(entries):
     return list(dict.fromkeys((entry.document, entry.chapter, entry.section) for entry in entries))
-
-
-def test_quotes_are_what_the_inventory_has():
-    assert quote("hung1984.II.s1.claim-main-activity") == "Kalman filtering is the main activity in GP-B data reduction"
-    assert all(quote(entry.id) == entry.printed for entry in INVENTORY[::100])
-    with pytest.raises(KeyError, match=r"'hung1984\.I\.none'; needed the id of a statement"):
-        quote("hung1984.I.none")
-
-
-def test_select_everything():
-    assert select(INVENTORY) == INVENTORY
 
 
 def test_select_by_each_filter():
@@ -89,11 +78,6 @@ def markup_faults(printed):
         faults += ["unpaired brace"] * (plain.count("{") != plain.count("}"))
         faults += ["a LaTeX comment"] * ("%" in math.replace(r"\%", ""))
     return faults
-
-
-@pytest.mark.parametrize("printed", ["$a", r"\beta", "$$", "$ a$", r"$\frac{a$", "$1%$", r"$\{a}$"])
-def test_unsound_markup_is_noticed(printed):
-    assert len(markup_faults(printed)) == 1
 
 
 @pytest.mark.parametrize(("document", "chapter"), [("hung1984", "II"), ("hung1982", "III")])

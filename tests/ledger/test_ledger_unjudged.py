@@ -10,9 +10,7 @@ from gpbnb.report.inversion import example as inverse
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.checks import kalman as year
 from gpbnb.report.ledger.checks.rolling import SIX, TEN
-from gpbnb.report.ledger.finding import Verdict
 from gpbnb.report.ledger.formula import Number, Undefined, Words
-from gpbnb.report.ledger.html import chapter
 from gpbnb.report.ledger.judge import CheckRow
 from gpbnb.report.ledger.statements import statement
 from gpbnb.report.rolling.theory import PERIOD
@@ -91,13 +89,3 @@ def test_an_altered_given_value_is_another_one(key):
 def test_each_given_number_is_compared_with_the_package():
     numbers = {key for key in UNJUDGED if statement(key).form and statement(key).kind in ("number", "example", "table")}
     assert numbers == {*USED, *NOT_USED}
-
-
-def test_an_alteration_of_an_unjudged_statement_is_not_judged_right():
-    verdicts = {checks.run(other).verdict for key, checks in UNJUDGED.items() for _, other in altered(statement(key))}
-    assert verdicts == {Verdict.GIVEN, Verdict.UNVERIFIABLE}
-
-
-def test_a_note_names_the_chapter_by_its_present_title():
-    key = "hung1984.III.s1.figure-iii-2"
-    assert chapter("rolling") in UNJUDGED[key].run(statement(key)).note

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from . import axe
 from . import browser as tools
 
 WIDTHS = """() => [...document.querySelectorAll(".correction-printed, .correction-corrected")].map((panel) => {
@@ -44,7 +43,3 @@ def test_each_brace_has_the_colour_of_its_panel(page):
     assert len({one, other, plain}) == 3
     # The limits of a sum are no brace.
     assert {*page.evaluate(LIMITS)} == {plain}
-
-
-def test_axe_finds_nothing_in_the_figure(page):
-    assert axe.violations(page, within=".correction") == []
