@@ -23,8 +23,6 @@ FORMATS = (
     FloatFormat(10, 12, NEAREST),
     FloatFormat(16, 6, CHOP),
 )
-FORMATS_OF_ALL_FORMS = FORMATS[:5]
-"""Those in which UD and the second gain are compiled, too."""
 STEPS = 6
 
 

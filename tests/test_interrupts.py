@@ -19,29 +19,28 @@ from gpbnb import (
     linalg,
 )
 
-FORMATS = [BINARY32, FloatFormat(2, 20, "chop"), FloatFormat(10, 12, "up"), FloatFormat(10, 25), FixedFormat(9, 20)]
+FORMATS = [BINARY32, FloatFormat(2, 20, "chop"), FloatFormat(10, 12, "up"), FloatFormat(10, 25)]
 SYSTEM = LinearSystem.from_coefficients(["0.2", "0.1"], [1, "-1.2", "0.5"])
 RNG = np.random.default_rng(4)
 A, B = RNG.uniform(1, 2, (7, 7)) + 9 * np.eye(7), RNG.uniform(1, 2, (7, 5))
-ARRAYS = {
-    "entries": lambda a, b: a * a[0] / a,
-    "sum": lambda a, b: np.sum(b),
-    "columns": lambda a, b: np.sum(b, axis=0),
-    "partial sums": lambda a, b: np.cumsum(b, axis=0),
-    "product": lambda a, b: a @ b,
-    "comparison": lambda a, b: (a > a.T).astype(int),
-    "conversion": lambda a, b: a.format.array(FloatFormat(10, 9).array(b)),
-    "solution": lambda a, b: linalg.solve(a, b, pivot=True),
-}
+ARRAYS = [
+    lambda a, b: a * a[0] / a,
+    lambda a, b: np.sum(b),
+    lambda a, b: np.sum(b, axis=0),
+    lambda a, b: np.cumsum(b, axis=0),
+    lambda a, b: a @ b,
+    lambda a, b: (a > a.T).astype(int),
+    lambda a, b: a.format.array(FloatFormat(10, 9).array(b)),
+    lambda a, b: linalg.solve(a, b, pivot=True),
+]
 
 
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
-@pytest.mark.parametrize("name", ARRAYS)
-def test_an_array_in_slices_has_the_same_digits(fmt, name, monkeypatch):
+def test_an_array_in_slices_has_the_same_digits(fmt, monkeypatch):
     a, b = fmt.array(A), fmt.array(B)
-    whole = ARRAYS[name](a, b).tolist()
+    whole = [operate(a, b).tolist() for operate in ARRAYS]
     monkeypatch.setattr("gpbnb.interrupts.SLICE", 11)
-    assert ARRAYS[name](a, b).tolist() == whole
+    assert [operate(a, b).tolist() for operate in ARRAYS] == whole
 
 
 @pytest.mark.parametrize("fmt", [BINARY32, FloatFormat(2, 20), FloatFormat(10, 7), "Q3.20"], ids=str)

@@ -9,14 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import sympy as sp
 from test_notebooks import PATHS
 
-from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.forms import Form
-from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.integration import theory as integration
 from gpbnb.report.kalman import report_bounds
@@ -116,14 +112,6 @@ def printed(page: str, code: str) -> list[float]:
     return [float(each) for each in re.findall(r"\d+\.\d+", output(page, code))]
 
 
-def decades_a_digit() -> float:
-    """Decades that each decimal digit takes off the error of the drift rate after a year, on average."""
-    base = year.YearCase(year.MODELS[0], 10, 8, Rounding.NEAREST, Form.HUNG)
-    runs = {run.case: run for run in year.load()}
-    ends = [float(np.abs(runs[base._replace(precision=t)].rate[-1]).max()) for t in (8, 16)]
-    return math.log10(ends[0] / ends[1]) / 8
-
-
 def fitted_slope(record: sp.Expr) -> sp.Expr:
     """Slope of the line fitted to a record by the weight of the text, for T = 1."""
     t = sp.Symbol("t")
@@ -140,11 +128,6 @@ def mean_square_of_a_rounding() -> sp.Expr:
     b, t, x = sp.symbols("b t x", positive=True)
     mean = sp.integrate(1 / (12 * x**2) / x, (x, b ** (t - 1), b**t)) / sp.log(b)
     return sp.simplify(mean - (b**2 - 1) / (24 * sp.log(b)) * b ** (-2 * t))
-
-
-def near(number: float) -> Any:
-    """Within 1 %."""
-    return pytest.approx(number, rel=0.01)
 
 
 #: Quantities in words and numbers in formulas, by page and phrase. For formulas, each function

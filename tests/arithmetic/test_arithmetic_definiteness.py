@@ -33,7 +33,7 @@ def eliminated(matrix, strictly):
 ENTRIES = st.fractions(-3, 3, max_denominator=7)
 
 
-@settings(derandomize=True, deadline=None, database=None, max_examples=300)
+@settings(derandomize=True, deadline=None, database=None, max_examples=100)
 @given(st.data())
 def test_it_decides_as_elimination_does(data):
     """Of semidefinite matrices of every rank, and of those that differ from them by the least or the most."""
@@ -53,9 +53,9 @@ def hilbert(n):
     return np.array([[Fraction(1, i + j + 1) for j in range(n)] for i in range(n)], dtype=object)
 
 
-@pytest.mark.parametrize("n", [20, 60])
-def test_definite_matrices_are_told_from_those_that_miss_it_by_the_least(n, without_elimination):
-    """The least eigenvalue of Hilbert's matrix of 60 rows is near 1e-90; less 1 from a sum of squares is negative."""
+def test_definite_matrices_are_told_from_those_that_miss_it_by_the_least(without_elimination):
+    """The least eigenvalue of Hilbert's matrix of 30 rows is near 1e-44; less 1 from a sum of squares is negative."""
+    n = 30
     assert is_definite(hilbert(n), strictly=True)
     G = exact(np.random.default_rng(n).integers(-9, 9, (n, n - 1)))
     singular = G @ G.T

@@ -161,9 +161,6 @@ def test_numbers_beyond_the_range_have_no_bound(fmt: Any) -> None:
     assert "may exceed the largest" in found.why
 
 
-# -- a model of finitely many steps -----------------------------------------------------------------------------------
-
-
 # -- inputs of a linear system as a format stores them ----------------------------------------------------------------
 
 

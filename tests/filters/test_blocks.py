@@ -24,21 +24,6 @@ Z[3] = Z[5, 0] = Z[8:10] = np.nan
 """Measurements, of which some are missing: rows of K H are then zero, and rows of I - K H the identity's."""
 
 
-def taken(blocks, form):
-    """Estimates, gains and covariances, or factors, after each step of a run of the package."""
-    model, z = MODEL.without_missing(Z)
-    run = Run(model, blocks, form, range(1, len(Z) + 1))
-    run.take(z)
-    return run.exactly(run.X), run.exactly(run.G), run.exactly(run.C)
-
-
-@pytest.mark.parametrize("form", list(Form), ids=str)
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 12), FloatFormat(2, 24, "even", -126, 127), FloatFormat(10, 6, "chop")])
-def test_equal_blocks_are_one_format(form, fmt):
-    for one, blocks in zip(taken(fmt, form), taken(BlockFormats.uniform(fmt), form), strict=True):
-        assert one.tolist() == blocks.tolist()
-
-
 def test_an_overflow_names_the_quantity_of_the_block_whose_range_it_leaves():
     narrow = FloatFormat(2, 11, "even", -14, 3)
     wide, sums = FloatFormat(2, 11, "even"), FloatFormat(2, 20, "even")

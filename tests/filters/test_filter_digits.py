@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from independent_filter import Arithmetic, Filter
-from small_filter import CHOP, FORMATS, FORMATS_OF_ALL_FORMS, measurements, model, run
+from small_filter import CHOP, run
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.forms import Form
@@ -15,21 +15,6 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.gravity_probe_b.model import gravity_probe_b
 from gpbnb.report.kalman import smallest
-
-
-# The second gain and UD take long to compile. Their loops are the same for all formats, so five formats are enough.
-@pytest.mark.parametrize(
-    ("fmt", "form"),
-    [
-        (fmt, form)
-        for fmt in FORMATS
-        for form in Form
-        if form not in (Form.HUNG_SECOND_GAIN, Form.UD) or fmt in FORMATS_OF_ALL_FORMS
-    ],
-)
-def test_every_digit_is_that_of_a_filter_on_integers(fmt, form):
-    z = measurements()
-    check_each_step(run(fmt, form), Filter.of(model(), Arithmetic.of(fmt), form), z)
 
 
 def check_each_step(found, slow, z):

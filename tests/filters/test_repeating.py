@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, FixedFormat, FloatFormat, Form, NonlinearModel
-from gpbnb.filters.forms import ArrayForm
+from gpbnb import FixedFormat, FloatFormat, NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun
 from gpbnb.filters.repeating import RepeatedStep
 from gpbnb.wordlength.nonlinear_examples import tracked_motion, tracked_sight
@@ -31,18 +30,7 @@ def repeats(run) -> bool:
     return run._step._inside is not None
 
 
-FORMATS = [
-    FloatFormat(2, 24),
-    FloatFormat(2, 20, "chop"),
-    BINARY32,
-    FloatFormat(10, 8, "even"),
-    FloatFormat(16, 8),
-    FloatFormat(2, 100, "even"),
-    FloatFormat(2, 300),
-    FixedFormat(20, 30),
-    FixedFormat(8, 60, "chop", "wrap"),
-]
-FORMS = [Form.INNOVATION, Form.JOSEPH, Form.UD, ArrayForm.SYMMETRIZED, ArrayForm.POTTER, ArrayForm.CARLSON]
+FORMATS = [FloatFormat(2, 24), FloatFormat(10, 8, "even"), FloatFormat(2, 300), FixedFormat(8, 60, "chop", "wrap")]
 
 
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
@@ -53,16 +41,6 @@ def test_an_unscented_and_an_iterated_filter_in_each_kind_of_numbers(fmt, monkey
         states = run.states(z)
         assert np.array_equal(states, by_operations(monkeypatch, lambda model=model: NonlinearRun(model, fmt), z))
         assert len(states) == len(Z)
-        assert repeats(run)
-
-
-@pytest.mark.parametrize("form", FORMS, ids=str)
-def test_each_form(form, monkeypatch):
-    model, z = sight()
-    for fmt in (FloatFormat(2, 24), FloatFormat(10, 9), FloatFormat(2, 300)):
-        run = NonlinearRun(model, fmt, form, [8])
-        states = run.states(z)
-        assert np.array_equal(states, by_operations(monkeypatch, lambda fmt=fmt: NonlinearRun(model, fmt, form), z))
         assert repeats(run)
 
 

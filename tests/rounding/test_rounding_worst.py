@@ -138,6 +138,3 @@ def test_a_first_order_product_bound_is_exceeded_by_twelve_factors_and_n_plus_on
     for n, trial in exceeded.items():
         assert trial.error <= (1 + fmt.unit_roundoff / (1 + fmt.unit_roundoff)) ** (n - 1) - 1
     assert exceeded[20].ratio("1982 (20)") > 1.2
-
-
-# -- chopping -------------------------------------------------------------------------------------

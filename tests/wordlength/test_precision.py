@@ -259,16 +259,15 @@ def in_other_units(model, states, measurements):
     )
 
 
-@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD, Form.HUNG])
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.UD])
 @pytest.mark.parametrize("basis", ["emulation", "bound"])
-@pytest.mark.parametrize("unit", [-40, 30])
-def test_answers_do_not_depend_on_units(basis, form, unit):
+def test_answers_do_not_depend_on_units(basis, form):
     """Powers of two change no rounding, hence no answer: here a simulation in coarse steps did."""
-    other = in_other_units(MODEL, (unit, unit - 3), (unit + 5,))
+    other = in_other_units(MODEL, (-40, -43), (-35,))
     tolerance = np.array([1e-4, 3e-4])
     asked = {"basis": basis, "form": form}
     first = required_precision(MODEL, STEPS, tolerance, **asked)
-    second = required_precision(other, STEPS, tolerance * 2.0 ** np.array([unit, unit - 3]), **asked)
+    second = required_precision(other, STEPS, tolerance * 2.0 ** np.array([-40, -43]), **asked)
     assert first.format is not None
     assert first.tried == second.tried
 
@@ -322,7 +321,7 @@ def expected():
     return {False: answers_for(WHOLE), True: answers_for(masked), "system": answers_for_system(WHOLE)}
 
 
-@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.longdouble, np.int8, np.uint64, object, "U9"])
+@pytest.mark.parametrize("dtype", [np.float32, np.int8, object, "U9"])
 @pytest.mark.parametrize("masked", [False, True], ids=["whole", "masked"])
 def test_measurements_of_any_type_are_read_exactly(dtype, masked, expected):
     """The same numbers in another type give the same answer, for a filter with and without inputs, and for a system."""

@@ -114,11 +114,10 @@ def test_what_changed_is_compiled_again(copy):
     assert len(copy.kept) == 4  # new files take the place of old ones
 
 
-@pytest.mark.parametrize("damage", [b"", b"no pickle", b"cgpbnb.nowhere\nNothing\n.", None])
-def test_a_damaged_file_is_compiled_again(copy, damage):
-    """Without damage, one is cut by a byte."""
+def test_damaged_files_are_compiled_again(copy):
+    """Each of the four in its way; one is cut by a byte."""
     copy.run()
-    for path in copy.kept:
+    for path, damage in zip(copy.kept, (b"", b"no pickle", b"cgpbnb.nowhere\nNothing\n.", None), strict=True):
         path.write_bytes(path.read_bytes()[:-1] if damage is None else damage)
     assert copy.run() == (VALUES, ALL)
     assert copy.run() == (VALUES, [])
