@@ -125,21 +125,6 @@ class TestFormulas:
     def parts(self):
         return linalg.lu(self.A), linalg.inv(self.A)
 
-    def test_higham(self):
-        factors, x = self.parts()
-        gamma = 6 * 5e-8 / (1 - 6 * 5e-8)
-        lower, upper = np.array([[1, 0], [0.5, 1]]), np.array([[2, 1], [0, 2.5]])
-        sizes = np.array([[0.6, 0.2], [0.2, 0.4]])
-        g = gamma * lower @ upper @ sizes
-        expected = (sizes @ g).sum(axis=0).max() / (1 - g.sum(axis=0).max())
-        assert bounds.higham(factors, x) == pytest.approx(expected, rel=1e-12)
-        assert bounds.higham(factors, x) >= expected
-
-    def test_wilkinson(self):
-        factors, x = self.parts()
-        g = 6 * 5e-8 / (1 - 6 * 5e-8) * 4 * 2.5 * 0.8
-        assert bounds.wilkinson(factors, x) == pytest.approx(0.8 * g / (1 - g), rel=1e-12)
-
     def test_probabilistic(self):
         factors, x = self.parts()
         u = 5e-8
@@ -200,7 +185,7 @@ def test_rounded_up_to_float64(text):
 class TestSmallestPrecision:
     HILBERT = np.array([[Fraction(1, i + j + 1) for j in range(5)] for i in range(5)], dtype=object)
 
-    @pytest.mark.parametrize("tolerance", [0.5, 1e-3, 1e-9])
+    @pytest.mark.parametrize("tolerance", [0.5, 1e-9])
     @pytest.mark.parametrize(("base", "rounding"), [(10, NEAREST), (2, CHOP)])
     @pytest.mark.parametrize("name", ["hilbert", "far from its origin", "in unequal units"])
     def test_it_is_the_first_of_all_precisions_that_meets_the_tolerance_with_the_next(

@@ -33,22 +33,6 @@ def test_one_changed_digit_is_found(sweep, tmp_path):
         sweep.load(changed)
 
 
-@pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
-def test_a_cut_sweep_is_rejected(sweep, tmp_path):
-    lines = sweep.file.read_text(encoding="utf-8").splitlines(keepends=True)
-    cut = tmp_path / sweep.file.name
-    cut.write_text("".join(lines[:-7]), encoding="utf-8")
-    with pytest.raises(DamagedFileError, match=rf"line {len(lines) - 6}: the file ends after .*{sweep.command}"):
-        sweep.load(cut)
-
-
-def test_a_year_cut_at_the_end_of_a_row_does_not_load(tmp_path):
-    text = year.SWEEP.file.read_text(encoding="utf-8").splitlines(keepends=True)
-    (tmp_path / "year.csv").write_text("".join(text[: len(text) // 2]), encoding="utf-8")
-    with pytest.raises(DamagedFileError, match="the file ends after"):
-        year.load(tmp_path / "year.csv")
-
-
 def test_the_first_steps_include_the_last_of_them():
     """Of the checkpoints, three a decade."""
     assert [row[5] for row in year.rows(year.CASES[0], steps=10)] == ["1", "2", "5", "10"]

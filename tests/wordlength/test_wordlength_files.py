@@ -40,21 +40,15 @@ def test_measurements_are_read(text, rows, tmp_path):
     ("content", "message"),
     [
         (b"1;2\n3;4\n", "z.csv, line 1: got semicolons between the cells; needed commas, and a point as decimal mark"),
-        (b"tilt;rate\n1,5;2\n", "z.csv, line 1: got semicolons between the cells"),
         (b"1\t2\n", "z.csv, line 1: got tabs between the cells; needed commas"),
         (
             "1\n2\n3 °\n".encode("latin-1"),
             "z.csv, line 3: got the byte 0xb0, which is not UTF-8; needed a file in UTF-8",
         ),
-        ("tilt (°)\n1\n".encode("utf-16"), "z.csv, line 1: got the byte 0xff, which is not UTF-8"),
         (
             b"1,2,\n3,4,\n",
             "z.csv, line 1: got an empty cell in column 3 of this row and every other; needed numbers; remove the "
             "comma at the end of each row, or write nan where a measurement is missing",
-        ),
-        (
-            b"1,2\n3,4,\n",
-            "z.csv, line 2: got 3 cells; needed 2, as in the rows above; remove the comma at the end of the lo",
         ),
         (
             b"1,2,\n3,4\n",
@@ -67,9 +61,6 @@ def test_measurements_are_read(text, rows, tmp_path):
         ),
         (b"1_0\n", "z.csv, line 1: got '1_0'; needed a number"),
         (b"1\nrange\n", "z.csv, line 2: got 'range'; needed a number"),
-        (b"0x10\n1\n", "z.csv, line 1: got '0x10'; needed a number"),
-        (b"1.5V\n1\n", "z.csv, line 1: got '1.5V'; needed a number"),
-        (b"range\n", "z.csv: got no rows of numbers"),
         (b"", "z.csv: got no rows of numbers"),
     ],
 )

@@ -51,24 +51,15 @@ def refused(capsys, *arguments):
     [
         (b"", "model.toml: A, B missing; needed"),
         (b"\x00\xff\xfe", "model.toml, line 1: got the byte 0xff, which is not UTF-8; needed a file in UTF-8"),
-        (toml(FILTER).encode("utf-16"), "model.toml, line 1: got the byte 0xff, which is not UTF-8; needed a file"),
         (toml(FILTER).encode() + b"\x00", "model.toml is not TOML: Invalid statement"),
         (toml(FILTER).encode() + b"R = [[3]]", "model.toml is not TOML: Cannot overwrite a value"),
         (b"A = " + b"[" * 5000 + b"]" * 5000, "model.toml is not TOML: its lists are nested too deeply"),
-        (toml(SYSTEM | {"A": "[" * 100 + "1" + "]" * 100}).encode(), "model.toml: A: entry 0, 0, 0"),
         (toml(FILTER | {"R": "[" * 60 + "4" + "]" * 60}).encode(), "model.toml: got R of shape (1, 1, 1, 1, "),
         (toml(FILTER | {"R": f"[[{'9' * 5000}]]"}).encode(), "model.toml is not TOML: Exceeds the limit"),
         (toml(FILTER | {"R": "[[1e99999999]]"}).encode(), "model.toml: R: entry 0, 0: got a number with the power of"),
-        (toml(FILTER | {"R": "[[1e-99999999]]"}).encode(), "model.toml: R: entry 0, 0: got a number with the power of"),
         (toml(FILTER | {"R": f"[[1e{'9' * 40}]]"}).encode(), "model.toml: got an exponent that is too long"),
-        (
-            toml(FILTER | {"R": f"[['{'9' * 200_000}']]"}).encode(),
-            "model.toml: R: entry 0, 0: got a number of 200000 ch",
-        ),
         (toml(FILTER | {"R": "[[1e9999]]"}).encode(), "got R with an entry near 2**33215; needed 2**-450 to 2**450"),
-        (toml(FILTER | {"x0": f"[{'9' * 4000}, 0]"}).encode(), "got x0 with an entry near 2**13287; needed 2**-450"),
         (toml(FILTER | {"R": "[[nan]]"}).encode(), "model.toml: R: entry 0, 0: got NaN; needed a finite number"),
-        (toml(FILTER | {"R": "[[inf]]"}).encode(), "model.toml: R: entry 0, 0: got Infinity; needed a finite number"),
         ((toml(FILTER) + "[u]\na = 1").encode(), "model.toml: got u without B"),
         ((".".join("a" * 3000) + " = 1").encode(), "model.toml: A, B missing; a unknown"),
     ],
@@ -121,13 +112,10 @@ def test_a_value_of_a_wrong_type_is_refused_with_its_key(folder, capsys, entries
     ("report", "message"),
     [
         ("z.csv", "got z.csv and z.csv, which are one file"),
-        ("./folder/../filter.toml", "which are one file"),
         ("data.html", "got data.json and data.json, which are one file"),
         ("linked.html", "got z.csv and linked.html, which are one file"),
         ("hard.html", "got z.csv and hard.html, which are one file"),
         ("a.json", "got --report a.json; needed the name of an HTML file"),
-        ("a.JSON", "got --report a.JSON; needed the name of an HTML file"),
-        (".", "got --report .; needed the name of an HTML file"),
         ("", "got --report .; needed the name of an HTML file"),
         ("folder", "got --report folder, but folder is a folder"),
         ("absent/a.html", "got --report absent/a.html, but absent/a.html is in no folder that exists"),
@@ -159,8 +147,3 @@ def test_measurements_that_are_all_missing_leave_a_filter_at_zero(folder, capsys
     assert read_measurements("z.csv").shape == (2, 1)
     assert main(["filter.toml", "--tolerance", "0.1", "--basis", "emulation", "--measurements", "z.csv"]) == 0
     assert "observed in 2 steps" in capsys.readouterr().out
-
-
-def test_a_key_of_a_mapping_need_not_be_text():
-    with pytest.raises(ValueError, match=r"^the mapping: \(1, 2\), 3 unknown; needed"):
-        read_model({"A": [[1]], "B": [[1]], 3: 1, (1, 2): 2})
