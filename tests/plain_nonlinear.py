@@ -1,8 +1,7 @@
 """Extended and unscented Kalman filters, and steps of systems, as plain loops over fractions.
 
 The loops are written from the equations of each form, with an explicit rounding after each operation. Elementary
-functions come from mpmath, with 300 bits, and are rounded once. Nothing is taken from the package but the names of the
-forms, and the models that the loops are compared with.
+functions come from mpmath, with 300 bits, and are rounded once. Nothing is taken from the package.
 """
 
 from __future__ import annotations
@@ -13,17 +12,8 @@ from math import ceil, floor, isqrt
 import mpmath
 import numpy as np
 
-from gpbnb import FloatFormat, Form, NonlinearModel, NonlinearSystem
-from tests.plain_structures import floating
-
-STEPS = 50
 PRECISE = mpmath.mp.clone()
 PRECISE.prec = 300
-
-
-def rounding(base, digits):
-    """A function that rounds to the nearest number with some digits, ties away from zero."""
-    return floating(base, digits, "nearest")
 
 
 def of_mpmath(r, function, *arguments):
@@ -171,7 +161,7 @@ class PlainFilter:
         self.r = self.state.r
         Q, R, x0, P0 = given
         self.x = [self.r(r(a)) for a in x0]
-        if form is Form.UD:
+        if form == "UD":
             Q, R, P0 = map(factors, (Q, R, P0))
         self.Q, self.R = ([[r(a) for a in row] for row in each] for each in (Q, R))
         self.P = self.covariance.take([[r(a) for a in row] for row in P0])
@@ -199,12 +189,12 @@ class PlainFilter:
 
     def predicted(self, F):
         p = self.covariance
-        if self.form is Form.UD:
+        if self.form == "UD":
             return self.thornton(F)
         return p.plus(p.times(p.times(F, self.P), transposed(F)), p.take(self.Q))
 
     def updated(self, ahead, V, H, y):
-        if self.form is Form.UD:
+        if self.form == "UD":
             return self.bierman(ahead, V, H, y)
         p, s, g = self.covariance, self.innovation, self.gain
         VH = s.times(s.take(V), transposed(s.take(H)))
@@ -213,7 +203,7 @@ class PlainFilter:
         own = p.take(K)
         W = p.plus(eye(len(V)), p.times(own, p.take(H)), -1)
         P = p.times(W, V)
-        if self.form is Form.JOSEPH:
+        if self.form == "Joseph":
             P = p.plus(p.times(P, transposed(W)), p.times(p.times(own, p.take(self.R)), transposed(own)))
         step = self.state.times(self.state.take(K), [[a] for a in y])
         return [self.r(a + b[0]) for a, b in zip(ahead, step, strict=True)], P
@@ -280,30 +270,6 @@ class PlainFilter:
             K = [g(each / g(a)) for each in K]
             change = [r(c + r(r(k) * value)) for c, k in zip(change, K, strict=True)]
         return [r(a + b) for a, b in zip(ahead, change, strict=True)], U
-
-
-def case(motion, seed):
-    """A model that passes a beacon, so that its bearing crosses π, with measurements of 50 steps."""
-    rng = np.random.default_rng(seed)
-    n = motion.n
-    Q = np.diag([2.0**-8] * n)
-    R = np.array([[2.0**-4, 2.0**-9], [2.0**-9, 2.0**-8]])
-    P0 = np.eye(n) + 2.0**-3
-    x0 = [4.0, -1.5, 2.0, 0.25][:n]
-    u = np.round(rng.normal(size=(STEPS, 2)) * 0.2, 3) + np.array([-0.2, 0.05])
-    sight = Ranges(["0.3", "0.2"])
-    model = NonlinearModel(motion.emulated, None, sight.emulated, None, Q, R, x0, P0, u=u, angles=[1])
-    x, z = np.array(x0), []
-    for k in range(STEPS):
-        fmt = FloatFormat(2, 53)
-        x = motion.emulated(fmt.array(x), fmt.array(u[k])).to_float() + rng.normal(size=n) / 16
-        a, b = 0.3 - x[0], 0.2 - x[1]
-        bearing = np.arctan2(b, a) + rng.normal() / 16
-        z.append([np.hypot(a, b) + rng.normal() / 4, (bearing + np.pi) % (2 * np.pi) - np.pi])
-    return model, np.round(z, 4)
-
-
-MOTIONS = {motion.n: motion for motion in (Moving(), Turning(), Coasting())}
 
 
 class PlainUnscented(PlainFilter):
@@ -415,7 +381,7 @@ OPERATIONS = [
 
 
 def drawn(seed):
-    """A system whose step has random operations on states, inputs and constants, and the same step in fractions."""
+    """A step with random operations on states, inputs and constants, and the same step in fractions."""
     steps = np.random.default_rng(seed).integers(0, 1000, (25, 4)).tolist()
 
     def step(fmt, x, u):
@@ -432,4 +398,4 @@ def drawn(seed):
             known.append(OPERATIONS[kind % len(OPERATIONS)][1](r, *operands))
         return [limits(each, -4, 4) for each in known[-3:]], known[-8:-3]
 
-    return NonlinearSystem(step, ["0.3", "-0.2", 0], 2), plain
+    return step, plain

@@ -106,10 +106,8 @@ def impulse_response(sections: Any, steps: int, scale: int = ONE) -> list[int]:
     ("order", "frequency", "rate", "kind"),
     [
         (2, 60, 48_000, "lowpass"),
-        (2, 20, 192_000, "lowpass"),
         (3, 30, 96_000, "highpass"),
         (8, 100, 48_000, "lowpass"),
-        (8, 20, 48_000, "highpass"),
     ],
 )
 def test_peak_gains_of_slow_filters_are_those_of_a_plain_loop(

@@ -53,11 +53,6 @@ def rounds(fmt: Format) -> Rounding:
 # -- filters ----------------------------------------------------------------------------------------------------------
 
 
-_FORM = plain_nonlinear.Form
-_FORMS = dict(zip(("Hung", "Hung second gain", "innovation", "Joseph", "UD"), _FORM, strict=True))
-PLAIN_FORMS = {"innovation": _FORM.INNOVATION, "Joseph": _FORM.JOSEPH, "UD": _FORM.UD}
-
-
 class Numbers(independent_filter.Arithmetic):
     """The arithmetic of the independent filter, in any format."""
 
@@ -168,7 +163,7 @@ def _in_blocks(model: Model, z: Any, form: str, sums: Float | None = None, **for
     stored = definite(model, widest)
     each = {name: plain_blocks.Rounds(rounds(fmt), rounds(sums or fmt)) for name, fmt in formats.items()}
     given = {**dict(zip(("Phi", "H", "Q", "R"), (cycle[0] for cycle in stored[:4]), strict=True)), "x0": stored.x0}
-    plain = plain_blocks.Filter({**given, "P0": stored.P0}, _FORMS[form], rounds(widest), each)
+    plain = plain_blocks.Filter({**given, "P0": stored.P0}, form, rounds(widest), each)
     cycles = [[[list(map(plain.model, row)) for row in one] for one in cycle] for cycle in stored[:4]]
     factored = [plain_blocks.factors(plain.model, one) for one in cycles[2]]
     for k, row in enumerate(z):
@@ -226,20 +221,14 @@ class Extended(plain_nonlinear.PlainFilter):
         self.x, self.P = self.updated(ahead, V, H, [r(a - b) for a, b in zip(z, expected, strict=True)])
 
 
-PLAIN_FORMS = {
-    "innovation": plain_nonlinear.Form.INNOVATION,
-    "Joseph": plain_nonlinear.Form.JOSEPH,
-    "UD": plain_nonlinear.Form.UD,
-}
+PLAIN_FORMS = ("innovation", "Joseph", "UD")
 
 
 def as_functions(model: Model, z: Any, fmt: Format, form: str) -> Steps:
     if form in ("Potter", "Carlson", "symmetrized"):
         raise NotImplementedError
     parts = (Linear(model.Phi[0]), Linear(model.H[0]))
-    plain, *others = (
-        Extended(*parts, (Q, R, model.x0, model.P0), PLAIN_FORMS[form], rounds(fmt)) for Q in model.Q for R in model.R
-    )
+    plain, *others = (Extended(*parts, (Q, R, model.x0, model.P0), form, rounds(fmt)) for Q in model.Q for R in model.R)
     plain.angle, noise = False, [(each.Q, each.R) for each in (plain, *others)]
     for k, row in enumerate(z):
         plain.Q = noise[k % len(model.Q) * len(model.R)][0]
@@ -261,9 +250,9 @@ def tracked(motion: str, given: Any, z: Any, u: Any, fmt: Format, form: str, **o
         raise NotImplementedError
     r = rounds(fmt)
     if options.get("method") == "unscented":
-        plain: Any = plain_nonlinear.PlainUnscented(moved[motion](), sight, given, PLAIN_FORMS[form], r)
+        plain: Any = plain_nonlinear.PlainUnscented(moved[motion](), sight, given, form, r)
     else:
-        plain = Extended(moved[motion](), sight, given, PLAIN_FORMS[form], r, iterations=options["iterations"])
+        plain = Extended(moved[motion](), sight, given, form, r, iterations=options["iterations"])
     yield from _followed(plain, z, u, form)
 
 

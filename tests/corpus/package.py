@@ -23,6 +23,7 @@ from gpbnb import (
     LinearModel,
     LinearSystem,
     NonlinearModel,
+    NonlinearSystem,
     WordFormats,
     guarantee,
     limits,
@@ -37,7 +38,7 @@ from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums
 from gpbnb.filters.words import run_words
 from tests.corpus.draw import Fixed, Float, Format, Model
 from tests.plain_nonlinear import Coasting, Moving, Ranges, Turning
-from tests.plain_nonlinear import drawn as random_system
+from tests.plain_nonlinear import drawn as random_step
 from tests.step_functions import SYSTEMS
 
 Steps = Iterator[dict[str, Any]]
@@ -183,7 +184,7 @@ def words_of(data: Fixed, coefficients: Any, sums: Fixed | None) -> WordFormats:
 
 def stepped(index: int, u: Any, fmt: Format) -> Steps:
     """States and outputs of a system whose step is a function: one of four, or one of random operations."""
-    system = SYSTEMS[index] if index < len(SYSTEMS) else random_system(index)[0]
+    system = SYSTEMS[index] if index < len(SYSTEMS) else NonlinearSystem(random_step(index)[0], ["0.3", "-0.2", 0], 2)
     try:
         found = system.states(fmt_of(fmt), u)
     except STOPS as error:

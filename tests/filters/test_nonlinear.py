@@ -17,11 +17,8 @@ from gpbnb import (
 )
 from gpbnb.filters.forms import ArrayForm
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, opened, simulated, true_states
+from gpbnb.wordlength.nonlinear_examples import beacon
 from gpbnb.wordlength.records import survey_records
-from tests.plain_nonlinear import (
-    MOTIONS,
-    case,
-)
 from tests.surveying import survey
 
 
@@ -92,7 +89,8 @@ def test_the_reference_is_that_of_the_linear_filter():
 
 def test_the_reference_agrees_with_one_in_more_digits():
     """The same program in 1200 bits, read as fractions: a tenth of the digits are enough to agree to 2**-104."""
-    model, z = case(MOTIONS[3], seed=3)
+    model = beacon()
+    z = simulated(model, 8, seed=3)
     run = NonlinearRun(model, FloatFormat(2, 1200), Form.INNOVATION, [8])
     run.take(z[:8])
     found = nonlinear_reference(model, z[:8])[-1][0]

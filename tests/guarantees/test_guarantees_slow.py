@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
+from itertools import cycle
 from types import SimpleNamespace
 from typing import Any
 
@@ -45,8 +46,9 @@ def following(found: FilterGuarantee, x: NDArray[np.float64], z: NDArray[np.floa
     return np.asarray(values[program.outputs[0]].to_float())
 
 
-@pytest.mark.parametrize("rounding", [Rounding.NEAREST, Rounding.EVEN, Rounding.HALF_UP], ids=str)
-@pytest.mark.parametrize("form", Form)
+@pytest.mark.parametrize(
+    ("form", "rounding"), zip(Form, cycle([Rounding.NEAREST, Rounding.EVEN, Rounding.HALF_UP])), ids=str
+)
 def test_an_estimate_that_stands_still_nearly_reaches_the_bound(form: Form, rounding: Rounding) -> None:
     fmt = FloatFormat(2, 10, rounding)
     found = guarantee(slow(), fmt, WITHIN, form)
@@ -64,7 +66,7 @@ def test_an_estimate_that_stands_still_nearly_reaches_the_bound(form: Form, roun
     assert REACHED.get(form, 0.75) * found.bound[0] < np.abs(off).max() <= found.bound[0]
 
 
-@pytest.mark.parametrize("form", Form)
+@pytest.mark.parametrize("form", [Form.HUNG, Form.INNOVATION])
 def test_a_slow_tracker_comes_near_its_bound(form: Form) -> None:
     """Its position moves by less than its last place in a step, or by a little more; the best of some courses."""
     fmt, q, rng = FloatFormat(2, 14), 2.0**-22, np.random.default_rng(55)
