@@ -122,7 +122,7 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
 
 
 def test_bad_input() -> None:
-    for call, kind, message in [pytest.param(*case[1:], id=case[0]) for case in BAD]:
+    for _case, call, kind, message in BAD:
         before = [repr(x) for x in (V, W, HUGE, TINY)], ONE.tolist()
         with pytest.raises(Exception) as caught:  # noqa: PT011 (the kind and the message are compared exactly below)
             call()

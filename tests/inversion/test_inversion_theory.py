@@ -10,7 +10,7 @@ import oracles
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rational import column_sum_norm, exact, row_sum_norm
+from gpbnb.arithmetic.rational import column_sum_norm, exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import theory
 from gpbnb.report.inversion.theory import Reduction
@@ -34,38 +34,6 @@ def rows(a):
 
 
 # -- as printed, by hand --------------------------------------------------------------------------
-
-
-def test_first_approach_as_printed():
-    inverse = exact([[2, -3], [5, 7]])
-    residual, change = exact([[Fraction(1, 100), 0], [0, Fraction(-3, 100)]]), exact([[0, 1], [2, 0]]) / 1000
-    assert theory.printed_first_bound(inverse, residual) == 10 * Fraction(3, 100)
-    assert theory.printed_first_bound(inverse, residual, change) == 10 * Fraction(3, 100) + 100 * Fraction(2, 1000)
-    assert theory.printed_first_bound(inverse, residual, change, row_sum_norm) == 12 * Fraction(
-        3, 100
-    ) + 144 * Fraction(2, 1000)
-    assert theory.residual(inverse, exact([[1, 2], [3, 4]])).tolist() == [[-8, -8], [26, 37]]
-
-
-def test_triangularization_as_printed():
-    signed = [[0, 0, 0], [0, 3 * 13 - 2 * 7, 3 * 17 - 2 * 9], [0, -3 * 26 - 2 * 8, 3 * 19 - 2 * 11 + 3 * 23 - 2 * 19]]
-    sizes = [[0, 0, 0], [0, 3 * 13 + 2 * 7, 3 * 17 + 2 * 9], [0, 3 * 26 + 2 * 8, 3 * 19 + 2 * 11 + 3 * 23 + 2 * 19]]
-    assert rows(theory.triangularization_error(EXACT_STAGES, BETA, True, signed=True) / BETA) == signed
-    assert rows(theory.triangularization_error(EXACT_STAGES, BETA, True, signed=False) / BETA) == sizes
-    # Column sums of A_1(1), A_1(0), A_2(2), A_2(1): 39, 20, 23, 19.
-    assert theory.printed_triangularization_norm(EXACT_STAGES, BETA) == BETA * (3 * 39 + 2 * 20 + 3 * 23 + 2 * 19)
-    assert theory.printed_triangularization_norm(EXACT_STAGES, BETA, row_sum_norm) == BETA * (
-        3 * 45 + 2 * 19 + 3 * 23 + 2 * 19
-    )
-
-
-def test_back_substitution_as_printed():
-    assert rows(theory.back_substitution_weights(3)) == [[0, 4, 3], [0, 0, 3], [0, 0, 0]]
-    assert rows(theory.back_substitution_weights(4)) == [[0, 5, 4, 3], [0, 0, 4, 3], [0, 0, 0, 3], [0, 0, 0, 0]]
-    assert rows(theory.right_side_weights(4)) == [[4], [3], [2], [1]]
-    change, right = theory.back_substitution_error(MADE_UP, BETA)
-    assert rows(change / BETA) == [[0, 12, -15], [0, 0, 51], [0, 0, 0]]
-    assert rows(right / BETA) == [[9, 15], [-16, 12], [-25, 31]]
 
 
 def test_the_total_as_printed_and_corrected():
