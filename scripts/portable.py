@@ -18,7 +18,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 # Tests of files of this project, of its prose and of pages give the same result everywhere.
-NOT_NUMERICAL = ("pages", "test_environment.py", "test_prose.py", "test_book_extensions.py", "test_single_page.py")
+NOT_NUMERICAL = ("pages", "test_environment.py", "test_prose.py", "test_book_extensions.py")
 # What BLAS, LAPACK, libm and SIMD sums could change most. The chapters left out emulate arithmetic and compile long.
 QUICK_NOTEBOOKS = ("rolling", "integration", "geometry", "inversion", "budget")
 QUICK_TESTS = (

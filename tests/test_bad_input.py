@@ -19,7 +19,7 @@ from gpbnb.filters.run import Sums
 from gpbnb.wordlength.records import survey_records
 
 # GPBNB_EXAMPLES=20000 tries more.
-EXAMPLES = int(os.environ.get("GPBNB_EXAMPLES", "400"))
+EXAMPLES = int(os.environ.get("GPBNB_EXAMPLES", "100"))
 MANY = settings(derandomize=True, deadline=None, database=None, max_examples=EXAMPLES)
 SLOW = settings(MANY, max_examples=EXAMPLES // 4)
 DOCUMENTED = (ValueError, TypeError, OverflowError, ZeroDivisionError)
