@@ -17,10 +17,10 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
-FORMATS = [FloatFormat(b, t, r) for b, t in ((2, 6), (3, 4), (10, 3)) for r in Rounding.documented()]
+FORMATS = [FloatFormat(2, 6), FloatFormat(3, 4, CHOP), FloatFormat(10, 3, CHOP), FloatFormat(10, 3)]
 
 each_format = pytest.mark.parametrize("fmt", FORMATS, ids=lambda f: f"base{f.base}-{f.rounding.value}")
-each_size = pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
+each_size = pytest.mark.parametrize("n", [1, 3, 5])
 each_pivoting = pytest.mark.parametrize("pivot", [False, True], ids=["in order", "pivoting"])
 
 
@@ -46,14 +46,11 @@ def samples(fmt: FloatFormat, n: int) -> list[tuple[FloatArray, FloatArray]]:
 @each_format
 @each_size
 class TestDigitForDigit:
-    def test_dot(self, fmt: FloatFormat, n: int) -> None:
-        for a, b in samples(fmt, n):
-            assert linalg.dot(a[:, 0], b[:, 1]).to_fractions() == arithmetic(fmt).dot(exact(a[:, 0]), exact(b[:, 1]))
-
     def test_matmul(self, fmt: FloatFormat, n: int) -> None:
         for a, b in samples(fmt, n):
             expected = arithmetic(fmt).matmul(exact(a), exact(b))
             assert exact(linalg.matmul(a, b)) == exact(a @ b) == expected
+            assert linalg.dot(a[0], b[:, 1]).to_fractions() == expected[0][1]
 
     @each_pivoting
     def test_lu(self, fmt: FloatFormat, n: int, pivot: bool) -> None:

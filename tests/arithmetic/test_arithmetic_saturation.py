@@ -22,7 +22,6 @@ from gpbnb.arithmetic.kernels.backends import Compiled
 OPERATIONS = {"add": operator.add, "subtract": operator.sub, "multiply": operator.mul, "divide": operator.truediv}
 NATIVE = {
     "FP8_E4M3": ml_dtypes.float8_e4m3fn,
-    "FP8_E5M2": ml_dtypes.float8_e5m2,
     "FP6_E3M2": ml_dtypes.float6_e3m2fn,
     "FP6_E2M3": ml_dtypes.float6_e2m3fn,
     "FP4_E2M1": ml_dtypes.float4_e2m1fn,

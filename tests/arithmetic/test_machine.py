@@ -1,4 +1,4 @@
-"""The machine: random programs have the digits of fractions that are rounded by a few lines of this file."""
+"""The machine: random programs have the digits of fractions, each rounded by its definition."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.machine import CODES, OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT, code_of, evaluate, fault_of, tables
+from tests.plain_structures import floating
 
 INPUTS, ROWS = 12, 150
 OPERATIONS = {
@@ -36,29 +37,7 @@ FORMATS = [
 
 
 def rounded(x, fmt):
-    """Round a fraction to the digits of a format, or of its subnormal numbers; nothing here is the package's."""
-    if x == 0:
-        return Fraction(0)
-    size, base = abs(x), Fraction(fmt.base)
-    e = 0
-    while base**e > size:
-        e -= 1
-    while base ** (e + 1) <= size:
-        e += 1
-    if fmt.emin is not None:
-        e = max(e, fmt.emin)
-    unit = base ** (e - fmt.precision + 1)
-    whole, rest = divmod(size / unit, 1)
-    away = {
-        "nearest": rest >= Fraction(1, 2),
-        "half up": rest > Fraction(1, 2) or (rest == Fraction(1, 2) and x > 0),
-        "chop": False,
-        "even": rest > Fraction(1, 2) or (rest == Fraction(1, 2) and whole % 2 == 1),
-        "up": rest > 0 and x > 0,
-        "down": rest > 0 and x < 0,
-        "odd": rest > 0 and whole % 2 == 0,
-    }[fmt.rounding.value]
-    return (1 if x > 0 else -1) * (whole + away) * unit
+    return floating(fmt.base, fmt.precision, fmt.rounding.value, fmt.emin)(Fraction(x))
 
 
 def drawn(rng, exact, fmt):

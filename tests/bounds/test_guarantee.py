@@ -162,7 +162,7 @@ def test_sums_by_squares_are_those_of_balls(radius: float, steps: int | None, la
 # -- the guarantee ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("form", "rounding"), zip(Form, itertools.cycle(Rounding.documented())))
+@pytest.mark.parametrize(("form", "rounding"), [*zip(Form, itertools.cycle(Rounding.documented()))])
 def test_an_adversary_comes_near_but_not_above(form: Form, rounding: Rounding) -> None:
     """Measured with these seeds: 0.33 to 0.73."""
     found = guarantee(tracker(), FloatFormat(2, 24, rounding), limits(state=[1000, 30], innovation=8), form=form)

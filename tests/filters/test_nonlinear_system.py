@@ -21,7 +21,7 @@ def inputs(system, steps, level=0.25):
 @needs("system", SYSTEMS, ids=lambda each: each.name)
 def test_runs_have_the_digits_of_the_processor(system, fmt):
     fmt, native = fmt[0], Native(fmt[1])
-    u = inputs(system, 2000)
+    u = inputs(system, 300)
     found = system.states(fmt, u).to_float()
     x, given = native.array([float(each) for each in system.x0]), native.array(u)
     for k, row in enumerate(given):

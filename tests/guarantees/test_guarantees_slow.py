@@ -47,7 +47,7 @@ def following(found: FilterGuarantee, x: NDArray[np.float64], z: NDArray[np.floa
 
 
 @pytest.mark.parametrize(
-    ("form", "rounding"), zip(Form, cycle([Rounding.NEAREST, Rounding.EVEN, Rounding.HALF_UP])), ids=str
+    ("form", "rounding"), [*zip(Form, cycle([Rounding.NEAREST, Rounding.EVEN, Rounding.HALF_UP]))], ids=str
 )
 def test_an_estimate_that_stands_still_nearly_reaches_the_bound(form: Form, rounding: Rounding) -> None:
     fmt = FloatFormat(2, 10, rounding)

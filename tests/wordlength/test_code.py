@@ -44,7 +44,7 @@ needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", [f"code {i}" for i in range(0, 60, 5)])
+@pytest.mark.parametrize("name", [f"code {i}" for i in range(0, 60, 11)])
 def test_code_has_the_digits_of_its_emulation(name):
     _, builds, steps, faults = conformance.built(name, 2026)
     assert faults == []
@@ -154,9 +154,9 @@ def sparse(seed):
 def test_what_zeros_leave_without_use_ends_the_code_as_the_emulation():
     """An inverse that a zero row of H multiplies may overflow; a factor that multiplies a zero gain is not computed."""
     formats = BINARY32, FixedFormat(2, 13, "even"), FixedFormat(3, 6, "even", "saturate")
-    models = [(sparse(seed), formats[seed % 3]) for seed in range(40, 52)]
+    models = [(sparse(seed), formats[seed % 3]) for seed in range(40, 46)]
     cases = [(model, fmt, form) for model, fmt in models for form in Form if fits(model, fmt, form)]
-    assert len(cases) > 30
+    assert len(cases) > 15
     z = np.random.default_rng(0).uniform(-1, 1, (12, 2))
     assert [disagreement(model, fmt, form, z[:, : model.m]) for model, fmt, form in cases] == [""] * len(cases)
 

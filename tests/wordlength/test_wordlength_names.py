@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import dlti
 
 from gpbnb import LinearModel, LinearSystem, limits, read_model, required_precision
 from gpbnb.wordlength.examples import tilt
@@ -91,22 +90,3 @@ def test_a_model_file_has_names(tmp_path):
     given = {"Phi": [[1]], "H": [[1]], "Q": [[1]], "R": [[1]], "x0": [0], "P0": [[1]]}
     model = read_model({**given, "states": ["a (m)"], "measurements": ["b"]})
     assert (model.state_names, model.measurement_names) == (("a (m)",), ("b",))
-
-
-def test_a_question_reads_what_read_model_reads(tmp_path):
-    """A system of SciPy was refused; a StateSpace of python-control can be called, but is no function."""
-    control = pytest.importorskip("control")
-    z = np.arange(6.0).reshape(-1, 1) / 8
-    matrices = [[0.5]], [[1.0]], [[1.0]], [[0.0]]
-    expected = required_precision(LinearSystem(*matrices), z, 0.01)
-    (tmp_path / "system.toml").write_text("A = [[0.5]]\nB = [[1]]\n")
-    for given in (
-        dlti(*matrices, dt=1),
-        control.ss(*matrices, 1),
-        tmp_path / "system.toml",
-        str(tmp_path / "system.toml"),
-        {"A": [[0.5]], "B": [[1]]},
-    ):
-        assert required_precision(given, z, 0.01) == expected
-    with pytest.raises(TypeError, match="got a int; needed the path of a TOML file"):
-        required_precision(7, 6, 0.01)
