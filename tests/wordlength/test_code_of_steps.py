@@ -16,9 +16,8 @@ from tests.step_functions import SYSTEMS
 
 
 def short_words():
-    for rounding in ("nearest", "even", "half up", "chop", "up", "down", "odd"):
-        yield FixedFormat(4, 11, rounding, "saturate")
-        yield FixedFormat(0, 15, rounding, "wrap")
+    for i, rounding in enumerate(("nearest", "even", "half up", "chop", "up", "down", "odd")):
+        yield FixedFormat(0, 15, rounding, "wrap") if i % 2 else FixedFormat(4, 11, rounding, "saturate")
 
 
 def one_of_each(fmt, x, u):
@@ -31,10 +30,10 @@ def one_of_each(fmt, x, u):
 
 @pytest.mark.skipif(not shutil.which("gcc"), reason="no gcc")
 def test_short_words_in_every_rounding():
-    """At a quarter of all numbers, also the most negative one, whose opposite has no word."""
+    """Also for the most negative number, whose opposite has no word. A compiler builds each format, which takes time."""
     system = NonlinearSystem(one_of_each, [0], 2, "each")
     z = np.random.default_rng(0).uniform(-1, 1, (800, 2))
-    assert [disagreement(system, fmt, None, z) for fmt in short_words()] == [""] * 14
+    assert [disagreement(system, fmt, None, z) for fmt in short_words()] == [""] * 7
 
 
 def last_status(system, fmt, u, folder):
