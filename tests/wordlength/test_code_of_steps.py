@@ -30,7 +30,7 @@ def one_of_each(fmt, x, u):
 
 @pytest.mark.skipif(not shutil.which("gcc"), reason="no gcc")
 def test_short_words_in_every_rounding():
-    """Also for the most negative number, whose opposite has no word. A compiler builds each format, which takes time."""
+    """Also for the most negative number, whose opposite has no word. A compiler builds each, which takes long."""
     system = NonlinearSystem(one_of_each, [0], 2, "each")
     z = np.random.default_rng(0).uniform(-1, 1, (800, 2))
     assert [disagreement(system, fmt, None, z) for fmt in short_words()] == [""] * 7
