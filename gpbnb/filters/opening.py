@@ -173,7 +173,8 @@ def packed_array(array: FloatArray) -> NDArray[Any]:
         array.format.check_compiled()
         cure = "" if array.format.base == 10 else ", or use base 10"
         raise OverflowError(
-            f"got numbers beyond the range of the compiled loops of {array.format}; needed others: scale the states{cure}"
+            f"got numbers beyond the range of the compiled loops of {array.format}; needed others; "
+            f"scale the states{cure}"
         )
     return array.backend.pack(array.components)
 
