@@ -224,6 +224,10 @@ class Search(Generic[Kind]):
         """Return each precision tried, and its error / tolerance."""
         return tuple(sorted(self._ratios.items()))
 
+    def is_bounded(self) -> bool:
+        """Whether a precision that was tried has a finite error."""
+        return any(math.isfinite(ratio) for ratio in self._ratios.values())
+
     @property
     def reasons(self) -> dict[int, str]:
         """Return for each precision tried why its error is infinite, empty if it is not."""

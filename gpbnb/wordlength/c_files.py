@@ -9,29 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.wordlength.c_source import CodeNumbers, CodeSource, CodeStep
+from gpbnb.wordlength.c_source import CodeSource
 
 FLAGS = "-std=c99 -Wall -Wextra -pedantic -ffp-contract=off"
 """Flags under which the code compiles without a warning and has the digits of the emulation."""
-
-
-class Described(NamedTuple):
-    """What a header says about a filter.
-
-    Parameters
-    ----------
-    title, structure, fmt : name, structure or form, and format, in words.
-    bound : what is proven about its errors, in words; may be empty.
-    floating : whether it computes in floating point.
-    bounded : whether its errors can be bounded.
-    """
-
-    title: str
-    structure: str
-    fmt: str
-    bound: str
-    floating: bool
-    bounded: bool
 
 
 class Vectors(NamedTuple):
@@ -73,15 +54,19 @@ def _is_written(path: Path) -> bool:
         return False
 
 
-def written_files(
-    step: CodeStep, arithmetic: CodeNumbers, name: str, described: Described, vectors: Vectors
-) -> dict[str, str]:
-    """Return the text of each file by its name."""
-    source = CodeSource(step, arithmetic, name)
+def written_files(source: CodeSource, what: str, bound: str, bounded: bool, vectors: Vectors) -> dict[str, str]:
+    """Return the text of each file by its name.
+
+    Parameters
+    ----------
+    what, bound : what the filter is, and what is proven about its errors, which may be empty, in words.
+    bounded : whether its errors can be bounded.
+    """
+    name = source.name
     return {
-        f"{name}.h": _header(source, described),
-        f"{name}.c": _source(source, described),
-        f"test_{name}.c": _test(source, described),
+        f"{name}.h": _header(source, what, bound, bounded),
+        f"{name}.c": _source(source),
+        f"test_{name}.c": _test(source),
         f"{name}_vectors.txt": _vectors(source, vectors),
         "Makefile": _makefile(name),
     }
@@ -97,22 +82,20 @@ def _comment(*paragraphs: str) -> str:
     return "\n".join(["/*", *(f" * {line}".rstrip().rstrip("\\") for line in lines), " */", ""])
 
 
-def _header(source: CodeSource, described: Described) -> str:
+def _header(source: CodeSource, what: str, bound: str, bounded: bool) -> str:
     name, guard = source.name, f"{source.name.upper()}_H"
     order = (
         "Each statement of the step is one operation, rounded once, in the order in which gpbnb emulates the filter"
-        f"{' and bounds its errors' if described.bounded else ''}. Compilers keep this order unless told otherwise"
+        f"{' and bounds its errors' if bounded else ''}. Compilers keep this order unless told otherwise"
     )
-    flags = (
-        f"{order}: compile with -ffp-contract=off, and never with -ffast-math." if described.floating else f"{order}."
-    )
-    what = dict.fromkeys(each for each in (described.title, described.structure) if each)
+    flags = "compile with -ffp-contract=off, and never with -ffast-math."
+    flags = f"{order}: {flags}" if source.arithmetic.floating else f"{order}."
     program, statuses = source.step.program, source.statuses
-    paragraphs = _comment(f"{', '.join(what)}, in {described.fmt}. {WRITTEN}", flags, described.bound)
+    paragraphs = _comment(f"{what}. {WRITTEN}", flags, bound)
     values = ",\n".join(f"    {status.name} = {status.value}" for status in statuses)
     meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in statuses)
     takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
-    include = "" if described.floating else "#include <stdint.h>\n\n"
+    include = "" if source.arithmetic.floating else "#include <stdint.h>\n\n"
     return f"""{paragraphs}
 #ifndef {guard}
 #define {guard}
@@ -153,21 +136,21 @@ _KEPT = """#include <float.h>
 """
 
 
-def _source(source: CodeSource, described: Described) -> str:
+def _source(source: CodeSource) -> str:
     function, used = source.function()
     constants = source.constants(used)
-    includes = _KEPT.format(guard=f"{source.name.upper()}_FAST_MATH") if described.floating else ""
+    includes = _KEPT.format(guard=f"{source.name.upper()}_FAST_MATH") if source.arithmetic.floating else ""
     helpers = source.arithmetic.helpers(function)
     parts = [f'#include "{source.name}.h"', includes, constants, helpers, source.start(), function]
     return f"/* {WRITTEN} */\n" + "\n".join(f"{part.rstrip()}\n" for part in parts if part)
 
 
-def _test(source: CodeSource, described: Described) -> str:
+def _test(source: CodeSource) -> str:
     name, program = source.name, source.step.program
     number = f"{name}_number"
     fields = [f"&state.{place}" for place in source.states] + [f"&output[{i}]" for i in range(program.p)]
     listed = "\n".join(textwrap.wrap(", ".join(fields), 100, initial_indent=" " * 8, subsequent_indent=" " * 8))
-    if described.floating:
+    if source.arithmetic.floating:
         read = f'"%{"l" if source.arithmetic.number == "double" else ""}f"'
         variable, convert, same = number, "value", "a == b && !signbit(a) == !signbit(b)"
         include = "#include <math.h>\n"

@@ -112,7 +112,7 @@ class CodeFloats:
         """The same type, since the processor rounds each operation."""
         return self.number
 
-    may_overflow = True
+    floating = may_overflow = True
 
     def constant(self, step: CodeStep, coefficient: int, member: int) -> str:
         """Return the hexadecimal constant that has exactly this value."""
@@ -160,6 +160,7 @@ class CodeWords:
 
     words: WordFormats
     integers: Integers
+    floating = False
 
     @property
     def number(self) -> str:

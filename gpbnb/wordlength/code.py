@@ -42,12 +42,12 @@ from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.steps import HUNG_FORMS
 from gpbnb.filters.system import LinearSystem, system_inputs
-from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_words
-from gpbnb.wordlength.c_files import Described, Vectors, refuse_others, written_files
-from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeStep, checked_identifier, word_arithmetic
-from gpbnb.wordlength.emulation import longest
+from gpbnb.filters.words import WordFormats, integer_program, integers_of
+from gpbnb.wordlength.c_files import Vectors, refuse_others, written_files
+from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeSource, CodeStep, checked_identifier, word_arithmetic
+from gpbnb.wordlength.emulation import emulate
+from gpbnb.wordlength.judges import largest_inputs
 from gpbnb.wordlength.models import ModelSource
-from gpbnb.wordlength.strategies import largest_inputs
 from gpbnb.wordlength.tasks import admitted, data_of
 
 VECTORS = 100
@@ -152,11 +152,10 @@ def write_code(
         raise ValueError(f"got limits for {given.name}; needed none: a step of its own has no bound")
     vectors = found.emulate(z)
     bound = found.bound(within) if within is not None else ""
-    bounded = not isinstance(given, NonlinearSystem)
-    described = Described(
-        found.title, found.structure, format_words(chosen), bound, isinstance(chosen, FloatFormat), bounded
-    )
-    files = written_files(found.step, found.arithmetic, name, described, vectors)
+    what = ", ".join(dict.fromkeys(each for each in (found.title, found.structure) if each))
+    source = CodeSource(found.step, found.arithmetic, name)
+    text, bounded = f"{what}, in {format_words(chosen)}", not isinstance(given, NonlinearSystem)
+    files = written_files(source, text, bound, bounded, vectors)
     target.mkdir(parents=True, exist_ok=True)
     for file, text in files.items():
         replace_file(target / file, text.encode())
@@ -165,6 +164,12 @@ def write_code(
 
 def prepared(given: Filter, fmt: AnyFormat, form: AnyForm | str | None) -> Prepared:
     """Return a filter with what is needed to write its code; for the arguments, see :func:`write_code`."""
+    if isinstance(fmt, FloatFormat):
+        _type_of(fmt)
+    elif isinstance(fmt, (FixedFormat, WordFormats)):
+        _words(fmt)
+    else:
+        raise TypeError(f"got the format {fmt!r}; needed BINARY32, BINARY64, a FixedFormat or WordFormats")
     if isinstance(given, LinearModel):
         if isinstance(form, str) and plain_name(form) == plain_name(CONSTANT_GAIN):
             found = _of_system(settled_filter(given), fmt, CONSTANT_GAIN)
@@ -223,35 +228,44 @@ def _words(fmt: FixedFormat | WordFormats) -> WordFormats:
     return words
 
 
-def _checked(fmt: Any) -> None:
-    if not isinstance(fmt, (FloatFormat, FixedFormat, WordFormats)):
-        raise TypeError(f"got the format {fmt!r}; needed BINARY32, BINARY64, a FixedFormat or WordFormats")
+def _arithmetic(step: CodeStep, fmt: AnyFormat) -> CodeNumbers:
+    """Return how the operations of a step are written."""
+    return CodeFloats(_type_of(fmt)) if isinstance(fmt, FloatFormat) else word_arithmetic(step, _words(fmt))
+
+
+def _start(fmt: Any, x0: Any) -> NDArray[Any]:
+    """Return a first state as it is stored."""
+    return np.asarray(stored_start(fmt, x0).to_fractions(), dtype=object)
+
+
+def _stored(numbers: Any, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
+    """Return numbers of a format as the code stores them: float64, or integers in units of the format."""
+    if isinstance(fmt, FloatFormat):  # float64 holds the numbers of these formats exactly
+        return np.asarray(numbers.to_float())
+    return np.asarray(numbers.to_fractions() / fmt.unit, dtype=object).astype(np.int64)
 
 
 # -- linear systems ---------------------------------------------------------------------------------------------------
 
 
 def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared:
-    _checked(fmt)
     made = system.as_filter()
-    arithmetic: CodeNumbers
     if isinstance(fmt, FloatFormat):
-        arithmetic = CodeFloats(_type_of(fmt))
         stored = made.stored(fmt)[None]
-        start = np.asarray(stored_start(fmt, system.x0).to_fractions(), dtype=object)
-        step = CodeStep(without_exact(made.program, stored), stored, start)
+        step = CodeStep(without_exact(made.program, stored), stored, _start(fmt, system.x0))
     else:
         words = _words(fmt)
         stored = integer_program(made, words).coefficients[None]
         # With sums of their own, also a sum with zero may round or overflow.
         program = made.program if words.sums is not None else without_exact(made.program, stored)
-        start = np.asarray(stored_start(words.data, system.x0).to_fractions(), dtype=object)
-        step = CodeStep(program, stored, start)
-        arithmetic = word_arithmetic(step, words)
+        step = CodeStep(program, stored, _start(words.data, system.x0))
 
-    def emulate(u: Any) -> Vectors:
-        u = system_inputs(system, u)
-        return _float_vectors(system, u, fmt) if isinstance(fmt, FloatFormat) else _word_vectors(system, u, _words(fmt))
+    def emulated(u: Any) -> Vectors:
+        data, run = fmt.data if isinstance(fmt, WordFormats) else fmt, emulate(system, u, fmt)
+        start = np.append(_stored(data.array(system.x0), data), np.zeros(system.p, np.int64))
+        states = np.hstack([_stored(each, data) for each in (run.x, run.y)])
+        inputs = _stored(data.array(system_inputs(system, u)), data)
+        return _ended(inputs, start, states, np.zeros(run.steps, np.int64))
 
     def bound(within: FilterLimits) -> str:
         most = largest_inputs(system, within)
@@ -269,7 +283,7 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
             "whose coefficients are not rounded, for ever."
         )
 
-    return Prepared(step, arithmetic, system.name, structure, emulate, _noise(fmt, system.m), bound)
+    return Prepared(step, _arithmetic(step, fmt), system.name, structure, emulated, _noise(fmt, system.m), bound)
 
 
 def _noise(fmt: AnyFormat, m: int) -> Callable[[int], NDArray[np.float64]]:
@@ -287,40 +301,20 @@ def _ended(inputs: NDArray[Any], start: NDArray[Any], states: NDArray[Any], stat
     return Vectors(inputs[: len(states)], states, status)
 
 
-def _float_vectors(system: LinearSystem, u: NDArray[Any], fmt: FloatFormat) -> Vectors:
-    # float64 holds the numbers of these formats exactly
-    stored, start = fmt.array(u).to_float(), np.append(fmt.array(system.x0).to_float(), np.zeros(system.p))
-    done, pairs, _ = longest(lambda steps: system.states(u[:steps], fmt), len(u))
-    states = np.zeros((0, len(start))) if pairs is None else pairs[..., 0]
-    return _ended(stored, start, states, np.zeros(done, np.int64))
-
-
-def _word_vectors(system: LinearSystem, u: NDArray[Any], words: WordFormats) -> Vectors:
-    stored, first = integers_of(u, words.data), integers_of(system.x0[None], words.data)[0]
-    start = np.append(first, np.zeros(system.p, np.int64))
-    done, run, _ = longest(lambda steps: run_words(system, u[:steps], words), len(u))
-    states = np.zeros((0, len(start)), np.int64) if run is None else run.states
-    return _ended(stored, start, states, np.zeros(done, np.int64))
-
-
 # -- nonlinear systems ------------------------------------------------------------------------------------------------
 
 
 def _of_nonlinear(system: NonlinearSystem, fmt: AnyFormat) -> Prepared:
-    _checked(fmt)
     if isinstance(fmt, WordFormats):
         raise ValueError(
             "got formats of words for a nonlinear system; needed BINARY32, BINARY64 or a FixedFormat: all operations "
             "of its step are in one format"
         )
-    kind = _type_of(fmt) if isinstance(fmt, FloatFormat) else ""
-    words = _words(fmt) if isinstance(fmt, FixedFormat) else None
     program, coefficients = system.program(fmt)
-    step = CodeStep(program, coefficients, np.asarray(stored_start(fmt, system.x0).to_fractions(), dtype=object))
-    arithmetic = CodeFloats(kind) if words is None else word_arithmetic(step, words)
+    step = CodeStep(program, coefficients, _start(fmt, system.x0))
     return Prepared(
         step,
-        arithmetic,
+        _arithmetic(step, fmt),
         system.name,
         "",
         lambda u: _nonlinear_vectors(system, u, fmt, program.p),
@@ -339,16 +333,9 @@ def _nonlinear_vectors(system: NonlinearSystem, u: Any, fmt: FloatFormat | Fixed
             for each in inputs:
                 rows.append(system.advance(fmt, x, each))
                 x = rows[-1][: system.n]
-
-    def stored(numbers: Any) -> NDArray[Any]:
-        """Return numbers of the format as the code stores them."""
-        if isinstance(fmt, FloatFormat):
-            return np.asarray(numbers.to_float())
-        return np.asarray(numbers.to_fractions() / fmt.unit, dtype=object).astype(np.int64)
-
-    given = stored(inputs)
-    start = np.append(stored(fmt.array(system.x0)), np.zeros(p, given.dtype))
-    states = np.array([stored(each) for each in rows], given.dtype).reshape(-1, len(start))
+    given = _stored(inputs, fmt)
+    start = np.append(_stored(fmt.array(system.x0), fmt), np.zeros(p, given.dtype))
+    states = np.array([_stored(each, fmt) for each in rows], given.dtype).reshape(-1, len(start))
     return _ended(given, start, states, np.zeros(len(rows), np.int64))
 
 
@@ -356,16 +343,12 @@ def _nonlinear_vectors(system: NonlinearSystem, u: Any, fmt: FloatFormat | Fixed
 
 
 def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepared:
-    _checked(fmt)
     chosen = compiled_form(form)
     if isinstance(fmt, WordFormats):
         raise ValueError(
             f"got formats of words for the {chosen} form; needed BINARY32, BINARY64 or a FixedFormat, or the form "
             f"{CONSTANT_GAIN!r}"
         )
-    kind = _type_of(fmt) if isinstance(fmt, FloatFormat) else ""
-    if isinstance(fmt, FixedFormat):
-        _words(fmt)
     in_loops = isinstance(fmt, FloatFormat) or isinstance(fmt.backend, Compiled)
     if model.b is not None or model.d is not None:
         raise ValueError(f"got offsets of {model.name}; needed none in C: make each a known input that is always 1")
@@ -376,7 +359,6 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
     stored = _coefficients([each for letter, each in given.items() if letter != "u"])
     program = kalman_program(chosen, {letter: each.shape[1:] for letter, each in given.items()})
     step = CodeStep(without_exact(program, stored), stored, start)
-    arithmetic = word_arithmetic(step, _words(fmt)) if isinstance(fmt, FixedFormat) else CodeFloats(kind)
 
     def bound(within: FilterLimits) -> str:
         sized_limits(within, model.n, model.m, model.x0)
@@ -393,7 +375,7 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
 
     return Prepared(
         step,
-        arithmetic,
+        _arithmetic(step, fmt),
         model.name,
         f"{chosen} form" + (", whose input holds the measurements, then the known inputs" if p else ""),
         lambda z: _model_vectors(model, z, fmt, chosen) if in_loops else _long_vectors(model, z, fmt, step, chosen),

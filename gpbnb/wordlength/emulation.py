@@ -27,10 +27,10 @@ from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, first_integers, integer_program
 from gpbnb.wordlength.answer import format_in_words
-from gpbnb.wordlength.functions import STOPS, exact_outputs, function_strategy, outputs_of
+from gpbnb.wordlength.asked import AnyFormat, Data, Function
+from gpbnb.wordlength.functions import STOPS, exact_outputs, outputs_of
+from gpbnb.wordlength.judges import judge_of_function, measured, system_pairs
 from gpbnb.wordlength.models import ModelSource
-from gpbnb.wordlength.strategies import measured, system_pairs
-from gpbnb.wordlength.strategy import AnyFormat, Data, Function
 from gpbnb.wordlength.tasks import admitted, data_of
 
 
@@ -203,12 +203,12 @@ def longest(run: Callable[[int], Any], steps: int) -> tuple[int, Any, str]:
 
 
 def _function(run: Function, data: Data, fmt: Any) -> EmulatedRun:
-    strategy = function_strategy(run, data, 1.0, fmt.base, fmt.precision)
+    made, z, true = judge_of_function(run, data, 1.0, fmt.base, fmt.precision)[1]
     try:
-        found = outputs_of(strategy.run, fmt, strategy.z, None)
+        found = outputs_of(made, fmt, z, None)
     except STOPS as fault:
-        return EmulatedRun(fmt, None, None, np.zeros((0, strategy.true.shape[1])), f"the function stops: {fault}")
-    errors = (exact_outputs(found) - strategy.true).astype(np.float64)
+        return EmulatedRun(fmt, None, None, np.zeros((0, true.shape[1])), f"the function stops: {fault}")
+    errors = (exact_outputs(found) - true).astype(np.float64)
     if isinstance(run, FixedIntervalSmoother):
         return EmulatedRun(fmt, found, None, errors, form=form_named(run.form))
     return EmulatedRun(fmt, None, found, errors)

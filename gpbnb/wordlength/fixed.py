@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -22,13 +23,9 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.sections import scaled
 from gpbnb.filters.system import LinearFilter, LinearSystem
 from gpbnb.filters.words import WordFormats, largest_values
-from gpbnb.wordlength.answer import (
-    Requirement,
-    joined,
-    share_text,
-)
-from gpbnb.wordlength.asked import Asked, check_sizes
-from gpbnb.wordlength.strategies import measured, slowest_response
+from gpbnb.wordlength.answer import Requirement, joined, share_text
+from gpbnb.wordlength.asked import Asked
+from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, measured, slowest_response
 
 LARGEST_FRACTION = 60
 """Fraction bits that no search reaches."""
@@ -65,33 +62,29 @@ def in_fixed_point(
     asked: Asked, like: FixedFormat | WordFormats | None, rounding: Rounding, coefficient_bits: int | None
 ) -> Requirement:
     """Find the fewest fraction bits of a model of any kind."""
-    model = asked.model
-    if coefficient_bits is not None and (like is not None or not isinstance(model, LinearSystem)):
+    of_system = isinstance(asked.model, LinearSystem)
+    if coefficient_bits is not None and (like is not None or not of_system):
         raise ValueError(
             "got coefficient_bits beside like, or without a linear system; needed them for a linear system"
         )
-    of_system = isinstance(model, LinearSystem)
-    if isinstance(like, FixedFormat) and of_system:
-        like = WordFormats(like)
-    data_like = like.data if isinstance(like, WordFormats) else like
-    if data_like is None:
-        data_like = FixedFormat(_integer_bits(asked), LARGEST_FRACTION, rounding)
-    check_sizes(asked, data_like)
-    search = _FixedSearch(asked, data_like, like is None)
-    if of_system:
-        made, bits = model.as_filter(), coefficient_bits or COEFFICIENT_BITS
-        search.words_of = (
-            (lambda fmt: with_fraction_bits(like, fmt.fraction_bits))
-            if isinstance(like, WordFormats)
-            else (lambda fmt: WordFormats(fmt, bits))
-        )
-        search.blamed = (
-            "coefficients of WordFormats" if like is not None else "coefficient_bits, or --coefficients in the command"
-        )
-        search.made = made
+    data = like.data if isinstance(like, WordFormats) else like
+    if data is None:
+        data = FixedFormat(_integer_bits(asked), LARGEST_FRACTION, rounding)
+    asked.check_sizes(data)
+    if not of_system:
+        return _FixedSearch.of(asked, data, like is None).answer()
+    if like is None:
+        bits = coefficient_bits or COEFFICIENT_BITS
+        blamed = "coefficient_bits, or --coefficients in the command"
+        return _FixedSearch.of(asked, data, True, lambda fmt: WordFormats(fmt, bits), blamed).answer()
+    words = like if isinstance(like, WordFormats) else WordFormats(like)
+    search = _FixedSearch.of(
+        asked, data, False, lambda fmt: with_fraction_bits(words, fmt.fraction_bits), "coefficients of WordFormats"
+    )
     return search.answer()
 
 
+@dataclass(frozen=True)
 class _FixedSearch:
     """A search over fraction bits, with as many integer bits as each run needs.
 
@@ -99,54 +92,79 @@ class _FixedSearch:
     ----------
     like : a format with the integer bits, the rounding and the overflow of those to try.
     widens : whether a format in which a number overflows gets more integer bits.
+    words_of : function that returns what is run for a format of the data.
+    blamed : what sets the bits of coefficients.
+    more : integer bits that a number of fraction bits needs beyond those of `like`.
     """
 
-    def __init__(self, asked: Asked, like: FixedFormat, widens: bool) -> None:
-        self.asked, self.like, self.widens = asked, like, widens
-        self.strategy = asked.strategy(2, LARGEST_FRACTION + max(like.integer_bits, 0))
-        self.least = max(0, 1 - like.integer_bits)
-        self.words_of: Callable[[FixedFormat], Any] = lambda fmt: fmt
-        self.blamed = ""
-        self.made: LinearFilter | None = None
-        self._more = dict[int, int]()  # integer bits that a number of fraction bits needs beyond those of `like`
+    asked: Asked
+    judge: Judge
+    like: FixedFormat
+    widens: bool
+    words_of: Callable[[FixedFormat], Any]
+    blamed: str
+    more: dict[int, int] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        asked: Asked,
+        like: FixedFormat,
+        widens: bool,
+        words_of: Callable[[FixedFormat], Any] = lambda fmt: fmt,
+        blamed: str = "",
+    ) -> _FixedSearch:
+        """Return a search for a question."""
+        judge = judge_for(asked, 2, LARGEST_FRACTION + max(like.integer_bits, 0))
+        return cls(asked, judge, like, widens, words_of, blamed)
+
+    @property
+    def made(self) -> LinearFilter | None:
+        """A linear system as a filter; None for another model."""
+        return self.asked.model.as_filter() if isinstance(self.asked.model, LinearSystem) else None
+
+    @property
+    def least(self) -> int:
+        """The fewest fraction bits of a format."""
+        return max(0, 1 - self.like.integer_bits)
 
     def error(self, fmt: FixedFormat, prove: bool = False) -> Outcome:
         """Return the largest error over its tolerance in the narrowest format without an overflow."""
-        ask, found = self.strategy.proof if prove else self.strategy.error, Outcome(math.inf)
-        start = max((more for more in self._more.values()), default=0) - 1 if not self.made else 0
+        ask, found = self.judge.proof if prove else self.judge.error, Outcome(math.inf)
+        start = max(self.more.values(), default=0) - 1 if not self.made else 0
         for more in range(max(start, 0), 1 + MORE_INTEGER_BITS) if self.widens else (0,):
             found = ask(self.words_of(replace(fmt, integer_bits=fmt.integer_bits + more)))
             if not found.overflow:
-                self._more[fmt.fraction_bits] = more
+                self.more[fmt.fraction_bits] = more
                 return found
         return found
 
     def formats(self, fmt: FixedFormat) -> Any:
         """Return the formats of an answer, with the integer bits that its fraction bits need."""
-        return self.words_of(replace(fmt, integer_bits=fmt.integer_bits + self._more.get(fmt.fraction_bits, 0)))
+        return self.words_of(replace(fmt, integer_bits=fmt.integer_bits + self.more.get(fmt.fraction_bits, 0)))
 
     def search(self, largest: int) -> Search[FixedFormat]:
         """Search up to some fraction bits."""
-        proof = (lambda fmt: self.error(fmt, prove=True)) if self.strategy.guesses else None
+        proof = partial(self.error, prove=True) if self.judge.proved else None
         return Search(self.error, self.like, (), largest=largest, least=self.least, proof=proof)
 
     def answer(self) -> Requirement:
         """Return the smallest number of fraction bits that meets the tolerance."""
         asked, largest = self.asked, LARGEST_FRACTION - 1
         most = f"{largest} fraction bits are the most tried"
-        if isinstance(asked.model, LinearModel) and not self.widens:
-            replace(self.like, fraction_bits=self.least).check_compiled()
-        if isinstance(asked.model, LinearModel) and (compiled := _compiled_fraction(self.like)) < largest:
-            largest = max(compiled, self.least)
-            most = f"{digits_text(largest, kind='fraction')} are the most with compiled loops"
-        found = self.search(largest)
-        ends = self.strategy.steps is not None
-        if not any(math.isfinite(ratio) for _, ratio in found.tried):
-            later = self.strategy.over(asked.data.steps)
-            if later is not None:
-                self.strategy, ends = later, True
-                found = self.search(largest)
-        ratios, reasons = dict(found.tried), found.reasons
+        if isinstance(asked.model, LinearModel):
+            if not self.widens:
+                replace(self.like, fraction_bits=self.least).check_compiled()
+            if (compiled := _compiled_fraction(self.like)) < largest:
+                largest = max(compiled, self.least)
+                most = f"{digits_text(largest, kind='fraction')} are the most with compiled loops"
+        found, judge = for_ever_or_over(
+            asked, self.judge, lambda each: replace(self, judge=each).search(largest), Search.is_bounded
+        )
+        return replace(self, judge=judge)._answer(found, largest, most)
+
+    def _answer(self, found: Search[FixedFormat], largest: int, most: str) -> Requirement:
+        asked, ratios, reasons, ends = self.asked, dict(found.tried), found.reasons, self.judge.steps is not None
 
         def rejection(bits: int) -> str:
             text = digits_text(bits, kind="fraction")
@@ -156,25 +174,23 @@ class _FixedSearch:
             return f"{text} {'gives' if bits == 1 else 'give'} {ratios[bits]:.3g} times the tolerance"
 
         known, needed = asked.evidence(ends)
-        steps = asked.data.steps if ends or asked.basis == "emulation" else None
         if found.fmt is None:
-            blame = self.blame(largest)
-            cause = self.unstable() if not blame else ""
-            why = blame or cause or f"{rejection(largest)}; {most}"
-            notes = () if blame or cause else tuple(filter(None, [self.scaled_advice(None)]))
-            text = joined(f"no fixed-point format meets the tolerance {needed}: {why}", notes)
-            return Requirement(None, math.inf, asked.basis, steps, found.tried, text, why, notes)
+            cause = self.blame(largest) or self.unstable()
+            why = cause or f"{rejection(largest)}; {most}"
+            text = f"no fixed-point format meets the tolerance {needed}: {why}"
+            return asked.answer(
+                None, math.inf, found.tried, ends, text, why, ["" if cause else self.scaled_advice(None)]
+            )
         bits = found.fmt.fraction_bits
         why = rejection(bits - 1) if bits > self.least else ""
         formats = self.formats(found.fmt)
         data = formats.data if isinstance(formats, WordFormats) else formats
         if formats == WordFormats(data):
             formats = data
-        notes = tuple(filter(None, [self.scaled_advice(data), *self.strategy.warnings()]))
         subject = f"{digits_text(bits, kind='fraction')} in a word of {1 + data.precision} bits"
-        text = joined(f"{subject}: {share_text(ratios[bits])}, {known}", [why, *notes])
-        form = asked.form if asked.of_filter() else None
-        return Requirement(formats, ratios[bits], asked.basis, steps, found.tried, text, why, notes, form)
+        text = joined(f"{subject}: {share_text(ratios[bits])}, {known}", [why])
+        notes = (self.scaled_advice(data), *self.judge.warnings())
+        return asked.answer(formats, ratios[bits], found.tried, ends, text, why, notes)
 
     def unstable(self) -> str:
         """Return in words that errors of a linear system never decay; empty for another model."""
@@ -188,17 +204,15 @@ class _FixedSearch:
         if self.made is None:
             return ""
         fmt = replace(self.like, fraction_bits=fraction)
-        words_of = self.words_of
-        given = words_of(fmt).coefficients
+        given = self.words_of(fmt).coefficients
         if given is None:
             return ""
 
         def error(bits: FloatFormat) -> Outcome:
-            self.words_of = lambda each: replace(words_of(each), coefficients=bits.precision)
-            return self.error(fmt)
+            words_of = lambda each: replace(self.words_of(each), coefficients=bits.precision)  # noqa: E731
+            return replace(self, words_of=words_of).error(fmt)
 
         found = Search(error, FloatFormat(2, 2), (), largest=LONGEST_COEFFICIENT)
-        self.words_of = words_of
         if found.fmt is None:
             return ""
         stored = digits_text(given, kind="significant") if isinstance(given, int) else arithmetic(given)
@@ -214,13 +228,12 @@ class _FixedSearch:
         other = None if self.made is None else scaled_sections(self.asked.model)
         largest = LARGEST_FRACTION - 1 if fmt is None else fmt.fraction_bits - 1
         if other is None:
-            slow = self.made is not None and fmt is None and self.strategy.guesses
+            slow = self.made is not None and fmt is None and self.judge.proved is not None
             text = slowest_response(self.asked.model, self.asked.data.steps) if slow else ""
             return text and f"errors add up because the system is slow: its {text}"
         asked = replace(self.asked, model=other)
         like = replace(self.like, integer_bits=_integer_bits(asked)) if self.widens else self.like
-        better = _FixedSearch(asked, like, self.widens)
-        better.words_of, better.blamed, better.made = self.words_of, self.blamed, other.as_filter()
+        better = _FixedSearch.of(asked, like, self.widens, self.words_of, self.blamed)
         if largest < better.least:
             return ""
         found = better.search(largest)
@@ -307,45 +320,38 @@ def with_fraction_bits(words: WordFormats, fraction: int) -> WordFormats:
 def exact_sums(made: LinearFilter, data: FixedFormat, coefficient_bits: int) -> WordFormats:
     """Return formats whose sums are exact and are rounded once, when they are stored."""
     stored = FloatFormat(2, coefficient_bits).array(made.coefficients).to_fractions()
-    fraction = data.fraction_bits + max(each.denominator.bit_length() - 1 for each in stored)
+    fraction = data.fraction_bits + max((each.denominator.bit_length() - 1 for each in stored), default=0)
     sums = FixedFormat(max(63 - fraction, data.integer_bits + 8), fraction, overflow="wrap")
     return WordFormats(data, coefficient_bits, sums)
 
 
 def in_words(asked: Asked, rounding: Rounding, bits: int) -> Requirement:
     """Lower the formats of data, coefficients and sums of a linear system in this order."""
-    made = asked.model.as_filter()
-    search = _FixedSearch(asked, FixedFormat(_stored_integer_bits(asked), LARGEST_FRACTION, rounding), True)
-    search.words_of, search.made = lambda fmt: exact_sums(made, fmt, bits), made
-    search.blamed = "coefficient_bits=, which is the most to try"
-    data = search.answer()
+    made, like = asked.model.as_filter(), FixedFormat(_stored_integer_bits(asked), LARGEST_FRACTION, rounding)
+    blamed = "coefficient_bits=, which is the most to try"
+    search = _FixedSearch.of(asked, like, True, lambda fmt: exact_sums(made, fmt, bits), blamed)
+    data, judge = search.answer(), search.judge
     if data.format is None:
         return data
-    strategy, words = search.strategy, cast(WordFormats, data.format)
-    found = Search(
-        lambda fmt: strategy.proof(exact_sums(made, words.data, fmt.precision)), FloatFormat(2, 2), (), largest=bits
-    )
-    if found.fmt is not None:
-        words = exact_sums(made, words.data, found.fmt.precision)
-    sums = words.accumulator
-    shorter = Search(
-        lambda fmt: strategy.proof(replace(words, sums=fmt)),
-        sums,
-        (),
-        largest=sums.fraction_bits,
-        least=words.data.fraction_bits,
-    )
-    if shorter.fmt is not None:
-        words = replace(words, sums=shorter.fmt)
+    words = cast(WordFormats, data.format)
+
+    def least(error: Callable[[Any], Any], like: Any, largest: int, fewest: int = 2) -> Any:
+        return Search(lambda fmt: judge.proof(error(fmt)), like, (), largest=largest, least=fewest).fmt
+
+    if (found := least(lambda fmt: exact_sums(made, words.data, fmt.precision), FloatFormat(2, 2), bits)) is not None:
+        words = exact_sums(made, words.data, found.precision)
+    sums, fraction = words.accumulator, words.data.fraction_bits
+    if (found := least(lambda fmt: replace(words, sums=fmt), sums, sums.fraction_bits, fraction)) is not None:
+        words = replace(words, sums=found)
     for more in range(9):  # sums that wrap may overflow on the way if what is stored fits
         narrow = replace(words, sums=replace(words.accumulator, integer_bits=words.data.integer_bits + more))
-        if strategy.proof(narrow).ratio <= 1:
+        if judge.proof(narrow).ratio <= 1:
             words = narrow
             break
-    ratio = strategy.proof(words).ratio
-    known, _ = asked.evidence(strategy.steps is not None)
-    text = joined(f"{words}: {share_text(ratio)}, {known}", strategy.warnings())
-    return replace(data, format=words, ratio=ratio, text=text, why="", notes=strategy.warnings())
+    ratio = judge.proof(words).ratio
+    known, _ = asked.evidence(judge.steps is not None)
+    text, notes = f"{words}: {share_text(ratio)}, {known}", judge.warnings()
+    return replace(data, format=words, ratio=ratio, text=joined(text, notes), why="", notes=notes)
 
 
 def _stored_integer_bits(asked: Asked) -> int:

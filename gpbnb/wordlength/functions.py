@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from fractions import Fraction
 from inspect import signature
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,80 +16,57 @@ from gpbnb.arithmetic.exits import kept_in, lifted
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.arithmetic.rounding import digit_unit, digits_text
+from gpbnb.arithmetic.rounding import digits_text
 from gpbnb.arithmetic.search import Outcome, largest_by_default
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother
-from gpbnb.wordlength.strategy import Data, Function, Strategy, largest_ratio, tolerances_of
+from gpbnb.wordlength.asked import Data, Function
 
 SPARE_BITS = 37
 """Bits that the reference has beyond the highest precision; a second run that checks it has half as many again."""
-
-SETTLED = 2.0**-20
-"""Largest difference allowed between the two runs of the reference, as a share of the tolerance."""
 
 STOPS = (ZeroDivisionError, OverflowError, DomainError, WholeNumberError, np.linalg.LinAlgError)
 """Errors that end a function in a format."""
 
 
-@dataclass(frozen=True, eq=False)
-class EmulatedFunction(Strategy):
-    """Errors of a function for given inputs, against `true`, its outputs in the reference, (steps, p)."""
+class Referenced(NamedTuple):
+    """A function, its inputs, and `true`, its outputs in the reference, (steps, p)."""
 
     run: TracedFunction | FixedIntervalSmoother
     z: NDArray[Any] | None
     true: NDArray[Any]
-    tolerances: NDArray[np.float64]
 
     @property
-    def untraced(self) -> str:  # type: ignore[override]
+    def untraced(self) -> str:
         """Why the user's function cannot be traced; empty if it can be."""
         return self.run.refusal if isinstance(self.run, TracedFunction) else ""
 
-    def error(self, fmt: Any) -> Outcome:
-        """Return the largest error or bound over its tolerance, or infinity and the reason."""
+    def errors(self, fmt: Any) -> NDArray[np.float64] | Outcome:
+        """Return the largest error of each output, or why the function stops."""
         try:
-            found = exact_outputs(outputs_of(self.run, fmt, self.z, None))
+            return self.off(exact_outputs(outputs_of(self.run, fmt, self.z, None)))
         except STOPS as fault:
             return Outcome(math.inf, f"the function stops: {fault}", isinstance(fault, OverflowError))
-        ratio = self.share(found - self.true)
-        return Outcome(ratio, "" if ratio < math.inf else "an error of the function is beyond the range of float64")
 
-    def share(self, errors: NDArray[Any]) -> float:
-        """Return the largest ratio of an error, (steps, p), to its tolerance."""
-        asked = np.isfinite(self.tolerances)
-        largest = np.array([_float(max(abs(each) for each in column)) for column in errors.T])
-        return largest_ratio(largest[asked], self.tolerances[asked])
+    def off(self, outputs: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the largest distance of outputs, (steps, p), from the reference, (p,)."""
+        return np.array([_float(max(abs(each) for each in column)) for column in (outputs - self.true).T])
 
 
-def traced(run: Function) -> TracedFunction | FixedIntervalSmoother:
-    """Return a function that runs in compiled code if it can be traced."""
-    return run if isinstance(run, (FixedIntervalSmoother, TracedFunction)) else TracedFunction(run)
-
-
-def function_strategy(run: Function, data: Data, tolerance: Any, base: int, most: int) -> EmulatedFunction:
-    """Compute the reference of a function in more digits than `most`, and return the strategy that compares with it."""
+def referenced(run: Function, data: Data, base: int, most: int) -> tuple[Referenced, NDArray[Any], int]:
+    """Compute the reference of a function in more digits than `most`; return also one in fewer, and their number."""
     inputs, steps = None if data.z is None else real_numbers(data.z), data.steps
     if isinstance(run, FixedIntervalSmoother):
         if inputs is not None or steps != len(run.z):
             raise ValueError(f"got z for a smoother, which has its record; needed its number of steps, {len(run.z)}")
     elif inputs is None and isinstance(run, NonlinearSystem):
         raise ValueError(f"got a number of steps for {run.name}; needed its inputs, of shape (steps, {run.m})")
+    made = run if isinstance(run, (FixedIntervalSmoother, TracedFunction)) else TracedFunction(run)
     digits = max(most, largest_by_default(base)) + math.ceil(SPARE_BITS / math.log2(base))
-    made = traced(run)
     short, true = (_reference(made, FloatFormat(base, each), inputs, steps) for each in (digits, digits * 3 // 2))
-    found = EmulatedFunction(made, inputs, true, tolerances_of(tolerance, true.shape[1], "outputs"))
-    off = found.share(short - true)
-    if not off <= SETTLED:
-        raise ValueError(
-            f"got a function whose reference in {digits_text(digits, base)} is {off:.2g} times the tolerance from "
-            f"that in {digits * 3 // 2}; needed one that settles; do comparisons, or the format itself, decide between "
-            f"results far apart? If errors only grow, try highest={2 * digits}, which gives the reference more "
-            f"{digit_unit(base)}"
-        )
-    return found
+    return Referenced(made, inputs, true), short, digits
 
 
 def _reference(

@@ -26,9 +26,9 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.system import LinearSystem
 from gpbnb.sweeps import Column, Sweep
 from gpbnb.wordlength.answer import Basis
+from gpbnb.wordlength.asked import Asked, Data, Function, checked_basis, tolerances_of
+from gpbnb.wordlength.judges import judge_for
 from gpbnb.wordlength.models import ModelSource
-from gpbnb.wordlength.strategies import strategy_for
-from gpbnb.wordlength.strategy import Data, Function, checked_basis, tolerances_of
 from gpbnb.wordlength.tasks import MOST_STEPS, TASK_OF_BASIS, admitted, data_of
 
 MOST_RECORDS = 1_000_000
@@ -228,8 +228,9 @@ def _ratios(
 ) -> list[Outcome]:
     """Return the error / tolerance of one record in each format, and why it is infinite."""
     most = max(fmt.precision for fmt in formats)
-    strategy = strategy_for(model, data[cell.record], tolerance, basis, form, base=formats[0].base, most=most)
-    return [strategy.proof(fmt) for fmt in formats]
+    asked = Asked(model, data[cell.record], tolerance, basis, form=form)
+    judge = judge_for(asked, formats[0].base, most)
+    return [judge.proof(fmt) for fmt in formats]
 
 
 def _digest(model: Any, data: Data, *question: Any) -> str:

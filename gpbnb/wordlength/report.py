@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
@@ -26,13 +26,17 @@ from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.sweeps import machine
 from gpbnb.wordlength.answer import PROOFS, Basis, Requirement, format_in_words
+from gpbnb.wordlength.asked import tolerances_of
 from gpbnb.wordlength.emulation import emulate
+from gpbnb.wordlength.models import FilterSource
 from gpbnb.wordlength.ranges import binary_ranges
 from gpbnb.wordlength.required import judge, required_precision
-from gpbnb.wordlength.strategy import tolerances_of
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms that a report compares; the requested form comes first."""
+
+BITS = FloatFormat(2, 2)
+"""What is searched if nothing else is asked: binary, rounded to nearest, with unlimited exponents."""
 
 DEFAULT_STEPS = 1000
 """Steps that are simulated if no number is given."""
@@ -140,45 +144,38 @@ class Question:
 
     Parameters
     ----------
-    tolerance : as in :func:`gpbnb.required_precision`, as are base, rounding and form.
+    source : the filter, perhaps in several structures. The first gives the answer, or, if the source compares all, that
+        which needs the fewest digits on the first basis.
+    tolerance, form, bases, within : as in :func:`gpbnb.required_precision`; the first basis gives the answer.
     z : (steps, m), measurements or inputs; by default simulated, for a Kalman filter.
     steps : number of steps to simulate; by default the number of measurements, or :data:`DEFAULT_STEPS`.
-    bases : as in :func:`gpbnb.required_precision`; the first gives the answer.
-    within : result of :func:`gpbnb.bounds.guarantee.limits`, for the bases "guarantee" and "probable".
-    emin, emax : range of the formats, as in ``FloatFormat``; by default unlimited.
-    fmt : the one format to judge, in place of a search; it replaces base, rounding and range.
-    structures : structures of a digital filter to compare, by their names; the first gives the answer, in place of the
-        model. See :func:`gpbnb.wordlength.models.read_filter`.
-    mixed : whether to find the digits of each block of a Kalman filter as well; see
-        :func:`gpbnb.required_precision`. In fixed point, the formats of data, coefficients
-        and sums of a linear system.
+    like : a format with the base, the rounding and the range of those to search.
+    fmt : the one format to judge, in place of a search.
+    mixed : whether to find the digits of each block of a Kalman filter as well. In fixed point, the formats of data,
+        coefficients and sums of a linear system.
     fixed : whether to count fraction bits of fixed point, of a linear system.
     coefficient_bits : significant bits of each coefficient in fixed point.
-    choose : whether the structure that needs the fewest digits on the first basis gives the answer, in place of the
-        first structure.
-    lacking : structures that the filter does not have, each with the reason.
     seed : seed of simulated measurements.
     """
 
-    model: LinearModel | LinearSystem
+    source: FilterSource
     tolerance: str | float | Sequence[str | float]
     z: Any = None
     steps: int | None = None
-    base: int = 2
-    rounding: str = "nearest"
     form: str = "innovation"
     bases: Sequence[Basis] = ("emulation", "bound")
     within: FilterLimits | None = None
-    emin: int | None = None
-    emax: int | None = None
+    like: FloatFormat = BITS
     fmt: FloatFormat | FixedFormat | None = None
-    structures: Mapping[str, LinearSystem] = field(default_factory=dict)
     mixed: bool = False
     fixed: bool = False
     coefficient_bits: int | None = None
-    choose: bool = False
-    lacking: Mapping[str, str] = field(default_factory=dict)
     seed: int = 0
+
+    @property
+    def model(self) -> LinearModel | LinearSystem:
+        """The filter in its first structure."""
+        return self.source.model
 
     @property
     def count(self) -> int:
@@ -187,7 +184,12 @@ class Question:
             return self.steps
         return usual_steps(self.model) if self.z is None else len(self.z)
 
-    def parts(self) -> list[_Part]:
+    @property
+    def data(self) -> Any:
+        """Measurements or inputs, or the number of those to simulate."""
+        return self.count if self.z is None else self.z
+
+    def parts(self) -> list[Part]:
         """Return the single questions, one for each basis and form or structure.
 
         Raises
@@ -198,15 +200,15 @@ class Question:
         if isinstance(model, LinearSystem):
             if form is not Form.INNOVATION:
                 raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
-            systems = self.structures or {"": model}
+            systems = self.source.structures or {"": model}
             return [
-                _Part(part_label(name, basis), basis, each, form, name)
+                Part(f"{name}, {basis}" if name else basis, basis, each, None, name)
                 for name, each in systems.items()
                 for basis in self.bases
             ]
         model.check_sizes()
         forms = [form, *(each for each in SIDE_BY_SIDE if each is not form)]
-        return [_Part(f"{each}, {basis}", basis, model, each) for each in forms for basis in self.bases]
+        return [Part(f"{each}, {basis}", basis, model, each) for each in forms for basis in self.bases]
 
     def measured(self) -> Any:
         """Return the measurements or inputs; those of a Kalman filter are simulated if there are none.
@@ -226,72 +228,41 @@ class Question:
             )
         return self.z
 
-    def answer(self, part: _Part, z: Any, progress: bool = False) -> Requirement:
+    def answer(self, part: Part, z: Any) -> Requirement:
         """Answer one of the single questions, by a search or by judging the one format."""
-        data: Any = self.count if z is None else z
-        form = part.form if isinstance(part.model, LinearModel) else None
+        basis, data = part.basis, self.count if z is None else z
         if self.fixed:
-            bits = self.coefficient_bits
-            return required_precision(
-                part.model,
-                data,
-                self.tolerance,
-                kind="fixed",
-                basis=part.basis,
-                rounding=self.rounding,
-                coefficient_bits=bits,
-            )
-        within = self.within if part.basis in ("guarantee", "probable") else None
+            more = {"rounding": self.like.rounding, "coefficient_bits": self.coefficient_bits}
+            return required_precision(part.model, data, self.tolerance, kind="fixed", basis=basis, **more)  # type: ignore[arg-type]
+        within = self.within if basis in ("guarantee", "probable") else None
         if self.fmt is not None:
-            return judge(part.model, self.fmt, data, self.tolerance, form=form, basis=part.basis, within=within)
+            return judge(part.model, self.fmt, data, self.tolerance, form=part.form, basis=basis, within=within)
         return required_precision(
-            part.model,
-            data,
-            self.tolerance,
-            basis=part.basis,
-            within=within,
-            form=form,
-            progress=progress,
-            **self.formats,
+            part.model, data, self.tolerance, like=self.like, basis=basis, within=within, form=part.form
         )
-
-    @property
-    def formats(self) -> dict[str, Any]:
-        """The options that describe the formats of a search in floating point."""
-        limits = None if self.emin is None or self.emax is None else (self.emin, self.emax)
-        return {"base": self.base, "rounding": self.rounding, "range": limits}
 
     def blocks(self, z: Any, structure: str = "") -> Requirement | None:
         """Find the digits of each block of a Kalman filter, or of words in fixed point, if they are asked for."""
         if not self.mixed:
             return None
         if isinstance(self.model, LinearSystem):
-            system, basis = self.structures.get(structure, self.model), self.bases[0]
-            return required_precision(system, z, self.tolerance, kind="words", basis=basis, rounding=self.rounding)
-        return required_precision(self.model, z, self.tolerance, kind="blocks", form=self.form, **self.formats)
+            system, rounding = self.source.structures.get(structure, self.model), self.like.rounding
+            return required_precision(system, z, self.tolerance, kind="words", basis=self.bases[0], rounding=rounding)
+        return required_precision(self.model, z, self.tolerance, kind="blocks", form=self.form, like=self.like)
 
 
-class _Part(NamedTuple):
+class Part(NamedTuple):
     """One basis, and one form or structure, of a question."""
 
     label: str
     basis: Basis
     model: LinearModel | LinearSystem
-    form: AnyForm
+    form: AnyForm | None
     structure: str = ""
 
 
-def part_label(structure: str, basis: str) -> str:
-    """Return the label of the answer for a structure, perhaps none, on a basis."""
-    return f"{structure}, {basis}" if structure else basis
-
-
 def study(
-    asked: Question,
-    source: str = "",
-    command: str = "",
-    tell: Callable[[str], Any] = lambda text: None,
-    progress: bool = False,
+    asked: Question, source: str = "", command: str = "", tell: Callable[[str], Any] = lambda text: None
 ) -> Report:
     """Find the answer for each basis and form or structure, and collect what explains it.
 
@@ -300,7 +271,6 @@ def study(
     source : origin of the measurements; by default whether they were given or simulated.
     command : the command that reproduces the report.
     tell : function called with a line of text before and after each search.
-    progress : show a progress bar that counts precisions.
 
     Raises
     ------
@@ -308,38 +278,38 @@ def study(
         with a basis that holds for all of them.
     OverflowError : for a reason given there.
     """
-    parts, z = asked.parts(), asked.measured()
-    found: list[tuple[_Part, Requirement]] = []
+    parts, z, structures = asked.parts(), asked.measured(), asked.source.structures
+    lacking = dict(asked.source.lacking) if len(structures) > 1 else {}
+    found: list[tuple[Part, Requirement]] = []
     for part in parts:
         tell(f"{part.label} …")
-        answer = asked.answer(part, z, progress)
+        answer = asked.answer(part, z)
         found.append((part, answer))
         tell(f"{part.label}: {answer}")
-    for name, why in asked.lacking.items():
+    for name, why in lacking.items():
         tell(f"{name}, left out: {why}")
-    first, main = _fewest(found) if asked.choose else found[0]
+    first, main = _fewest(found) if asked.source.compares_all else found[0]
     if (blocks := asked.blocks(z, first.structure)) is not None:
         tell(f"blocks: {blocks}")
-    met = main.met
-    stored = _stored(asked.structures.get(first.structure), main) if met else ""
+    met, model, fmt, within = main.met, asked.model, asked.fmt, asked.within
+    stored = _stored(structures.get(first.structure), main) if met else ""
     if stored:
         tell(f"{first.structure}: {stored}")
-    model, fmt, within = asked.model, asked.fmt, asked.within
     is_filter = isinstance(model, LinearModel)
-    width = model.p if isinstance(model, LinearSystem) else model.n
-    tolerances = tolerances_of(asked.tolerance, width, "outputs")
+    tolerances = tolerances_of(asked.tolerance, model.n if is_filter else model.p, "outputs")
     origin = (
         "given" if asked.z is not None else f"simulated by the model, seed {asked.seed}" if z is not None else "none"
     )
+    like = fmt or asked.like
     return Report(
         name=model.name,
         kind="Kalman filter" if is_filter else "linear system",
         digits=main.digits if met else None,
-        text=f"{first.structure}: {main}" if len(asked.structures) > 1 else str(main),
-        base=asked.base if fmt is None else fmt.base,
-        rounding=str(asked.rounding) if fmt is None else fmt.rounding.value,
+        text=f"{first.structure}: {main}" if len(structures) > 1 else str(main),
+        base=like.base,
+        rounding=like.rounding.value,
         steps=asked.count,
-        tolerance=tuple(_finite(float(each)) for each in np.broadcast_to(asked.tolerance, width).tolist()),
+        tolerance=tuple(_finite(float(each)) for each in np.broadcast_to(asked.tolerance, len(tolerances)).tolist()),
         source=source or origin,
         answers=tuple(_plain(part.label, answer) for part, answer in found),
         errors=_errors(model, z, main.format if met else None, asked.form, tolerances),
@@ -351,12 +321,12 @@ def study(
         met=met,
         names=model.state_names if isinstance(model, LinearModel) else model.output_names,
         measurement_names=model.measurement_names if isinstance(model, LinearModel) else model.input_names,
-        exponents=_exponents(fmt, asked.emin, asked.emax),
+        exponents=_exponents(like),
         fixed=asked.fixed,
         mixed="" if blocks is None else str(blocks),
         blocks=() if blocks is None else _digits_of_blocks(blocks),
         structure=first.structure,
-        lacking=dict(asked.lacking),
+        lacking=lacking,
         stored=stored,
         shortest=_shorter(found, main, fmt is not None),
         formats=(main if blocks is None or not asked.fixed else blocks).format,
@@ -381,8 +351,8 @@ def _stored(system: LinearSystem | None, answer: Requirement) -> str:
 
 
 def _fewest(
-    found: Sequence[tuple[_Part, Requirement]],
-) -> tuple[_Part, Requirement]:
+    found: Sequence[tuple[Part, Requirement]],
+) -> tuple[Part, Requirement]:
     """Return the answer with the fewest digits on the first basis, in fixed point with the shortest word.
 
     Among equals, it is the one with the smallest error; the first of all if none is met.
@@ -399,7 +369,7 @@ def _length(answer: Requirement) -> int:
     return 0 if fmt is None or isinstance(fmt, BlockFormats) else int(fmt.precision)
 
 
-def _shorter(found: Sequence[tuple[_Part, Requirement]], answer: Requirement, judged: bool) -> str:
+def _shorter(found: Sequence[tuple[Part, Requirement]], answer: Requirement, judged: bool) -> str:
     """Name the structure that needs fewer digits than an answer, or that meets the tolerance where it does not."""
     part, best = _fewest(found)
     if not (part.structure and best.met and best is not answer) or (answer.met and _length(best) >= _length(answer)):
@@ -440,13 +410,11 @@ def _errors(
     return tuple(_finite(float(e / t)) if math.isfinite(t) else None for e, t in zip(largest, tolerances, strict=True))
 
 
-def _exponents(fmt: FloatFormat | FixedFormat | None, emin: int | None, emax: int | None) -> str:
+def _exponents(fmt: FloatFormat | FixedFormat) -> str:
     """Describe the range of the exponents; empty if it is unlimited."""
     if isinstance(fmt, FixedFormat):
         return f"none: fixed point, from {float(fmt.lowest):.6g} to {float(fmt.largest):.6g}"
-    if fmt is not None:
-        emin, emax = fmt.emin, fmt.emax
-    return "" if emin is None else f"{emin} to {emax}"
+    return "" if fmt.limits is None else f"{fmt.emin} to {fmt.emax}"
 
 
 def _finite(number: float) -> float | None:

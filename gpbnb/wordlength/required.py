@@ -16,7 +16,6 @@ from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic, digits, format_named
 from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text, rounding_named
 from gpbnb.arithmetic.search import CHECKED, Search, largest_by_default, largest_compiled
-from gpbnb.bounds.guarantee import check_within
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.forms import AnyForm, Form
@@ -26,21 +25,11 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, opened
 from gpbnb.filters.system import LinearSystem, unobserved
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.answer import (
-    PROOFS,
-    Basis,
-    Kind,
-    Requirement,
-    joined,
-    judgement,
-    listed,
-    share_text,
-)
-from gpbnb.wordlength.asked import Asked, check_sizes, for_ever_or_over
+from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, joined, judgement, listed, share_text
+from gpbnb.wordlength.asked import Asked, Function, checked_basis
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS, fixed_like, in_fixed_point, in_words
+from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, slowest_response
 from gpbnb.wordlength.models import ModelSource
-from gpbnb.wordlength.strategies import Recorded, recorded_strategy, slowest_response
-from gpbnb.wordlength.strategy import Function, Strategy, checked_basis, tolerances_of
 from gpbnb.wordlength.tasks import TASK_OF_BASIS, TASK_OF_KIND, admitted, data_of
 
 
@@ -195,12 +184,14 @@ def judge(
     if isinstance(given, LinearModel | LinearSystem) and not isinstance(chosen, WordFormats):
         chosen.check_compiled()
     precision = chosen.data.precision if isinstance(chosen, WordFormats) else chosen.precision
-    strategy = asked.strategy(2 if isinstance(chosen, WordFormats) else chosen.base, precision)
-    found, ends = for_ever_or_over(
-        data.steps, strategy, lambda each: each.proof(chosen), lambda outcome: not math.isinf(outcome.ratio)
+    found, judge = for_ever_or_over(
+        asked,
+        judge_for(asked, 2 if isinstance(chosen, WordFormats) else chosen.base, precision),
+        lambda each: each.proof(chosen),
+        lambda outcome: not math.isinf(outcome.ratio),
     )
-    notes = strategy.warnings() if found.ratio <= 1 else ()
-    return judgement(chosen, basis, data.steps, found.ratio, found.why, ends, notes)
+    notes = judge.warnings() if found.ratio <= 1 else ()
+    return judgement(chosen, basis, data.steps, found.ratio, found.why, judge.steps is not None, notes)
 
 
 # -- floating point ---------------------------------------------------------------------------------------------------
@@ -236,31 +227,27 @@ def _highest(asked: Asked, like: FloatFormat) -> int | None:
 def _in_floating_point(asked: Asked, like: FloatFormat) -> Requirement:
     base = like.base
     highest = _highest(asked, like)
-    check_sizes(asked, like)
-    strategy = asked.strategy(base, highest or largest_compiled(like))
+    asked.check_sizes(like)
     lasting = asked.of_filter() and asked.basis in ("guarantee", "probable")
     bounds = asked.basis == "bound" or (asked.basis != "emulation" and not lasting)
     with tqdm(desc="precisions", unit="run", disable=not asked.progress) as bar:
 
-        def search(each: Strategy) -> Search[FloatFormat]:
-            proof = each.proof if each.guesses else None
-            checks = () if lasting else CHECKED[base]
+        def search(each: Judge) -> Search[FloatFormat]:
+            proof, checks = each.proof if each.proved else None, () if lasting else CHECKED[base]
             return Search(each.error, like, checks, bar.update, bounds, highest, proof=proof)
 
-        found, ends = for_ever_or_over(
-            asked.data.steps, strategy, search, lambda each: any(math.isfinite(ratio) for _, ratio in each.tried)
-        )
-        notes, cause = _advice(asked, strategy, found, like, search, ends)
-    return _float_answer(asked, found, ends, notes, cause, like)
+        judge = judge_for(asked, base, highest or largest_compiled(like))
+        found, judge = for_ever_or_over(asked, judge, search, Search.is_bounded)
+        notes, cause = _advice(asked, judge, found, like, search)
+    return _float_answer(asked, found, judge.steps is not None, notes, cause, like)
 
 
 def _advice(
     asked: Asked,
-    strategy: Strategy,
+    judge: Judge,
     found: Search[FloatFormat],
     like: FloatFormat,
-    search: Callable[[Strategy], Search[FloatFormat]],
-    ends: bool,
+    search: Callable[[Judge], Search[FloatFormat]],
 ) -> tuple[list[str], str]:
     """Return what else there is to say about the result of a search, and why no precision can be an answer."""
     model, notes, cause = asked.model, list[str](), ""
@@ -272,25 +259,24 @@ def _advice(
         notes.append(
             f"the proof does not cover {undecided}, in which no bound was found: {found.reasons[found.undecided[-1]]}"
         )
-    if isinstance(strategy, Recorded):
-        sound = strategy.model
-        unseen = unobserved_part(sound) if found.fmt is None else ""
-        better = _better_form(strategy, search) if found.irregular or found.fmt is None else ""
+    if judge.of_form is not None:
+        unseen = unobserved_part(judge.model) if found.fmt is None else ""
+        better = _better_form(judge, search) if found.irregular or found.fmt is None else ""
         notes += [better] if better else []
         if remedy and not better and not unseen:
             notes += [give, remedy]
         notes += [f"{unseen}, so that its errors never decay"] if unseen else []
-        notes += _repairs(model, sound, found.fmt, asked.form)
+        notes += _repairs(model, judge.model, found.fmt, asked.form)
     elif isinstance(model, LinearModel):
-        cause = unobserved_part(model) if found.fmt is None and not ends else ""
+        cause = unobserved_part(model) if found.fmt is None and judge.steps is None else ""
         cause += '; ask with basis "bound" for a number of steps instead' if cause else ""
         notes += _repairs(model, model, found.fmt, asked.form)
     elif isinstance(model, LinearSystem):
         notes_of, cause = _of_linear_system(asked, found, like, give)
         notes += notes_of + ([remedy] if remedy and not cause and not _is_long(model) and not notes_of[1:] else [])
-    if strategy.untraced:
-        notes.append(f"the function ran operation by operation: {strategy.untraced}")
-    return notes + list(strategy.warnings() if found.fmt is not None else ()), cause
+    if judge.untraced:
+        notes.append(f"the function ran operation by operation: {judge.untraced}")
+    return notes + list(judge.warnings() if found.fmt is not None else ()), cause
 
 
 def _of_linear_system(asked: Asked, found: Search[FloatFormat], like: FloatFormat, give: str) -> tuple[list[str], str]:
@@ -345,12 +331,12 @@ def _in_more_digits(asked: Asked, found: Search[FloatFormat], like: FloatFormat)
     )
 
 
-def _better_form(strategy: Recorded, search: Callable[[Strategy], Search[FloatFormat]]) -> str:
+def _better_form(judge: Judge, search: Callable[[Judge], Search[FloatFormat]]) -> str:
     """Name the form that meets the tolerance with the fewest digits, as advice; empty if there is none."""
-    if isinstance(strategy.model, NonlinearModel) and strategy.model.method == "unscented":
+    if judge.of_form is None or (isinstance(judge.model, NonlinearModel) and judge.model.method == "unscented"):
         return ""
-    others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not strategy.form]
-    answers = [(other, search(replace(strategy, form=other)).fmt) for other in others]
+    others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not judge.form]
+    answers = [(other, search(judge.of_form(other)).fmt) for other in others]
     met = [(fmt.precision, str(other), digits(fmt)) for other, fmt in answers if fmt is not None]
     return f"the form {min(met)[1]} needs {min(met)[2]}" if met else ""
 
@@ -388,19 +374,9 @@ def _float_answer(
         on_processors = f" ({'; '.join(named)})" if named else ""
         below = why if math.isinf(tried.get(fmt.precision - 1, 0.0)) else ""
         text = joined(f"{arithmetic(fmt)}{on_processors}: {share_text(tried[fmt.precision])}, {known}", [below])
-    return Requirement(
-        fmt,
-        math.inf if fmt is None else tried[fmt.precision],
-        asked.basis,
-        None if asked.basis in ("guarantee", "probable") and not ends else asked.data.steps,
-        found.tried,
-        joined(text, notes),
-        cause or why,
-        tuple(filter(None, notes)),
-        asked.form if asked.of_filter() else None,
-        found.irregular,
-        enough,
-    )
+    ratio = math.inf if fmt is None else tried[fmt.precision]
+    more = {"irregular": found.irregular, "processor_format": enough}
+    return asked.answer(fmt, ratio, found.tried, ends, text, cause or why, notes, **more)
 
 
 def _processors_with(fmt: FloatFormat | None) -> tuple[tuple[str, FloatFormat], ...]:
@@ -418,20 +394,17 @@ def _of_blocks(asked: Asked, like: FloatFormat) -> Requirement:
     model, form = asked.model, compiled_form(asked.form)
     if asked.basis != "emulation":
         raise ValueError(f'got basis "{asked.basis}" for blocks; needed "emulation": bounds are for one format')
-    check_within(asked.within, asked.basis)
     if isinstance(model, NonlinearModel):
         check_form(model, form, blocks=True)
-    check_sizes(asked, like)
-    strategy = recorded_strategy(
-        model, asked.data, tolerances_of(asked.tolerance, model.n, "states"), form, asked.basis
-    )
+    asked.check_sizes(like)
+    judge = judge_for(replace(asked, form=form))
     most = replace(like, precision=largest_compiled(like))
-    found = Search(strategy.error, like, CHECKED[like.base])
+    found = Search(judge.error, like, CHECKED[like.base])
 
     def lowered(formats: BlockFormats, name: str) -> int | None:
         """Return the smallest precision of a block, up to that which it has; None if this is not enough."""
         top = getattr(formats, name).precision
-        search = Search(lambda fmt: strategy.error(formats.with_block(name, fmt)), like, (), largest=top)
+        search = Search(lambda fmt: judge.error(formats.with_block(name, fmt)), like, (), largest=top)
         return None if search.fmt is None else search.fmt.precision
 
     alone = {name: lowered(BlockFormats.uniform(most), name) for name in BLOCKS}
@@ -442,7 +415,7 @@ def _of_blocks(asked: Asked, like: FloatFormat) -> Requirement:
     for name in sorted(alone, key=lambda name: alone[name] or math.inf):
         digits = lowered(formats, name)
         formats = formats.with_block(name, replace(like, precision=found.fmt.precision if digits is None else digits))
-    answer = replace(uniform, format=formats, ratio=strategy.error(formats).ratio, alone=alone, processor_format="")
+    answer = replace(uniform, format=formats, ratio=judge.error(formats).ratio, alone=alone, processor_format="")
     limits = " and ".join(f"the {name}" for name in answer.limiting)
     each = ", ".join(f"{name} {digits}" for name, digits in alone.items())
     text = (

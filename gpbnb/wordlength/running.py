@@ -31,28 +31,23 @@ from gpbnb.wordlength.code import VECTORS, write_code
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
 from gpbnb.wordlength.options import QUANTITIES, WRITTEN
-from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, part_label, study, usual_steps
-from gpbnb.wordlength.required import judge
+from gpbnb.wordlength.report import DEFAULT_STEPS, Part, Question, Report, study, usual_steps
 
 
 class CommandInput(NamedTuple):
-    """What a command line asks about, with the files that it names as they were read.
+    """What a command line asks, with the files that it names as they were read.
 
     Parameters
     ----------
     options : the options, as :func:`gpbnb.wordlength.options.read` returns them.
-    source : the filter; with a constant gain, it is a linear system.
-    own : the model in its file.
-    bases : what answers may be based on.
-    z : measurements or inputs; None if a model simulates them.
-    origin : where they come from.
+    own : the model in its file; with a constant gain, the question is about a linear system.
+    question : the question.
+    origin : where measurements or inputs come from.
     """
 
     options: argparse.Namespace
-    source: FilterSource
     own: LinearModel | LinearSystem
-    bases: Sequence[Basis]
-    z: Any
+    question: Question
     origin: str
 
 
@@ -82,7 +77,24 @@ def read_files(options: argparse.Namespace) -> CommandInput:
         refuse_others(options.code, "filter")
     source, own = _filter(options)
     bases: Sequence[Basis] = options.basis or ("emulation", "guarantee" if options.fixed else "bound")
-    return CommandInput(options, source, own, bases, *_inputs(options, source.model, bases, own))
+    z, origin = _inputs(options, source.model, bases, own)
+    fmt, rounding = _format(options), Rounding(options.rounding or "nearest")
+    question = Question(
+        source,
+        options.tolerance,
+        z,
+        options.steps,
+        "innovation" if options.form in (None, CONSTANT_GAIN) else options.form,
+        bases,
+        None if options.fixed else _limits(options, bases, source.model),
+        FloatFormat(options.base or 2, 2, rounding, options.emin, options.emax),
+        fmt,
+        options.mixed,
+        options.fixed,
+        options.coefficients,
+        options.seed or 0,
+    )
+    return CommandInput(options, own, question, origin)
 
 
 def answer(asked: CommandInput, command: str, tell: Callable[[str], Any]) -> Report:
@@ -97,29 +109,7 @@ def answer(asked: CommandInput, command: str, tell: Callable[[str], Any]) -> Rep
     ------
     ValueError, ArithmeticError : for a reason given in :func:`gpbnb.wordlength.report.study`.
     """
-    given, source = asked.options, asked.source
-    question = Question(
-        source.model,
-        given.tolerance,
-        asked.z,
-        given.steps,
-        given.base or 2,
-        given.rounding or "nearest",
-        _form(given),
-        asked.bases,
-        None if given.fixed else _limits(asked, source.model),
-        given.emin,
-        given.emax,
-        _format(given),
-        source.structures,
-        given.mixed,
-        given.fixed,
-        given.coefficients,
-        source.compares_all,
-        source.lacking if len(source.structures) > 1 else {},
-        given.seed or 0,
-    )
-    return study(question, asked.origin, command, tell)
+    return study(asked.question, asked.origin, command, tell)
 
 
 def _filter(given: argparse.Namespace) -> tuple[FilterSource, LinearModel | LinearSystem]:
@@ -131,11 +121,6 @@ def _filter(given: argparse.Namespace) -> tuple[FilterSource, LinearModel | Line
         raise _no_form(given)
     settled = settled_filter(read.model)
     return FilterSource(settled, {CONSTANT_GAIN: settled}), read.model
-
-
-def _form(given: argparse.Namespace) -> str:
-    """Return the form of a Kalman filter; a filter with constant gain is a linear system, which has none."""
-    return "innovation" if given.form in (None, CONSTANT_GAIN) else str(given.form)
 
 
 def _no_form(given: argparse.Namespace) -> ValueError:
@@ -216,19 +201,18 @@ def certificate(asked: CommandInput, report: Report) -> Certified:
     ------
     ValueError : no precision has a guarantee, or the system limits its values.
     """
-    given, source = asked.options, asked.source
-    guaranteed = [each for each in report.answers if each.basis == "guarantee"]
-    own = part_label(report.structure, "guarantee")
-    digits = next(each.digits for each in guaranteed if not report.structure or each.label == own)
-    fmt = _format(given)
+    part = _part(asked, report, "guarantee")
+    digits = next(each.digits for each in report.answers if each.label == part.label)
     if digits is None:
         raise ValueError("got no precision with a guarantee; needed one for a certificate; allow a larger tolerance")
-    if fmt is None:
-        fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
-    chosen = source.structures.get(report.structure, source.model)
-    form = _form(given) if isinstance(chosen, LinearModel) else None
-    found = guarantee(chosen, fmt, limits(**_sizes(given)), form=form, horizon=report.steps)
+    fmt = asked.question.fmt or replace(asked.question.like, precision=digits)
+    found = guarantee(part.model, fmt, limits(**_sizes(asked.options)), form=part.form, horizon=report.steps)
     return Certified(found.certificate(), fmt)
+
+
+def _part(asked: CommandInput, report: Report, basis: str) -> Part:
+    """Return the single question on a basis, for the form or the structure of the answer."""
+    return next(each for each in asked.question.parts() if each.basis == basis and each.structure == report.structure)
 
 
 def write_code_of(asked: CommandInput, report: Report) -> WrittenCode:
@@ -243,35 +227,30 @@ def write_code_of(asked: CommandInput, report: Report) -> WrittenCode:
         :func:`gpbnb.write_code`.
     OSError : a file cannot be written.
     """
-    given, source, own, z = asked.options, asked.source, asked.own, asked.z
-    fmt: Any
-    within: FilterLimits | None
-    if given.fixed:
-        fmt, within = report.formats, limits(measurement=np.abs(z).max(axis=0))
-    else:
-        fmt, within = _format(given) or _type_within_tolerance(asked, report), _limits(asked, source.model)
+    folder, form, own, question, z = asked.options.code, asked.options.form, asked.own, asked.question, asked.question.z
+    fmt: Any = report.formats if question.fixed else question.fmt or _type_within_tolerance(asked, report)
+    within = limits(measurement=np.abs(z).max(axis=0)) if question.fixed else question.within
     if not isinstance(own, LinearModel):
-        model: Any = source.design or source.structures.get(report.structure) or source.model
-        form = report.structure if source.design else None
-        return WrittenCode(write_code(model, fmt, given.code, form=form, within=within), fmt)
+        design, structures = question.source.design, question.source.structures
+        model: Any = design or structures.get(report.structure) or question.model
+        form = report.structure if design else None
+        return WrittenCode(write_code(model, fmt, folder, form=form, within=within), fmt)
     if z is None:
-        z = simulated_measurements(own, given.steps or usual_steps(own), given.seed or 0)
+        z = simulated_measurements(own, question.count, question.seed)
     vectors = None if np.isnan(z[:VECTORS]).any() else z[:VECTORS]
-    return WrittenCode(write_code(own, fmt, given.code, form=given.form, inputs=vectors, within=within), fmt)
+    return WrittenCode(write_code(own, fmt, folder, form=form, inputs=vectors, within=within), fmt)
 
 
 def _type_within_tolerance(asked: CommandInput, report: Report) -> FloatFormat:
     """Return binary32 if it meets the tolerance of a command line, else binary64."""
-    given, model = asked.options, asked.source.structures.get(report.structure, asked.source.model)
-    basis, data = asked.bases[0], report.steps if asked.z is None else asked.z
-    within = _limits(asked, model) if basis in ("guarantee", "probable") else None
-    form = _form(given) if isinstance(model, LinearModel) else None
+    question = asked.question
+    part = _part(asked, report, question.bases[0])
     for fmt in (BINARY32, BINARY64):
-        if judge(model, fmt, data, given.tolerance, form=form, basis=basis, within=within).met:
+        if replace(question, fmt=fmt).answer(part, question.z).met:
             return fmt
     raise ValueError(
-        f"got --code {given.code}, and neither binary32 nor binary64 meets the tolerance; needed a larger tolerance, "
-        "or --format with fixed point"
+        f"got --code {asked.options.code}, and neither binary32 nor binary64 meets the tolerance; needed a larger "
+        "tolerance, or --format with fixed point"
     )
 
 
@@ -301,12 +280,9 @@ def write_run(asked: CommandInput, report: Report, file: Path) -> None:
     ------
     OSError : the file cannot be written.
     """
-    given, source = asked.options, asked.source
-    model = source.structures.get(report.structure, source.model)
-    data = report.steps if asked.z is None else asked.z
-    form = _form(given) if isinstance(model, LinearModel) else None
-    seed = 0 if asked.z is not None else given.seed or 0
-    run = emulate(model, data, report.formats, form=form, seed=seed)
+    question, (_, _, model, form, _) = asked.question, _part(asked, report, asked.question.bases[0])
+    seed = question.seed if question.z is None else 0
+    run = emulate(model, question.data, report.formats, form=form, seed=seed)
     numbers = run.x if isinstance(model, LinearModel) else run.y
     kind = "output" if run.form is None else "state"
     names = report.names or [f"{kind} {i}" for i in range(run.errors.shape[1])]
@@ -340,12 +316,14 @@ def _sizes(given: argparse.Namespace) -> dict[str, Any]:
     return {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
 
 
-def _limits(asked: CommandInput, model: LinearModel | LinearSystem) -> FilterLimits | None:
+def _limits(
+    given: argparse.Namespace, bases: Sequence[Basis], model: LinearModel | LinearSystem
+) -> FilterLimits | None:
     """Return the limits that the bases need; None if they need none."""
-    bounds = [each for each in asked.bases if each in ("guarantee", "probable")]
+    bounds = [each for each in bases if each in ("guarantee", "probable")]
     if not bounds:
         return None
-    of_system, sizes = isinstance(model, LinearSystem), _sizes(asked.options)
+    of_system, sizes = isinstance(model, LinearSystem), _sizes(given)
     needed = "--measurement" if of_system else "--state and --innovation, or --measurement"
     if not sizes or (of_system and set(sizes) != {"measurement"}):
         options = ", ".join(f"--{each}" for each in sizes)

@@ -15,8 +15,8 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem
+from gpbnb.wordlength.asked import Data
 from gpbnb.wordlength.models import SYSTEMS, read_model
-from gpbnb.wordlength.strategy import Data
 
 MOST_STEPS = 100_000_000
 """Largest number of steps to simulate."""

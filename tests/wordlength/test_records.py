@@ -9,8 +9,8 @@ import pytest
 from gpbnb import FloatFormat, Rounding
 from gpbnb.wordlength import examples
 from gpbnb.wordlength import records as module
+from gpbnb.wordlength.judges import judge_for
 from gpbnb.wordlength.records import RecordSurvey, survey_records
-from gpbnb.wordlength.strategies import strategy_for
 from tests.surveying import survey
 
 FORMATS = [FloatFormat(2, 10), FloatFormat(2, 24), FloatFormat(10, 5), FloatFormat(2, 12, Rounding.CHOP)]
@@ -44,13 +44,13 @@ def test_any_executor_gives_the_same(kind):
 def test_an_interrupted_survey_goes_on(tmp_path, monkeypatch):
     calls = []
 
-    def counted(model, data, *rest, **options):
-        calls.append(data.steps)
+    def counted(asked, *rest):
+        calls.append(asked.data.steps)
         if len(calls) == 3:
             raise KeyboardInterrupt
-        return strategy_for(model, data, *rest, **options)
+        return judge_for(asked, *rest)
 
-    monkeypatch.setattr(module, "strategy_for", counted)
+    monkeypatch.setattr(module, "judge_for", counted)
     z, formats = data(4), FORMATS[:1]
     with pytest.raises(KeyboardInterrupt):
         survey_records(TRACKER, z, 0.01, formats, directory=tmp_path)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from gpbnb import FixedFormat, LinearSystem, WordFormats, required_precision
+from gpbnb.wordlength.asked import Asked, Data
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS
-from gpbnb.wordlength.strategies import strategy_for
-from gpbnb.wordlength.strategy import Data
+from gpbnb.wordlength.judges import judge_for
 
 
 def words_error(system, z, tolerance, basis="emulation"):
-    return strategy_for(system, Data(z, len(z)), tolerance, basis).proof
+    return judge_for(Asked(system, Data(z, len(z)), tolerance, basis)).proof
 
 
 ALPHA = Fraction(1097, 4096)
@@ -83,3 +83,9 @@ def test_no_format_of_a_biquad_can_be_lowered(basis):
         ).ratio
         > 1
     )
+
+
+def test_a_sum_without_coefficients_has_words():
+    found = required_precision(LinearSystem.sum(running=True), [0.5, 0.25, 0.125], "1/100", kind="words")
+    assert found.met
+    assert found.format.data.fraction_bits == 3  # the data themselves, which nothing rounds

@@ -24,7 +24,7 @@ from gpbnb.report.ledger.render import FORMATS
 from gpbnb.wordlength import options, running
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.answer import Basis
-from gpbnb.wordlength.strategy import tolerances_of
+from gpbnb.wordlength.asked import tolerances_of
 
 SYSTEM = 'A = [[0.875]]\nB = [[0.125]]\ninputs = ["sensor (V)"]\noutputs = ["level (V)"]\n'
 FILTER = "Phi = [[1]]\nH = [[1]]\nQ = [[0.01]]\nR = [[1]]\nx0 = [0]\nP0 = [[1]]\n"

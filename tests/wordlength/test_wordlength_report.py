@@ -9,6 +9,7 @@ from dataclasses import replace
 import pytest
 
 from gpbnb.filters.model import LinearModel
+from gpbnb.wordlength.models import FilterSource
 from gpbnb.wordlength.report import Answer, Question, Report, study
 
 REPORT = Report(
@@ -113,7 +114,8 @@ def test_the_report_ends_with_how_to_reproduce_it():
 def test_a_study_says_where_its_measurements_come_from(given, source):
     told: list[str] = []
     asked = {name: value for name, value in given.items() if name != "source"}
-    found = study(Question(MODEL, 0.1, bases=("emulation",), **asked), given.get("source", ""), tell=told.append)
+    question = Question(FilterSource(MODEL), 0.1, bases=("emulation",), **asked)
+    found = study(question, given.get("source", ""), tell=told.append)
     assert (found.kind, found.source, found.steps) == ("Kalman filter", source, given.get("steps", 2))
     assert [each.label for each in found.answers] == ["innovation, emulation", "Joseph, emulation", "UD, emulation"]
     assert told[:2] == ["innovation, emulation …", f"innovation, emulation: {found.text}"]

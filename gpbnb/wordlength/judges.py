@@ -1,0 +1,469 @@
+"""How well a format does for a model: errors of a run, or bounds of them, over their tolerances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.bounds import all_above
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import digit_unit, digits_text
+from gpbnb.arithmetic.search import Outcome
+from gpbnb.bounds.guarantee import FilterGuarantee, check_within, guarantee, guessed, sized_limits
+from gpbnb.bounds.guess import FilterLimits
+from gpbnb.bounds.probable import probable_error, probable_output_errors
+from gpbnb.bounds.system import guessed_errors, output_errors
+from gpbnb.bounds.words import WordGuarantee
+from gpbnb.filters.forms import AnyForm, ArrayForm, Form
+from gpbnb.filters.model import LinearModel, stored_measurements
+from gpbnb.filters.named import named
+from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
+from gpbnb.filters.nonlinear_run import check_form, nonlinear_checkpoints, opened, simulated, true_states
+from gpbnb.filters.poles import eigenvalues
+from gpbnb.filters.run import reference
+from gpbnb.filters.system import LinearSystem, is_stable, system_inputs
+from gpbnb.filters.words import WordFormats, run_words
+from gpbnb.wordlength.answer import Basis
+from gpbnb.wordlength.asked import AnyFormat, Asked, Data, tolerances_of
+from gpbnb.wordlength.functions import Referenced, referenced
+
+Found = NDArray[np.float64] | Outcome
+"""The largest error or bound of each state or output, (n,); or why there is none."""
+
+Answer = TypeVar("Answer")
+
+SETTLED = 2.0**-20
+"""Largest difference allowed between two references of a function, as a share of the tolerance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """What says how well a format does, for a model, data and tolerances that were checked.
+
+    Parameters
+    ----------
+    errors : function that returns what is found in a format; a guess if it is proved otherwise.
+    tolerances : (n,).
+    proved : function that returns what is proved, if this is not what is found.
+    steps : steps for which a bound holds; None if it holds for ever.
+    over : function that returns a judge over some steps, where nothing bounds the errors for ever.
+    warnings : function that returns why the errors may say little about other runs.
+    beyond : what an infinite ratio means; by default that float64 does not hold it.
+    untraced : why a user's function cannot be traced; empty if it can be.
+    model, form : a Kalman filter for the measurements that are present, and its form; `of_form` judges another.
+    """
+
+    errors: Callable[[Any], Found]
+    tolerances: NDArray[np.float64]
+    proved: Callable[[Any], Found] | None = None
+    steps: int | None = None
+    over: Callable[[int], Judge] | None = None
+    warnings: Callable[[], tuple[str, ...]] = tuple
+    beyond: str = ""
+    untraced: str = ""
+    model: AnyModel | None = None
+    form: AnyForm = Form.INNOVATION
+    of_form: Callable[[AnyForm], Judge] | None = None
+
+    def error(self, fmt: Any) -> Outcome:
+        """Return the largest error or bound as a multiple of the tolerance; or infinity, with the reason."""
+        return self.outcome(self.errors(fmt))
+
+    def proof(self, fmt: Any) -> Outcome:
+        """Return what is proved of a format."""
+        return self.outcome((self.proved or self.errors)(fmt))
+
+    def outcome(self, found: Found) -> Outcome:
+        """Return errors over their tolerances."""
+        if isinstance(found, Outcome):
+            return found
+        asked = np.isfinite(self.tolerances)
+        with np.errstate(over="ignore"):
+            ratio = float((found[asked] / self.tolerances[asked]).max())
+        if ratio < math.inf:
+            return Outcome(ratio)
+        what = "an error over its tolerance" if np.isfinite(found).all() else "an output or a bound"
+        return Outcome(math.inf, self.beyond or f"{what} is beyond the range of float64")
+
+
+def judge_for(asked: Asked, base: int = 2, most: int = 0) -> Judge:
+    """Check a question about a model, and return what answers it.
+
+    Parameters
+    ----------
+    base, most : base and most digits of the formats to try, for the reference of a function.
+
+    Raises
+    ------
+    ValueError, TypeError, OverflowError : for a reason given in :func:`gpbnb.required_precision`.
+    """
+    model, data, basis = asked.model, asked.data, asked.basis
+    check_within(asked.within, basis)
+    if isinstance(model, LinearSystem):
+        return _of_system(model, data, asked.tolerance, basis, asked.within)
+    if not asked.of_filter():
+        return judge_of_function(model, data, asked.tolerance, base, most)[0]
+    tolerances = tolerances_of(asked.tolerance, model.n, "states")
+    if basis in ("emulation", "bound"):
+        return _of_record(model, data, tolerances, asked.form, basis == "bound")
+    if not isinstance(model, LinearModel):
+        raise TypeError(f"got {model.name}; needed a LinearModel")
+    return _for_ever(model, data, tolerances, basis, asked.form, asked.within)
+
+
+def for_ever_or_over(
+    asked: Asked, judge: Judge, ask: Callable[[Judge], Answer], has_bound: Callable[[Answer], bool]
+) -> tuple[Answer, Judge]:
+    """Ask a judge for a bound for ever and, if it has none, one for a bound over the steps of the data.
+
+    Returns
+    -------
+    found : what `ask` returns.
+    judge : the judge that found it.
+    """
+    found = ask(judge)
+    if not has_bound(found) and judge.over is not None:
+        later = judge.over(asked.data.steps)
+        if has_bound(ended := ask(later)):
+            return ended, later
+    return found, judge
+
+
+def reasoned(errors: Callable[[Any], Found]) -> Callable[[Any], Found]:
+    """Return a function that says why a format has no errors, in place of raising it."""
+
+    def found(fmt: Any) -> Found:
+        try:
+            return errors(fmt)
+        except ValueError as fault:
+            return Outcome(math.inf, str(fault))
+        except OverflowError as fault:
+            return Outcome(math.inf, str(fault), True)
+
+    return found
+
+
+# -- functions --------------------------------------------------------------------------------------------------------
+
+
+def judge_of_function(run: Any, data: Data, tolerance: Any, base: int, most: int) -> tuple[Judge, Referenced]:
+    """Return what judges a function by its reference in more digits than `most`, and this reference."""
+    given, short, digits = referenced(run, data, base, most)
+    found = Judge(
+        given.errors,
+        tolerances_of(tolerance, given.true.shape[1], "outputs"),
+        beyond="an error of the function is beyond the range of float64",
+        untraced=given.untraced,
+    )
+    off = found.outcome(given.off(short)).ratio
+    if not off <= SETTLED:
+        raise ValueError(
+            f"got a function whose reference in {digits_text(digits, base)} is {off:.2g} times the tolerance from "
+            f"that in {digits * 3 // 2}; needed one that settles; do comparisons, or the format itself, decide between "
+            f"results far apart? If errors only grow, try highest={2 * digits}, which gives the reference more "
+            f"{digit_unit(base)}"
+        )
+    return found, given
+
+
+# -- Kalman filters ---------------------------------------------------------------------------------------------------
+
+
+def measured(model: AnyModel, data: Data) -> tuple[AnyModel, NDArray[Any]]:
+    """Return a model for the measurements that are present, and the measurements (steps, m), perhaps simulated."""
+    z = _simulated(model, data) if data.z is None else data.z
+    sound, filled = model.without_missing(z)
+    found = np.asarray(filled)
+    if found.ndim != 2 or found.shape[1] != model.m or not len(found):
+        length = f"{len(found)} measurements of shape {found.shape[1:]}" if found.ndim else "a single number"
+        raise ValueError(
+            f"got {length}; needed one measurement for each of the steps, at least one, of shape ({model.m},)"
+        )
+    if found.dtype.kind == "f" and not np.isfinite(found).all():
+        k, i = np.argwhere(~np.isfinite(found))[0]
+        which = named("measurement", int(i), model.measurement_names)
+        if data.z is None:
+            raise ValueError(
+                f"the simulated measurements grow beyond float64 by step {k + 1}: {model.name} is not stable; give "
+                "measurements, or fewer steps"
+            )
+        raise ValueError(
+            f"got {found[k, i]} for {which} of step {k + 1}; needed finite numbers, or NaN where one is missing"
+        )
+    sound.check_steps(len(found))
+    return sound, found
+
+
+def _simulated(model: AnyModel, data: Data) -> NDArray[Any]:
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return simulated(model, data.steps, data.seed)
+    except OverflowError:
+        raise ValueError(
+            f"the simulated measurements of {model.name} grow beyond float64: it is not stable; give measurements, or "
+            "fewer steps"
+        ) from None
+
+
+def _of_record(model: AnyModel, data: Data, tolerances: NDArray[np.float64], form: AnyForm, bounded: bool) -> Judge:
+    """Judge the errors of one run with a measurement record, or its bounds."""
+    sound, z = measured(model, data)
+    if not bounded and isinstance(sound, NonlinearModel):
+        check_form(sound, form)
+    true = None if bounded else true_states(sound, z)
+
+    lacking = cache(lambda: _without_variance(sound, z))
+
+    def of_form(form: AnyForm) -> Judge:
+        errors = partial(_recorded, sound, z, form, true, lacking)
+        return Judge(errors, tolerances, beyond="the bound says nothing", model=sound, form=form, of_form=of_form)
+
+    return of_form(form)
+
+
+def _recorded(
+    model: AnyModel,
+    z: NDArray[Any],
+    form: AnyForm,
+    true: NDArray[np.float64] | None,
+    lacking: Callable[[], str],
+    fmt: Any,
+) -> Found:
+    """Return the errors of a run, relative to the estimates (steps, n, 2) without rounding; without these, bounds."""
+    try:
+        stored = stored_measurements(z, fmt)
+        run: Any = opened(model, fmt, form, range(1, len(z) + 1) if true is None else (), true is None)
+    except ValueError as error:  # with so few digits, a covariance is not definite
+        return Outcome(math.inf, str(error))
+    except OverflowError as error:
+        return Outcome(math.inf, f"overflow: {error}", True)
+    if true is None:
+        run.take(stored)
+        errors = np.asarray(run.bounds[0])
+    else:
+        states = run.states(stored)
+        errors = (states - true[: len(states)]).sum(axis=2)
+    if run.stopped is not None:
+        return Outcome(math.inf, f"the run is refused: {run.reason}", run.reason.startswith("overflow"))
+    if run.indefinite is not None and true is not None:
+        lost = f"a computed variance was not positive at step {run.indefinite}"
+        return Outcome(math.inf, lost + (lacking() if run.indefinite == 1 else ""))
+    return np.asarray(np.abs(errors).max(axis=0))
+
+
+def _without_variance(model: Any, z: NDArray[Any]) -> str:
+    """Return in words which state has no variance after the first step without rounding; empty if none lacks it."""
+    linear = isinstance(model, LinearModel)
+    found = reference(model, z[:1], [1]) if linear else nonlinear_checkpoints(model, z[:1], [1])
+    lacking = [named("state", i, model.state_names) for i in range(model.n) if not found.P[0, i, i] > 0]
+    cure = "whatever the precision; give it a little in P0 or Q"
+    return f"; the model gives {' and '.join(lacking)} no variance, {cure}" if lacking else ""
+
+
+def _for_ever(
+    model: LinearModel, data: Data, tolerances: Any, basis: Basis, form: AnyForm, within: FilterLimits | None
+) -> Judge:
+    """Judge the guarantee for all measurements within limits, or three deviations of the probable error."""
+    if within is None:
+        raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
+    sized = sized_limits(within, model.n, model.m, model.x0)
+    if isinstance(form, ArrayForm):
+        raise ValueError(f'got the {form} form and basis "{basis}"; needed one of {", ".join(map(str, Form))}')
+    if model.steps is not None:
+        raise ValueError(f'got a model of {model.steps} steps and basis "{basis}"; needed one that goes on for ever')
+    outside: tuple[str, ...] = ()
+    if data.z is not None:
+        sound, z = measured(model, data)
+        if sound is not model:
+            raise ValueError(
+                f'got missing measurements and basis "{basis}"; needed none: it does not depend on a record'
+            )
+        outside = _outside(model, z, sized)
+
+    def over(steps: int | None) -> Judge:
+        guess, proof = (partial(_bounded, model, sized, form, steps, basis, each) for each in (guessed, guarantee))
+        if basis == "probable":
+            return Judge(guess, tolerances, warnings=lambda: outside)
+        return Judge(guess, tolerances, proof, steps, over if steps is None else None, lambda: outside)
+
+    return over(None)
+
+
+def _bounded(
+    model: LinearModel,
+    within: FilterLimits,
+    form: Any,
+    steps: int | None,
+    basis: Basis,
+    bounded: Callable[..., FilterGuarantee],
+    fmt: Any,
+) -> Found:
+    """Return the bound of each state for ever or over some steps, or three deviations of its probable error."""
+    try:
+        found = bounded(model, fmt, within, form, steps, steps or 1)
+    except ValueError as error:
+        return Outcome(math.inf, str(error))
+    except OverflowError as error:
+        if isinstance(fmt, FloatFormat) and fmt.limits is None:
+            raise
+        return Outcome(math.inf, f"overflow: {error}", True)
+    if not found.for_ever and found.steps != steps:
+        return Outcome(math.inf, found.why, "exceed the largest" in found.why)
+    return 3 * probable_error(found) if basis == "probable" else found.bound
+
+
+def _outside(model: LinearModel, z: NDArray[Any], within: FilterLimits) -> tuple[str, ...]:
+    """Return in words which limits the filter without rounding leaves in a run, one sentence at most."""
+    x = true_states(model, z)[..., 0]
+    before = np.concatenate([model.x0.astype(np.float64)[None], x[:-1]])
+    at = np.arange(len(z))
+    Phi, H = (each.astype(np.float64)[at % len(each)] for each in (model.Phi, model.H))
+    numbers = z.astype(np.float64)
+    expected = np.einsum("kij,kjl,kl->ki", H, Phi, before)
+    seen = {"state": x, "innovation": numbers - expected, "measurement": numbers}
+    for name, values in seen.items():
+        most = getattr(within, name)
+        over = np.abs(values) > most * (1 + 2.0**-30)
+        if over.any():
+            k, i = np.argwhere(over)[0].tolist()
+            which = named(name, i, model.state_names if name == "state" else model.measurement_names)
+            return (
+                f"the given run leaves the limits at step {k + 1}: {which} is {values[k, i]:.4g}, above {most[i]:.4g}",
+            )
+    return ()
+
+
+# -- linear systems ---------------------------------------------------------------------------------------------------
+
+
+def system_pairs(system: LinearSystem, u: Any, fmt: AnyFormat) -> NDArray[np.float64]:
+    """Return states and outputs after each step in any format, (steps, n + p, 2), each as a sum of two float64."""
+    if isinstance(fmt, FixedFormat):
+        fmt = WordFormats(fmt)
+    if isinstance(fmt, WordFormats):
+        return run_words(system, u, fmt).outputs(system.n + system.p)
+    return system.states(u, fmt)  # type: ignore[arg-type]
+
+
+def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, within: FilterLimits | None) -> Judge:
+    tolerances, u = tolerances_of(tolerance, system.p, "outputs"), None
+    if data.z is not None:
+        u = system_inputs(system, data.z)
+    elif within is None:
+        how = "" if basis == "emulation" else '; or basis "guarantee" and within=limits(measurement=...)'
+        raise ValueError(
+            f"got a number of steps for {system.name}, a linear system; needed inputs of shape (steps, {system.m}), "
+            f"whose size decides how large errors are{how}"
+        )
+    if basis == "emulation":
+        true = system.outputs(u)
+
+        def errors(fmt: Any) -> NDArray[np.float64]:
+            found = system_pairs(system, u, fmt)[:, system.n :]
+            largest = np.abs((found[..., 0] - true[..., 0]) + (found[..., 1] - true[..., 1])).max(axis=0)
+            return np.where(np.isnan(largest), np.inf, largest)
+
+        return Judge(reasoned(errors), tolerances, warnings=lambda: weak_evidence(system, true, tolerances))
+    outside: tuple[str, ...] = ()
+    if within is None:
+        if basis == "probable":
+            raise ValueError(f'got basis "{basis}" without limits; needed within=limits(measurement=...)')
+        most = all_above(np.abs(np.asarray(u)).max(axis=0))
+    else:
+        most = largest_inputs(system, within)
+        if u is not None:
+            reached = np.abs(u).astype(np.float64).max(axis=0)
+            outside = tuple(
+                f"the given run leaves the limits: {named('input', i, system.input_names)} reaches {size:.4g}, above "
+                f"{limit:.4g}"
+                for i, (size, limit) in enumerate(zip(reached.tolist(), most.tolist(), strict=True))
+                if size > limit
+            )[:1]
+    if any(system.x0):
+        raise ValueError(f'got a first state {system.x0.tolist()} and basis "{basis}"; needed x0 = 0 for a bound')
+    linear = system.as_filter().program.is_linear
+
+    def over(steps: int | None) -> Judge:
+        words = cache(lambda: WordGuarantee(system, most, steps))
+
+        def bounds(proved: bool) -> Callable[[Any], Found]:
+            def found(fmt: Any) -> NDArray[np.float64]:
+                if isinstance(fmt, WordFormats) or (isinstance(fmt, FixedFormat) and linear):
+                    in_words = fmt if isinstance(fmt, WordFormats) else WordFormats(fmt)
+                    return words().errors(in_words) if proved else words().guessed(in_words)
+                if basis == "probable":
+                    return probable_output_errors(system, fmt, most)
+                return (output_errors if proved else guessed_errors)(system, fmt, most, steps)
+
+            return reasoned(found)
+
+        if basis == "probable":
+            return Judge(bounds(False), tolerances, warnings=lambda: outside)
+        later = over if steps is None and not linear else None
+        return Judge(bounds(False), tolerances, bounds(True), steps, later, lambda: outside)
+
+    return over(data.steps if linear and not is_stable(system.A) else None)
+
+
+def largest_inputs(system: LinearSystem, within: FilterLimits) -> NDArray[np.float64]:
+    """Return the limits on the inputs of a system, (m,).
+
+    Raises
+    ------
+    TypeError : `within` is not a result of :func:`gpbnb.bounds.guarantee.limits`.
+    ValueError : limits for another number of states or inputs, or limits on the states or innovations.
+    """
+    if isinstance(within, FilterLimits) and (np.isfinite(within.state).any() or np.isfinite(within.innovation).any()):
+        raise ValueError(
+            f"got limits on states or innovations for {system.name}; needed limits on its inputs alone: write "
+            "limits(measurement=...)"
+        )
+    return sized_limits(within, system.n, system.m).measurement
+
+
+_FORGOTTEN = 0.01
+"""Share to which the slowest response must decay within a run."""
+
+
+def slowest_response(system: LinearSystem, steps: int) -> str:
+    """Say how long the slowest response of a stable system lasts; nothing if it decays to 1 % within some steps."""
+    entries = system.A.astype(np.float64)
+    radius = float(np.abs(eigenvalues(entries)).max()) if np.isfinite(entries).all() else math.inf
+    if not 0 < radius < 1 or radius**steps <= _FORGOTTEN:
+        return ""
+    needed = math.log(_FORGOTTEN) / math.log(radius)
+    digits = max(len(str(int(needed))) - 2, 0)
+    return f"slowest response takes {math.ceil(needed / 10**digits) * 10**digits} steps to decay to 1 %"
+
+
+def weak_evidence(system: LinearSystem, true: NDArray[np.float64], tolerances: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return why the errors of a run may say little about other runs, in a sentence each; empty if nothing does.
+
+    A run that ends before the slowest response has decayed does not show how errors add up. An output that stays within
+    its tolerance would also meet it if it were zero.
+
+    Parameters
+    ----------
+    true : (steps, p, 2), outputs of the system as given.
+    tolerances : (p,).
+    """
+    found = list[str]()
+    if slow := slowest_response(system, len(true)):
+        found.append(
+            f"the run of {len(true)} step{'s' * (len(true) != 1)} is shorter than the memory of the system, whose "
+            f"{slow}: take as many, or ask for a guarantee"
+        )
+    largest = np.abs(true[..., 0]).max(axis=0)
+    for i in np.flatnonzero((largest <= tolerances) & np.isfinite(tolerances)):
+        found.append(
+            f"{named('output', int(i), system.output_names)} never exceeds {largest[i]:.3g} in this run, so that zero "
+            f"would be within the tolerance of {tolerances[i]:.3g}: take larger inputs, or a smaller tolerance"
+        )
+    return tuple(found)
