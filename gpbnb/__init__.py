@@ -19,6 +19,7 @@ The public interface::
     survey_records             many measurement records in many formats at once
     write_code                 the model as C99, with results that agree with the emulation digit for digit
     TracedFunction             your own function of arrays, run in compiled code
+    convert                    round numbers into another format, such as those of a plant beside a controller
     peek                       show intermediate values of a function whose precision is being searched
     read_model                 a model from a TOML file, SciPy, python-control or FilterPy
 
@@ -39,7 +40,7 @@ __all__ = [
     "BlockFormats", "EmulatedRun", "FilterGuarantee", "FixedFormat", "FixedIntervalSmoother", "FloatArray",
     "FloatFormat", "Form", "Guarantee", "LimitCycles", "LinearModel", "LinearSystem", "NonlinearModel",
     "NonlinearSystem", "RecordSurvey", "Requirement", "Rounding", "SmoothedRecord", "TracedFunction", "WordFormats",
-    "emulate", "guarantee", "limit_cycles", "limits", "linalg",
+    "convert", "emulate", "guarantee", "limit_cycles", "limits", "linalg",
     "peek", "read_model", "required_precision", "survey_records", "write_code",
 ]
 # fmt: on

@@ -1,5 +1,6 @@
 from gpbnb.arithmetic import linalg as linalg
 from gpbnb.arithmetic.array import FloatArray as FloatArray
+from gpbnb.arithmetic.exits import convert as convert
 from gpbnb.arithmetic.exits import peek as peek
 from gpbnb.arithmetic.fixed import FixedFormat as FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat as FloatFormat

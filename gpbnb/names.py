@@ -39,6 +39,7 @@ HOMES = {
     "SmoothedRecord": "gpbnb.filters.smoothing",
     "TracedFunction": "gpbnb.arithmetic.traced",
     "WordFormats": "gpbnb.filters.words",
+    "convert": "gpbnb.arithmetic.exits",
     "emulate": "gpbnb.wordlength.emulation",
     "guarantee": "gpbnb.wordlength.bounding",
     "limit_cycles": "gpbnb.wordlength.bounding",

@@ -23,11 +23,12 @@ def _run(arguments: Sequence[str] | None) -> int:
         given = read(arguments)
         # These imports take a second, and help and refusals need none of them.
         from gpbnb.arithmetic.named import format_text
-        from gpbnb.wordlength.running import answer, certificate, read_files, uncovered, write, write_code_of, write_run
+        from gpbnb.wordlength.report import study
+        from gpbnb.wordlength.running import certificate, read_files, uncovered, write, write_code_of, write_run
 
         asked = read_files(given)
         tell = (lambda text: None) if given.quiet else (lambda text: print(text, file=sys.stderr, flush=True))
-        report = answer(asked, command, tell)
+        report = study(asked.question, asked.origin, command, tell)
         proof = certificate(asked, report) if given.certificate else None
     except (ValueError, OSError, ArithmeticError, ImportError) as error:
         print(f"{program}: {error}", file=sys.stderr)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -31,7 +31,7 @@ from gpbnb.wordlength.code import VECTORS, write_code
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
 from gpbnb.wordlength.options import QUANTITIES, WRITTEN
-from gpbnb.wordlength.report import DEFAULT_STEPS, Part, Question, Report, study, usual_steps
+from gpbnb.wordlength.report import DEFAULT_STEPS, Part, Question, Report, usual_steps
 
 
 class CommandInput(NamedTuple):
@@ -66,13 +66,7 @@ class WrittenCode(NamedTuple):
 
 
 def read_files(options: argparse.Namespace) -> CommandInput:
-    """Read the files of a command line.
-
-    Raises
-    ------
-    ValueError, ArithmeticError : a file or an option does not fit the others.
-    OSError : a file cannot be read.
-    """
+    """Read the files of a command line, and reject those that do not fit the others or its options."""
     if options.code:
         refuse_others(options.code, "filter")
     source, own = _filter(options)
@@ -95,21 +89,6 @@ def read_files(options: argparse.Namespace) -> CommandInput:
         options.seed or 0,
     )
     return CommandInput(options, own, question, origin)
-
-
-def answer(asked: CommandInput, command: str, tell: Callable[[str], Any]) -> Report:
-    """Answer the question of a command line.
-
-    Parameters
-    ----------
-    command : the command line, for the report.
-    tell : function called with a line of text before and after each search.
-
-    Raises
-    ------
-    ValueError, ArithmeticError : for a reason given in :func:`gpbnb.wordlength.report.study`.
-    """
-    return study(asked.question, asked.origin, command, tell)
 
 
 def _filter(given: argparse.Namespace) -> tuple[FilterSource, LinearModel | LinearSystem]:
@@ -195,12 +174,7 @@ def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: Linear
 
 
 def certificate(asked: CommandInput, report: Report) -> Certified:
-    """Return the certificate of the first guarantee in a report.
-
-    Raises
-    ------
-    ValueError : no precision has a guarantee, or the system limits its values.
-    """
+    """Return the certificate of the first guarantee in a report, or reject a report without one."""
     part = _part(asked, report, "guarantee")
     digits = next(each.digits for each in report.answers if each.label == part.label)
     if digits is None:
@@ -220,12 +194,6 @@ def write_code_of(asked: CommandInput, report: Report) -> WrittenCode:
 
     The format is the one that is judged, or the answer in fixed point, or else the first of binary32 and binary64 that
     meets the tolerance, on the first basis. A digital filter has the structure that gives the answer of the report.
-
-    Raises
-    ------
-    ValueError : neither meets the tolerance; no type of C for the format; or for a reason given in
-        :func:`gpbnb.write_code`.
-    OSError : a file cannot be written.
     """
     folder, form, own, question, z = asked.options.code, asked.options.form, asked.own, asked.question, asked.question.z
     fmt: Any = report.formats if question.fixed else question.fmt or _type_within_tolerance(asked, report)
@@ -263,23 +231,13 @@ def uncovered(proof: Certified | None, code: WrittenCode) -> str:
 
 
 def write(report: Report, page: Path) -> None:
-    """Write a report as a page and as JSON of the same name; each file is written completely or not at all.
-
-    Raises
-    ------
-    OSError : a file cannot be written; its old contents are kept.
-    """
+    """Write a report as a page and as JSON of the same name; each file is written completely or not at all."""
     replace_file(page, report.to_html().encode())
     replace_file(page.with_suffix(".json"), f"{report.to_json()}\n".encode())
 
 
 def write_run(asked: CommandInput, report: Report, file: Path) -> None:
-    """Write each step of a run in the format of the answer as CSV: estimates or outputs, and their errors.
-
-    Raises
-    ------
-    OSError : the file cannot be written.
-    """
+    """Write each step of a run in the format of the answer as CSV: estimates or outputs, and their errors."""
     question, (_, _, model, form, _) = asked.question, _part(asked, report, asked.question.bases[0])
     seed = question.seed if question.z is None else 0
     run = emulate(model, question.data, report.formats, form=form, seed=seed)

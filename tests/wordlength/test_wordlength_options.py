@@ -21,7 +21,7 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.simulation import simulated_inputs
 from gpbnb.report import ledger_options
 from gpbnb.report.ledger.render import FORMATS
-from gpbnb.wordlength import options, running
+from gpbnb.wordlength import options, report
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.asked import tolerances_of
@@ -45,7 +45,7 @@ def folder(tmp_path):
 def computed(monkeypatch):
     """Questions that were computed; none of them takes time."""
     asked = []
-    monkeypatch.setattr(running, "study", lambda question, *_: asked.append(question) or REPORT)
+    monkeypatch.setattr(report, "study", lambda question, *_: asked.append(question) or REPORT)
     return asked
 
 
@@ -76,7 +76,7 @@ def test_the_light_lists_are_those_of_the_library():
     ],
 )
 def test_an_option_is_refused_before_anything_is_read_or_imported(arguments, message, folder, capsys, monkeypatch):
-    monkeypatch.setattr(running, "answer", lambda *_: pytest.fail("something was computed"))
+    monkeypatch.setattr(report, "study", lambda *_: pytest.fail("something was computed"))
     (folder / "own.json").write_text("{}")
     names = {"z": folder / "z.csv", "absent": folder / "absent.csv", "folder": folder}
     given = [each.format(**names) for each in arguments]
