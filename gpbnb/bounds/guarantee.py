@@ -88,6 +88,8 @@ class Guarantee:
         numbers = ", ".join(f"{b:.3g}" for b in self.bound)
         time = "for ever" if self.for_ever else f"for {self.steps} steps only, because {self.why};"
         fmt = str(self.format) if isinstance(self.format, WordFormats) else arithmetic(self.format)
+        if self.steps == 0:
+            return f"no bound, because {self.why}; in {fmt}"
         return f"within {numbers} {time}{',' * self.for_ever} in {fmt}"
 
 

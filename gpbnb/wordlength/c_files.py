@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -54,17 +56,24 @@ def _is_written(path: Path) -> bool:
         return False
 
 
-def written_files(source: CodeSource, what: str, bound: str, bounded: bool, vectors: Vectors) -> dict[str, str]:
+Sections = Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]]
+"""Coefficients b and a, without the leading 1 of a, of each section of a cascade."""
+
+
+def written_files(
+    source: CodeSource, what: str, bound: str, bounded: bool, sections: Sections, vectors: Vectors
+) -> dict[str, str]:
     """Return the text of each file by its name.
 
     Parameters
     ----------
     what, bound : what the filter is, and what is proven about its errors, which may be empty, in words.
     bounded : whether its errors can be bounded.
+    sections : those of a cascade in floating point, as stored; else empty.
     """
     name = source.name
     return {
-        f"{name}.h": _header(source, what, bound, bounded),
+        f"{name}.h": _header(source, what, bound, bounded, sections),
         f"{name}.c": _source(source),
         f"test_{name}.c": _test(source),
         f"{name}_vectors.txt": _vectors(source, vectors),
@@ -82,7 +91,7 @@ def _comment(*paragraphs: str) -> str:
     return "\n".join(["/*", *(f" * {line}".rstrip().rstrip("\\") for line in lines), " */", ""])
 
 
-def _header(source: CodeSource, what: str, bound: str, bounded: bool) -> str:
+def _header(source: CodeSource, what: str, bound: str, bounded: bool, sections: Sections) -> str:
     name, guard = source.name, f"{source.name.upper()}_H"
     order = (
         "Each statement of the step is one operation, rounded once, in the order in which gpbnb emulates the filter"
@@ -116,9 +125,20 @@ void {name}_start({name}_state *state);
 {meanings}
  */
 {source.prototype};
-
+{_cmsis(source, sections)}
 #endif
 """
+
+
+def _cmsis(source: CodeSource, sections: Sections) -> str:
+    """Return the coefficients of second-order sections in the order of CMSIS-DSP; empty if there are none."""
+    if not sections or any(len(b) > 3 or len(a) > 2 for b, a in sections):
+        return ""
+    zero, text = [Fraction(0)], source.arithmetic.number_text
+    rows = [[*b, *zero * (3 - len(b)), *(-each for each in a), *zero * (2 - len(a))] for b, a in sections]
+    lines = ", \\\n    ".join(", ".join(map(text, row)) for row in rows)
+    what = "b0, b1, b2, -a1, -a2 of each section, as CMSIS-DSP takes them: arm_biquad_cascade_df1_f32 and others."
+    return f"\n/* {what} */\n#define {source.name.upper()}_CMSIS {{ \\\n    {lines} }}\n"
 
 
 _KEPT = """#include <float.h>

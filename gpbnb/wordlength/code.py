@@ -43,7 +43,7 @@ from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.steps import HUNG_FORMS
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, integer_program, integers_of
-from gpbnb.wordlength.c_files import Vectors, refuse_others, written_files
+from gpbnb.wordlength.c_files import Sections, Vectors, refuse_others, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeSource, CodeStep, checked_identifier, word_arithmetic
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.judges import largest_inputs
@@ -74,6 +74,7 @@ class Prepared(NamedTuple):
     emulate : function that returns the vectors for inputs, (steps, m).
     inputs : function that returns inputs for a number of steps.
     bound : function that returns what is proven about the errors, in words, for limits.
+    sections : those of a cascade in floating point, as stored; else empty.
     """
 
     step: CodeStep
@@ -83,6 +84,7 @@ class Prepared(NamedTuple):
     emulate: Callable[[Any], Vectors]
     inputs: Callable[[int], NDArray[np.float64]]
     bound: Callable[[FilterLimits], str]
+    sections: Sections = ()
 
 
 def write_code(
@@ -118,7 +120,8 @@ def write_code(
 
     Returns
     -------
-    paths : header, source, test, test vectors and Makefile.
+    paths : header, source, test, test vectors and Makefile. The header of a cascade of second-order sections in
+        floating point also has their coefficients in the order of CMSIS-DSP.
 
     Raises
     ------
@@ -155,7 +158,7 @@ def write_code(
     what = ", ".join(dict.fromkeys(each for each in (found.title, found.structure) if each))
     source = CodeSource(found.step, found.arithmetic, name)
     text, bounded = f"{what}, in {format_words(chosen)}", not isinstance(given, NonlinearSystem)
-    files = written_files(source, text, bound, bounded, vectors)
+    files = written_files(source, text, bound, bounded, found.sections, vectors)
     target.mkdir(parents=True, exist_ok=True)
     for file, text in files.items():
         replace_file(target / file, text.encode())
@@ -249,9 +252,10 @@ def _stored(numbers: Any, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
 
 
 def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared:
-    made = system.as_filter()
+    made, sections = system.as_filter(), list[Any]()
     if isinstance(fmt, FloatFormat):
         stored = made.stored(fmt)[None]
+        sections = made.cascade.sections(stored[0]) if made.cascade is not None else []
         step = CodeStep(without_exact(made.program, stored), stored, _start(fmt, system.x0))
     else:
         words = _words(fmt)
@@ -283,7 +287,9 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
             "whose coefficients are not rounded, for ever."
         )
 
-    return Prepared(step, _arithmetic(step, fmt), system.name, structure, emulated, _noise(fmt, system.m), bound)
+    return Prepared(
+        step, _arithmetic(step, fmt), system.name, structure, emulated, _noise(fmt, system.m), bound, sections
+    )
 
 
 def _noise(fmt: AnyFormat, m: int) -> Callable[[int], NDArray[np.float64]]:

@@ -375,3 +375,16 @@ def test_the_command_writes_code_in_the_format_that_meets_the_tolerance(options,
     assert main([*arguments, *options]) == 0
     assert f"low-pass, direct form I, in {fmt}" in header(folder / "filter.h").replace("fixed point, ", "")
     assert str(folder / "filter.c") in capsys.readouterr().out
+
+
+def test_a_header_has_the_coefficients_of_sections_in_the_order_of_cmsis(tmp_path):
+    sos = [["0.1", "0.2", "0.1", 1, "-0.5", "0.25"], ["0.3", "0.1", 0, 1, "-0.6", 0]]
+    for fmt, number in (("float32", np.float32), ("float64", np.float64)):
+        header = write_code(LinearSystem.from_sections(sos), fmt, tmp_path)[0].read_text()
+        given = re.search(r"#define FILTER_CMSIS \{(.*?)\}", header, re.DOTALL)[1].replace("\\", "").split(",")
+        found = [float.fromhex(each.strip().removesuffix("f")) for each in given]
+        b0, b1, b2, _, a1, a2 = np.array([[number(each) for each in row] for row in sos]).T
+        assert np.reshape(found, (2, 5)).T.tolist() == [each.tolist() for each in (b0, b1, b2, -a1, -a2)]
+    third = LinearSystem.from_coefficients([1], [1, 0, 0, "0.5"])
+    for system, fmt in ((LinearSystem.from_sections(sos), "Q3.12"), (third, "float32"), (GROWING, "float32")):
+        assert "CMSIS" not in write_code(system, fmt, tmp_path)[0].read_text()

@@ -10,7 +10,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, LinearModel, LinearSystem, limits, required_precision
+from gpbnb import FloatFormat, LinearModel, LinearSystem, guarantee, limits, required_precision
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.bounds.system import output_errors
 from gpbnb.wordlength.required import judge
 from tests.plain_structures import floating
@@ -123,6 +124,12 @@ def test_a_stable_system_is_bounded_for_ever_and_another_only_for_its_steps():
     judged = judge(CLOCK, FloatFormat(2, 24), 200, 1e-3, basis="guarantee", within=within)
     assert "nothing is proved for 24 bits: the guaranteed bound for 200 steps is " in str(judged)
     assert judged.ratio == pytest.approx(output_errors(CLOCK, FloatFormat(2, 24), 1.0, 200)[0] / 1e-3)
+
+
+def test_a_guarantee_without_a_bound_says_so_and_why():
+    found = guarantee(LinearSystem.pid("0.5", "0.05", limits=(-1, 1)), "Q0.15", limits(measurement=2), horizon=3)
+    assert not np.isfinite(found.bound).any()
+    assert repr(found) == f"no bound, because {found.why}; in {arithmetic(found.format)}"
 
 
 # -- sums ------------------------------------------------------------------------------------------------------------
