@@ -5,6 +5,16 @@ import numpy as np
 from gpbnb import NonlinearSystem
 
 
+def tracked_motion(x):
+    """The next x, y and velocities of a target, after one second."""
+    return np.stack([x[0] + x[2], x[1] + x[3], x[2], x[3]])
+
+
+def tracked_sight(x):
+    """Range and bearing of a target from the origin."""
+    return np.stack([np.hypot(x[0], x[1]), np.arctan2(x[1], x[0])])
+
+
 class Native:
     """A format whose arrays are NumPy's own, so that the processor rounds."""
 

@@ -153,8 +153,9 @@ def convert(x: Any, fmt: Any) -> Any:
     """Round numbers of one format into another, also in a function whose precision is being searched.
 
     In a search, all numbers must stay in the format that the function is given, so that the answer is about this format
-    alone. A function that also computes in a second format, such as a plant without rounding errors beside a rounded
-    controller, says so with this call wherever numbers pass from one to the other. It runs operation by operation.
+    alone. A function that also computes in a second format says so with this call wherever numbers pass from one to the
+    other: a plant without rounding errors beside a rounded controller, or error feedback, which adds what the last
+    rounding of a long sum lost to the next sum. Such a function runs operation by operation.
 
     Parameters
     ----------

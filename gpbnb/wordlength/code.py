@@ -22,6 +22,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.named import BINARY32, BINARY64, format_named, format_text, rounding_text
+from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.bounds.guarantee import guarantee, sized_limits
 from gpbnb.bounds.guess import FilterLimits
@@ -45,8 +46,8 @@ from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, integer_program, integers_of
 from gpbnb.wordlength.c_files import Sections, Vectors, refuse_others, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeSource, CodeStep, checked_identifier, word_arithmetic
-from gpbnb.wordlength.emulation import emulate
-from gpbnb.wordlength.judges import largest_inputs
+from gpbnb.wordlength.emulation import longest
+from gpbnb.wordlength.judges import largest_inputs, system_pairs
 from gpbnb.wordlength.models import ModelSource
 from gpbnb.wordlength.tasks import admitted, data_of
 
@@ -265,11 +266,12 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
         step = CodeStep(program, stored, _start(words.data, system.x0))
 
     def emulated(u: Any) -> Vectors:
-        data, run = fmt.data if isinstance(fmt, WordFormats) else fmt, emulate(system, u, fmt)
-        start = np.append(_stored(data.array(system.x0), data), np.zeros(system.p, np.int64))
-        states = np.hstack([_stored(each, data) for each in (run.x, run.y)])
-        inputs = _stored(data.array(system_inputs(system, u)), data)
-        return _ended(inputs, start, states, np.zeros(run.steps, np.int64))
+        u, data = system_inputs(system, u), fmt.data if isinstance(fmt, WordFormats) else fmt
+        inputs = _stored(data.array(u), data)
+        start = np.append(_stored(data.array(system.x0), data), np.zeros(system.p, inputs.dtype))
+        done, pairs, _ = longest(lambda steps: system_pairs(system, u[:steps], fmt), len(u))
+        exactly = np.zeros((0, len(start))) if pairs is None else exact(pairs[..., 0]) + exact(pairs[..., 1])
+        return _ended(inputs, start, _stored(data.array(exactly), data), np.zeros(done, np.int64))
 
     def bound(within: FilterLimits) -> str:
         most = largest_inputs(system, within)

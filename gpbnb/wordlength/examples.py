@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32, BINARY64, TF32
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.model import LinearModel
@@ -17,13 +16,6 @@ from gpbnb.filters.simulation import Simulation
 
 #: The states of :func:`tilt`, and their units.
 TILT_STATES = (("tilt", "°"), ("rate", "°/s"), ("gyro bias", "°/s"))
-
-#: Formats in which processors compute, by the name in their standard.
-STANDARD = {
-    "binary16": FloatFormat(2, 11),
-    "binary32": FloatFormat(2, 24),
-    "binary64": FloatFormat(2, 53),
-}
 
 #: Smallest and largest powers of two among the normal numbers of each format, by its name.
 NORMAL_RANGE = {

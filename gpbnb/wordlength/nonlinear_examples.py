@@ -1,4 +1,4 @@
-"""Nonlinear examples: a vehicle seen in range and bearing, and an aircraft's height."""
+"""An aircraft's height, of which a computed variance becomes negative in single precision."""
 
 from __future__ import annotations
 
@@ -11,41 +11,8 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.derivatives import jacobian
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.nonlinear import NonlinearModel
 
 _WIDE = FloatFormat(2, 53)
-
-
-def tracked_motion(x: FloatArray) -> Any:
-    """Return the next x, y and velocities of a target, after one second."""
-    return np.stack([x[0] + x[2], x[1] + x[3], x[2], x[3]])
-
-
-def tracked_sight(x: FloatArray) -> Any:
-    """Return range and bearing of a target from the origin."""
-    return np.stack([np.hypot(x[0], x[1]), np.arctan2(x[1], x[0])])
-
-
-def beacon() -> NonlinearModel:
-    """A surveying instrument that follows a vehicle by range, to 1 cm, and bearing, to 0.1 mrad; n = 4 and m = 2.
-
-    The vehicle is 2 km away and known to 1 km and 10 m/s at first. It passes behind the instrument, so that its
-    bearing crosses 180°. The states are east and north in metres, and their rates in metres per second.
-    """
-    return NonlinearModel(
-        tracked_motion,
-        None,
-        tracked_sight,
-        None,
-        Q=np.diag([0, 0, 2.0**-10, 2.0**-10]),
-        R=[["1e-4", 0], [0, "1e-8"]],
-        x0=[-2000, 600, 0, -30],
-        P0=np.diag([10**6, 10**6, 100, 100]),
-        angles=["bearing (rad)"],
-        state_names=["east (m)", "north (m)", "east rate (m/s)", "north rate (m/s)"],
-        measurement_names=["range (m)", "bearing (rad)"],
-        name="range and bearing",
-    )
 
 
 LEVEL_HEADING = 0.7

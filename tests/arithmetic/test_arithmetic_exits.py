@@ -288,6 +288,35 @@ def test_a_plant_in_another_format_is_not_rounded_with_its_controller():
     assert "operation by operation: it converts numbers to another format" in str(slowly)
 
 
+def smoothed(fmt, z, kept):
+    """A smoother whose products and sums are exact, and perhaps add what the last rounding of a sum lost."""
+    wide = FloatFormat(2, 100)
+    y, lost, found = fmt.array(0), wide.array(0), []
+    a, b = (convert(fmt.array(each), wide) for each in ("127/128", "1/128"))
+    for u in z:
+        total = a * convert(y, wide) + b * convert(u, wide) + lost
+        y = convert(total, fmt)
+        lost = total - convert(y, wide) if kept else lost
+        found.append(y)
+    return found
+
+
+def test_error_feedback_keeps_what_a_rounding_loses():
+    """Its largest error is that of a loop over Fractions, and fewer bits are enough than without it."""
+    z = np.round(np.sin(np.arange(200) / 20) * 64) / 64
+    plain, kept = (required_precision(partial(smoothed, kept=each), z, "1/500", kind="fixed") for each in (False, True))
+    assert kept.digits < plain.digits
+    for bits, ratio in kept.tried[-3:]:
+        y, lost, true, worst = Fraction(0), Fraction(0), Fraction(0), Fraction(0)
+        for u in map(Fraction, z.tolist()):
+            stored = FixedFormat(1, bits).round(u)
+            total = Fraction(127, 128) * y + stored / 128 + lost
+            y = FixedFormat(1, bits).round(total)
+            lost, true = total - y, Fraction(127, 128) * true + u / 128
+            worst = max(worst, abs(y - true))
+        assert ratio == pytest.approx(float(worst * 500), rel=1e-12)
+
+
 # -- questions -------------------------------------------------------------------------------------------------------
 
 

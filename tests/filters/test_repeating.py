@@ -8,7 +8,7 @@ import pytest
 from gpbnb import FixedFormat, FloatFormat, NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun
 from gpbnb.filters.repeating import RepeatedStep
-from gpbnb.wordlength.nonlinear_examples import tracked_motion, tracked_sight
+from tests.step_functions import tracked_motion, tracked_sight
 
 Z = [[5.0, 0.93], [5.6, 0.9], [None, 0.88], [6.9, 0.86], [7.5, None], [8.1, 0.83], [8.8, 0.81], [9.4, 0.8]]
 PLANE = {"Q": np.diag([0, 0, 0.01, 0.01]), "R": np.diag([0.01, 0.0001]), "x0": [3, 4, 0.5, 0.5], "P0": np.eye(4)}

@@ -8,11 +8,12 @@ from fractions import Fraction
 import numpy as np
 from independent_filter import Arithmetic, transposed
 
-from gpbnb import FloatFormat, emulate
+from gpbnb import FloatFormat, NonlinearModel, emulate
 from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.run import Run
 from gpbnb.wordlength import nonlinear_examples as examples
 from gpbnb.wordlength.examples import turns
+from tests.step_functions import tracked_motion, tracked_sight
 
 COLLAPSE = 1791
 """The step that the book names."""
@@ -92,14 +93,25 @@ def test_the_height_channel_is_the_derivative_of_its_equations():
     assert np.abs(np.asarray(model.P0[:4, :4], float) @ q).max() < 1e-16  # no variance along the quaternion
 
 
-def test_the_beacon_is_tracked_behind_the_instrument():
-    model = examples.beacon()
+def test_a_vehicle_is_tracked_behind_the_instrument():
+    """It is 2 km away, known to 1 km and 10 m/s at first, and followed by range, to 1 cm, and bearing, to 0.1 mrad."""
+    model = NonlinearModel(
+        tracked_motion,
+        None,
+        tracked_sight,
+        None,
+        Q=np.diag([0, 0, 2.0**-10, 2.0**-10]),
+        R=[["1e-4", 0], [0, "1e-8"]],
+        x0=[-2000, 600, 0, -30],
+        P0=np.diag([10**6, 10**6, 100, 100]),
+        angles=[1],
+    )
     z = simulated(model, 40, seed=1)
     assert np.ptp(z[:, 1]) > 6  # the bearing jumps by a whole turn
     x = np.array([300.0, -400.0, 5.0, 6.0])
     given = FloatFormat(2, 53).array(x)
-    assert examples.tracked_motion(given).to_float().tolist() == [305, -394, 5, 6]
-    assert examples.tracked_sight(given).to_float().tolist() == [500, math.atan2(-400, 300)]
+    assert tracked_motion(given).to_float().tolist() == [305, -394, 5, 6]
+    assert tracked_sight(given).to_float().tolist() == [500, math.atan2(-400, 300)]
     found = emulate(model, z, FloatFormat(2, 40), form="Joseph")
     distance = np.hypot(*found.x[-1, :2].to_float())
     assert abs(distance - z[-1, 0]) < 0.1
