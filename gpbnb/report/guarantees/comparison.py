@@ -6,7 +6,6 @@ of this package does not cover, is listed with the reason.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
@@ -24,21 +23,14 @@ SINGLE, DOUBLE = FloatFormat(2, 24, Rounding.EVEN), FloatFormat(2, 53, Rounding.
 
 
 class PublishedNumber(NamedTuple):
-    """One row: a program, what is bounded, the number published, ours, and the source.
-
-    Parameters
-    ----------
-    published : None if the source prints no number.
-    ours : function that computes our number; None if there is none.
-    note : why a number is missing, or differs.
-    """
+    """One row: a program, what is bounded, why a number is missing or differs, the source, and both numbers, if any."""
 
     program: str
     quantity: str
-    published: float | None
-    ours: Callable[[], float] | None
     note: str
     source: str
+    published: float | None = None
+    ours: float | None = None
 
 
 def second_order_filter() -> LinearSystem:
@@ -61,33 +53,12 @@ def lead_lag() -> LinearSystem:
     return LinearSystem.from_filter(LinearFilter(program, exact(["0.499", "-0.05", 1, "0.010", 1, 0]), "lead-lag"))
 
 
-@cache
-def _reduction() -> float:
-    return float(output_errors(LinearSystem.sum(1024, "tree"), DOUBLE, 1.0)[0])
-
-
-def _range() -> float:
-    made = second_order_filter()
-    return float(peak_gain(made.A, made.B, made.C, made.D).high[0, 0])
-
-
-def _of_output(make: Callable[[], LinearSystem], fmt: FloatFormat) -> Callable[[], float]:
-    return cache(lambda: float(output_errors(make(), fmt, 1.0)[0]))
-
-
-def _coefficient(j: int) -> Callable[[], float]:
-    given = fixif_longitudinal()
-    return lambda: float(error_coefficients(given["A"], given["B"], given["C"], given["D"], given["input_bound"])[j])
-
-
 _FPBENCH = "FPBench, benchmarks"
 
 NOT_COMPARABLE = (
     PublishedNumber(
         "PID and odometry loops",
         "rounding error",
-        None,
-        None,
         "no error is printed; the PID loop starts from a given state, where our bounds start from rest, and the "
         "odometry loop multiplies states",
         f"{_FPBENCH}: salsa.fpcore, PID and Odometry",
@@ -95,32 +66,24 @@ NOT_COMPARABLE = (
     PublishedNumber(
         "filter x ← 3x/4 - y/8",
         "rounding error",
-        None,
-        None,
         "no error is printed; the loop has no input and starts from a given state",
         f"{_FPBENCH}: apron.fpcore, Filter",
     ),
     PublishedNumber(
         "filters of Roux",
         "rounding error",
-        None,
-        None,
         "we found his proofs in Coq, but no filter with its printed number",
         "Roux, Application: Impact of floating-point rounding errors on a Lyapunov stability proof",
     ),
     PublishedNumber(
         "filters of FixIF 2015",
         "worst-case peak gain",
-        None,
-        None,
         "the examples use random filters or binary files, and the repository contains no printed results",
         "fixif/examples, TC2018",
     ),
     PublishedNumber(
         "Kalman filters of VerFilter",
         "probability that a variance is not positive",
-        None,
-        None,
         "the repository has the program, but neither a model nor a number",
         "VerFilter, by A. Evangelidis",
     ),
@@ -131,48 +94,50 @@ NOT_COMPARABLE = (
 @cache
 def rows() -> tuple[PublishedNumber, ...]:
     """Return the rows of the table."""
-    coefficients = fixif_longitudinal()["published_E"]
+    given, second = fixif_longitudinal(), second_order_filter()
+    coefficients = given["published_E"]
     most = coefficients.index(max(coefficients))
+    ours = error_coefficients(given["A"], given["B"], given["C"], given["D"], given["input_bound"])
     return (
         PublishedNumber(
             "sum of 1024 numbers within 1, as a tree",
             "rounding error, binary64",
-            1.2505552149377763e-12,
-            _reduction,
             "SATIRE charges a unit roundoff for storing a number; storing a number within 1 costs at most half of that",
             "Satire, README.md, Reduction_1024",
+            1.2505552149377763e-12,
+            float(output_errors(LinearSystem.sum(1024, "tree"), DOUBLE, 1.0)[0]),
         ),
         PublishedNumber(
             "second-order filter of Fluctuat, inputs within 1, from rest",
             "largest output, exact",
-            8.70578,
-            _range,
             "Pilat finds an invariant ellipse; a peak gain is exact",
             "Frama-C, plug-in Pilat, a test with the option -pilat-degree 2",
+            8.70578,
+            float(peak_gain(second.A, second.B, second.C, second.D).high[0, 0]),
         ),
         PublishedNumber(
             "second-order filter of Fluctuat, inputs within 1, from rest",
             "rounding for ever, binary64",
-            None,
-            _of_output(second_order_filter, DOUBLE),
             "the example prints no number",
             "Fluctuat, example of a second-order filter with DBETWEEN(-1.0, 1.0)",
+            None,
+            float(output_errors(second, DOUBLE, 1.0)[0]),
         ),
         PublishedNumber(
             "aircraft's longitudinal controller",
             f"FixIF's coefficient of state {most + 1}",
-            coefficients[most],
-            _coefficient(most),
             "all eleven coefficients agree in each printed digit",
             "fixif/examples, ARITH26 (2019)",
+            coefficients[most],
+            float(ours[most]),
         ),
         PublishedNumber(
             "lead-lag controller, deviation clamped to 1",
             "rounding for ever, binary32",
-            None,
-            _of_output(lead_lag, SINGLE),
             "FPBench has the program and its inputs, but no error",
             f"{_FPBENCH}: salsa.fpcore, Lead-lag System",
+            None,
+            float(output_errors(lead_lag(), SINGLE, 1.0)[0]),
         ),
         *NOT_COMPARABLE,
     )
@@ -184,9 +149,8 @@ def table() -> Table:
     body = tuple(
         (
             f"{each.program}: {each.quantity}",
-            "none" if each.published is None else short(each.published, 6),
-            "none" if each.ours is None else short(each.ours(), 6),
-            "; ".join(filter(None, (each.note, f"source: {each.source}"))),
+            *("none" if number is None else short(number, 6) for number in (each.published, each.ours)),
+            f"{each.note}; source: {each.source}",
         )
         for each in rows()
     )

@@ -72,15 +72,15 @@ class FilterRow(NamedTuple):
     range: str
     form: str
     limited: str
-    result: str
-    reason: str
-    runs: int
-    steps: int
-    stopped: int
-    gains: int
-    random: str
-    constant: str
-    chosen: str
+    result: str = "refused"
+    reason: str = "another"
+    runs: int = 0
+    steps: int = 0
+    stopped: int = 0
+    gains: int = 0
+    random: str = "0"
+    constant: str = "0"
+    chosen: str = "0"
 
     @property
     def largest(self) -> float:
@@ -253,28 +253,10 @@ def examine(
 
 def _unexamined(seed: int, drawn: Drawn) -> FilterRow:
     """Return the row of a filter whose guarantee refuses an answer."""
-    fmt, model = drawn.fmt, drawn.model
-    return FilterRow(
-        seed=seed,
-        kind=drawn.kind,
-        n=model.n,
-        m=model.m,
-        base=fmt.base,
-        precision=fmt.precision,
-        rounding=fmt.rounding.value,
-        range="unlimited" if fmt.emin is None else "subnormal" if fmt.subnormal else "flushed",
-        form=drawn.form.name.lower(),
-        limited=drawn.limited,
-        result="refused",
-        reason="another",
-        runs=0,
-        steps=0,
-        stopped=0,
-        gains=0,
-        random="0",
-        constant="0",
-        chosen="0",
-    )
+    fmt, model, form = drawn.fmt, drawn.model, drawn.form.name.lower()
+    kind = "unlimited" if fmt.emin is None else "subnormal" if fmt.subnormal else "flushed"
+    about = drawn.kind, model.n, model.m, fmt.base, fmt.precision, fmt.rounding.value, kind, form, drawn.limited
+    return FilterRow(seed, *about)
 
 
 def reason_of(text: str) -> str:

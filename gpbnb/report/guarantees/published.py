@@ -20,28 +20,12 @@ def nile_local_level() -> LinearModel:
 
     Its first covariance of 1e7 holds before the first update, whereas this package predicts first.
     """
-    return LinearModel(
-        Phi=exact([["1"]]),
-        H=exact([["1"]]),
-        Q=exact([["1469.1"]]),
-        R=exact([["15099"]]),
-        x0=exact(["0"]),
-        P0=exact([["9998530.9"]]),
-        name="Nile, local level",
-    )
+    return LinearModel([[1]], [[1]], [["1469.1"]], [[15099]], [0], [["9998530.9"]], name="Nile, local level")
 
 
 def elaenia_gold() -> LinearModel:
     """A constant, 990 at first, observed with a standard deviation of 15: sandialabs/elaenia, example 05_kalman."""
-    return LinearModel(
-        Phi=exact([["1"]]),
-        H=exact([["1"]]),
-        Q=exact([["0"]]),
-        R=exact([["225"]]),
-        x0=exact(["990"]),
-        P0=exact([["100"]]),
-        name="elaenia, gold",
-    )
+    return LinearModel([[1]], [[1]], [[0]], [[225]], [990], [[100]], name="elaenia, gold")
 
 
 def dyer_mcreynolds(d: str = "0.0024") -> LinearModel:
@@ -57,68 +41,35 @@ def dyer_mcreynolds(d: str = "0.0024") -> LinearModel:
     dyer1969; the script ``shootout.m`` of grewal2008.
     """
     e = Fraction(d)
-    return LinearModel(
-        Phi=exact(np.eye(3, dtype=np.int64)),
-        H=exact([[1, 1, 1], [1, 1, 1 + e]]),
-        Q=exact(np.zeros((3, 3), dtype=np.int64)),
-        R=exact(np.eye(2, dtype=np.int64)) * e**2,
-        x0=exact(["1", "1", "-1"]),
-        P0=exact(np.eye(3, dtype=np.int64)),
-        name="Dyer and McReynolds",
-    )
+    unit, H = exact(np.eye(3, dtype=np.int64)), exact([[1, 1, 1], [1, 1, 1 + e]])
+    R = exact(np.eye(2, dtype=np.int64)) * e**2
+    return LinearModel(unit, H, 0 * unit, R, [1, 1, -1], unit, name="Dyer and McReynolds")
 
 
 def filterpy_velocity() -> LinearModel:
     """Position and velocity by a sensor with a variance of 1e-8: rlabbe/filterpy, tests/test_kf.py."""
-    return LinearModel(
-        Phi=exact([["1", "1"], ["0", "1"]]),
-        H=exact([["1", "0"]]),
-        Q=exact([["0.001", "0"], ["0", "0.001"]]),
-        R=exact([["1e-8"]]),
-        x0=exact(["0", "0"]),
-        P0=exact([["1", "0"], ["0", "1"]]),
-        name="filterpy, velocity",
-    )
+    Q = [["0.001", "0"], ["0", "0.001"]]
+    return LinearModel([[1, 1], [0, 1]], [[1, 0]], Q, [["1e-8"]], [0, 0], np.eye(2), name="filterpy, velocity")
 
 
 def filterpy_fusion() -> LinearModel:
     """Position and velocity ten times a second: rlabbe/filterpy, tests/test_sensor_fusion.py, its single sensor."""
-    return LinearModel(
-        Phi=exact([["1", "0.1"], ["0", "1"]]),
-        H=exact([["1", "0"]]),
-        Q=exact([["1/150000", "1/10000"], ["1/10000", "1/500"]]),
-        R=exact([["4"]]),
-        x0=exact(["0", "1"]),
-        P0=exact([["100", "0"], ["0", "100"]]),
-        name="filterpy, sensor fusion",
-    )
+    Phi, Q, P0 = [["1", "0.1"], ["0", "1"]], [["1/150000", "1/10000"], ["1/10000", "1/500"]], 100 * np.eye(2)
+    return LinearModel(Phi, [[1, 0]], Q, [[4]], [0, 1], P0, name="filterpy, sensor fusion")
 
 
 def dynamax_tracking() -> LinearModel:
     """A point in the plane, two positions and two velocities: probml/dynamax, notebook kf_tracking."""
-    unit = [[str(int(i == j)) for j in range(4)] for i in range(4)]
-    return LinearModel(
-        Phi=exact([["1", "0", "1", "0"], ["0", "1", "0", "1"], ["0", "0", "1", "0"], ["0", "0", "0", "1"]]),
-        H=exact([["1", "0", "0", "0"], ["0", "1", "0", "0"]]),
-        Q=exact(unit) / 1000,
-        R=exact([["1", "0"], ["0", "1"]]),
-        x0=exact(["8", "10", "1", "0"]),
-        P0=exact(unit) / 10,
-        name="dynamax, tracking",
-    )
+    unit = exact(np.eye(4, dtype=np.int64))
+    Phi = np.eye(4) + np.eye(4, k=2)
+    return LinearModel(Phi, np.eye(4)[:2], unit / 1000, np.eye(2), [8, 10, 1, 0], unit / 10, name="dynamax, tracking")
 
 
 def px4_landing_target() -> LinearModel:
     """A landing target's position and velocity, 50 times a second: PX4-Autopilot, at a distance of 1 m."""
-    return LinearModel(
-        Phi=exact([["1", "0.02"], ["0", "1"]]),
-        H=exact([["1", "0"]]),
-        Q=exact([["1/2500000", "1/25000"], ["1/25000", "1/250"]]),
-        R=exact([["0.005"]]),
-        x0=exact(["0", "0"]),
-        P0=exact([["0.1", "0"], ["0", "0.1"]]),
-        name="PX4, landing target",
-    )
+    Phi, Q = [["1", "0.02"], ["0", "1"]], [["1/2500000", "1/25000"], ["1/25000", "1/250"]]
+    P0 = [["0.1", "0"], ["0", "0.1"]]
+    return LinearModel(Phi, [[1, 0]], Q, [["0.005"]], [0, 0], P0, name="PX4, landing target")
 
 
 def fixif_longitudinal() -> dict[str, Any]:
