@@ -171,6 +171,14 @@ def test_sums_in_halves_and_in_blocks_are_those_of_their_definition(fmt: FloatFo
         assert np.cumsum(x).to_fractions().tolist()[-1] == from_left(x.to_fractions().tolist())
 
 
+def test_long_sums_in_loops_are_those_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    a, b = (FloatFormat(10, 3).array(np.random.default_rng(k).normal(size=(37, 37))) for k in range(2))
+    asked: tuple[dict, ...] = ({"order": "pairwise"}, {"order": "blocked", "block": 5}, {"fused": True})
+    at_once = [exact(linalg.matmul(a, b, **options)) for options in asked]
+    monkeypatch.setattr(linalg, "_MOST_PRODUCTS", 0)
+    assert [exact(linalg.matmul(a, b, **options)) for options in asked] == at_once
+
+
 @pytest.mark.parametrize("overflow", ["raise", "saturate", "wrap"])
 def test_a_format_without_the_number_one_has_no_identity(overflow: str) -> None:
     """Q15 clipped the ones to 32767/32768; what needs no ones is computed."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from test_structures import random_filter
@@ -9,9 +11,18 @@ from test_structures import random_filter
 from gpbnb import FixedFormat, LinearSystem
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.structures import STRUCTURES
-from gpbnb.filters.words import WordFormats, run_words
+from gpbnb.filters.words import WordFormats, integers_of, run_words
+from tests.plain_structures import fixed, limited
 
 MODES = ["nearest", "even", "chop", "up", "down", "odd", "half up"]
+
+
+def test_numbers_are_rounded_to_integers_as_by_their_definition():
+    values = np.concatenate([np.arange(-300, 300) / 32, np.random.default_rng(0).uniform(-9, 9, 200)])
+    for mode in MODES:
+        fmt = FixedFormat(3, 4, mode, "saturate")
+        rounded = [limited(4, 3, "saturate")(fixed(4, mode)(Fraction(x))) for x in values]
+        assert [int(n) * fmt.unit for n in integers_of(values, fmt)] == rounded
 
 
 def test_a_smoother_in_integers_stops_three_below_its_step():

@@ -4,7 +4,7 @@ import pytest
 
 from gpbnb.report import ledger
 from gpbnb.report.ledger import legibility
-from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict, compare
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, compare
 from gpbnb.report.ledger.legibility import Damage, charged, load_legibility
 
 DAMAGES = load_legibility()
@@ -28,6 +28,11 @@ def test_a_witness_charges_the_scan(damaged, verdict):
     found = charged("a", author)
     assert (found.verdict, found.root) == (Verdict.OCR, "")
     assert (found.recomputed, found.note, found.agrees) == ("1", "why", False)
+
+
+def test_a_statement_that_is_right_needs_nobody_to_charge(damaged):
+    for right in (compare(True, "1"), Finding("", None, Verdict.GIVEN, "a definition")):
+        assert charged("a", right) is right
 
 
 def test_each_damage_belongs_to_a_statement_and_each_witness_is_right(rows):

@@ -119,6 +119,22 @@ def test_the_error_table_has_a_row_for_each_root_error_with_all_its_statements()
     assert "<details>" not in lines[1]
 
 
+def test_of_equally_serious_errors_the_one_with_more_statements_comes_first():
+    notes = ["one", "three", "three", "two", "three", "two"]
+    rows = [Row(s, compare(False, "1", Verdict.WRONG, note)) for s, note in zip(STATEMENTS, notes, strict=False)]
+    rows.append(Row(STATEMENTS[6], compare(False, "1", Verdict.MISPRINT, "last")))
+    html = ledger.error_table(rows).html
+    assert re.findall(r'<tr><th scope="row">(\w+)<', html) == ["three", "two", "one", "last"]
+
+
+def test_root_errors_begin_with_the_one_that_spoils_most():
+    first, second, third = list(ledger.load_roots())[:3]
+    roots = [first, second, second, second, third, third]
+    rows = [Row(s, compare(False, "1", Verdict.WRONG, root=r)) for s, r in zip(STATEMENTS, roots, strict=False)]
+    shown = [a["id"] for a in Elements(ledger.root_table(rows).html).all("tr") if "id" in a]
+    assert shown == [f"root-{each}" for each in (second, third, first)]
+
+
 @pytest.mark.parametrize(
     ("finding", "shown", "collapsed"),
     [

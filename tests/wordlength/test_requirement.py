@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from gpbnb import (
+    FloatFormat,
     LinearModel,
     LinearSystem,
     limits,
     required_precision,
 )
+from gpbnb.wordlength.answer import judgement
 
 WALK = LinearModel([["0.9"]], [[1]], [["0.01"]], [[1]], [0], [[1]])
+
+
+def test_a_judgement_is_a_sentence():
+    for basis, ratio, ends, text in [
+        ("emulation", 0.25, False, "10 bits meet the tolerance: 0.25 of it, observed in 1 step"),
+        ("bound", 2, False, "nothing is proved for 10 bits: the bound on this run of 1 step is 2 times the tolerance"),
+        ("guarantee", math.inf, True, "nothing is proved for 10 bits, without a guarantee for 1 step: lost"),
+    ]:
+        assert str(judgement(FloatFormat(2, 10), basis, 1, ratio, "lost", ends)) == text
 
 
 @pytest.mark.parametrize(("z", "leaves"), [([0.5] * 9, ""), ([0.5, 7, 0.5], "step 2: innovation 0 is 6.")])
