@@ -163,9 +163,8 @@ def test_an_adversary_comes_within_a_factor_of_four_of_a_guarantee_at_60_hertz()
     assert bound / 4 < observed <= bound
 
 
-@pytest.mark.parametrize(("order", "frequency", "rate"), [(2, 20, 48_000), (4, 60, 96_000)])
-def test_low_frequencies_have_a_guarantee_that_the_checker_proves(order: int, frequency: float, rate: float) -> None:
-    _, system = cascade(order, frequency, rate)
+def test_a_low_frequency_has_a_guarantee_that_the_checker_proves() -> None:
+    _, system = cascade(2, 20, 48_000)
     found = required_precision(system, np.ones((100, 1)), 1e-3, basis="guarantee", within=limits(measurement=1))
     assert found.format is not None
     assert str(found).endswith("guaranteed for ever")
@@ -175,7 +174,10 @@ def test_low_frequencies_have_a_guarantee_that_the_checker_proves(order: int, fr
 
 
 def test_order_eight_at_20_hertz_is_bounded_for_ever() -> None:
-    """NumPy's eigenvalues of the whole matrix reach 1.017; those of its sections stay below 1."""
+    """NumPy's eigenvalues of the whole matrix reach 1.017; those of its sections stay below 1.
+
+    The response lasts for 10,000 steps, so that the sum of its sizes takes ten seconds.
+    """
     sections, system = cascade(8, 20, 48_000)
     F_ = system.A.astype(np.float64)
     assert np.abs(np.linalg.eigvals(F_)).max() > 1

@@ -10,14 +10,80 @@ from functools import cache
 import numpy as np
 import oracles
 import pytest
+from flint import fmpq_mat
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 BETA = Fraction(1, 2000)
+X = [Fraction(3), Fraction(-5), Fraction(7, 2), Fraction(-11)]  # sum -19/2
 A = np.array([[1, -2, 3], [4, 5, -6]], dtype=object)
+B = np.array([[2, -1], [3, 7], [-4, 1]], dtype=object)
+C = np.array([[1, -3], [2, 5]], dtype=object)
+D = np.array([[100, -7], [1, 2]], dtype=object)
+
+
+def g(n):
+    return n * BETA / (1 - n * BETA)
+
+
+# -- as printed -----------------------------------------------------------------------------------
+
+
+def test_sums_as_printed():
+    s = Fraction(19, 2)
+    assert theory.printed_sum_bound_1982(X, BETA) == 3 * BETA * s
+    assert theory.printed_sum_bound(X, BETA) == 3 * BETA * s + BETA * Fraction(7, 2) + 2 * BETA * 11
+    assert theory.printed_sum_bound_coarse(X, BETA) == 3 * BETA * s + 3 * BETA * 11
+    five = [*X, Fraction(1, 4)]
+    s = Fraction(37, 4)
+    assert theory.printed_sum_bound_1982(five, BETA) == 4 * BETA * s
+    assert theory.printed_sum_bound(five, BETA) == BETA * (4 * s + Fraction(7, 2) + 2 * 11 + Fraction(3, 4))
+    assert theory.printed_sum_bound_coarse(five, BETA) == BETA * (4 * s + 6 * 11)
+
+
+def test_products_as_printed():
+    assert theory.printed_product_bound(2, 1, BETA) == 4 * BETA
+    assert theory.product_bound(2, 1, BETA) == 2 * BETA
+    assert theory.printed_product_bound(5, 3, BETA) == 9 * BETA
+    assert theory.product_bound(5, 3, BETA) == 7 * BETA
+    assert theory.strict_product_bound(5, 3, BETA) == g(7)
+    assert theory.product_bound(1, 0, BETA) == theory.strict_product_bound(1, 0, BETA) == 0
+
+
+def test_inner_products_as_printed():
+    a, b = [1, -2, 3], [4, 5, -6]
+    assert theory.dot_bound(a, b, BETA) == BETA * (3 * 4 + 3 * 10 + 2 * 18)
+    assert theory.strict_dot_bound(a, b, BETA) == g(3) * 32
+    assert theory.relative_dot_bound(a, b, BETA) == g(3) * Fraction(32, 24)
+    assert theory.dot_weights(4) == [4, 4, 3, 2]
+    assert theory.dot_weights(1) == [1]
+
+
+def test_matrix_products_as_printed():
+    norms = [9, 9, 8]  # of A, B and C
+    assert [column_sum_norm(m) for m in (A, B, C)] == norms
+    assert column_sum_norm(np.zeros((2, 0))) == column_sum_norm(fmpq_mat(2, 0)) == 0
+    assert theory.chain_bound([A, B], BETA) == 3 * BETA * 81
+    assert theory.chain_bound([A, B, C], BETA) == 5 * BETA * 648
+    assert theory.strict_chain_bound([A, B, C], BETA) == g(5) * 648
+    assert theory.chain_bound([A], BETA) == theory.strict_chain_bound([A], BETA) == 0
+    assert theory.matrix_sum_bound(C, D, BETA) == BETA * 104
+
+
+def test_chains_and_examples_as_printed():
+    abc = A @ B @ C
+    assert theory.printed_chain_claim([A, B, C], BETA) == 5 * BETA * column_sum_norm(abc)
+    assert theory.printed_example_bound(A, B, C, D, BETA) == BETA * (6 * column_sum_norm(abc) + 101)
+    whole = column_sum_norm(abc + D)
+    assert theory.example_bound(A, B, C, D, BETA) == BETA * (5 * 648 + whole)
+    assert theory.strict_example_bound(A, B, C, D, BETA) == (1 + BETA) * g(5) * 648 + BETA * whole
+    square = [C, C, C, C]
+    ccc = column_sum_norm(C @ C @ C)
+    assert theory.printed_example_bound(*square, BETA) == BETA * ((2 * 2 + 1) * ccc + 8)
 
 
 # -- what the weights mean ------------------------------------------------------------------------
