@@ -10,7 +10,7 @@ import oracles
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rational import column_sum_norm, exact
+from gpbnb.arithmetic.rational import column_sum_norm, exact, row_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import theory
 from gpbnb.report.inversion.theory import Reduction
@@ -34,6 +34,17 @@ def rows(a):
 
 
 # -- as printed, by hand --------------------------------------------------------------------------
+
+
+def test_first_approach_as_printed():
+    inverse = exact([[2, -3], [5, 7]])
+    residual, change = exact([[Fraction(1, 100), 0], [0, Fraction(-3, 100)]]), exact([[0, 1], [2, 0]]) / 1000
+    assert theory.printed_first_bound(inverse, residual) == 10 * Fraction(3, 100)
+    assert theory.printed_first_bound(inverse, residual, change) == 10 * Fraction(3, 100) + 100 * Fraction(2, 1000)
+    assert theory.printed_first_bound(inverse, residual, change, row_sum_norm) == 12 * Fraction(
+        3, 100
+    ) + 144 * Fraction(2, 1000)
+    assert theory.residual(inverse, exact([[1, 2], [3, 4]])).tolist() == [[-8, -8], [26, 37]]
 
 
 def test_the_total_as_printed_and_corrected():
