@@ -1,11 +1,12 @@
 """Formats without compiled loops are refused with the setting that prevents them."""
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
 import pytest
 
-from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
+from gpbnb import BINARY32, DECIMAL32, FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.filters.run import Run, Sums
@@ -85,3 +86,13 @@ def test_other_sums_in_53_bits_name_the_digits(options):
     model = LinearModel([["0.9"]], [[1]], [[1]], [[1]], [0], [[1]])
     with pytest.raises(ValueError, match=r"in 53 bits; needed up to 52 bits, or up to 13 base-16 digits"):
         Run(model, FloatFormat(2, 53), "innovation", (1,), Sums(**options))
+
+
+def test_an_overflow_that_a_format_does_not_have_is_refused():
+    for make, message in (
+        (lambda: replace(BINARY32, overflow="wrap"), "overflow: got 'wrap'; needed one of 'raise', 'saturate'"),
+        (lambda: FloatFormat(2, 8, overflow="saturate"), "or overflow without a range; needed emin and emax as well"),
+        (replace(DECIMAL32, overflow="saturate").check_compiled, "got overflow that saturates in base 10; needed"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            make()
