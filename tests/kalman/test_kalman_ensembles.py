@@ -26,13 +26,13 @@ def test_a_trial_compares_every_step_with_the_bounds(kind):
     z = np.abs(z) if kind == "one sign" else z
     run = emulate_with_bound(model, z, task.fmt, task.form, range(1, 11))
     assert [found.state, found.gain, found.covariance] == run.ratios().max(axis=0).tolist()
-    assert found.last == run.ratios()[-1, 0]
-    assert found.bounded == np.isfinite(run.state).all(axis=1).mean()
+    assert found.typical == run.ratios()[-1, 0]
+    assert found.steps_bounded == np.isfinite(run.state).all(axis=1).mean()
     history = emulate(model, z, task.fmt, task.form, range(1, 11))
     beta, n, m = 1e-7, model.n, model.m
     for error, true, count, ratio in (
-        (history.covariance, history.reference.P, 3 * n + m + 2, found.printed_covariance),
-        (history.gain, history.reference.K, 4 * n + 2 * m + 3, found.printed_gain),
+        (history.covariance, history.reference.P, 3 * n + m + 2, found.worst_105),
+        (history.gain, history.reference.K, 4 * n + 2 * m + 3, found.worst_108),
     ):
         true = true.astype(float)
         assert ratio == pytest.approx(np.nanmax(np.abs(error) / (count * beta * np.abs(true))), rel=1e-12)
@@ -49,7 +49,7 @@ def test_a_trial_compares_every_step_with_the_bounds(kind):
         bound = beta * (k * c * np.abs(x[k - 1]).max() + (k * (3 * n + 1) + k * (k - 1) * c / 2) * B)
         worst = max(worst, np.abs(history.state[k - 1]).max() / bound)
     # The model is stored in eight digits, which enter F and u.
-    assert found.printed_state == pytest.approx(worst, rel=1e-4)
+    assert found.worst_125 == pytest.approx(worst, rel=1e-4)
 
 
 # -- what the package brings ----------------------------------------------------------------------

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, cast, get_type_hints
@@ -51,29 +50,33 @@ class Task(NamedTuple):
     steps: int
 
 
-@dataclass(frozen=True)
-class TrialOutcome:
-    """Largest error over bound of a trial, over all steps and entries.
+class Summary(NamedTuple):
+    """Trials of one kind and form, and the largest error over each bound.
 
-    Parameters
-    ----------
-    state, gain, covariance : error / contraction bound; 0 if the bound is infinite.
-    last : error / contraction bound of the state after the last step; 0 if the bound is infinite.
-    bounded : share of the steps at which the contraction bound of the state is finite.
-    printed_covariance, printed_gain, printed_state : error / (105), (108) and (125) of hung1984, ch. II.
-    indefinite : whether a variance or pivot was not positive at some step.
+    Violations count trials with an error above the bound at any step; an infinite bound is not violated.
+    `steps_bounded` is the mean share of steps at which the contraction bound is finite. `typical` is the geometric mean
+    of error / contraction bound for the state after the last step, over the `compared` trials in which neither is zero.
+    `state`, `gain` and `covariance` are the largest error / contraction bound, and `worst_105` and so on those of error
+    / (105) of hung1984, ch. II. `indefinite` counts trials in which a variance or pivot was not positive.
     """
 
-    task: Task
+    kind: str
+    form: str
+    trials: int
+    steps_bounded: float
+    contraction_violations: int
     state: float
     gain: float
     covariance: float
-    last: float
-    bounded: float
-    printed_covariance: float
-    printed_gain: float
-    printed_state: float
-    indefinite: bool
+    compared: int
+    typical: float
+    violations_105: int
+    worst_105: float
+    violations_108: int
+    worst_108: float
+    violations_125: int
+    worst_125: float
+    indefinite: int
 
 
 def random_model(rng: np.random.Generator, kind: str) -> tuple[LinearModel, float]:
@@ -122,23 +125,36 @@ def _short(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([float(f"{value:.6g}") for value in values.flat]).reshape(values.shape)
 
 
-def trial(task: Task) -> TrialOutcome:
+def trial(task: Task) -> Summary:
     """Draw the model and the measurements of a task, run the filter, and compare it with its bounds."""
     rng = np.random.default_rng([task.seed, KINDS.index(task.kind)])
     model, size = random_model(rng, task.kind)
     z = _short(size * rng.standard_normal((task.steps, model.m)))
-    found = emulate_with_bound(
-        model, np.abs(z) if task.kind == "one sign" else z, task.fmt, task.form, range(1, task.steps + 1)
+    z = np.abs(z) if task.kind == "one sign" else z
+    found = emulate_with_bound(model, z, task.fmt, task.form, range(1, task.steps + 1))
+    ratios, history = found.ratios(), found.history
+    state, gain, covariance = (float(each) for each in (ratios.max(axis=0, initial=0.0) if len(ratios) else (0, 0, 0)))
+    last = float(ratios[-1, 0]) if len(ratios) == task.steps else 0.0  # 0 if the bound is infinite
+    of_covariance, of_gain, of_state = printed_ratios(found, task)
+    return Summary(
+        kind=task.kind,
+        form=task.form.name.lower(),
+        trials=1,
+        steps_bounded=float(np.isfinite(found.state).all(axis=1).sum() / task.steps),
+        contraction_violations=int(not all(ratio <= 1 for ratio in (state, gain, covariance))),
+        state=state,
+        gain=gain,
+        covariance=covariance,
+        compared=int(last > 0),
+        typical=last or 1.0,
+        violations_105=int(of_covariance > 1),
+        worst_105=of_covariance,
+        violations_108=int(of_gain > 1),
+        worst_108=of_gain,
+        violations_125=int(of_state > 1),
+        worst_125=of_state,
+        indefinite=int(history.indefinite is not None or history.stopped is not None),
     )
-    ratios = found.ratios()
-    finite = np.isfinite(found.state).all(axis=1)
-    largest = ratios.max(axis=0, initial=0.0) if len(ratios) else np.zeros(3)
-    history = found.history
-    state, gain, covariance = (float(each) for each in largest)
-    lost = history.indefinite is not None or history.stopped is not None
-    share = float(finite.sum() / task.steps)
-    last = float(ratios[-1, 0]) if len(ratios) == task.steps else 0.0
-    return TrialOutcome(task, state, gain, covariance, last, share, *printed_ratios(found, task), lost)
 
 
 def printed_ratios(found: BoundedHistory, task: Task) -> tuple[float, float, float]:
@@ -196,57 +212,6 @@ def tasks(repeats: int, steps: int = STEPS, first_seed: int = 0) -> tuple[Task, 
 # -- what was found -----------------------------------------------------------------------------------
 
 
-class Summary(NamedTuple):
-    """Trials of one kind and form, and the largest error over each bound.
-
-    Violations count trials with an error above the bound at any step; an infinite bound is not violated.
-    `steps_bounded` is the mean share of steps at which the contraction bound is finite. `typical` is the geometric mean
-    of error / contraction bound for the state after the last step, over the `compared` trials in which neither is zero.
-    """
-
-    kind: str
-    form: str
-    trials: int
-    steps_bounded: float
-    contraction_violations: int
-    state: float
-    gain: float
-    covariance: float
-    compared: int
-    typical: float
-    violations_105: int
-    worst_105: float
-    violations_108: int
-    worst_108: float
-    violations_125: int
-    worst_125: float
-    indefinite: int
-
-
-def _alone(outcome: TrialOutcome) -> Summary:
-    task, ratios = outcome.task, (outcome.state, outcome.gain, outcome.covariance)
-    compared = outcome.last > 0
-    return Summary(
-        kind=task.kind,
-        form=task.form.name.lower(),
-        trials=1,
-        steps_bounded=outcome.bounded,
-        contraction_violations=int(not all(ratio <= 1 for ratio in ratios)),
-        state=outcome.state,
-        gain=outcome.gain,
-        covariance=outcome.covariance,
-        compared=int(compared),
-        typical=outcome.last if compared else 1.0,
-        violations_105=int(outcome.printed_covariance > 1),
-        worst_105=outcome.printed_covariance,
-        violations_108=int(outcome.printed_gain > 1),
-        worst_108=outcome.printed_gain,
-        violations_125=int(outcome.printed_state > 1),
-        worst_125=outcome.printed_state,
-        indefinite=int(outcome.indefinite),
-    )
-
-
 def merged(parts: Sequence[Summary]) -> tuple[Summary, ...]:
     """Return one summary for each kind and form, in order of appearance."""
     groups: dict[tuple[str, str], list[Summary]] = {}
@@ -270,16 +235,11 @@ _COUNTED = (
 )  # fmt: skip
 
 
-def summaries(outcomes: Sequence[TrialOutcome]) -> tuple[Summary, ...]:
-    """Return one summary for each kind and form, in order of appearance."""
-    return merged([_alone(outcome) for outcome in outcomes])
-
-
-def lines(seed: int, outcomes: Sequence[TrialOutcome]) -> list[tuple[str, ...]]:
+def lines(seed: int, trials: Sequence[Summary]) -> list[tuple[str, ...]]:
     """Return the rows of ``ensembles.csv`` for the trials of one seed, with six significant digits."""
     return [
         (str(seed), *(f"{each:.6g}" if isinstance(each, float) else str(each) for each in summary))
-        for summary in summaries([outcome for outcome in outcomes if outcome.task.seed == seed])
+        for summary in merged(trials)
     ]
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -287,11 +286,6 @@ SURVEY_PERIODS = (None, 6000.0, 600.0, 200.0, 77.5)
 SURVEY_GYROS = 128
 
 
-def survey_rng() -> np.random.Generator:
-    """Return the generator of the survey in its initial state."""
-    return np.random.default_rng(1984)
-
-
 #: Columns of the stored survey, errors of the drift rates of x and y, mas/yr, for each roll period.
 SURVEY_COLUMNS = (
     Column("gyro", "integer", 0, SURVEY_GYROS - 1),
@@ -318,12 +312,8 @@ def survey_rows(study: DriftStudy) -> list[tuple[str, ...]]:
 
 def survey_of(gyros: int, directory: Path | None = None) -> list[tuple[str, ...]]:
     """Simulate a year for each of several gyros; the noise of each does not depend on their number."""
-    return survey_rows(drift_rates(SURVEY_PERIODS, gyros, survey_rng(), progress=directory is not None))
-
-
-def first_gyros(gyros: int, rng: np.random.Generator) -> list[tuple[str, ...]]:
-    """Return the rows of the first one to three gyros."""
-    return survey_of(int(rng.integers(1, 4)))
+    rng = np.random.default_rng(1984)
+    return survey_rows(drift_rates(SURVEY_PERIODS, gyros, rng, progress=directory is not None))
 
 
 SWEEP: Sweep[int] = Sweep(
@@ -335,30 +325,24 @@ SWEEP: Sweep[int] = Sweep(
     compute=survey_of,
     command="python -m gpbnb.report.stored recompute rolling/drift_rates",
     seed=1984,
-    sample=first_gyros,
+    sample=lambda gyros, rng: survey_of(int(rng.integers(1, 4))),
 )
 
 
 # -- filters -------------------------------------------------------------------------------------
 
 
-class LowPass(Enum):
-    """A kind of low-pass filter: a single pole or a moving average."""
-
-    SINGLE_POLE = "single pole"
-    MOVING_AVERAGE = "moving average"
-
-
 @dataclass(frozen=True)
 class FilterStudy:
     """Mean square errors (filters, records) in mas², after low-pass filters that have settled.
 
-    `lag` and `bandwidth` are those of the filters; `error` is the mean over the records.
+    `kinds` are "single pole" or "moving average", and `lag` and `bandwidth` those of the filters; `error` is the mean
+    over the records.
     """
 
     drift: float
     period: float
-    kinds: tuple[LowPass, ...]
+    kinds: tuple[str, ...]
     lag: NDArray[np.float64]
     bandwidth: NDArray[np.float64]
     squares: NDArray[np.float64]
@@ -389,7 +373,7 @@ def filter_study(
     Each component of each gyro, rolled and derolled, is a record. Averages start after ten time constants.
     """
     n = round(duration / interval)
-    kinds = (*(LowPass.SINGLE_POLE for _ in bandwidths), *(LowPass.MOVING_AVERAGE for _ in bandwidths))
+    kinds = ("single pole",) * len(bandwidths) + ("moving average",) * len(bandwidths)
     skip = math.ceil(10 / (4 * min(bandwidths)) / interval)
     squares = np.zeros((len(kinds), 2 * gyros))
     filters = [theory.single_pole(1 / (4 * b), interval) for b in bandwidths]
@@ -399,7 +383,7 @@ def filter_study(
         for c, part in enumerate((np.real, np.imag)):
             derolled, truth = part(stages["derolled"]), part(stages["signal"])
             for i, weights in enumerate(filters):
-                if kinds[i] is LowPass.SINGLE_POLE:
+                if kinds[i] == "single pole":
                     out = scipy.signal.lfilter([weights[0]], [1, weights[0] - 1], derolled)
                 else:
                     total = np.concatenate([np.zeros(len(weights)), np.cumsum(derolled)])

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
@@ -22,20 +21,11 @@ from gpbnb.report.rolling import theory
 from gpbnb.report.rolling.theory import INTERVAL
 
 
-@dataclass(frozen=True)
-class Rotation:
-    """A rotation (cos nδ, sin nδ) computed in a format, with its amplitude error, phase error and total error.
+class Rotation(NamedTuple):
+    """The error of a rotation (cos nδ, sin nδ) computed in a format after some samples n, and its bound."""
 
-    `method` is "recursion" or "direct", `step` holds the samples n, and `bound` the bound on `size`, the total error.
-    """
-
-    fmt: FloatFormat
-    period: float
     interval: float
-    method: str
     step: NDArray[np.int64]
-    amplitude: NDArray[np.float64]
-    phase: NDArray[np.float64]
     size: NDArray[np.float64]
     bound: NDArray[np.float64]
 
@@ -74,22 +64,14 @@ def _fraction(x: Any) -> Fraction:
     return Fraction(-int(mantissa) if sign else int(mantissa)) * Fraction(2) ** exponent
 
 
-def _compared(
-    fmt: FloatFormat, period: float, interval: float, method: str, steps: Any, values: Any, bounds: Any
-) -> Rotation:
+def _compared(period: float, interval: float, steps: Any, values: Any, bounds: Any) -> Rotation:
     """Return the errors of computed pairs (m, 2) of exact Fractions."""
     errors = []
     for n, (c, s) in zip(steps, values, strict=True):
         cosine, sine = _exact_turn(int(n), period, interval)
         # z e^{-inδ} - 1, without cancellation
         errors.append(complex((c - cosine) * cosine + (s - sine) * sine, (s - sine) * cosine - (c - cosine) * sine))
-    e = np.array(errors)
-    amplitude = np.hypot(1 + e.real, e.imag) - 1
-    small = np.abs(e) < 1e-8
-    amplitude[small] = e.real[small]
-    return Rotation(
-        fmt, period, interval, method, np.asarray(steps), amplitude, np.arctan2(e.imag, 1 + e.real), np.abs(e), bounds
-    )
+    return Rotation(interval, np.asarray(steps), np.abs(np.array(errors)), bounds)
 
 
 def recursion(
@@ -112,7 +94,7 @@ def recursion(
     _rotate(backend.tag, step, state, marks, out)
     values = FloatArray.from_packed(out, fmt).to_fractions()
     bounds = np.array([theory.recursion_bound(int(n), fmt.unit_roundoff) for n in marks])
-    return _compared(fmt, period, interval, "recursion", marks, values, bounds)
+    return _compared(period, interval, marks, values, bounds)
 
 
 def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: float = INTERVAL) -> Rotation:
@@ -127,4 +109,4 @@ def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: floa
             values.append([fmt.round(_fraction(mpmath.cos(x))), fmt.round(_fraction(mpmath.sin(x)))])
     phases = 2 * np.pi * marks * (interval / period)
     bounds = np.array([theory.direct_bound(float(phase), fmt.unit_roundoff) for phase in phases])
-    return _compared(fmt, period, interval, "direct", marks, values, bounds)
+    return _compared(period, interval, marks, values, bounds)

@@ -85,7 +85,7 @@ def expected_squares(study: experiment.FilterStudy, duration: float = YEAR / 16)
     middle = round(duration / theory.INTERVAL / math.e)
     expected = []
     for kind, lag, width in zip(study.kinds, study.lag, study.bandwidth, strict=True):
-        if kind is experiment.LowPass.SINGLE_POLE:
+        if kind == "single pole":
             weights = theory.single_pole(lag_constant(lag))
         else:
             weights = theory.moving_average(1 / (2 * width))
