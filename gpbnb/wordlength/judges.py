@@ -395,11 +395,11 @@ def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, w
 
         def bounds(proved: bool) -> Callable[[Any], Found]:
             def found(fmt: Any) -> NDArray[np.float64]:
+                if basis == "probable":
+                    return probable_output_errors(system, fmt.data if isinstance(fmt, WordFormats) else fmt, most)
                 if isinstance(fmt, WordFormats) or (isinstance(fmt, FixedFormat) and linear):
                     in_words = fmt if isinstance(fmt, WordFormats) else WordFormats(fmt)
                     return words().errors(in_words) if proved else words().guessed(in_words)
-                if basis == "probable":
-                    return probable_output_errors(system, fmt, most)
                 return (output_errors if proved else guessed_errors)(system, fmt, most, steps)
 
             return reasoned(found)

@@ -135,7 +135,10 @@ def required_precision(
     if kind not in TASK_OF_KIND:
         raise ValueError(f"got kind {kind!r}; needed one of {', '.join(map(repr, TASK_OF_KIND))}")
     bounded = kind in ("fixed", "words") and checked_basis(basis) in PROOFS
-    tasks = [TASK_OF_BASIS[checked_basis(basis)], TASK_OF_KIND[kind], "" if form is None else "have a form"]
+    one = isinstance(format_named(like), FixedFormat)
+    probable = basis == "probable" and (kind == "words" or (kind == "fixed" and not one))
+    tasks = ["have a probable error in words"] if probable else []
+    tasks += [TASK_OF_BASIS[checked_basis(basis)], TASK_OF_KIND[kind], "" if form is None else "have a form"]
     given = admitted(model, *tasks, "have a guarantee in fixed-point words" if bounded else "")
     data = data_of(given, z, seed)
     found = form_named(Form.INNOVATION if form is None else form)
@@ -178,7 +181,8 @@ def judge(
 ) -> Requirement:
     """Judge one format; for the arguments, see :func:`required_precision`."""
     chosen: Any = format_named(fmt)
-    given = admitted(model, TASK_OF_BASIS[checked_basis(basis)], "" if form is None else "have a form")
+    words = "have a probable error in words" if basis == "probable" and isinstance(chosen, WordFormats) else ""
+    given = admitted(model, TASK_OF_BASIS[checked_basis(basis)], words, "" if form is None else "have a form")
     data = data_of(given, z)
     asked = Asked(given, data, tolerance, basis, within, form_named(form or Form.INNOVATION))
     if isinstance(given, LinearModel | LinearSystem) and not isinstance(chosen, WordFormats):

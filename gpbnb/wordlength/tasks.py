@@ -48,6 +48,7 @@ CANNOT: dict[str, Mapping[str, str]] = {
     "have a guarantee in fixed-point words": {
         LIMITED: "guarantee(model, fmt, within), with one format for all numbers"
     },
+    "have a probable error in words": {SYSTEM: 'ask with basis="guarantee", or with one format: like="Q3.12"'},
     "have formats for data, coefficients and sums": dict.fromkeys(_OF_SYSTEMS, _WORDS),
     "have formats for blocks": dict.fromkeys((DRIVEN, *KINDS[3:]), 'ask with kind="float"'),
     "be searched for limit cycles": dict.fromkeys(

@@ -11,9 +11,11 @@ import pytest
 from gpbnb import BINARY64, LinearSystem, WordFormats, emulate, guarantee, limits, required_precision
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.probable import probable_output_errors
 from gpbnb.bounds.words import bounded_rounding
 from gpbnb.filters.system import controller, state_space
 from gpbnb.filters.words import run_words
+from gpbnb.wordlength.required import judge
 
 
 def test_the_bound_of_one_state_is_its_geometric_series() -> None:
@@ -78,3 +80,16 @@ def test_a_coefficient_of_one_is_not_multiplied_and_needs_no_integer_bits(a1):
     assert (run.y.to_float().ravel() * 2**15).tolist() == seen
     bound = guarantee(system, fmt, limits(measurement=0.05), horizon=8)
     assert np.abs(emulate(system, [0.05] * 8, fmt).errors).max() <= bound.bound[0] < 1e-3
+
+
+def test_a_probable_error_is_less_than_a_bound_and_refused_in_words() -> None:
+    system, asked = LinearSystem([["0.9"]], [["0.1"]]), {"z": [0.5] * 20, "tolerance": "1/100"}
+    given = asked | {"within": limits(measurement=1)}
+    probable, bound = (judge(system, "Q3.12", **given, basis=basis).ratio for basis in ("probable", "guarantee"))
+    assert probable == pytest.approx(probable_output_errors(system, FixedFormat(3, 12), np.ones(1))[0] * 100)
+    assert probable < bound / 2
+    found = required_precision(system, **given, kind="fixed", like="Q3.9", basis="probable")
+    assert dict(found.tried)[found.digits] <= 1 < dict(found.tried)[found.digits - 1]
+    for kind in ("fixed", "words"):
+        with pytest.raises(ValueError, match="a linear system cannot have a probable error in words; ask with basis="):
+            required_precision(system, **given, kind=kind, basis="probable")
