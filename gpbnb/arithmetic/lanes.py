@@ -97,12 +97,13 @@ class Lanes:
 
 
 @lru_cache(maxsize=128)
-def recorded(function: Callable[..., tuple[Any, ...]], *shapes: tuple[int, ...]) -> Lanes:
-    """Record a function of arrays of some shapes, which returns arrays and truth values in a tuple."""
+def recorded(function: Callable[..., Any], *shapes: tuple[int, ...]) -> Lanes:
+    """Record a function of arrays of some shapes, which returns an array, or arrays and truth values in a tuple."""
     tape, places, at = Tape(sum(map(math.prod, shapes))), [], 1
     for shape in shapes:
         places.append(np.arange(at, at + math.prod(shape)).reshape(shape))
         at += math.prod(shape)
-    results = function(*map(TracedFormat(tape).made, places))
+    returned = function(*map(TracedFormat(tape).made, places))
+    results = returned if isinstance(returned, tuple) else (returned,)
     found = [each if isinstance(each, TracedTruth) else each.components[0] for each in results]
     return Lanes(tape.instructions.astype(np.int64), tape.sizes, tape.all_constants, places, found)

@@ -102,13 +102,9 @@ def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Sched
     )  # fmt: skip
 
 
-def _closed_loop(K: Any, H: Any, Phi: Any) -> tuple[Any]:
+def _closed_loop(K: Any, H: Any, Phi: Any) -> Any:
     """Return (I - KH)Φ, in the order of the filter."""
-    return ((K.format.eye(len(Phi)) - K @ H) @ Phi,)
-
-
-def _decorrelated(UR: Any, H: Any) -> tuple[Any]:
-    return (decorrelated(UR, H),)
+    return (K.format.eye(len(Phi)) - K @ H) @ Phi
 
 
 def check_deterministic(fmt: FloatFormat | FixedFormat) -> None:
@@ -236,7 +232,7 @@ def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> t
         return loop_program(n, m), np.concatenate([flat(F), flat(K)], axis=1)
     if run.form is Form.UD:
         every = np.arange(int(np.lcm(len(H), len(run.UR))))
-        rows_of = recorded(_decorrelated, (m, m), (m, n))
+        rows_of = recorded(decorrelated, (m, m), (m, n))
         (D,) = rows_of.run(run.fmt, run.UR[every % len(run.UR)], H[every % len(H)])
         U = np.array(run.UR)
         for i in range(m):  # the diagonal stores variances in place of ones

@@ -20,11 +20,11 @@ from gpbnb.filters.contraction import (
     gain_error_bound,
     state_error_bound,
 )
-from gpbnb.filters.forms import ROOTS, AnyForm, Form
+from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import Opening, opening
 from gpbnb.filters.recording import recorded_step, step_kind
-from gpbnb.filters.steps import FACTORED, StepModel, decorrelated
+from gpbnb.filters.steps import FACTORED, StepModel, combined_gain
 
 Array = NDArray[np.float64]
 
@@ -107,7 +107,7 @@ class CarriedBound:
         """
         try:
             taken = taken._replace(before=self._kept(taken.before), after=self._kept(taken.after))
-            covariance = _squared if self.form in ROOTS else _represented if self.form is Form.UD else _symmetric
+            covariance = FACTORED[self.form].covariance if self.form in FACTORED else _symmetric
             (covariances,), _ = recorded(covariance, taken.P.shape[1:3]).begin(None, taken.P)
             done = self._take(first, taken, covariances) if len(covariances) else 0
         except (OverflowError, ZeroDivisionError):
@@ -152,7 +152,7 @@ class CarriedBound:
         some, used = Contraction(*(each[i] for each in bounds)), taken.gains[i]
         if self.form in FACTORED:
             UR = taken.UR[(first + i) % len(taken.UR)]
-            (used,) = recorded(_whole_gain, (n, m), (m, n), (m, m)).run(None, used, H[i], UR)
+            (used,) = recorded(combined_gain, (n, m), (m, n), (m, m)).run(None, used, H[i], UR)
         bound = state_error_bound(some)
         self.saved.state[at:last] = np.nextafter(bound + DECAYED, np.inf) if self._dropped else bound
         self.saved.gain[at:last] = gain_error_bound(some, K[i], used[..., 0], off.gain[i])
@@ -173,34 +173,10 @@ def _model(exact: Opening) -> dict[str, Array]:
     return {"Phi": exact.Phi, "H": exact.H, "Q": exact.Q, "R": exact.R}
 
 
-def _symmetric(P: Any) -> tuple[Any]:
-    return ((P + P.T) * 0.5,)
-
-
-def _represented(factors: Any) -> tuple[Any]:
-    """Return the covariance that factors represent, with D on their diagonal and U above."""
-    n, one = len(factors), factors.format.eye(len(factors))
-    U = np.stack([np.stack([factors[i, j] if i < j else one[i, j] for j in range(n)]) for i in range(n)])
-    return ((U * np.diagonal(factors)) @ U.T,)
-
-
-def _squared(root: Any) -> tuple[Any]:
-    return (root @ root.T,)
+def _symmetric(P: Any) -> Any:
+    return (P + P.T) * 0.5
 
 
 def _residuals(Phi: Any, H: Any, z: Any, x: Any, after: Any, P: Any, repeated: Any, again: Any) -> tuple[Any, Any, Any]:
     """Return the innovation, and the state and covariance of a run minus the repeated ones."""
-    return z - H @ (Phi @ x), after - repeated, P - _symmetric(again)[0]
-
-
-def _whole_gain(K: Any, H: Any, UR: Any) -> tuple[Any]:
-    """Return the gain of a step in the UD form, combined from the gains of its single measurements."""
-    m, rows = len(UR), decorrelated(UR, H)
-    columns = [K[:, j] for j in range(m)]
-    for i in range(m):
-        for j in range(i):
-            columns[j] = columns[j] - K[:, i] * (rows[i] * columns[j]).sum()
-    for j in range(1, m):
-        for i in range(j):
-            columns[j] = columns[j] - columns[i] * UR[i, j]
-    return (np.stack(columns, axis=1),)
+    return z - H @ (Phi @ x), after - repeated, P - _symmetric(again)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.algebra import Matrix, inverse_in_order
 from gpbnb.arithmetic.definiteness import factor
 from gpbnb.arithmetic.lanes import recorded
-from gpbnb.arithmetic.rational import exact, inverse_of
 from gpbnb.filters.steps import if_nonzero, root_of_factors
 
 
@@ -19,35 +18,6 @@ def upper_factors(covariance: NDArray[Any]) -> NDArray[Any]:
     """Return exact factors U D U' of a covariance (n, n): D is the diagonal, U the unit triangle above it."""
     lower, d = factor(covariance[::-1, ::-1])
     return np.triu(lower[::-1, ::-1], 1) + np.diag(d[::-1])
-
-
-def unit_triangle(factors: NDArray[Any]) -> NDArray[Any]:
-    """Return the unit upper triangle that is stored above the diagonal of a matrix (n, n)."""
-    return np.triu(factors, 1) + exact(np.eye(len(factors), dtype=int))
-
-
-def covariance_of_factors(factors: NDArray[Any]) -> NDArray[Any]:
-    """Return :math:`U D U^T`, (n, n): D is the diagonal, U the unit triangle above it."""
-    triangle = unit_triangle(factors)
-    return np.asarray((triangle * factors.diagonal()) @ triangle.T)
-
-
-def combined_gain(columns: Sequence[NDArray[Any]], UR: NDArray[Any], H: NDArray[Any]) -> NDArray[Any]:
-    """Return the gain (n, m) for all measurements together.
-
-    Parameters
-    ----------
-    columns : m gains (n,), each for one decorrelated measurement after the other.
-    UR : (m, m), the factors of R.
-    H : (m, n).
-    """
-    decorrelation = inverse_of(unit_triangle(UR))
-    rows = decorrelation @ H
-    gain = np.array(columns, dtype=object).T
-    for i, column in enumerate(columns):
-        for j in range(i):
-            gain[:, j] -= column * (rows[i] @ gain[:, j])
-    return np.asarray(gain @ decorrelation)
 
 
 # -- in a format -------------------------------------------------------------------------------------------------------
@@ -101,12 +71,8 @@ def inverses_of_each(fmt: Any, tag: Any, matrices: NDArray[Any], found: NDArray[
 
 def roots_of_each(fmt: Any, tag: Any, factors: NDArray[Any]) -> NDArray[Any]:
     """Return the roots of covariances for their packed factors (p, n, n, ...)."""
-    (found,) = recorded(_rooted, factors.shape[1:3]).run(fmt, factors, tag=tag)
+    (found,) = recorded(root_of_factors, factors.shape[1:3]).run(fmt, factors, tag=tag)
     return found
-
-
-def _rooted(factors: Matrix) -> tuple[Matrix]:
-    return (root_of_factors(factors),)
 
 
 def _of_each(

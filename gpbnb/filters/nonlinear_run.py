@@ -17,7 +17,7 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
-from gpbnb.filters.factors import combined_gain, covariance_of_factors, upper_factors
+from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import ROOTS, AnyForm, ArrayForm, Form
 from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
@@ -31,6 +31,7 @@ from gpbnb.filters.steps import (
     FACTORED,
     BlockAlgebra,
     UnscentedModel,
+    combined_gain,
     corrected_by,
     measured_in,
     observed,
@@ -162,11 +163,7 @@ class NonlinearRun:
     def covariance(self, P: FloatArray) -> NDArray[Any]:
         """Return the exact covariance, as Fractions, from a covariance, its factors or its root."""
         given: NDArray[Any] = P.to_fractions()
-        if self.form in ROOTS:
-            return np.asarray(given @ given.T)
-        if self.form is Form.UD:
-            return covariance_of_factors(given)
-        return given
+        return FACTORED[self.form].covariance(given) if self.form in FACTORED else given
 
     # -- one step ---------------------------------------------------------------------------------------
 
@@ -200,14 +197,14 @@ class NonlinearRun:
     def _predicted(self, blocks: BlockAlgebra, F: Any, P: Any, Q: Any) -> tuple[Any, Any]:
         if self.form in FACTORED:
             taken = blocks.stored.covariance
-            return FACTORED[self.form][0](taken(F), P, taken(Q))
+            return FACTORED[self.form].predict(taken(F), P, taken(Q))
         return predicted_in(blocks, F, P, Q), True
 
     def _updated(self, blocks: BlockAlgebra, H: Any, R: Any, y: Any, ahead: _Ahead) -> tuple[Any, Any, Any, Any]:
         """Return estimate, covariance, gain, and whether all variances and pivots are positive."""
         stored = blocks.stored
         if self.form in FACTORED:  # what the measurements correct is zero before them
-            observe = FACTORED[self.form][1]
+            observe = FACTORED[self.form].observe
             observe = partial(observe, stored=stored) if self.form is Form.UD else observe
             step = observed(observe, H, R, y, ahead.x * 0, ahead.P, stored)
             return ahead.x + step.x, step.P, (step.gains, H, R), step.definite
@@ -247,7 +244,8 @@ class NonlinearRun:
         if not isinstance(gain, tuple):
             return np.asarray(gain.to_fractions(), dtype=object)
         columns, H, UR = gain
-        return combined_gain([each.to_fractions() for each in columns], UR.to_fractions(), H.to_fractions())
+        K = np.stack([each.to_fractions() for each in columns], axis=1)
+        return np.asarray(combined_gain(K, H.to_fractions(), UR.to_fractions()))
 
 
 def _fault(error: Exception) -> str:

@@ -20,8 +20,7 @@ from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import DECAYED, Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
-from gpbnb.filters.factors import combined_gain, covariance_of_factors
-from gpbnb.filters.forms import ROOTS, AnyForm, ArrayForm, Form
+from gpbnb.filters.forms import AnyForm, ArrayForm, Form
 from gpbnb.filters.kernels.records import pairs_as_floats
 from gpbnb.filters.kernels.widened import widen
 from gpbnb.filters.model import INPUTS, LinearModel, identity_in
@@ -39,7 +38,7 @@ from gpbnb.filters.opening import (
 from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
 from gpbnb.filters.stepping import Stepper, Stop
-from gpbnb.filters.steps import FACTORED, HUNG_FORMS
+from gpbnb.filters.steps import FACTORED, HUNG_FORMS, combined_gain
 
 LEAST_SHARE = 2.0**-60
 """Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""
@@ -143,7 +142,7 @@ class Run:
         self._carried: CarriedBound | None = None
         if bounded:
             self._stored = model if fmt is None else model.rounded(fmt)
-            first = self.covariance(self.exactly(self.P)) if self.form in FACTORED else None
+            first = FACTORED[self.form].covariance(self.exactly(self.P)) if self.form in FACTORED else None
             self._carried = CarriedBound(self._stored.without_inputs(), self.form, first, self.checkpoint_steps)
 
     def _check(self, sums: Sums, compensated: bool, bounded: bool, records: int) -> None:
@@ -481,13 +480,9 @@ class Run:
         gains, covariances = np.empty_like(K), np.empty_like(U)
         H, UR = self.exactly(self.matrices.H), self.exactly(self.UR)
         for at, step in enumerate(self.checkpoint_steps[: len(K)] - 1):
-            gains[at] = combined_gain(list(K[at].T), UR[step % len(UR)], H[step % len(H)])
-            covariances[at] = self.covariance(U[at])
+            gains[at] = combined_gain(K[at], H[step % len(H)], UR[step % len(UR)])
+            covariances[at] = FACTORED[self.form].covariance(U[at])
         return gains, covariances
-
-    def covariance(self, P: NDArray[Any]) -> NDArray[Any]:
-        """Return the covariance that factors or a root represent."""
-        return np.asarray(P @ P.T) if self.form in ROOTS else covariance_of_factors(P)
 
 
 def _nearest_floats(pairs: NDArray[np.int64], out: NDArray[np.float64]) -> None:

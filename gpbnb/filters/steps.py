@@ -439,12 +439,50 @@ def _stacked(parts: list[Matrix]) -> Any:
     return np.stack(parts)
 
 
-FACTORED: dict[AnyForm, tuple[Callable[..., Any], Callable[..., Any]]] = {
-    Form.UD: (predict_ud, observe_ud),
-    ArrayForm.POTTER: (predict_root, observe_potter),
-    ArrayForm.CARLSON: (predict_root, observe_carlson),
+def combined_gain(K: Matrix, H: Matrix, UR: Matrix) -> Any:
+    """Return the gain (n, m) for all measurements together, from those of decorrelated measurements one by one.
+
+    Parameters
+    ----------
+    K (n, m) : each column is the gain of one decorrelated measurement after the other.
+    H (m, n), UR (m, m) : measurement matrix, and factors of R.
+    """
+    m, rows = len(UR), decorrelated(UR, H)
+    columns = [K[:, j] for j in range(m)]
+    for i in range(m):
+        for j in range(i):
+            columns[j] = columns[j] - K[:, i] * (rows[i] * columns[j]).sum()
+    for j in range(1, m):
+        for i in range(j):
+            columns[j] = columns[j] - columns[i] * UR[i, j]
+    return np.stack(columns, axis=1)
+
+
+def covariance_of_factors(U: Matrix) -> Matrix:
+    """Return U D U', (n, n): D is the diagonal, U the unit triangle above it."""
+    triangle = np.where(np.tri(len(U), k=-1, dtype=bool), 0, _unit(U))
+    return (triangle * np.diagonal(U)) @ triangle.T
+
+
+def covariance_of_root(S: Matrix) -> Matrix:
+    """Return S S', (n, n)."""
+    return S @ S.T
+
+
+class Factored(NamedTuple):
+    """How a form predicts factors or a root, updates them by one measurement, and what covariance they stand for."""
+
+    predict: Callable[..., Any]
+    observe: Callable[..., Any]
+    covariance: Callable[[Matrix], Matrix]
+
+
+FACTORED: dict[AnyForm, Factored] = {
+    Form.UD: Factored(predict_ud, observe_ud, covariance_of_factors),
+    ArrayForm.POTTER: Factored(predict_root, observe_potter, covariance_of_root),
+    ArrayForm.CARLSON: Factored(predict_root, observe_carlson, covariance_of_root),
 }
-"""How a form with factors or roots predicts them, and updates them by one measurement."""
+"""Forms with factors or roots."""
 
 
 # -- whole steps -------------------------------------------------------------------------------------------------------
@@ -534,7 +572,7 @@ class LinearStep:
 
     def _factored(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
         stored, given, about = self.blocks.stored, self.given, self.about
-        predict, observe = FACTORED[self.form]
+        predict, observe, _ = FACTORED[self.form]
         about("the predicted covariance")
         P, definite = predict(
             stored.covariance(given["Phi"]), P, stored.covariance(given["UQ"]), self.blocks.covariance.times

@@ -16,11 +16,11 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters import bounded_steps
 from gpbnb.filters.emulation import emulate
-from gpbnb.filters.factors import covariance_of_factors
 from gpbnb.filters.forms import ArrayForm, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import simulated_measurements
+from gpbnb.filters.steps import FACTORED, covariance_of_factors
 
 STEPS = ("0.001", "0.005", "0.01", "0.02", "0.04", "0.05", "0.1", "0.2", "0.3", "0.7")
 FORMATS = (FloatFormat(2, 8), FloatFormat(2, 24), FloatFormat(2, 24, Rounding.CHOP), FloatFormat(10, 5))
@@ -152,7 +152,7 @@ def test_a_bound_begins_with_the_distance_of_the_factors_from_the_covariance(for
     start = bounded_steps.contraction_start
     monkeypatch.setattr(bounded_steps, "contraction_start", lambda P, x, off: asked.append(off) or start(P, x, off))
     run = Run(model, fmt, form, (1,), bounded=True)
-    true = np.abs(run.covariance(run.exactly(run.P)) - model.rounded(fmt).P0)
+    true = np.abs(FACTORED[form].covariance(run.exactly(run.P)) - model.rounded(fmt).P0)
     assert true.any()
     for off, exactly in zip(asked[0].flat, true.flat, strict=True):
         assert exactly <= Fraction(off) <= exactly * (1 + Fraction(1, 2**49))
