@@ -37,10 +37,6 @@ from gpbnb.filters.kernels.records import pairs_as_double_doubles
 from gpbnb.filters.model import INPUTS, LETTERS, LinearModel, remembered, stored_arrays
 from gpbnb.filters.steps import FACTORED
 
-#: Entries of a run's status: number of steps done, index of the next checkpoint, first step with a variance or pivot
-#: that is not positive, and step at which a number without a value ended the run.
-DONE, NEXT_CHECKPOINT, INDEFINITE, STOPPED = range(4)
-
 
 class Opening(NamedTuple):
     """What a run starts with, as the compiled loops expect it.

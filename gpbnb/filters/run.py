@@ -26,10 +26,6 @@ from gpbnb.filters.kernels.widened import widen
 from gpbnb.filters.model import INPUTS, LinearModel, identity_in
 from gpbnb.filters.named import form_named
 from gpbnb.filters.opening import (
-    DONE,
-    INDEFINITE,
-    NEXT_CHECKPOINT,
-    STOPPED,
     Opening,
     as_packed,
     opening,
@@ -37,7 +33,7 @@ from gpbnb.filters.opening import (
 )
 from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
-from gpbnb.filters.stepping import Stepper, Stop
+from gpbnb.filters.stepping import Block, Stepper, Stop
 from gpbnb.filters.steps import FACTORED, HUNG_FORMS, combined_gain
 
 LEAST_SHARE = 2.0**-60
@@ -129,7 +125,13 @@ class Run:
         self.X, self.G, self.C = (
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, records), (n, m), (n, n))
         )
-        self.notes = np.zeros(4, dtype=np.int64)
+        #: Number of steps done, and of checkpoints saved.
+        self.steps, self.saved = 0, 0
+        #: The first step at which a variance or a pivot of the innovation covariance was not positive.
+        self.indefinite: int | None = None
+        #: The step at which a division by zero, or a number beyond the range of the backend, ended the run, and why.
+        self.stopped: int | None = None
+        self.reason = ""
         if fmt is not None:
             identity_in(fmt, 1)
         #: What the run starts with, and the matrices of its model.
@@ -137,8 +139,6 @@ class Run:
         self._increment = as_packed(fmt, model.Phi - np.eye(n, dtype=int)) if compensated else None
         self._compensation = np.zeros_like(self.x)
         self._stepper: Stepper | None = None
-        #: Why the run stopped, if it did.
-        self.reason = ""
         self._carried: CarriedBound | None = None
         if bounded:
             self._stored = model if fmt is None else model.rounded(fmt)
@@ -216,33 +216,16 @@ class Run:
             raise ValueError("got a run without its bound; needed bounded=True")
         return self._carried
 
-    @property
-    def steps(self) -> int:
-        """Number of steps done."""
-        return int(self.notes[DONE])
-
-    @property
-    def indefinite(self) -> int | None:
-        """The first step at which a variance or a pivot of the innovation covariance was not positive."""
-        return int(self.notes[INDEFINITE]) or None
-
-    @property
-    def stopped(self) -> int | None:
-        """The step at which a division by zero, or a number beyond the range of the backend, ended the run."""
-        return int(self.notes[STOPPED]) or None
-
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
         self.model.check_measurements(z, self.steps)
-        if self.stopped:
-            return
-        if self._carried is not None:
-            self._take_bounded(self._carried, self.pack_measurements(z))
-            return
-        self.advance(self.pack_measurements(z), (self.checkpoint_steps, self.X, self.G, self.C), self.notes)
+        if self.stopped is None:
+            packed = self.pack_measurements(z)
+            for _ in self.advance(packed) if self._carried is None else self._advance_bounded(self._carried, packed):
+                pass
 
-    def _take_bounded(self, carried: CarriedBound, z: NDArray[Any]) -> None:
-        """Take steps with packed measurements, keep the results of a block at a time, and take the bound over it."""
+    def _advance_bounded(self, carried: CarriedBound, z: NDArray[Any]) -> Iterator[None]:
+        """Take steps with packed measurements, and the bound over a block of them at a time."""
         exact_z = widened(z) if z.dtype == np.float64 else double_doubles(self.exactly(z))
         for begin in range(0, len(z), BLOCK):
             first, end = self.steps, begin + BLOCK
@@ -254,8 +237,7 @@ class Run:
                 if self.model.has_inputs:
                     after, measured = self._without_inputs(first, x[1:], z[begin : begin + done])
                 carried.take(first, Taken(measured, estimates[:-1], after, *each))
-            if self.stopped:
-                return
+            yield
 
     def _without_inputs(
         self, first: int, x: NDArray[Any], z: NDArray[Any]
@@ -318,8 +300,7 @@ class Run:
 
     def save_at(self, checkpoint_steps: NDArray[np.int64]) -> None:
         """Save the results of other steps, at most as many as before, in place of all results saved so far."""
-        self.checkpoint_steps = checkpoint_steps
-        self.notes[NEXT_CHECKPOINT] = 0
+        self.checkpoint_steps, self.saved = checkpoint_steps, 0
         if self._carried is not None:
             self._carried.checkpoint_steps = checkpoint_steps
 
@@ -354,51 +335,36 @@ class Run:
         The first entry of each is the value before these steps (zeros for the gain), followed by one entry for each
         step done.
         """
-        first, at = self.steps, int(self.notes[NEXT_CHECKPOINT])
-        x, K, P = (np.zeros((len(z) + 1, *each.shape[1:]), each.dtype) for each in (self.X, self.G, self.C))
-        x[0], P[0] = self.x, self.P
-        every, notes = np.arange(first + 1, first + len(z) + 1), self.notes.copy()
-        notes[NEXT_CHECKPOINT] = 0
-        self.advance(z, (every, x[1:], K[1:], P[1:]), notes)
-        done = int(notes[DONE]) - first
-        notes[NEXT_CHECKPOINT] = np.searchsorted(self.checkpoint_steps, notes[DONE], side="right")
-        saved = slice(at, notes[NEXT_CHECKPOINT])
-        rows = self.checkpoint_steps[saved] - first
-        self.X[saved], self.G[saved], self.C[saved], self.notes[:] = x[rows], K[rows], P[rows], notes
-        return x[: done + 1], K[: done + 1], P[: done + 1]
+        before = self.x.copy(), np.zeros(self.G.shape[1:], self.G.dtype), self.P.copy()
+        parts = [(each.x, each.K, each.P) for each in self.advance(z)]
+        x, K, P = (np.concatenate([first[None], *rest]) for first, *rest in zip(before, *parts, strict=True))
+        return x, K, P
 
-    def advance(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
-        """Take one step per packed measurement, (steps, m, columns of x), up to one that ends the run.
+    def advance(self, z: NDArray[Any]) -> Iterator[Block]:
+        """Take one step per packed measurement, (steps, m, columns of x), and give the results of a block at a time.
 
         Formats without a range run in float64. Where a step would leave it, for example because an estimate decays
-        below 2**-960, entries of the estimate below 2**-700 become zero first.
-
-        Parameters
-        ----------
-        kept : the checkpoint steps; arrays for estimates, gains and covariances, or factors, at them.
-        notes : the status of the run, which is brought up to date.
+        below 2**-960, entries of the estimate below 2**-700 become zero first. A step that has no result ends the run.
         """
         if self._stepper is None:
             self._stepper = self._made_stepper()
-        steps, *arrays = kept
         at = 0
-        while at < len(z) and not notes[STOPPED]:
-            first = int(notes[DONE])
+        while at < len(z) and self.stopped is None:
+            first, begin = self.steps, self.saved
             found = self._stepper.take(first, z[at : at + self._stepper.longest], self.x, self._compensation, self.P)
             done = len(found.x)
             at += done
-            notes[DONE] = first + done
-            if not notes[INDEFINITE] and not found.definite.all():
-                notes[INDEFINITE] = first + 1 + int(np.argmin(found.definite))
-            begin = int(notes[NEXT_CHECKPOINT])
-            end = int(np.searchsorted(steps, first + done, side="right"))
-            rows = steps[begin:end] - first - 1
-            for array, each in zip(arrays, (found.x, found.K, found.P), strict=True):
-                array[begin:end] = each[rows]
-            notes[NEXT_CHECKPOINT] = end
+            self.steps += done
+            if self.indefinite is None and not found.definite.all():
+                self.indefinite = first + 1 + int(np.argmin(found.definite))
+            self.saved = int(np.searchsorted(self.checkpoint_steps, self.steps, side="right"))
+            rows = self.checkpoint_steps[begin : self.saved] - first - 1
+            for array, each in zip((self.X, self.G, self.C), (found.x, found.K, found.P), strict=True):
+                array[begin : self.saved] = each[rows]
             if found.stop is not None and not (found.stop.fault.overflows and self._drop_decayed()):
-                notes[STOPPED] = first + done + 1
-                self.reason = self._reason(found.stop, first + done + 1)
+                self.stopped = self.steps + 1
+                self.reason = self._reason(found.stop, self.stopped)
+            yield found
 
     @property
     def _limits(self) -> Limits | None:
@@ -468,7 +434,7 @@ class Run:
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""
-        count = int(self.notes[NEXT_CHECKPOINT])
+        count = self.saved
         steps = [int(step) for step in self.checkpoint_steps[:count]]
         x, K, P = (Packed(each[:count].copy(), self.fmt) for each in (self.X[:, :, 0], self.G, self.C))
         if self.form in FACTORED:
@@ -554,7 +520,7 @@ def reference(
     start = run.P.copy()
     run.take(z)
     if run.form is not Form.UD:
-        count = int(run.notes[NEXT_CHECKPOINT])
+        count = run.saved
         at = np.array([0, *run.checkpoint_steps[:count]])
         if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C[:count]])):
             steps = precise_steps(model, z)
