@@ -36,10 +36,9 @@ class Block(NamedTuple):
 
     #: (steps, n, records, ...).
     x: NDArray[Any]
-    #: (steps, n, m, ...), (steps, n, n, ...) and (steps, m, m, ...).
+    #: (steps, n, m, ...) and (steps, n, n, ...).
     K: NDArray[Any]
     P: NDArray[Any]
-    S: NDArray[Any]
     #: (steps,).
     definite: NDArray[np.bool_]
     stop: Stop | None
@@ -108,8 +107,7 @@ class Stepper:
         loaded = tables(formats, tag)
         self._gain = _loop(step, step.gain, formats, alone, _GAIN, loaded)
         self._estimate = _loop(late, step.estimate._replace(rows=rows), formats, lanes, _ESTIMATE, loaded)
-        self._kept_at = np.concatenate([step.shared, step.K.ravel(), step.after["P"].ravel(), step.S.ravel()])
-        self._ends = np.cumsum([len(step.shared), step.K.size, step.after["P"].size])
+        self._kept_at = np.concatenate([step.shared, step.K.ravel(), step.after["P"].ravel()])
         repeats = formats[0] is None or formats[0].rounding is not Rounding.STOCHASTIC
         most = max(min(_LONGEST_BLOCK, _NUMBERS // max(len(self._kept_at), 1)), 16)
         work = len(step.gain.rows) + records * len(rows)
@@ -117,27 +115,18 @@ class Stepper:
         self.longest = 1 if not repeats else next(slices(most, work)).stop
         self._repeated: tuple[int, NDArray[Any], NDArray[np.bool_]] | None = None
         self._last: NDArray[Any] | None = None
-        self._model = dict(model)
-        self._feed_gain()
+        self._gain.feed(self._groups(model, self._gain))
+        self._of_estimate = self._groups(model, self._estimate)
 
-    def replace(self, letter: str, table: NDArray[Any]) -> None:
-        """Take another cycle of matrices from now on."""
-        self._model[letter] = table
-        self._repeated = self._last = None
-        self._feed_gain()
-
-    def _groups(self, part: Loop) -> list[tuple[NDArray[np.int64], NDArray[Any]]]:
+    def _groups(self, model: dict[str, NDArray[Any]], part: Loop) -> list[tuple[NDArray[np.int64], NDArray[Any]]]:
+        """Return the numbers of the model that a part of a step takes, and their places."""
         found = []
-        for letter, table in self._model.items():
+        for letter, table in model.items():
             places = self._step.places[letter].ravel()
             if np.isin(places, part.rows[:, 1:4]).any() or np.isin(places, part.after).any():
                 parts = table.shape[1 + self._step.places[letter].ndim :]
                 found.append((places, table.reshape(len(table), places.size, *parts)))
         return found
-
-    def _feed_gain(self) -> None:
-        self._gain.feed(self._groups(self._gain))
-        self._of_estimate = self._groups(self._estimate)
 
     def take(self, first: int, z: NDArray[Any], x: NDArray[Any], carried: NDArray[Any], P: NDArray[Any]) -> Block:
         """Take one step for each of the measurements (steps, m, records, ...), at most :attr:`longest`.
@@ -153,9 +142,10 @@ class Stepper:
         estimate = self._estimate
         lanes = estimate.values.shape[1:]
         parts = kept.shape[3:]
-        table = kept[:, : self._ends[0]].reshape(count, self._ends[0], *parts)
+        shared = len(step.shared)
+        table = kept[:, :shared].reshape(count, shared, *parts)
         groups = list(self._of_estimate)
-        if self._ends[0] and count:
+        if shared and count:
             groups.append((self._shared_at, np.roll(table, first % count, axis=0)))
         estimate.feed(groups)
         estimate.states = np.concatenate([x, carried])
@@ -167,18 +157,16 @@ class Stepper:
         done = len(found)
         states = estimate.states.reshape(2 * n, *x.shape[1:])
         x[:], carried[:] = states[:n], states[n:]
-        K, covariances, S = (
+        K, covariances = (
             each.reshape(done, *like.shape, *parts)
             for each, like in zip(
-                np.split(kept[:done, self._ends[0] :], self._ends[1:] - self._ends[0], axis=1),
-                (step.K, step.after["P"], step.S),
-                strict=True,
+                np.split(kept[:done, shared:], [step.K.size], axis=1), (step.K, step.after["P"]), strict=True
             )
         )
         if done:
             P[:] = covariances[-1]
         self._last = P.copy()
-        return Block(found.reshape(done, *x.shape), K, covariances, S, definite[:done], stop)
+        return Block(found.reshape(done, *x.shape), K, covariances, definite[:done], stop)
 
     def _gains(self, first: int, count: int, P: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_], Stop | None]:
         """Return what the gain's program computes in some steps."""
