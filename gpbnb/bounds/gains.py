@@ -214,7 +214,7 @@ def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> t
     rows : indices of the run's checkpoints; the first checkpoint is for step `before` + 1.
     """
     n, m, last = run.model.n, run.model.m, int(rows.max()) + 1
-    Phi, H = run.matrices.Phi, run.matrices.H
+    Phi, H = run.letters["Phi"], run.letters["H"]
     K = np.ascontiguousarray(run.G[:last])
     tail = K.shape[3:]
 
@@ -231,10 +231,11 @@ def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> t
         (F,) = loop.run(run.fmt, K, H[every % len(H)], Phi[every % len(Phi)])
         return loop_program(n, m), np.concatenate([flat(F), flat(K)], axis=1)
     if run.form is Form.UD:
-        every = np.arange(int(np.lcm(len(H), len(run.UR))))
+        UR = run.letters["UR"]
+        every = np.arange(int(np.lcm(len(H), len(UR))))
         rows_of = recorded(decorrelated, (m, m), (m, n))
-        (D,) = rows_of.run(run.fmt, run.UR[every % len(run.UR)], H[every % len(H)])
-        U = np.array(run.UR)
+        (D,) = rows_of.run(run.fmt, UR[every % len(UR)], H[every % len(H)])
+        U = np.array(UR)
         for i in range(m):  # the diagonal stores variances in place of ones
             U[:, i, : i + 1] = 0
         parts = [of_cycle(each) for each in (Phi, U, D)]

@@ -22,7 +22,7 @@ from gpbnb.filters.contraction import (
 )
 from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.opening import Opening, opening
+from gpbnb.filters.opening import opening
 from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.steps import FACTORED, StepModel, combined_gain
 
@@ -78,7 +78,7 @@ class CarriedBound:
         self.form, self.checkpoint_steps = form, checkpoint_steps
         given = stored.to_float()
         self._plain = given["Phi"], given["H"], given["Q"], given["R"]
-        self._exact = opening(stored, None, Form.INNOVATION, DoubleDouble())
+        self._exact = opening(stored, None, Form.INNOVATION, DoubleDouble()).letters
         self._repetition = _repetition(self._exact)
         n, m, count = stored.n, stored.m, len(checkpoint_steps)
         #: Bounds at the checkpoint steps.
@@ -126,7 +126,7 @@ class CarriedBound:
         """Take the bound over as many steps as can be repeated; return their number."""
         x, after, steps = taken.before[:, :, 0], taken.after[:, :, 0], len(covariances) - 1
         z, every = taken.z[:steps, :, 0], first + np.arange(steps)
-        Phi, H, Q, R = (each[every % len(each)] for each in _model(self._exact).values())
+        Phi, H, Q, R = (each[every % len(each)] for each in self._exact.values())
         (xe, Ke, Pe, Se), _ = self._repetition.begin(None, x[:steps], covariances[:-1], z, Phi, H, Q, R)
         steps, n, m = len(xe), x.shape[1], z.shape[1]
         compared = recorded(_residuals, (n, n), (m, n), (m,), (n,), (n,), (n, n), (n,), (n, n))
@@ -160,17 +160,13 @@ class CarriedBound:
         return steps
 
 
-def _repetition(exact: Opening) -> Lanes:
+def _repetition(exact: dict[str, Array]) -> Lanes:
     """Return a step in double-double from a given state; it takes the arrays x, P, z, Phi, H, Q and R."""
-    step = recorded_step(step_kind(Form.INNOVATION, _model(exact), None))
+    step = recorded_step(step_kind(Form.INNOVATION, exact, None))
     parts = step.gain, step.estimate
     rows = np.concatenate([part.rows for part in parts])[np.argsort(np.concatenate([part.at for part in parts]))]
     given = [step.places[letter] for letter in ("x", "P", "z", "Phi", "H", "Q", "R")]
     return Lanes(rows, step.sizes, step.constants, given, [step.after["x"], step.K, step.after["P"], step.S])
-
-
-def _model(exact: Opening) -> dict[str, Array]:
-    return {"Phi": exact.Phi, "H": exact.H, "Q": exact.Q, "R": exact.R}
 
 
 def _symmetric(P: Any) -> Any:

@@ -39,37 +39,26 @@ from gpbnb.filters.steps import FACTORED
 
 
 class Opening(NamedTuple):
-    """What a run starts with, as the compiled loops expect it.
+    """What a run starts with, as the compiled loops expect it; its arrays may be those of other runs.
 
     Parameters
     ----------
-    Phi, H, Q, R : (p, n, n), (p, m, n), (p, n, n) and (p, m, m), each with its own cycle of p members.
-    x0, P0 : (n,) and (n, n).
-    UQ, UR, U0 : factors of Q, R and P0 in the UD form, with D on the diagonal; in forms with roots, factors of R, and
-        roots of Q and P0; otherwise zeros.
-    RI : inverses of R in Hung's form with the second gain; otherwise zeros.
-    inputs : known inputs and offsets by their letters.
-    raised : covariances whose variances were raised until their factors were definite.
-    repairs : all changes of covariances, including those of the model.
+    x0, P0 : (n,) and (n, n); P0 is factors in the UD form, with D on the diagonal, or a root.
+    letters : matrices by their letters, each with its own cycle: Phi, H, Q and R, or UQ and UR, factors in the UD form,
+        in forms with roots a root of Q and factors of R. RI are inverses of R in Hung's form with the second gain, and
+        B, u, b and d known inputs and offsets.
+    repairs : all changes of covariances: those of the model, and variances that were raised until their factors were
+        definite.
     """
 
-    Phi: NDArray[Any]
-    H: NDArray[Any]
-    Q: NDArray[Any]
-    R: NDArray[Any]
     x0: NDArray[Any]
     P0: NDArray[Any]
-    UQ: NDArray[Any]
-    UR: NDArray[Any]
-    U0: NDArray[Any]
-    RI: NDArray[Any]
-    inputs: dict[str, NDArray[Any]]
-    raised: tuple[Repair, ...]
+    letters: dict[str, NDArray[Any]]
     repairs: tuple[Repair, ...]
 
 
 def opening(model: LinearModel, fmt: FloatFormat | None, form: AnyForm, tag: Tag) -> Opening:
-    """Return what a filter starts with; its arrays are new.
+    """Return what a filter starts with.
 
     Parameters
     ----------
@@ -78,13 +67,14 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: AnyForm, tag: Tag
     tag : arithmetic of the run, from which factors and inverses take their random numbers, too.
     """
     stored = model if fmt is None else model.definite_in(fmt)
-    given = _double_doubles(stored) if fmt is None else _packed(stored, fmt)
-    Phi, H, Q, R, x0, P0 = (given[letter].copy() for letter in LETTERS)
-    UQ, UR, U0, RI = (np.zeros_like(each) for each in (Q, R, P0, R))
-    raised: list[Repair] = []
+    letters = dict(_double_doubles(stored) if fmt is None else _packed(stored, fmt))
+    x0, P0, raised, lost = letters.pop("x0"), letters.pop("P0"), list[Repair](), ""
+    if model.u is not None and model.u.ndim == 1:
+        letters["u"] = letters["u"][np.newaxis]
 
-    def factored(letter: str, packed: NDArray[Any], factors: NDArray[Any]) -> bool:
-        """Compute factors, of raised variances if those stored are indefinite; whether any are definite."""
+    def factored(letter: str, packed: NDArray[Any]) -> NDArray[Any] | None:
+        """Return factors, of raised variances if those stored are indefinite; None if none are definite."""
+        factors = np.zeros_like(packed)
 
         def sound(given: NDArray[Any]) -> bool:
             definite = factors_of_each(fmt, tag, given, factors)
@@ -92,9 +82,9 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: AnyForm, tag: Tag
             return definite and (letter != "R" or bool(np.all(np.diagonal(signs, axis1=1, axis2=2) > 0)))
 
         if sound(packed):
-            return True
+            return factors
         if model.repair is False:
-            return False
+            return None
         matrices = getattr(stored, letter)
         found = raised_until(
             matrices.reshape(-1, *matrices.shape[-2:]),
@@ -102,19 +92,27 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: AnyForm, tag: Tag
             least_shift(fmt),
             LARGEST_STORED_SHIFT,
         )
-        if found is not None:
-            raised.append(Repair(letter, 0, 0.0, found[1], fmt))
-        return found is not None
+        if found is None:
+            return None
+        raised.append(Repair(letter, 0, 0.0, found[1], fmt))
+        return factors
 
-    lost = ""
     try:
         if form is Form.HUNG_SECOND_GAIN:
-            lost = "" if inverses_of_each(fmt, tag, R, RI) else "R"
+            letters["RI"] = np.zeros_like(letters["R"])
+            lost = "" if inverses_of_each(fmt, tag, letters["R"], letters["RI"]) else "R"
         elif form in FACTORED:
-            pairs = ("Q", Q, UQ), ("R", R, UR), ("P0", P0[np.newaxis], U0[np.newaxis])
-            lost = next((letter for letter, *arrays in pairs if not factored(letter, *arrays)), "")
-            if form in ROOTS and not lost:
-                UQ, U0 = roots_of_each(fmt, tag, UQ), roots_of_each(fmt, tag, U0[np.newaxis])[0]
+            for letter, packed in (("Q", letters.pop("Q")), ("R", letters.pop("R")), ("P0", P0[np.newaxis])):
+                factors = factored(letter, packed)
+                if factors is None:
+                    lost = letter
+                    break
+                letters[f"U{letter}"] = factors
+            else:
+                P0 = letters.pop("UP0")
+                if form in ROOTS:
+                    letters["UQ"], P0 = roots_of_each(fmt, tag, letters["UQ"]), roots_of_each(fmt, tag, P0)
+                P0 = P0[0]
     except ZeroDivisionError:
         lost = "R"
     except OverflowError as error:
@@ -128,10 +126,7 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: AnyForm, tag: Tag
             f"got {model.name} in {words}, in which {lost} does not stay {kind} when its factors or inverse are "
             f"computed; needed a covariance that does; use more {unit}, or add a little to the diagonal of {lost}"
         )
-    inputs = {letter: each for letter, each in given.items() if letter in INPUTS}
-    if model.u is not None and model.u.ndim == 1:
-        inputs["u"] = inputs["u"][np.newaxis]
-    return Opening(Phi, H, Q, R, x0, P0, UQ, UR, U0, RI, inputs, tuple(raised), (*stored.repairs, *raised))
+    return Opening(x0, P0, letters, (*stored.repairs, *raised))
 
 
 def as_packed(fmt: FloatFormat | FixedFormat | None, values: Any) -> NDArray[Any]:

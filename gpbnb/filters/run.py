@@ -120,8 +120,11 @@ class Run:
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
         self.records = records
         self.x = np.ascontiguousarray(np.repeat(start.x0[:, np.newaxis], records, axis=1))
-        self.P = start.U0 if self.form in FACTORED else start.P0
-        self.UQ, self.UR = start.UQ, start.UR
+        self.P = start.P0.copy()
+        #: What a step takes of the model, packed, by letters: matrices with a cycle of their own, and inputs.
+        self.letters = start.letters
+        if compensated:
+            self.letters["increment"] = as_packed(fmt, model.Phi - np.eye(n, dtype=int))
         self.X, self.G, self.C = (
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, records), (n, m), (n, n))
         )
@@ -134,9 +137,6 @@ class Run:
         self.reason = ""
         if fmt is not None:
             identity_in(fmt, 1)
-        #: What the run starts with, and the matrices of its model.
-        self.matrices = start
-        self._increment = as_packed(fmt, model.Phi - np.eye(n, dtype=int)) if compensated else None
         self._compensation = np.zeros_like(self.x)
         self._stepper: Stepper | None = None
         self._carried: CarriedBound | None = None
@@ -186,11 +186,8 @@ class Run:
 
     def _in_blocks(self, start: Opening, formats: BlockFormats) -> Opening:
         """Return a start whose state and covariance are rounded into the formats of their blocks."""
-        x0, P0, U0 = map(self.exactly, (start.x0, start.P0, start.U0))
-        covariance = formats.covariance
-        return start._replace(
-            x0=as_packed(formats.state, x0), P0=as_packed(covariance, P0), U0=as_packed(covariance, U0)
-        )
+        x0, P0 = as_packed(formats.state, self.exactly(start.x0)), self.exactly(start.P0)
+        return start._replace(x0=x0, P0=as_packed(formats.covariance, P0))
 
     @property
     def bounded(self) -> bool:
@@ -231,7 +228,7 @@ class Run:
             first, end = self.steps, begin + BLOCK
             x, K, P = self.take_block(z[begin:end])
             if done := len(x) - 1:
-                each = (widened(part) for part in (P, K[1:], self.UR))
+                each = (widened(part) for part in (P, K[1:], self.letters["UR" if self.form in FACTORED else "R"]))
                 estimates, measured = widened_estimates(x), exact_z[begin : begin + done]
                 after = estimates[1:]
                 if self.model.has_inputs:
@@ -295,7 +292,7 @@ class Run:
             packed[..., 1] -= np.where(packed[..., 0] == 0, 0, decimals)
         else:
             packed = as_packed(self.fmt, H)
-        self.matrices = self.matrices._replace(H=packed)
+        self.letters["H"] = packed
         self._stepper = None
 
     def save_at(self, checkpoint_steps: NDArray[np.int64]) -> None:
@@ -398,23 +395,11 @@ class Run:
             reason += "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
         return reason
 
-    @property
-    def letters(self) -> dict[str, NDArray[Any]]:
-        """What a step takes of the model, packed, by letters: matrices with a cycle of their own, and inputs."""
-        each = self.matrices
-        model = {"Phi": each.Phi, "H": each.H}
-        model |= {"UQ": self.UQ, "UR": self.UR} if self.form in FACTORED else {"Q": each.Q, "R": each.R}
-        if self.form is Form.HUNG_SECOND_GAIN:
-            model["RI"] = each.RI
-        if self._increment is not None:
-            model["increment"] = self._increment
-        return model | each.inputs
-
     def _made_stepper(self) -> Stepper:
         """Record a step, and make it ready to run in the run's formats."""
         model, (formats, blocks, sums) = self.letters, self._formats()
         cycle = int(np.lcm.reduce([len(table) for letter, table in model.items() if letter not in INPUTS]))
-        kind = step_kind(self.form, model, formats[0], blocks, sums, self._increment is not None)
+        kind = step_kind(self.form, model, formats[0], blocks, sums, "increment" in model)
         repeats = self.fmt is None or self.fmt.rounding is not Rounding.STOCHASTIC
         return Stepper(recorded_step(kind), formats, model, self.records, cycle if repeats else 0, self.tag)
 
@@ -444,7 +429,7 @@ class Run:
     def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return gains and covariances from factors and from the gains of one measurement after the other."""
         gains, covariances = np.empty_like(K), np.empty_like(U)
-        H, UR = self.exactly(self.matrices.H), self.exactly(self.UR)
+        H, UR = self.exactly(self.letters["H"]), self.exactly(self.letters["UR"])
         for at, step in enumerate(self.checkpoint_steps[: len(K)] - 1):
             gains[at] = combined_gain(K[at], H[step % len(H)], UR[step % len(UR)])
             covariances[at] = FACTORED[self.form].covariance(U[at])

@@ -63,7 +63,7 @@ def _raised_models(fmt: FloatFormat | FixedFormat, count: int) -> list[LinearMod
     for seed in range(1000):
         model = _drawn(seed)
         run, other = (Run(each, fmt, Form.UD, ()) for each in (model, model.rounded(fmt)))  # type: ignore[arg-type]
-        if not np.array_equal(run.UQ, other.UQ) or not np.array_equal(run.P, other.P):
+        if not np.array_equal(run.letters["UQ"], other.letters["UQ"]) or not np.array_equal(run.P, other.P):
             found.append(model)
         if len(found) == count:
             return found
@@ -94,14 +94,14 @@ def test_companions_are_for_the_run_of_the_model_as_given(monkeypatch: Any) -> N
     def noted(self: Run, model: LinearModel, fmt: Any, *arguments: Any, **options: Any) -> None:
         start(self, model, fmt, *arguments, **options)
         if self.form is Form.UD:
-            opened.append((self.exactly(self.UQ), self.exactly(self.P)))
+            opened.append((self.exactly(self.letters["UQ"]), self.exactly(self.P)))
 
     (model,) = _raised_models(NINE, 1)
     user = Run(model, NINE, Form.UD, ())
     monkeypatch.setattr(Run, "__init__", noted)
     companion_run(model, np.zeros((2, model.m)), NINE, Form.UD)
     ((UQ, P),) = opened
-    assert np.array_equal(UQ, user.exactly(user.UQ))
+    assert np.array_equal(UQ, user.exactly(user.letters["UQ"]))
     assert np.array_equal(P, user.exactly(user.P))
     assert user.repairs == Run(model, NINE, ArrayForm.POTTER, ()).repairs
 

@@ -107,7 +107,7 @@ def test_factors_are_those_of_the_raised_covariance():
         run, stored = Run(model, fmt, Form.UD, ()), model.definite_in(fmt)
         if run.repairs != list(stored.repairs):
             assert run.repairs[-1].letter == "Q"
-            found = covariance_of_factors(run.exactly(run.UQ)[0])
+            found = covariance_of_factors(run.exactly(run.letters["UQ"])[0])
             sizes = np.sqrt(np.diagonal(stored.Q[0]).astype(float))
             off = (np.abs(found - stored.Q[0]) / np.multiply.outer(sizes, sizes)).astype(float)
             assert 0 < off.max() <= 2 * run.repairs[-1].shift + 8 * model.n * float(fmt.unit_roundoff)
@@ -126,7 +126,7 @@ def test_each_covariance_is_raised_by_itself(letter):
     run = Run(model, fmt, Form.UD, ())
     assert [each.letter for each in run.repairs] == [letter]
     sizes = np.sqrt(np.diagonal(given).astype(float))
-    for name, factors in (("Q", run.UQ[0]), ("R", run.UR[0]), ("P0", run.P)):
+    for name, factors in (("Q", run.letters["UQ"][0]), ("R", run.letters["UR"][0]), ("P0", run.P)):
         off = covariance_of_factors(run.exactly(factors)) - (given if name == letter else one)
         assert np.abs(off / np.multiply.outer(sizes, sizes)).max() <= 2 * run.repairs[0].shift + 24 * 2.0**-24
 

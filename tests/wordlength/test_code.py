@@ -183,7 +183,7 @@ def test_the_ud_form_divides_by_no_factor_of_r_that_is_zero(tmp_path):
     model = LinearModel([["0.9"]], [["1"], ["0.5"]], [["0.5"]], R, [0], [["1"]])
     run = Run(model, FixedFormat(4, 12), Form.UD, ())
     assert [each.letter for each in run.repairs] == ["R"]
-    assert (run.exactly(run.UR)[0].diagonal() > 0).all()
+    assert (run.exactly(run.letters["UR"])[0].diagonal() > 0).all()
     with pytest.raises(ValueError, match="in which R does not stay positive definite when its factors"):
         write_code(replace(model, H=[["1"]], R=[["0.01"]]), FixedFormat(6, 4), tmp_path, form=Form.UD)
 
