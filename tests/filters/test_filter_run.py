@@ -77,7 +77,7 @@ def test_a_run_in_pieces_is_the_run_in_one(fmt, form):
     for piece in (z[:1], z[1:1], z[1:8], z[8:]):
         parts.take(piece)
     assert parts.steps == whole.steps == 20
-    for name in ("x", "P", "X", "G", "C", "notes"):
+    for name in ("x", "P", "X", "G", "C", "steps", "saved", "indefinite"):
         assert np.array_equal(getattr(parts, name), getattr(whole, name))
 
 
