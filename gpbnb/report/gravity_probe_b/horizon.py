@@ -167,7 +167,6 @@ class HorizonRow(NamedTuple):
     steps: int
     states: str
     bounds: tuple[float, ...]
-    gain_parts: tuple[float, ...]
 
 
 def table() -> Table:
@@ -244,6 +243,5 @@ SWEEP: Sweep[int] = Sweep(
 def load(file: Path = FILE) -> tuple[HorizonRow, ...]:
     """Return the stored rows."""
     return tuple(
-        HorizonRow(int(line[0]), int(line[1]), line[2], tuple(map(float, line[3:13])), tuple(map(float, line[13:])))
-        for line in SWEEP.load(file).rows
+        HorizonRow(int(line[0]), int(line[1]), line[2], tuple(map(float, line[3:13]))) for line in SWEEP.load(file).rows
     )

@@ -22,17 +22,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.definiteness import factor
 from gpbnb.filters.kernels.simulation import measured
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.simulation import BLOCK
+from gpbnb.filters.simulation import BLOCK, covariance_root
+from gpbnb.report.display.tables import Table
+from gpbnb.report.gravity_probe_b.year import STORED
 
 STATES = (
     ("drift φ2", "mas"),
@@ -111,6 +111,12 @@ PARAMETERS = (
 """The numbers of the model, with their sources."""
 
 _VALUE = {each.name: each.value for each in PARAMETERS}
+
+
+def parameters() -> Table:
+    """Tabulate the numbers of the model with their sources."""
+    rows = tuple((each.name, f"{each.value:g}", each.unit, each.source) for each in PARAMETERS)
+    return Table("parameters of the mission model", ("parameter", "value", "unit", "source"), rows)
 
 
 @dataclass(frozen=True)
@@ -219,10 +225,10 @@ class Mission:
         P0 = [*(first[0],) * 2, *(first[1],) * 2, alpha, alpha, first[2], first[3], first[4], first[4], *(flicker,) * 3]
         return LinearModel(
             Phi=_short(Phi, base),
-            H=_exact(np.zeros((2, _N))),
+            H=np.zeros((2, _N)),
             Q=_short(np.diag(Q), base),
             R=_short(np.diag([white, telescope]), base),
-            x0=_exact(np.zeros(_N)),
+            x0=np.zeros(_N),
             P0=_short(np.diag(P0), base),
             name=str(self),
         )
@@ -263,11 +269,8 @@ class Mission:
     @cached_property
     def _truth_model(self) -> tuple[NDArray[np.float64], ...]:
         given = self.model(2)
-        roots = []
-        for covariance in (given.Q[0], given.R[0]):
-            lower, d = factor(covariance)
-            roots.append(lower.astype(np.float64) * np.sqrt(d.astype(np.float64)))
-        return given.Phi.astype(np.float64), roots[0][np.newaxis], roots[1][np.newaxis]
+        process, noise = (covariance_root(covariance)[np.newaxis] for covariance in (given.Q[0], given.R[0]))
+        return given.Phi.astype(np.float64), process, noise
 
     def measurements(
         self, record: int, block: int, truth: NDArray[np.float64], H: NDArray[np.float64] | None, steps: int
@@ -308,20 +311,8 @@ def _earth_velocity(years: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _short(values: NDArray[np.float64], base: int) -> NDArray[Any]:
     """Return the nearest numbers of 14 bits or 4 decimal digits, via 9 digits that are the same on every machine."""
-    digits = 4 if base == 10 else 14
-    result = np.empty(values.shape, dtype=object)
-    for index in np.ndindex(values.shape):
-        value = Fraction(f"{values[index]:.9g}")
-        if value:
-            exponent = math.floor(math.log(abs(value), base)) - digits + 1
-            unit = Fraction(base) ** exponent
-            value = round(value / unit) * unit
-        result[index] = value
-    return result
-
-
-def _exact(values: NDArray[np.float64]) -> NDArray[Any]:
-    return np.array([Fraction(value) for value in values.flat], dtype=object).reshape(values.shape)
+    found = [STORED[base].round(f"{value:.9g}") for value in values.flat]
+    return np.array(found, dtype=object).reshape(values.shape)
 
 
 # -- the settings of the study, and what a year tells --------------------------------------------------

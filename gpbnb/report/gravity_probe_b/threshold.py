@@ -27,7 +27,6 @@ from gpbnb.filters.kernels.records import update_largest
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import BLOCK, Simulation
-from gpbnb.report.confidence import interval
 from gpbnb.report.gravity_probe_b.mission import SETTINGS, Mission
 from gpbnb.report.gravity_probe_b.model import TRUTH, YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS, model
@@ -268,11 +267,7 @@ MISSION_SWEEP = _sweep("mission", MISSION_COLUMNS, MISSION_CELLS, MISSION_SEED)
 
 
 class Share(NamedTuple):
-    """Largest errors of a year in one format, over many records; in mas and mas/yr.
-
-    `low` and `high` limit the probability that a record stays within the tolerance. Each limit is one-sided and has a
-    confidence of 95 %.
-    """
+    """Largest errors of a year in one format over many records, in mas and mas/yr, and how many meet the tolerance."""
 
     setting: str
     states: str
@@ -280,8 +275,6 @@ class Share(NamedTuple):
     fmt: FloatFormat
     errors: NDArray[np.float64]
     within: int
-    low: float
-    high: float
 
     @property
     def records(self) -> int:
@@ -306,7 +299,7 @@ def shares(table: StoredTable, tolerance: float = 1.0) -> tuple[Share, ...]:
         errors = np.array(group)
         within = int((errors <= tolerance).sum())
         fmt = FloatFormat(int(base), int(precision), Rounding(rounding))
-        found.append(Share(setting, states, form, fmt, errors, within, *interval(within, len(errors))))
+        found.append(Share(setting, states, form, fmt, errors, within))
     return tuple(sorted(found, key=_order))
 
 
