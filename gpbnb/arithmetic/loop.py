@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.machine import Memory, advance, code_of, first_without_result, is_far
+from gpbnb.arithmetic.machine import Memory, as_words, code_of, first_without_result, functions, is_far
 
 
 class Loop:
@@ -113,38 +113,40 @@ class Loop:
         """
         steps, lanes, machine, memory = len(own), self.values.shape[1:], self._machine, self._memory
         kept = np.empty((steps, len(kept_at), *lanes), self.values.dtype)
-        held, row = np.ones((steps, *lanes[:1]), np.uint8), 0
-        results = machine.Kept(
-            kept.reshape(steps, len(kept_at) * memory.width),
-            held.reshape(steps, memory.truths.shape[1]),
-            self._before,
-            np.empty_like(self._before),
+        held, row = np.ones(steps * memory.lanes, np.uint8), 0
+        run = machine.Stepping(
+            first,
+            steps,
+            cycle,
+            memory.lanes,
+            memory.width,
+            as_words(own),
+            at * memory.width,
+            own.shape[1] * memory.width,
+            as_words(self._table),
+            self._table.shape[1],
+            self._feeds.reshape(-1),
+            *map(memory.places, (self._states, self.after, kept_at)),
+            self._truth,
+            as_words(kept),
+            held,
+            as_words(self._before),
+            np.empty(self._before.size, np.int64),
         )
         far = any(self._distant.values()) or self._far(own) or self._far(self.states)
+        self._notes[machine.DONE] = 0
         with contextlib.suppress(OverflowError, ZeroDivisionError):
-            advance(
-                self._kind,
-                self._formats,
-                self._code,
-                memory,
-                far,
-                self._notes,
-                machine.Feeds(own.reshape(steps, own.shape[1] * memory.width), self._table, self._feeds),
-                machine.Places(
-                    at * memory.width, *map(memory.places, (self._states, self.after, kept_at)), self._truth
-                ),
-                results,
-                first,
-                cycle,
-            )
-            row = int(self._notes[machine.ROW])
+            for execute in functions(self._kind, far, memory.lanes == 1):
+                machine.advance(execute, self._formats, self._code, memory.held, run, self._notes)
+                row = int(self._notes[machine.ROW])
+                if row < 0:
+                    break
         done = int(self._notes[machine.DONE])
         if done == steps or self.period:
             row = -1
         elif row == 0:  # operations on integers do not tell which one it was
             row = self.first_without_result(self.rows)
-        held = held[:done].reshape(done, lanes[0] if lanes else 1)
-        return kept[:done], np.asarray(np.all(held != 0, axis=1)), row
+        return kept[:done], np.asarray(np.all(held.reshape(steps, -1)[:done] != 0, axis=1)), row
 
     def first_without_result(self, rows: NDArray[np.int64]) -> int:
         """Return the first of some operations that has no result in the step that ended the last ones."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
@@ -22,7 +23,7 @@ CODES = {
     )
 }
 # fmt: on
-"""Codes of operations, as in :mod:`gpbnb.arithmetic.kernels.machine`."""
+"""Codes of operations, as in :mod:`gpbnb.arithmetic.kernels.tags`."""
 
 NAMES = {code: name for name, code in CODES.items()}
 
@@ -49,11 +50,12 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
     """
     from gpbnb.arithmetic.kernels import machine
 
-    whole, numbers = np.zeros((len(formats), 16), np.int64), np.zeros((len(formats), 7))
+    whole = np.zeros((len(formats), machine.COLUMNS), np.int64)
+    numbers = np.zeros((len(formats), machine.NUMBERS))
     state = tags.random_state(tag)
     random = np.zeros(2, np.uint64) if state is None else state
     if formats[0] is None:
-        return tags.DoubleDouble(), machine.Formats(whole, numbers, random)
+        return tags.DoubleDouble(), machine.Formats(whole.ravel(), numbers.ravel(), random)
     kinds = set()
     for i, fmt in enumerate(formats):
         found = selection.tag_of(fmt.rules)
@@ -63,10 +65,15 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
             raise ValueError("no loops")
         kinds.add(_row(fmt, found, whole[i], numbers[i]))
     (kind,) = kinds
-    made: Any = {"pairs": machine.InPairs, "words": machine.InTwoWords}.get(kind, machine.Careful)()
-    if kind == "floats" and whole[:, machine.QUICK].all():
-        made = machine.Quick()
-    return made, machine.Formats(whole, numbers, random)
+    made: Any = machine.Quick() if whole[:, machine.QUICK].all() else machine.Careful()
+    if kind == "pairs":
+        made = machine.InPairs(bool(whole[:, _SHORT].all()))
+    elif kind == "words":
+        made = machine.InTwoWords()
+    return made, machine.Formats(whole.ravel(), numbers.ravel(), random)
+
+
+_SHORT = 5  # the column that tells whether a decimal format has few digits and no range
 
 
 def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float64]) -> str:
@@ -203,11 +210,10 @@ def code_of(rows: NDArray[Any], formats: NDArray[np.int64]) -> Any:
         edges[np.minimum(each, len(rows))] = True
     edges[[0, -1]] = True
     begins = np.flatnonzero(edges) if len(rows) else np.zeros(1, np.int64)
-    first = begins[:-1]
-    segments = np.stack([first, begins[1:], formats[first], how[first] & 3], axis=1)
-    gathered = np.empty((2, max(np.diff(begins), default=0)))
-    operands = np.ascontiguousarray(rows[:, 1:3].T, np.uint32)
-    return machine.Code(np.ascontiguousarray(rows, np.uint32), segments.astype(np.int64), operands, gathered)
+    _, a, b, c, out = np.ascontiguousarray(rows.T, np.uint32)
+    gathered = np.empty(2 * max(np.diff(begins), default=0))
+    codes, numbers, together = (each[begins[:-1]].astype(np.int64) for each in (rows[:, 0], formats, how & 3))
+    return machine.Code(a, b, c, out, begins, codes, numbers, together, gathered)
 
 
 _FEWEST, _MANY = 4, 24
@@ -258,8 +264,13 @@ def _divided(rows: list[list[int]], begin: int, end: int) -> Iterator[tuple[int,
 _SKIP = CODES["skip"]
 
 
+def as_words(numbers: NDArray[Any]) -> NDArray[np.int64]:
+    """Return the memory of numbers as int64, flat."""
+    return numbers.reshape(-1).view(np.int64)
+
+
 class Memory:
-    """Numbers and truth values of the machine, in the shapes in which its kinds of numbers take them.
+    """Numbers and truth values of the machine.
 
     Parameters
     ----------
@@ -268,17 +279,12 @@ class Memory:
     """
 
     def __init__(self, values: NDArray[Any], truths: NDArray[np.uint8]) -> None:
-        self.values, self.width = values, math.prod(values.shape[1:])
-        self.flat = values.reshape(-1)
-        self.truths = truths.reshape(len(truths), math.prod(truths.shape[1:]))
-
-    def of(self, kind: Any) -> NDArray[Any]:
-        """Return the numbers as a kind takes them."""
         from gpbnb.arithmetic.kernels import machine
 
-        if isinstance(kind, machine.Quick) and self.width == 1:
-            return self.flat
-        return self.values.reshape(len(self.values), -1) if isinstance(kind, machine.Careful) else self.values
+        self.values, self.truths = values, truths
+        self.width, self.lanes = math.prod(values.shape[1:]), math.prod(truths.shape[1:])
+        words = as_words(values)
+        self.held = machine.Held(words, words.view(np.float64), truths.reshape(-1))
 
     def places(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the places of numbers in flat memory, those of all lanes and parts."""
@@ -293,39 +299,32 @@ def is_far(numbers: NDArray[Any]) -> bool:
     return bool(np.any((sizes < machine.LEAST) & (sizes > 0)) or np.any(sizes > 1 / machine.LEAST))
 
 
-def advance(kind: Any, formats: Any, code: Any, memory: Memory, far: bool, notes: NDArray[np.int64], *run: Any) -> None:
-    """Take steps of a run, of which a quick kind leaves those that it cannot compute to the careful one.
+def functions(kind: Any, far: bool, alone: bool) -> Iterator[int]:
+    """Yield the address of a kind's function, and of those that compute what it leaves.
 
     Parameters
     ----------
     far : whether numbers may be too small or too large for quick computation.
-    run : the other arguments of :func:`gpbnb.arithmetic.kernels.machine.advance`, in its order.
+    alone : whether there is one lane.
     """
     from gpbnb.arithmetic.kernels import machine
 
-    feeds, places, kept, first, cycle = run
-    notes[machine.DONE], quick = 0, isinstance(kind, machine.Quick)
-    for each in (*([kind] if not (quick and far) else []), *([machine.Careful()] if quick else [])):
-        held = machine.Held(memory.of(each), memory.flat, memory.truths)
-        machine.advance(each, formats, code, feeds, places, held, kept, first, cycle, notes)
-        if notes[machine.ROW] < 0:
-            return
+    quick = isinstance(kind, machine.Quick)
+    if not (quick and far):
+        yield machine.address(kind, alone)
+    if quick:
+        yield machine.address(machine.Careful(), alone)
 
 
 def evaluate(kind: Any, formats: Any, code: Any, values: NDArray[Any], truths: NDArray[np.uint8]) -> int:
     """Run operations once for each lane; return how many have results, 0 if the machine does not tell."""
     from gpbnb.arithmetic.kernels import machine
 
-    memory, notes = Memory(values, truths), np.zeros(5, np.int64)
-    none, nowhere = np.zeros(0, values.dtype), np.zeros(0, np.int64)
-    feeds = machine.Feeds(none.reshape(1, 0), none.reshape(0, 1), nowhere.reshape(0, 4))
-    kept = machine.Kept(feeds.own, np.zeros((1, memory.truths.shape[1]), np.uint8), none, none)
+    memory, done = Memory(values, truths), 0
     far = isinstance(kind, machine.Quick) and is_far(values)
-    try:
-        advance(
-            kind, formats, code, memory, far, notes, feeds, machine.Places(0, nowhere, nowhere, nowhere, 0), kept, 0, 0
-        )
-    except (OverflowError, ZeroDivisionError):
-        return 0
-    row = int(notes[machine.ROW])
-    return len(code.rows) if row < 0 else row
+    with contextlib.suppress(OverflowError, ZeroDivisionError):
+        for execute in functions(kind, far, memory.lanes == 1):
+            done = machine.once(execute, formats, code, memory.held, memory.lanes)
+            if done == len(code.a):
+                break
+    return int(done)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.definiteness import factor
-from gpbnb.filters.kernels.simulation import measured
+from gpbnb.arithmetic.loop import Loop
+from gpbnb.arithmetic.machine import CODES, tables
+from gpbnb.arithmetic.named import BINARY64
 from gpbnb.filters.model import LinearModel
 
 #: Steps for which one seeded generator draws the noise, so that a run can resume at any block.
@@ -62,7 +64,7 @@ class Simulation:
         roots = (
             np.array([covariance_root(each) for each in covariances]) for covariances in (self.model.Q, self.model.R)
         )
-        return given["Phi"], given["H"], *roots
+        return given["Phi"], next(roots), given["H"], next(roots)
 
     def block(
         self, number: int, truth: NDArray[np.float64], steps: int = BLOCK
@@ -78,7 +80,7 @@ class Simulation:
         w = rng.standard_normal((BLOCK, self.model.n))
         v = rng.standard_normal((BLOCK, self.model.m))
         x, z = np.array(truth, dtype=np.float64), np.empty((min(steps, BLOCK), self.model.m))
-        measured(*self._given, number * BLOCK, w, v, x, z)
+        measured(self._given, number * BLOCK, w, v, x, z)
         unit = np.asarray(self.resolution, dtype=np.float64)
         return np.rint(z / unit) * unit, x
 
@@ -89,6 +91,66 @@ class Simulation:
             z, truth = self.block(number, truth, steps - number * BLOCK)
             blocks.append(z)
         return np.concatenate(blocks)
+
+
+def measured(
+    matrices: tuple[NDArray[np.float64], ...],
+    first: int,
+    w: NDArray[np.float64],
+    v: NDArray[np.float64],
+    x: NDArray[np.float64],
+    z: NDArray[np.float64],
+) -> None:
+    """Propagate the true state x by Phi plus a root of Q times w, and measure it by H plus a root of R times v.
+
+    Where float64 ends, z and x become infinite.
+
+    Parameters
+    ----------
+    matrices : Phi, the root of Q, H and the root of R, each with an axis of members that take turns.
+    first : number of steps before.
+    x, z : (n,) and (steps, m), to be overwritten.
+    """
+    n, (steps, m), groups = len(x), z.shape, []
+    # Column by column, so that sums of different rows, which do not wait for each other, lie beside each other.
+    terms = tuple(tuple((i, j) for j, i in np.argwhere((each != 0).any(axis=0).T).tolist()) for each in matrices)
+    rows, size, after, found = _recorded(n, m, terms)
+    own_at, at, states = 1 + n, 1 + 2 * n + m, np.arange(1, 1 + n)
+    for each, some in zip(matrices, terms, strict=True):
+        if some:
+            groups.append((np.arange(at, at + len(some)), each[:, *np.array(some).T]))
+        at += len(some)
+    alone = np.zeros(len(rows), np.int64)
+    loop = Loop(tables([BINARY64]), rows, alone, (size, 2), np.float64, (), states, after)
+    loop.feed(groups)
+    loop.states = x
+    kept, _, _ = loop.take(first, np.concatenate([w[:steps], v[:steps]], axis=1), own_at, found)
+    z[: len(kept)], z[len(kept) :], x[:] = kept, math.inf, loop.states if len(kept) == steps else math.inf
+
+
+@lru_cache(maxsize=16)
+def _recorded(
+    n: int, m: int, terms: tuple[tuple[tuple[int, int], ...], ...]
+) -> tuple[NDArray[np.int64], int, NDArray[np.int64], NDArray[np.int64]]:
+    """Return the rows of a step of :func:`measured`, its number of places, and those of the next state and of z.
+
+    Zero comes first, then the state, w and v, and the given entries of the matrices.
+    """
+    rows, at, entry = list[tuple[int, ...]](), 1 + 2 * n + m, 1 + 2 * n + m
+    size = at + sum(map(len, terms))
+
+    def operate(name: str, a: int, b: int) -> int:
+        rows.append((CODES[name], a, b, 0, size + len(rows)))
+        return size + len(rows) - 1
+
+    sums = np.zeros((2, max(n, m)), np.int64)
+    for k, factors in enumerate((range(1, 1 + n), range(1 + n, 1 + 2 * n), sums[0], range(1 + 2 * n, at))):
+        products = [operate("multiply", entry + t, int(factors[j])) for t, (_, j) in enumerate(terms[k])]
+        for product, (i, _) in zip(products, terms[k], strict=True):
+            place = sums[k // 2, i]
+            sums[k // 2, i] = operate("add", int(place), product) if place else product
+        entry += len(terms[k])
+    return np.array(rows, np.int64).reshape(-1, 5), size + len(rows), sums[0, :n].copy(), sums[1, :m].copy()
 
 
 def fine_resolution(model: LinearModel) -> tuple[float, ...]:

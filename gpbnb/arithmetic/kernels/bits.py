@@ -1,4 +1,4 @@
-"""Machine operations that Python does not offer: fused multiply-add, integer views, the high half of a product."""
+"""What Python does not offer: fused multiply-add, integer views, the high half of a product, memory, addresses."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 _WIDE = ir.IntType(128)
@@ -80,3 +81,30 @@ def select(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
         return builder.select(*args)
 
     return a(types.boolean, a, a), codegen
+
+
+@intrinsic
+def at(typingctx: Any, array: Any, index: Any) -> Any:
+    """The entries of a contiguous array from an index on; whether there are any is not checked."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        return builder.gep(data, [context.cast(builder, args[1], index, types.intp)])
+
+    return types.CPointer(array.dtype)(array, index), codegen
+
+
+@intrinsic
+def call(typingctx: Any, address: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Call the function of four arguments at an address, which returns an int64."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        given, kinds = args[1:], signature.args[1:]
+        kind = context.call_conv.get_function_type(types.int64, kinds)
+        function = builder.inttoptr(args[0], kind.as_pointer())
+        status, found = context.call_conv.call_function(builder, function, types.int64, kinds, given)
+        with cgutils.if_unlikely(builder, status.is_error):
+            context.call_conv.return_status_propagate(builder, status)
+        return found
+
+    return types.int64(address, a, b, c, d), codegen

@@ -271,8 +271,16 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
 
 
 @inner(forceinline=True)
+def opposite(fmt: Any, a: Any) -> Any:
+    return -a[0], a[1]
+
+
+negative = opposite
+
+
+@inner(forceinline=True)
 def subtract(fmt: Any, a: Any, b: Any) -> Any:
-    return add(fmt, a, (-b[0], b[1]))
+    return add(fmt, a, opposite(fmt, b))
 
 
 @inner(forceinline=True)
@@ -370,3 +378,14 @@ def compare(fmt: Any, a: Any, b: Any) -> Any:
         return (m1 > m2) - (m1 < m2)
     # Both have the same sign, so the larger exponent means the larger magnitude.
     return 1 if (e1 > e2) == (m1 > 0) else -1
+
+
+@inner(forceinline=True)
+def load(fmt: Any, words: Any, k: Any) -> Any:
+    """The pair k."""
+    return words[2 * k], words[2 * k + 1]
+
+
+@inner(forceinline=True)
+def put(fmt: Any, words: Any, k: Any, x: Any) -> None:
+    words[2 * k], words[2 * k + 1] = x

@@ -51,8 +51,16 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
 
 
 @inner(forceinline=True)
+def opposite(fmt: Any, a: Any) -> Any:
+    return 0.0 - a[0], 0.0 - a[1]
+
+
+negative = opposite
+
+
+@inner(forceinline=True)
 def subtract(fmt: Any, a: Any, b: Any) -> Any:
-    return add(fmt, a, (-b[0], -b[1]))
+    return add(fmt, a, opposite(fmt, b))
 
 
 @inner(forceinline=True)
@@ -101,3 +109,14 @@ def compare(fmt: Any, a: Any, b: Any) -> Any:
         )
     high = (a[0] > b[0]) - (a[0] < b[0])
     return high if high != 0 else (a[1] > b[1]) - (a[1] < b[1])
+
+
+@inner(forceinline=True)
+def load(fmt: Any, floats: Any, k: Any) -> Any:
+    """The pair k."""
+    return floats[2 * k], floats[2 * k + 1]
+
+
+@inner(forceinline=True)
+def put(fmt: Any, floats: Any, k: Any, x: Any) -> None:
+    floats[2 * k], floats[2 * k + 1] = x

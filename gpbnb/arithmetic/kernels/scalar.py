@@ -28,7 +28,7 @@ from numba import types
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, processor, shortdecimal, wide
-from gpbnb.arithmetic.kernels.compiling import borrowing, inner
+from gpbnb.arithmetic.kernels.compiling import Compiler, borrowing, inner
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
     PAIRS,
@@ -46,7 +46,7 @@ from gpbnb.arithmetic.kernels.tags import (
     Wide,
 )
 
-_INLINE = {"forceinline": True, "no_cfunc_wrapper": True, "_nrt": False}
+_INLINE = {"forceinline": True, "no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": Compiler}
 _MODULES = {
     Decimal: decimal,
     ShortDecimal: shortdecimal,
@@ -315,7 +315,7 @@ def _negative(fmt: Any, a: Any) -> Any:
     if _tag(fmt) is Double:
         return lambda fmt, a: -a
     if _tag(fmt) is Wide:
-        return lambda fmt, a: round_(fmt, wide.opposite(a))
+        return lambda fmt, a: wide.negative(fmt, a)
     return lambda fmt, a: _beyond_largest(fmt, zero(fmt) - a)
 
 

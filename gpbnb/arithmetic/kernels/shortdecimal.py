@@ -13,9 +13,26 @@ import numpy as np
 
 from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros, select
 from gpbnb.arithmetic.kernels.compiling import inner
-from gpbnb.arithmetic.kernels.decimal import HALF, INVERSE, LENGTH, POWER, check, compare, divide, round_, sqrt
+from gpbnb.arithmetic.kernels.decimal import (
+    HALF,
+    INVERSE,
+    LENGTH,
+    POWER,
+    check,
+    compare,
+    divide,
+    load,
+    negative,
+    opposite,
+    put,
+    round_,
+    sqrt,
+)
 
-__all__ = ["add", "compare", "divide", "multiply", "multiply_add", "round_", "sqrt", "subtract"]
+__all__ = [
+    "add", "compare", "divide", "load", "multiply", "multiply_add", "negative", "opposite", "put", "round_", "sqrt",
+    "subtract",
+]  # fmt: skip
 
 _DIGITS = 18  # of a sum at most: t of the larger number, and t + 2 below them
 _ZERO = np.int64(0), np.int64(0)
@@ -94,7 +111,7 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
 
 @inner(forceinline=True)
 def subtract(fmt: Any, a: Any, b: Any) -> Any:
-    return add(fmt, a, (-b[0], b[1]))
+    return add(fmt, a, opposite(fmt, b))
 
 
 @inner(forceinline=True)

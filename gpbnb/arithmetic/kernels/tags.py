@@ -21,6 +21,19 @@ UNLIMITED, GRADUAL, ABRUPT, FIXED = range(4)
 FARTHEST = 2**60  # exponent of a Wide number
 
 
+# fmt: off
+(
+    ADD, SUBTRACT, MULTIPLY, DIVIDE, ROOT, NEGATIVE, ABSOLUTE, CHOOSE, COMPARE, COMBINE, ROUND, FUSED, NONZERO,
+    SKIP,
+) = range(14)
+# fmt: on
+"""Codes of operations. CHOOSE takes its second or third operand, as the truth value that is its first operand is true
+or false. COMPARE compares two numbers; its third operand has bit 0, 1 or 2 set if it holds for the order less, equal or
+greater. COMBINE combines two truth values by a table, the bits of its third operand. ROUND brings a number of another
+format into that of the segment, FUSED adds its third operand to a product, NONZERO stops where a number is zero,
+and SKIP leaves out as many rows as its second operand says if its truth value is false."""
+
+
 class Binary(NamedTuple):
     """Base 2, precision 1 to 53; a number is a float64, an array is float64 (...)."""
 

@@ -337,12 +337,28 @@ def _add_long(fmt: Any, a: Any, b: Any) -> Any:
 
 @inner(forceinline=True)
 def subtract(fmt: Any, a: Any, b: Any) -> Any:
-    return add(fmt, a, opposite(b))
+    return add(fmt, a, opposite(fmt, b))
 
 
 @inner(forceinline=True)
-def opposite(a: Any) -> Any:
+def opposite(fmt: Any, a: Any) -> Any:
     return (not a[0]) & (a[1] != wide(_U0)), a[1], a[2]
+
+
+@inner(forceinline=True)
+def negative(fmt: Any, a: Any) -> Any:
+    return round_(fmt, opposite(fmt, a))
+
+
+@inner(forceinline=True)
+def load(fmt: Any, words: Any, k: Any) -> Any:
+    """The number k."""
+    return number(fmt, words[3 * k], words[3 * k + 1], words[3 * k + 2])
+
+
+@inner(forceinline=True)
+def put(fmt: Any, words: Any, k: Any, x: Any) -> None:
+    words[3 * k], words[3 * k + 1], words[3 * k + 2] = parts(fmt, x)
 
 
 @inner(forceinline=True)

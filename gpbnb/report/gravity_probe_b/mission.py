@@ -28,9 +28,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.filters.kernels.simulation import measured
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.simulation import BLOCK, covariance_root
+from gpbnb.filters.simulation import BLOCK, covariance_root, measured
 from gpbnb.report.display.tables import Table
 from gpbnb.report.gravity_probe_b.year import STORED
 
@@ -289,7 +288,7 @@ class Mission:
         w, v = rng.standard_normal((BLOCK, _N)), rng.standard_normal((BLOCK, 2))
         Phi, process, noise = self._truth_model
         x, z = np.array(truth, dtype=np.float64), np.empty((steps, 2))
-        measured(Phi, H, process, noise, block * BLOCK, w, v, x, z)
+        measured((Phi, process, H, noise), block * BLOCK, w, v, x, z)
         z[~H[:steps].any(axis=(1, 2))] = 0
         resolution = _VALUE["resolution of measurements"]
         return np.rint(z / resolution) * resolution, x
