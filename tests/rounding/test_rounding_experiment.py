@@ -11,7 +11,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.rounding import experiment
+from gpbnb.report.rounding import experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FOUR = FloatFormat(10, 4)
@@ -107,41 +107,30 @@ def test_bounds_in_a_sweep(sort):
         assert found[bound].worst.violates(bound)
 
 
-# -- ratio and bound statistics ---------------------------------------------------------------------
-
-
-def trial(error, **bounds):
-    zero = FOUR.array(0)
-    return experiment.Trial(FOUR, (), zero, Fraction(0), Fraction(error), {k: Fraction(v) for k, v in bounds.items()})
-
-
-# -- growth ---------------------------------------------------------------------------------------
+# -- the law of the square root -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", [*experiment.KINDS, "constant"])
 @pytest.mark.parametrize("rule", Rounding.documented())
-def test_growth_is_the_error_of_each_sum(kind, rule):
-    fmt = FloatFormat(10, 3, rule)
-    result = experiment.growth(fmt, kind, (7, 2, 4), 5, np.random.default_rng(6))
-    assert (result.fmt, result.kind, result.lengths) == (fmt, kind, (2, 4, 7))
-    assert result.errors.shape == (3, 5)
+def test_errors_are_those_of_each_sum(kind, rule):
+    fmt, n = FloatFormat(10, 3, rule), 7
+    found = experiment.sum_errors(fmt, kind, n, 5, np.random.default_rng(6))
     rng = np.random.default_rng(6)
     if kind == "constant":
-        x = np.repeat(experiment.random_numbers(rng, fmt, (5, 1), "like signs").to_fractions(), 7, axis=1)
+        x = np.repeat(experiment.random_numbers(rng, fmt, (5, 1), "like signs").to_fractions(), n, axis=1)
     else:
-        x = experiment.random_numbers(rng, fmt, (5, 7), kind).to_fractions()
-    for i, n in enumerate((2, 4, 7)):
-        for repeat in range(5):
-            terms = x[repeat, :n].tolist()
-            error = arithmetic(fmt).total(terms) - sum(terms)
-            assert result.errors[i, repeat] == float(error / (sum(map(abs, terms)) * fmt.unit_roundoff))
-    assert (abs(result.errors) <= np.array([[1], [3], [6]])).all()
+        x = experiment.random_numbers(rng, fmt, (5, n), kind).to_fractions()
+    for terms, error in zip(x.tolist(), found, strict=True):
+        exact = arithmetic(fmt).total(terms) - sum(terms)
+        assert error == float(exact / (sum(map(abs, terms)) * fmt.unit_roundoff))
+    assert (abs(found) <= n - 1).all()
 
 
 def test_the_root_n_law_holds_where_its_assumptions_do_and_fails_where_not():
     def beyond(kind, rule):
         fmt = FloatFormat(2, 11, rule)
-        return experiment.growth(fmt, kind, (1000,), 40, np.random.default_rng(2)).beyond_probabilistic()[0]
+        law = theory.probabilistic_sum_factor(1000, fmt.unit_roundoff) / float(fmt.unit_roundoff)
+        return np.mean(abs(experiment.sum_errors(fmt, kind, 1000, 40, np.random.default_rng(2))) > law)
 
     assert beyond("like signs", NEAREST) == beyond("mixed signs", NEAREST) == 0
     assert beyond("constant", NEAREST) > 0.05  # five times what the law grants

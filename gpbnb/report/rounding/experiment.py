@@ -256,44 +256,18 @@ _DRAWS: dict[str, Callable[[Callable[..., FloatArray], int], Trial]] = {
 }
 
 
-@dataclass(frozen=True)
-class Growth:
-    r"""Errors of sums of n terms in units of :math:`\beta \sum_j |x_j|`, for several n.
+def sum_errors(fmt: FloatFormat, kind: str, n: int, repeats: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    r"""Return the signed errors of sums of n terms in units of :math:`\beta \sum_j |x_j|`, (repeats,).
 
-    `errors[i]` holds the signed errors of the sums of `lengths[i]` terms, one for each repeat. The
-    first-order bound is at most n - 1.
+    The terms are of a kind of :func:`random_numbers`, or of kind "constant" one number n times. The first-order bound
+    is n - 1.
     """
-
-    fmt: FloatFormat
-    kind: str
-    lengths: tuple[int, ...]
-    errors: NDArray[np.float64]
-
-    def beyond_probabilistic(self, failure: float = 0.01) -> NDArray[np.float64]:
-        """Return the share of the sums of each length whose error exceeds the √n law."""
-        law = [theory.probabilistic_sum_factor(n, self.fmt.unit_roundoff, failure) for n in self.lengths]
-        limit = np.array(law) / float(self.fmt.unit_roundoff)
-        return np.mean(abs(self.errors) > limit[:, np.newaxis], axis=1)
-
-
-def growth(fmt: FloatFormat, kind: str, lengths: Sequence[int], repeats: int, rng: np.random.Generator) -> Growth:
-    """Add up more and more terms, from left to right: of a kind of :func:`random_numbers`, or one number n times."""
-    longest = max(lengths, default=0)
-    if kind == "constant":
-        once: Any = random_numbers(rng, fmt, (repeats, 1), "like signs")
-        x = cast(FloatArray, np.repeat(once, longest, axis=1))
-    else:
-        x = random_numbers(rng, fmt, (repeats, longest), kind)
+    constant = kind == "constant"
+    x: Any = random_numbers(rng, fmt, (repeats, 1 if constant else n), "like signs" if constant else kind)
+    x = np.repeat(x, n, axis=1) if constant else x
     terms, unit = integers(x.to_fractions())
-    sizes: Any = abs(terms)
-    total, exact, size = x[:, 0], terms[:, 0], sizes[:, 0]
-    errors = {}
-    for j in range(1, longest):
-        total, exact, size = total + x[:, j], exact + terms[:, j], size + sizes[:, j]
-        if j + 1 in lengths:
-            errors[j + 1] = (total.to_fractions() / unit - exact) / (size * fmt.unit_roundoff)
-    ordered = tuple(sorted(errors))
-    return Growth(fmt, kind, ordered, np.array([errors[n] for n in ordered], dtype=np.float64))
+    computed = x.sum(axis=1).to_fractions() / unit - terms.sum(axis=1)
+    return np.array(computed / (abs(terms).sum(axis=1) * fmt.unit_roundoff), dtype=np.float64)
 
 
 # -- the worst case -------------------------------------------------------------------------------
