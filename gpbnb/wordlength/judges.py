@@ -395,12 +395,13 @@ def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, w
 
         def bounds(proved: bool) -> Callable[[Any], Found]:
             def found(fmt: Any) -> NDArray[np.float64]:
+                one = fmt.data if isinstance(fmt, WordFormats) and fmt == WordFormats(fmt.data) else fmt
                 if basis == "probable":
-                    return probable_output_errors(system, fmt.data if isinstance(fmt, WordFormats) else fmt, most)
-                if isinstance(fmt, WordFormats) or (isinstance(fmt, FixedFormat) and linear):
-                    in_words = fmt if isinstance(fmt, WordFormats) else WordFormats(fmt)
+                    return probable_output_errors(system, one, most)
+                if isinstance(one, WordFormats) or (isinstance(one, FixedFormat) and linear):
+                    in_words = WordFormats(one) if isinstance(one, FixedFormat) else one
                     return words().errors(in_words) if proved else words().guessed(in_words)
-                return (output_errors if proved else guessed_errors)(system, fmt, most, steps)
+                return (output_errors if proved else guessed_errors)(system, one, most, steps)
 
             return reasoned(found)
 

@@ -32,6 +32,11 @@ from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, slowest_
 from gpbnb.wordlength.models import ModelSource
 from gpbnb.wordlength.tasks import TASK_OF_BASIS, TASK_OF_KIND, admitted, data_of
 
+_TASK_IN_WORDS: dict[str, str] = {
+    **dict.fromkeys(PROOFS, "have a guarantee in fixed-point words"),
+    "probable": "have a probable error in words",
+}
+
 
 def required_precision(
     model: ModelSource | NonlinearModel | Function,
@@ -134,12 +139,9 @@ def required_precision(
     """
     if kind not in TASK_OF_KIND:
         raise ValueError(f"got kind {kind!r}; needed one of {', '.join(map(repr, TASK_OF_KIND))}")
-    bounded = kind in ("fixed", "words") and checked_basis(basis) in PROOFS
-    one = isinstance(format_named(like), FixedFormat)
-    probable = basis == "probable" and (kind == "words" or (kind == "fixed" and not one))
-    tasks = ["have a probable error in words"] if probable else []
-    tasks += [TASK_OF_BASIS[checked_basis(basis)], TASK_OF_KIND[kind], "" if form is None else "have a form"]
-    given = admitted(model, *tasks, "have a guarantee in fixed-point words" if bounded else "")
+    words = kind == "words" or (kind == "fixed" and not isinstance(format_named(like), FixedFormat))
+    tasks = [TASK_OF_BASIS[checked_basis(basis)], TASK_OF_KIND[kind], "" if form is None else "have a form"]
+    given = admitted(model, *tasks, _TASK_IN_WORDS.get(basis, "") if words else "")
     data = data_of(given, z, seed)
     found = form_named(Form.INNOVATION if form is None else form)
     options = {"base": base != 2, "rounding": rounding != Rounding.NEAREST, "range": range is not None}
@@ -181,8 +183,8 @@ def judge(
 ) -> Requirement:
     """Judge one format; for the arguments, see :func:`required_precision`."""
     chosen: Any = format_named(fmt)
-    words = "have a probable error in words" if basis == "probable" and isinstance(chosen, WordFormats) else ""
-    given = admitted(model, TASK_OF_BASIS[checked_basis(basis)], words, "" if form is None else "have a form")
+    words = _TASK_IN_WORDS.get(checked_basis(basis), "") if isinstance(chosen, WordFormats) else ""
+    given = admitted(model, TASK_OF_BASIS[basis], words, "" if form is None else "have a form")
     data = data_of(given, z)
     asked = Asked(given, data, tolerance, basis, within, form_named(form or Form.INNOVATION))
     if isinstance(given, LinearModel | LinearSystem) and not isinstance(chosen, WordFormats):

@@ -39,16 +39,15 @@ _UNBOUNDED = dict.fromkeys(_RUNS, _FIXED) | {SMOOTHER: "since no bound covers it
 _OBSERVE = 'ask with basis="emulation", and survey_records for many records'
 _OF_SYSTEMS = (FILTER, DRIVEN, NONLINEAR, STEP, SMOOTHER, FUNCTION)
 _WORDS = 'kind="fixed", which finds one format for all numbers'
+_ONE_FORMAT = 'with one format for all numbers, like="Q3.12" (--format Q3.12 in the command)'
 _OWN_STEP = "write its step as a NonlinearSystem, whose code has no functions such as np.sin"
 
 CANNOT: dict[str, Mapping[str, str]] = {
     "be bounded along a run": dict.fromkeys(_RUNS, _OBSERVE),
     "have a guarantee": dict.fromkeys(_RUNS, _OBSERVE) | {DRIVEN: 'ask required_precision with basis="bound"'},
     "have a probable error": dict.fromkeys((*_RUNS, LIMITED), _OBSERVE) | {DRIVEN: 'ask with basis="bound"'},
-    "have a guarantee in fixed-point words": {
-        LIMITED: "guarantee(model, fmt, within), with one format for all numbers"
-    },
-    "have a probable error in words": {SYSTEM: 'ask with basis="guarantee", or with one format: like="Q3.12"'},
+    "have a guarantee in fixed-point words": {LIMITED: f"ask {_ONE_FORMAT}"},
+    "have a probable error in words": {SYSTEM: f'ask with basis="guarantee", or {_ONE_FORMAT}'},
     "have formats for data, coefficients and sums": dict.fromkeys(_OF_SYSTEMS, _WORDS),
     "have formats for blocks": dict.fromkeys((DRIVEN, *KINDS[3:]), 'ask with kind="float"'),
     "be searched for limit cycles": dict.fromkeys(

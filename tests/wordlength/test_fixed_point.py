@@ -93,3 +93,17 @@ def test_a_probable_error_is_less_than_a_bound_and_refused_in_words() -> None:
     for kind in ("fixed", "words"):
         with pytest.raises(ValueError, match="a linear system cannot have a probable error in words; ask with basis="):
             required_precision(system, **given, kind=kind, basis="probable")
+
+
+def test_a_controller_with_limits_has_a_guarantee_in_one_format() -> None:
+    system, within = LinearSystem.pid("0.5", "0.1", leak="0.9", limits=(-1, 1)), limits(measurement=1)
+    asked = {"tolerance": "1/50", "kind": "fixed", "like": "Q3.4", "basis": "guarantee", "within": within}
+    found = required_precision(system, 30, **asked)
+    assert found.met
+    assert found.ratio == pytest.approx(guarantee(system, found.format, within, horizon=30).bound[0] * 50)
+    shares = []
+    for u in np.random.default_rng(0).choice([-1.0, -0.5, 0.5, 1.0], (20, 30)):
+        shares.append(emulate(system, u, found.format).largest[0] * 50 / found.ratio)
+    assert 0.1 < max(shares) <= 1
+    with pytest.raises(ValueError, match="cannot have a guarantee in fixed-point words; ask with one format for all"):
+        required_precision(system, 30, **asked | {"like": None})
