@@ -56,7 +56,6 @@ REFUTED = "#C44E00"
 """Colour of printed formulas that fail."""
 BLACK = "#000000"
 REFERENCE = "#6B6B6B"
-MARKERS = "osD^v"
 MOST_ENTRIES = 6
 """Most entries of a legend."""
 _RAMP = LinearSegmentedColormap.from_list("bits", ["#C43C8C", "#7B3FA0", "#16265E"])

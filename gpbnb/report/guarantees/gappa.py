@@ -11,11 +11,11 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -99,20 +99,22 @@ def gappa(text: str) -> list[float]:
     return [max(map(abs, side)) for side in sides]
 
 
-def _computed(name: str, directory: Path | None = None) -> list[list[str]]:
+def _rows(name: str, bounds_of_gappa: Callable[[FilterGuarantee], Sequence[str]]) -> list[tuple[str, ...]]:
     case = case_named(name)
     found = single_step(case_guarantee(case, case.make(), FORMAT))
-    pairs = zip(ours(found), gappa(script(found)), strict=True)
-    return [[name, str(i), f"{mine:.4g}", f"{other:.4g}"] for i, (mine, other) in enumerate(pairs)]
+    pairs = zip(ours(found), bounds_of_gappa(found), strict=True)
+    return [(name, str(i), f"{mine:.4g}", other) for i, (mine, other) in enumerate(pairs)]
 
 
-def _sample(name: str, rng: np.random.Generator) -> list[Any]:
+def _computed(name: str, directory: Path | None = None) -> list[tuple[str, ...]]:
+    return _rows(name, lambda found: [f"{bound:.4g}" for bound in gappa(script(found))])
+
+
+def _sample(name: str, rng: np.random.Generator) -> list[tuple[str, ...]]:
     """Recompute the rows of a filter; without Gappa, keep its stored bounds."""
     if shutil.which("gappa"):
-        return [tuple(row) for row in _computed(name)]
-    case = case_named(name)
-    mine = ours(single_step(case_guarantee(case, case.make(), FORMAT)))
-    return [(name, str(row.state), f"{mine[row.state]:.4g}", row.gappa) for row in load() if row.name == name]
+        return _computed(name)
+    return _rows(name, lambda found: [row.gappa for row in load() if row.name == name])
 
 
 SWEEP: Sweep[str] = Sweep(

@@ -137,11 +137,6 @@ class Reading:
     triangular: bool = False
     norm: str = "column sum"
 
-    def __post_init__(self) -> None:
-        for name, known in (("form", FORMS), ("norm", tuple(NORMS))):
-            if getattr(self, name) not in known:
-                raise ValueError(f"{name}: got {getattr(self, name)!r}; needed one of {', '.join(known)}")
-
     def __str__(self) -> str:
         signs = "signed" if self.signed else "sizes"
         norm = "" if self.norm == "column sum" else f", {self.norm}"
