@@ -23,7 +23,7 @@ from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import compiled_form
+from gpbnb.filters.named import form_with_program
 from gpbnb.filters.opening import as_packed, widened_array
 from gpbnb.filters.program import Program, innovation_program, loop_program, matrices, sequential_program
 from gpbnb.filters.run import Run
@@ -135,7 +135,7 @@ def schedule(
     horizon : number of steps to return if the gain does not settle; by default all that were tried.
     """
     model.refuse_inputs("a guarantee")
-    form = compiled_form(form)
+    form = form_with_program(form)
     check_deterministic(fmt)
     stored, nothing = model.rounded(fmt), np.array([Fraction(0)] * model.n, dtype=object)
     x0, stored = stored.x0, replace(stored, x0=nothing, steps=None)

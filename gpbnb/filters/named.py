@@ -36,7 +36,7 @@ def form_named(form: AnyForm | str) -> AnyForm:
     raise ValueError(f"got form {form!r}; needed one of {names} of gpbnb.Form")
 
 
-def compiled_form(form: AnyForm | str) -> Form:
+def form_with_program(form: AnyForm | str) -> Form:
     """Return a form that guarantees and C code know, or the one with this name."""
     found = form_named(form)
     if isinstance(found, ArrayForm):

@@ -68,10 +68,6 @@ class RepeatedStep:
             self._states = self._inside.after
         return self._states
 
-    @states.setter
-    def states(self, states: tuple[FloatArray, ...]) -> None:
-        self._states = states
-
     @property
     def gain(self) -> Any:
         """The gain of the last step."""

@@ -33,7 +33,7 @@ from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, AnyForm, Form, plain_name
 from gpbnb.filters.listing import kalman_program
 from gpbnb.filters.model import LinearModel, identity_in
-from gpbnb.filters.named import compiled_form
+from gpbnb.filters.named import form_with_program
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.program import without_exact
@@ -351,7 +351,7 @@ def _nonlinear_vectors(system: NonlinearSystem, u: Any, fmt: FloatFormat | Fixed
 
 
 def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepared:
-    chosen = compiled_form(form)
+    chosen = form_with_program(form)
     if isinstance(fmt, WordFormats):
         raise ValueError(
             f"got formats of words for the {chosen} form; needed BINARY32, BINARY64 or a FixedFormat, or the form "

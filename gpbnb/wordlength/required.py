@@ -20,7 +20,7 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import compiled_form, form_named, whole_number
+from gpbnb.filters.named import form_named, form_with_program, whole_number
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, opened
 from gpbnb.filters.system import LinearSystem, unobserved
@@ -397,7 +397,7 @@ def _processors_with(fmt: FloatFormat | None) -> tuple[tuple[str, FloatFormat], 
 
 def _of_blocks(asked: Asked, like: FloatFormat) -> Requirement:
     """Lower each block of a Kalman filter to its smallest precision within a tolerance, and name the limiting block."""
-    model, form = asked.model, compiled_form(asked.form)
+    model, form = asked.model, form_with_program(asked.form)
     if asked.basis != "emulation":
         raise ValueError(f'got basis "{asked.basis}" for blocks; needed "emulation": bounds are for one format')
     if isinstance(model, NonlinearModel):
