@@ -146,7 +146,7 @@ class Loop:
             row = -1
         elif row == 0:  # operations on integers do not tell which one it was
             row = self.first_without_result(self.rows)
-        return kept[:done], np.asarray(np.all(held.reshape(steps, -1)[:done] != 0, axis=1)), row
+        return kept[:done], np.asarray(np.all(held.reshape(steps, memory.lanes)[:done] != 0, axis=1)), row
 
     def first_without_result(self, rows: NDArray[np.int64]) -> int:
         """Return the first of some operations that has no result in the step that ended the last ones."""
