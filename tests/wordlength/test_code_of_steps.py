@@ -17,7 +17,7 @@ from tests.step_functions import SYSTEMS
 
 def short_words():
     for i, rounding in enumerate(("nearest", "even", "half up", "chop", "up", "down", "odd")):
-        yield FixedFormat(0, 15, rounding, "wrap") if i % 2 else FixedFormat(4, 11, rounding, "saturate")
+        yield FixedFormat(4, 11, rounding, "saturate") if i % 2 else FixedFormat(0, 15, rounding, "wrap")
 
 
 def one_of_each(fmt, x, u):
