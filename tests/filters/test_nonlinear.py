@@ -17,8 +17,8 @@ from gpbnb import (
 )
 from gpbnb.filters.forms import ArrayForm
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, opened, simulated, true_states
-from gpbnb.wordlength.nonlinear_examples import beacon
 from gpbnb.wordlength.records import survey_records
+from tests.step_functions import tracked_motion, tracked_sight
 from tests.surveying import survey
 
 
@@ -89,7 +89,9 @@ def test_the_reference_is_that_of_the_linear_filter():
 
 def test_the_reference_agrees_with_one_in_more_digits():
     """The same program in 1200 bits, read as fractions: a tenth of the digits are enough to agree to 2**-104."""
-    model = beacon()
+    noises = (np.diag([0, 0, 2.0**-10, 2.0**-10]), [["1e-4", 0], [0, "1e-8"]])
+    start = ([-2000, 600, 0, -30], np.diag([10**6, 10**6, 100, 100]))
+    model = NonlinearModel(tracked_motion, None, tracked_sight, None, *noises, *start, angles=[1])
     z = simulated(model, 8, seed=3)
     run = NonlinearRun(model, FloatFormat(2, 1200), Form.INNOVATION, [8])
     run.take(z[:8])
