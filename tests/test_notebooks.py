@@ -238,7 +238,9 @@ def test_no_output_shows_a_name_of_the_code(path):
     assert [match[0] for text in texts for match in CODE_NAME.finditer(text)] == []
 
 
-@pytest.mark.parametrize("name", ["wordlength", "mission", "nonlinear", "processors", "principles", "arithmetic"])
+@pytest.mark.parametrize(
+    "name", ["wordlength", "mission", "nonlinear", "processors", "principles", "arithmetic", "guarantee", "budget"]
+)
 def test_a_page_of_use_ends_with_three_exercises_whose_answers_are_folded_and_computed(name):
     notebook = json.loads((BOOK / f"{name}.ipynb").read_text(encoding="utf-8"))
     start = next(k for k, cell in enumerate(notebook["cells"]) if "## Exercises" in "".join(cell["source"]))
