@@ -360,7 +360,7 @@ class Kalman:
         self.RI = [a.inverse(c) for c in self.stored[3] if form == "hung second gain"]
         need(all(positive for _, positive in self.RI), "R loses its definiteness when it is inverted")
         if form == "ud":
-            self.UQ, self.UR, (self.start,) = map(self.factored, (Q, R, [P0]))
+            self.UQ, self.UR, (self.start,) = map(self.factored, (Q, R, [P0]), (False, True, False))
 
     def raised(self, c: Any, share: Any) -> Any:
         return [[self.a.store(x * (1 + share) if i == j else x) for j, x in enumerate(row)] for i, row in enumerate(c)]
@@ -373,10 +373,10 @@ class Kalman:
                 return stored if share else c
         raise NotProvedError("a stored covariance is not definite, so there is no exact filter")
 
-    def factored(self, given: Any) -> Any:
+    def factored(self, given: Any, strictly: bool) -> Any:
         for share in self.shares:
             found = [self.a.factors(self.raised(c, share)) for c in given]
-            if None not in found:
+            if None not in found and not (strictly and any(not u[i][i] for u in found for i in range(len(u)))):
                 return found
         raise NotProvedError("factors of a covariance are not definite in this format, so no filter runs")
 

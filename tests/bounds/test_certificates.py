@@ -148,6 +148,15 @@ def test_random_filters_are_proved(seed: int) -> None:
 REFUSED, WITHOUT_BOUND = (14,), (11,)
 
 
+def test_measurement_noise_is_raised_until_no_factor_is_zero() -> None:
+    """In seven bits, a nearly singular R has such a factor."""
+    drawn = draw(1904)
+    content = written(drawn.model, drawn.fmt, drawn.within, drawn.form)
+    assert content["steps"] is None
+    scale_bound("0.99")(content)
+    assert "may exceed its bound" in refused(content)
+
+
 @pytest.mark.parametrize("peak", [1, 4, 8, 11])
 def test_an_error_that_peaks_within_a_block_of_steps_counts(peak: int) -> None:
     """The checker moves its set once a block, and bounds the steps between by the first and the last."""
