@@ -72,6 +72,10 @@ def test_a_filter_in_integers_gives_the_digits_of_a_run():
     assert seen >= {*Form, *KINDS, *DETERMINISTIC, 2, 10, 16, *RANGES, 1, 3, 4}
 
 
+def test_a_first_gain_without_a_result_ends_the_run_there():
+    assert compared(draw(20261173), 3, np.random.default_rng(8)) == "stopped"
+
+
 # -- the survey -------------------------------------------------------------------------------------------------------
 
 
