@@ -207,6 +207,7 @@ def _back(F: NDArray[np.float64], *sizes: NDArray[np.float64]) -> int:
     return max(most, 1)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # where nothing moves the gain, no share is needed
 def _width(
     given: Schedule, innovation: NDArray[np.float64], bound: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], int]:

@@ -148,6 +148,12 @@ def test_random_filters_are_proved(seed: int) -> None:
 REFUSED, WITHOUT_BOUND = (14,), (11,)
 
 
+def test_a_gain_that_hardly_moves_gives_no_warning() -> None:
+    """A step adds so little to the bound of one state that the quotient of both leaves the range of float64."""
+    drawn = draw(20261191)
+    assert written(drawn.model, drawn.fmt, drawn.within, drawn.form)["steps"] is None
+
+
 def test_measurement_noise_is_raised_until_no_factor_is_zero() -> None:
     """In seven bits, a nearly singular R has such a factor."""
     drawn = draw(1904)
