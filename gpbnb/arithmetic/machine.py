@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -320,11 +321,38 @@ def evaluate(kind: Any, formats: Any, code: Any, values: NDArray[Any], truths: N
     """Run operations once for each lane; return how many have results, 0 if the machine does not tell."""
     from gpbnb.arithmetic.kernels import machine
 
-    memory, done = Memory(values, truths), 0
     far = isinstance(kind, machine.Quick) and is_far(values)
+    return _once(kind, formats, code, Memory(values, truths), far)
+
+
+def _once(kind: Any, formats: Any, code: Any, memory: Memory, far: bool) -> int:
+    from gpbnb.arithmetic.kernels import machine
+
+    done = 0
     with contextlib.suppress(OverflowError, ZeroDivisionError):
         for execute in functions(kind, far, memory.lanes == 1):
             done = machine.once(execute, formats, code, memory.held, memory.lanes)
             if done == len(code.a):
                 break
     return int(done)
+
+
+_NO_TRUTHS = np.array([0, 1], np.uint8)
+
+
+def rounded(kind: Any, formats: Any, numbers: NDArray[Any]) -> NDArray[Any] | None:
+    """Round packed numbers, (count, ...), into a format; None if it does not have one of them."""
+    count = len(numbers)
+    values = np.concatenate([numbers, np.zeros_like(numbers)])
+    # However small or large they are, quick computation rounds them, or tells that it cannot.
+    done = _once(kind, formats, _of_rounding(count), Memory(values, _NO_TRUTHS), False)
+    return values[count:] if done == count else None
+
+
+@lru_cache(maxsize=64)
+def _of_rounding(count: int) -> Any:
+    from gpbnb.arithmetic.kernels import machine
+
+    at, none = np.arange(count, dtype=np.uint32), np.zeros(1, np.int64)
+    begins, codes = np.array([0, count]), np.array([CODES["round"]])
+    return machine.Code(at, at, at, at + np.uint32(count), begins, codes, none, none, np.empty(0))

@@ -34,6 +34,7 @@ from gpbnb.arithmetic.kernels.tags import (
     Tag,
     Wide,
     extents_of_sums,
+    random_state,
 )
 from gpbnb.arithmetic.rounding import Rounding, Rules
 from gpbnb.interrupts import slices
@@ -41,6 +42,7 @@ from gpbnb.interrupts import slices
 Array = NDArray[Any]
 Components = tuple[Array, ...]
 
+_FEW = 1 << 12  # numbers that the machine rounds, which other work needs as well: no loop is compiled for them
 _MANY = 1000  # multiplications in a product for which a look at the range of its entries pays
 _LEAST_32, _LARGEST_32 = 2.0**-126, float(np.finfo(np.float32).max)
 
@@ -183,12 +185,21 @@ class Looped(Backend):
         shape = _shape(*operands)
         size = math.prod(shape)
         out = self._empty(size)
-        inputs = [self._seen(tuple([_flat(part, shape) for part in components])) for components in operands]
+        flat = [tuple([_flat(part, shape) for part in components]) for components in operands]
+        if name == "round_" and 0 < size <= _FEW and self._machine is not None:
+            found = _machine().rounded(*self._machine, self.pack(flat[0]))
+            return None if found is None else tuple(part.reshape(shape) for part in self.unpack(found))
+        inputs = [self._seen(each) for each in flat]
         try:
             gone = _along(_loops().ENTRIES[name], (tag,), size, *inputs, self._seen(out))
         except OverflowError:
             return None
         return None if gone else tuple(part.reshape(shape) for part in out)
+
+    @cached_property
+    def _machine(self) -> Any:
+        """The kind and columns of the format on the machine; None if random numbers are drawn."""
+        return None if random_state(self.tag) is not None else _machine().tables([self])
 
     @property
     def fusing_tag(self) -> Tag | None:
@@ -691,6 +702,13 @@ def _loops() -> Any:
     from gpbnb.arithmetic.kernels import elementwise
 
     return elementwise
+
+
+@lru_cache(maxsize=1)
+def _machine() -> Any:
+    from gpbnb.arithmetic import machine
+
+    return machine
 
 
 @lru_cache(maxsize=1)
