@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from gpbnb.report.display.style import BLACK, OBSERVED, OBSERVED_OTHERS, REFERENCE, TEXT
 
@@ -25,19 +23,6 @@ FRAME_NAMES = {
 }
 
 
-def in_space(fig: Figure, axes: Collection[Axes]) -> list[Any]:
-    """Replace the axes of a figure by three-dimensional ones."""
-    solid = []
-    for column, ax in enumerate(axes, start=1):
-        ax.remove()
-        new: Any = fig.add_subplot(1, len(axes), column, projection="3d")
-        new.set_box_aspect((1, 1, 1), zoom=1.25)
-        new.set_axis_off()
-        new.patch.set_visible(False)  # it would be black in dark mode
-        solid.append(new)
-    return solid
-
-
 def chain(ax: Axes) -> list[Artist]:
     """Draw Figure IV-2: the chain of frames and the angles between them."""
     places = {"g": (0.0, 1.0), "a": (0.0, 0.0), "i": (1.35, 0.5), "φ": (2.45, 0.5), "t": (3.4, 0.5), "r": (4.6, 0.5)}
@@ -49,16 +34,16 @@ def chain(ax: Axes) -> list[Artist]:
         ("i", "φ", r"$\omega t$", (0.12, 0.12), "-"),
         ("φ", "t", r"$\beta$", (-0.08, 0.12), "-"),
         ("t", "r", r"$\gamma$", (0.02, 0.12), "-"),
-        ("g", "r", r"$\delta$, grows with the roll", (0.2, 0.44), "--"),
+        ("g", "r", r"$\delta$, grows with the roll", (0.2, 0.6), "--"),
     ]
     artists: list[Artist] = []
     for start, end, name, shift, style in links:
         (x0, y0), (x1, y1) = places[start], places[end]
         upright = x0 == x1
         arrow: dict[str, Any] = {"arrowstyle": "->", "ls": style, "color": REFERENCE}
-        arrow |= {"shrinkA": 22 if upright else half[start], "shrinkB": 22 if upright else half[end]}
+        arrow |= {"shrinkA": 24 if upright else half[start], "shrinkB": 24 if upright else half[end]}
         if style == "--":
-            arrow |= {"connectionstyle": "arc3,rad=-0.22", "shrinkB": 24}
+            arrow |= {"connectionstyle": "angle3,angleA=12,angleB=-90", "shrinkA": half[start], "shrinkB": 22}
         artists.append(ax.annotate("", (x1, y1), (x0, y0), arrowprops=arrow))
         artists.append(
             ax.text((x0 + x1) / 2 + shift[0], (y0 + y1) / 2 + shift[1], name, ha="center", va="center", fontsize=TEXT)
@@ -68,38 +53,51 @@ def chain(ax: Axes) -> list[Artist]:
         text = ("$\\varphi$" if name == "φ" else f"${name}$") + f"\n{FRAME_NAMES[name]}"
         artists.append(ax.text(x, y, text, ha="center", va="center", bbox=box, fontsize=TEXT))
     ax.set_xlim(-0.85, 5.05)
-    ax.set_ylim(-0.25, 1.5)
+    ax.set_ylim(-0.25, 1.55)
     ax.set_axis_off()
     return artists
 
 
-def precessions(ax: Any, declination: float) -> list[Artist]:
+def precessions(ax: Axes, declination: float) -> list[Artist]:
     """Draw Figure I-1: the drifts of a gyroscope in polar orbit, for a guide star of this declination in radians."""
-    turn = np.linspace(0, 2 * np.pi, 120)
-    star = np.array([np.cos(declination), 0, np.sin(declination)])
-    geodetic = np.cross([0, 1, 0], star)
-    motional = np.cross([0, 0, 1], star)
-    u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(0, np.pi, 13))
+    turn = np.linspace(0, 2 * np.pi, 200)
+    gyro, star = np.array([np.cos(0.9), np.sin(0.9)]), np.array([np.cos(declination), np.sin(declination)])
+    tip, down, away = gyro + 1.5 * star, np.array([star[1], -star[0]]), np.array([0.5, 0.35])
     artists: list[Artist] = [
-        ax.plot_surface(
-            0.45 * np.cos(u) * np.sin(v), 0.45 * np.sin(u) * np.sin(v), 0.45 * np.cos(v), color="#8FBBDD", alpha=0.35
-        ),
-        *ax.plot(np.cos(turn), 0 * turn, np.sin(turn), color=REFERENCE, lw=1.2),
+        *ax.fill(0.62 * np.cos(turn), 0.62 * np.sin(turn), color=OBSERVED, alpha=0.15, lw=0),
+        *ax.plot(np.cos(turn), np.sin(turn), color=REFERENCE, lw=1.2),
+        *ax.plot(*gyro, "o", color=BLACK, ms=8),
     ]
-    gyro = np.array([np.cos(1.1), 0.0, np.sin(1.1)])
-    tip = gyro + 0.8 * star
     arrows = (
-        ((0, 0, -0.8), (0, 0, 1.6), BLACK, "Earth's axis", (0.0, 0, -1.16)),
-        (gyro, 0.8 * star, REFERENCE, "spin axis, to the star", gyro + 0.36 * star + np.array([0.1, 0, 0.27])),
-        (tip, 0.5 * geodetic, OBSERVED, "geodetic", tip + 0.62 * geodetic + np.array([0.2, 0, 0])),
-        (tip, 0.6 * motional, OBSERVED_OTHERS[1], "frame dragging", tip + 0.62 * motional + np.array([0.0, 0, 0.06])),
+        (np.array([0, -0.85]), np.array([0, 0.85]), BLACK, "Earth's\naxis", (0.06, 0.0), "left"),
+        (gyro, tip, BLACK, "spin axis, to the star", (gyro + tip) / 2 + np.array([0.1, 0.2]), "center"),
+        (
+            tip,
+            tip + 0.8 * down,
+            OBSERVED,
+            "geodetic drift,\nin the plane of the orbit",
+            tip + 0.45 * down + 0.08,
+            "left",
+        ),
+        (tip, tip + away, OBSERVED_OTHERS[1], "frame dragging,\nat right angles to it", tip + away + 0.06, "left"),
     )
-    for start, way, colour, name, place in arrows:
-        artists.append(ax.quiver(*start, *way, color=colour, lw=1.8, arrow_length_ratio=0.12))
-        artists.append(ax.text(*place, name, color=colour, ha="center", clip_on=False, fontsize=TEXT))
-    artists.append(ax.text(-1.05, 0, -0.98, "polar orbit", color=REFERENCE, ha="center", fontsize=TEXT))
-    for limit, (low, high) in ((ax.set_xlim, (-0.6, 1.4)), (ax.set_ylim, (-1.0, 1.0)), (ax.set_zlim, (-0.9, 1.1))):
-        limit(low, high)
-    ax.set_box_aspect((1, 1, 1), zoom=1.0)
-    ax.view_init(elev=18, azim=-62)
+    for start, end, colour, name, place, side in arrows:
+        look = {
+            "arrowstyle": "-|>,head_width=0.25,head_length=0.5",
+            "color": colour,
+            "lw": 1.8,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        }
+        artists.append(ax.annotate("", tuple(end), tuple(start), arrowprops=look))
+        artists.append(ax.text(place[0], place[1], name, color=colour, ha=side, va="center", fontsize=TEXT))
+    for name, place, side in (
+        ("polar orbit", (-0.78, -0.82), "right"),
+        ("gyroscope", gyro + np.array([0.0, 0.36]), "left"),
+    ):
+        artists.append(ax.text(place[0], place[1], name, color=REFERENCE, ha=side, va="center", fontsize=TEXT))
+    ax.set_xlim(-1.9, 4.2)
+    ax.set_ylim(-1.15, 1.35)
+    ax.set_aspect("equal")
+    ax.set_axis_off()
     return artists
