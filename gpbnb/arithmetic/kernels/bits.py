@@ -88,7 +88,7 @@ def at(typingctx: Any, array: Any, index: Any) -> Any:
     """The entries of a contiguous array from an index on; whether there are any is not checked."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        data = context.data_model_manager[signature.args[0]].get(builder, args[0], "data")
         return builder.gep(data, [context.cast(builder, args[1], index, types.intp)])
 
     return types.CPointer(array.dtype)(array, index), codegen
