@@ -333,7 +333,7 @@ class TracedArray(FloatArray):
         self.tape.refuse("it branches on a number")
 
     def if_nonzero(self, changed: Callable[[], Any], unchanged: Any) -> Any:
-        """Record what changes if this number is not zero, and the choice; see ``array_steps.if_nonzero``."""
+        """Record what changes if this number is not zero, and the choice; see ``filters.steps.if_nonzero``."""
         if not self.components[0].any():
             return unchanged
         nonzero = self != 0

@@ -80,10 +80,7 @@ def _check_terms(terms: int | None) -> None:
 
 
 def _enclosed(matrices: tuple[Any, ...], terms: int | None, accuracy: float, bits: int) -> Interval | None:
-    """Enclose the gains in balls of some bits; None if these are too few.
-
-    This shares no code with :mod:`gpbnb.bounds.envelope` and is its oracle.
-    """
+    """Enclose the gains in balls of some bits; None if these are too few."""
     before, ctx.prec = ctx.prec, bits
     try:
         sums = _Sums(*matrices)

@@ -90,11 +90,6 @@ def gain(algebra: Algebra, H: Matrix, R: Matrix, V: Matrix) -> Gain:
     return Gain(algebra.times(found.VH, found.inverse), found.covariance, found.pivots)
 
 
-def second_gain(algebra: Algebra, H: Matrix, R: Matrix, P: Matrix) -> Matrix:
-    """Return :math:`(PH^T)R^{-1}` for the new covariance P; the second form of (99)."""
-    return algebra.times(algebra.times(P, H.T), algebra.invert(R, algebra.identity(len(R))).matrix)
-
-
 def reduction(algebra: Algebra, K: Matrix, H: Matrix) -> Matrix:
     """Return :math:`I - KH`."""
     return algebra.rounded(algebra.identity(H.shape[1]) - algebra.times(K, H))

@@ -29,7 +29,7 @@ BASES_OF_NUMBERS = (2, 10, 16)
 _FORMATS = tuple(name for name in NAMED_FORMATS if name not in WITHOUT_LOOPS)
 
 QUANTITIES = ("state", "innovation", "measurement")
-"""What may have limits, as in :class:`gpbnb.bounds.envelope.FilterLimits`."""
+"""What may have limits, as in :class:`gpbnb.bounds.guess.FilterLimits`."""
 
 SIGNALS = ("step", "sine", "noise")
 """Inputs that are simulated, as by :func:`gpbnb.filters.simulation.simulated_inputs`."""

@@ -20,7 +20,7 @@ from gpbnb.arithmetic.algebra import EXACT, Algebra, rounded_algebra
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, inverse_of, row_sum_norm
 from gpbnb.filters.forms import Form
-from gpbnb.filters.steps import StepModel, gain, predicted, reduction, second_gain, updated
+from gpbnb.filters.steps import StepModel, gain, predicted, reduction, updated
 from gpbnb.report.kalman import report_bounds, smallest
 from gpbnb.report.kalman.smallest import FilterCase
 from gpbnb.report.ledger.first_order import FirstOrder
@@ -55,7 +55,8 @@ def take(algebra: Algebra, number: Number, case: FilterCase, x: Matrix, P: Matri
     P_kp = predicted(algebra, model.Phi, P, model.Q)
     K = gain(algebra, model.H, model.R, P_kp).K
     P_new = updated(algebra, Form.HUNG, model, P_kp, K)
-    K_2 = second_gain(algebra, model.H, model.R, P_new)
+    inverse = algebra.invert(model.R, algebra.identity(len(model.R))).matrix
+    K_2 = algebra.times(algebra.times(P_new, model.H.T), inverse)
     used = K_2 if second else K
     F, u = reduce(algebra, used, model.H, model.Phi), algebra.times(used, number(case.z[:, None]))
     return ComputedStep(P_kp, K, P_new, K_2, F, u, update(algebra, F, x, u))
