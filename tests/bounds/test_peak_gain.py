@@ -173,14 +173,14 @@ def test_a_low_frequency_has_a_guarantee_that_the_checker_proves() -> None:
     assert "after any number of steps" in prove(json.loads(proof))
 
 
-def test_order_eight_at_20_hertz_is_bounded_for_ever() -> None:
-    """NumPy's eigenvalues of the whole matrix reach 1.017; those of its sections stay below 1.
+def test_order_eight_at_100_hertz_is_bounded_for_ever() -> None:
+    """NumPy's eigenvalues of the whole matrix reach 1.006; those of its sections stay below 1.
 
-    The response lasts for 10,000 steps, so that the sum of its sizes takes ten seconds.
+    The response lasts for thousands of steps, so that the sum of its sizes takes five seconds.
     """
-    sections, system = cascade(8, 20, 48_000)
+    sections, system = cascade(8, 100, 48_000)
     F_ = system.A.astype(np.float64)
     assert np.abs(np.linalg.eigvals(F_)).max() > 1
     poles = sorted(abs(root) for row in sections for root in np.roots(row[3:]))
     assert sorted(np.abs(eigenvalues(F_))) == pytest.approx(poles, rel=1e-9)
-    assert 0 < output_errors(system, FloatFormat(2, 40), 1.0)[0] < 1e-4
+    assert 0 < output_errors(system, FloatFormat(2, 40), 1.0)[0] < 1e-6
