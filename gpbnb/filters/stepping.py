@@ -165,7 +165,7 @@ class Stepper:
         )
         if done:
             P[:] = covariances[-1]
-        self._last = P.copy()
+        self._last = P.copy() if done == count else None  # the gain is ahead of the estimate
         return Block(found.reshape(done, *x.shape), K, covariances, definite[:done], stop)
 
     def _gains(self, first: int, count: int, P: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_], Stop | None]:

@@ -61,6 +61,23 @@ def test_two_estimates_decay_at_their_own_time_and_a_late_measurement_counts():
     assert (checkpoints.checkpoints().to_float("x") == late[[first - 1, -1], :, 0]).all()
 
 
+def test_covariances_go_on_where_an_estimate_becomes_zero_before_they_repeat():
+    """The gain is computed ahead of the estimates, here until it repeats."""
+    model = LinearModel(
+        [["0.001", 0], [0, "0.999"]], np.eye(2), [["0.001", 0], [0, "0.001"]], np.eye(2), [1, 1], [[1, 0], [0, 100]]
+    )
+    z = np.zeros((200, 2))
+    z[:, 1] = np.arange(200) % 7
+    together, alone = (Run(model, FloatFormat(2, 12), "innovation", range(1, 201)) for _ in range(2))
+    together.take(z)
+    for k in range(len(z)):
+        alone.take(z[k : k + 1])
+    estimates, gains = together.X[:, 0, 0], together.G
+    assert int(np.argmax(estimates == 0)) < int(np.argmax((gains == gains[-1]).all(axis=(1, 2))))
+    for one, other in zip((together.X, gains, together.C), (alone.X, alone.G, alone.C), strict=True):
+        assert (one == other).all()
+
+
 @pytest.mark.parametrize("subnormal", [True, False])
 def test_a_decimal_estimate_decays_through_subnormal_numbers_to_zero(subnormal):
     fmt = FloatFormat(10, 7, emin=-95, emax=96, subnormal=subnormal)
