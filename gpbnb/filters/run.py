@@ -15,7 +15,7 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
 from gpbnb.arithmetic.machine import OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT
 from gpbnb.arithmetic.named import format_text
-from gpbnb.arithmetic.rounding import Limits, Order, Rounding
+from gpbnb.arithmetic.rounding import Limits, Order
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import DECAYED, Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed
@@ -400,8 +400,7 @@ class Run:
         model, (formats, blocks, sums) = self.letters, self._formats()
         cycle = int(np.lcm.reduce([len(table) for letter, table in model.items() if letter not in INPUTS]))
         kind = step_kind(self.form, model, formats[0], blocks, sums, "increment" in model)
-        repeats = self.fmt is None or self.fmt.rounding is not Rounding.STOCHASTIC
-        return Stepper(recorded_step(kind), formats, model, self.records, cycle if repeats else 0, self.tag)
+        return Stepper(recorded_step(kind), formats, model, self.records, cycle, self.tag)
 
     def _formats(self) -> tuple[list[Any], tuple[int, ...], tuple[Any, ...]]:
         """Return all formats; the numbers of those of the blocks and of the model; how sums are computed."""

@@ -79,7 +79,7 @@ class Stepper:
     formats : the formats of the numbers that it names; None is double-double.
     model : matrices of the model by their letters, (p, rows, columns, ...) or (p, rows, ...), packed.
     records : number of records.
-    cycle : number of steps after which covariances may repeat; 0 if they are not looked at.
+    cycle : number of steps after which covariances may repeat, if no format draws random numbers.
     tag : the arithmetic of the run, from which both parts of a step draw random numbers.
     """
 
@@ -92,7 +92,7 @@ class Stepper:
         cycle: int,
         tag: Any = None,
     ) -> None:
-        self._step, self._records, self._cycle = step, records, cycle
+        self._step = step
         parts = model["Phi"].shape[3:]
         alone = () if not parts else (1, *parts)
         lanes = (records, *parts) if parts or records > 1 else ()
@@ -108,7 +108,8 @@ class Stepper:
         self._gain = _loop(step, step.gain, formats, alone, _GAIN, loaded)
         self._estimate = _loop(late, step.estimate._replace(rows=rows), formats, lanes, _ESTIMATE, loaded)
         self._kept_at = np.concatenate([step.shared, step.K.ravel(), step.after["P"].ravel()])
-        repeats = formats[0] is None or formats[0].rounding is not Rounding.STOCHASTIC
+        repeats = all(fmt is None or fmt.rounding is not Rounding.STOCHASTIC for fmt in formats)
+        self._cycle = cycle if repeats else 0
         most = max(min(_LONGEST_BLOCK, _NUMBERS // max(len(self._kept_at), 1)), 16)
         work = len(step.gain.rows) + records * len(rows)
         #: Most steps that are taken at once; random numbers are drawn step by step.

@@ -6,7 +6,7 @@ import numpy as np
 
 from gpbnb import FloatFormat, LinearModel
 from gpbnb.arithmetic.kernels import tags
-from gpbnb.filters.run import Run
+from gpbnb.filters.run import Run, Sums
 
 
 def test_no_random_number_is_drawn_twice_in_a_run():
@@ -23,3 +23,17 @@ def test_no_random_number_is_drawn_twice_in_a_run():
     once = int(state[1])
     run.take(np.full((20, 2), 0.7))
     assert int(state[1]) - once == once - opened > 0
+
+
+def test_random_sums_are_drawn_step_by_step():
+    """No covariance is taken for a repeated one, and steps taken at once have the digits of steps taken alone."""
+    model = LinearModel([["0.9"]], [[1]], [["0.01"]], [[1]], [0], [[1]])
+    z = np.ones((100, 1))
+    sums = Sums(fmt=FloatFormat(2, 12, "stochastic"))
+    together, alone = (Run(model, FloatFormat(2, 12), "innovation", range(1, 101), sums) for _ in range(2))
+    together.take(z)
+    for k in range(len(z)):
+        alone.take(z[k : k + 1])
+    assert len(np.unique(together.C[50:])) > 2
+    for one, other in ((together.X, alone.X), (together.C, alone.C)):
+        assert (one == other).all()
