@@ -164,6 +164,7 @@ def convert(x: Any, fmt: Any) -> Any:
 
     Raises
     ------
+    TypeError : `x` is not an array of a format.
     OverflowError : an entry is beyond the range of `fmt`.
 
     Examples
@@ -182,6 +183,8 @@ def convert(x: Any, fmt: Any) -> Any:
     >>> print(str(required_precision(loop, [1] * 50, "1/1000", kind="fixed")).partition(":")[0])
     10 fraction bits in a word of 12 bits
     """
+    if not hasattr(x, "backend"):
+        raise TypeError(f"got a {type(x).__name__}; needed an array of a format; fmt.array(...) rounds other numbers")
     if x.backend.records:
         x.tape.refuse("it converts numbers to another format")
     with lifted():

@@ -288,6 +288,11 @@ def test_a_plant_in_another_format_is_not_rounded_with_its_controller():
     assert "operation by operation: it converts numbers to another format" in str(slowly)
 
 
+def test_numbers_without_a_format_have_nothing_to_convert():
+    with pytest.raises(TypeError, match=r"got a float; needed an array of a format; fmt\.array\(\.\.\.\)"):
+        convert(0.5, FMT)
+
+
 def smoothed(fmt, z, kept):
     """A smoother whose products and sums are exact, and perhaps add what the last rounding of a sum lost."""
     wide = FloatFormat(2, 100)
