@@ -21,12 +21,18 @@ def pytest_pycollect_makemodule(module_path, parent):
 
 
 @pytest.fixture(scope="session")
-def open_page():
+def browser():
+    with tools.launch() as launched:
+        yield launched
+
+
+@pytest.fixture(scope="session")
+def open_page(browser):
     """Open a page of the book and wait for its formulas, if it does not lead elsewhere; `page.faults` collects.
 
     Pages have their own settings and cache, unless they are `shared`: then scripts and fonts are loaded once.
     """
-    with tools.serve() as base, tools.launch() as browser:
+    with tools.serve() as base:
         contexts = {}
 
         def new_context(size):

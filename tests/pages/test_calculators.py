@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pages import browser as tools
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
@@ -19,25 +18,13 @@ from gpbnb.report.kalman import report_bounds
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory as rolling
 
-BOOK = Path(__file__).resolve().parents[1] / "book"
+BOOK = Path(__file__).resolve().parents[2] / "book"
 NOTEBOOKS = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(BOOK.glob("*.ipynb"))]
 CELLS = ["".join(cell["source"]) for notebook in NOTEBOOKS for cell in notebook["cells"]]
 FORMS = [text for text in CELLS if text.startswith("<form")]
 TRIALS = 500
 U = 2.0**-53
 DAY = 86400
-
-pytestmark = pytest.mark.skipif(
-    tools.sync_playwright is None or tools.chromium() is None, reason="no Chromium, or the group `pages` is missing"
-)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with tools.sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=tools.chromium(), args=tools.FLAGS)
-        yield launched
-        launched.close()
 
 
 @pytest.fixture
