@@ -103,7 +103,7 @@ def measured(
 ) -> None:
     """Propagate the true state x by Phi plus a root of Q times w, and measure it by H plus a root of R times v.
 
-    Where float64 ends, z and x become infinite.
+    Entries of z and x beyond the range of float64 become infinite.
 
     Parameters
     ----------
