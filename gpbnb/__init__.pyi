@@ -1,6 +1,5 @@
 from gpbnb.arithmetic import linalg as linalg
 from gpbnb.arithmetic.array import FloatArray as FloatArray
-from gpbnb.arithmetic.exits import convert as convert
 from gpbnb.arithmetic.exits import peek as peek
 from gpbnb.arithmetic.fixed import FixedFormat as FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat as FloatFormat
@@ -56,6 +55,7 @@ from gpbnb.arithmetic.named import (
     TF32 as TF32,
 )
 from gpbnb.arithmetic.rounding import Rounding as Rounding
+from gpbnb.arithmetic.second_format import convert as convert
 from gpbnb.arithmetic.traced import TracedFunction as TracedFunction
 from gpbnb.bounds.guarantee import FilterGuarantee as FilterGuarantee
 from gpbnb.bounds.guarantee import Guarantee as Guarantee

@@ -39,7 +39,7 @@ HOMES = {
     "SmoothedRecord": "gpbnb.filters.smoothing",
     "TracedFunction": "gpbnb.arithmetic.traced",
     "WordFormats": "gpbnb.filters.words",
-    "convert": "gpbnb.arithmetic.exits",
+    "convert": "gpbnb.arithmetic.second_format",
     "emulate": "gpbnb.wordlength.emulation",
     "guarantee": "gpbnb.wordlength.bounding",
     "limit_cycles": "gpbnb.wordlength.bounding",

@@ -13,7 +13,8 @@ HOMES = {
     "arithmetic.rounding": "Rounding",
     "arithmetic.fixed": "FixedFormat",
     "arithmetic.array": "FloatArray",
-    "arithmetic.exits": "convert peek",
+    "arithmetic.exits": "peek",
+    "arithmetic.second_format": "convert",
     "arithmetic.traced": "TracedFunction",
     "arithmetic.named": "BINARY16 BINARY32 BINARY64 BINARY128 BFLOAT16 TF32 FP8_E4M3 FP8_E5M2 FP6_E3M2 FP6_E2M3 "
     "FP4_E2M1 DECIMAL32 DECIMAL64 DECIMAL128 IBM_HEX32 IBM_HEX64 IBM_704",

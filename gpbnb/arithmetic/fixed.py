@@ -33,6 +33,9 @@ class FixedArray(FloatArray):
 class FixedFormat(NumberFormat[FixedArray]):
     r"""Two's complement fixed point: multiples of :math:`2^{-f}` from :math:`-2^i` to :math:`2^i - 2^{-f}`.
 
+    Decimal fixed point, as for money, is a :class:`FloatFormat` with one exponent: ``FloatFormat(10, 8, emin=5,
+    emax=5)`` holds the multiples of 0.01 of up to eight digits.
+
     Parameters
     ----------
     integer_bits : i, the number of bits before the binary point, without the sign bit.

@@ -55,7 +55,7 @@ def whole_number(name: str, value: Any, least: int = 1, most: int | None = None)
             if number >= least and (most is None or number <= most):
                 return number
     limit = "" if most is None else f" and at most {most:,}"
-    raise ValueError(f"got {value!r} {name}; needed a whole number, at least {least}{limit}")
+    raise ValueError(f"got {name} {value!r}; needed a whole number, at least {least}{limit}")
 
 
 def checked_name(name: Any) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from inspect import signature
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_named
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.second_format import convert
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.listing import Listing
@@ -45,7 +46,9 @@ class NonlinearSystem:
     step : function of a format, the state (n,) and the inputs (m,) of a step. It returns the next state and the
         output, each as an array of the format or as a list of arrays, which are then joined. All operations must be
         in the format; write constants as ``fmt.array("0.1")``. To run in compiled code and in C, the function must
-        express a choice that depends on a number with ``np.where``, ``np.clip`` or a similar function.
+        express a choice that depends on a number with ``np.where``, ``np.clip`` or a similar function. A state may be
+        returned in a format of its own, such as that of an exact plant, see :func:`gpbnb.convert`; the next step then
+        gets a list of its entries, each in the format in which it was returned. Such a step has no C code.
     x0 : (n,), the first state.
     m : number of inputs.
     name : name in tables and in code.
@@ -108,10 +111,12 @@ class NonlinearSystem:
 
     def __call__(self, fmt: Any, u: Any) -> FloatArray:
         """Return the outputs of a run in a format, (steps, p); the parameters are those of :meth:`states`."""
-        return self.states(fmt, u)[:, self.n :]
+        return self._run_in(fmt, u)[1]
 
     def states(self, fmt: Any, u: Any) -> FloatArray:
         """Return state and output after each step of a run in a format, (steps, n + p).
+
+        States with a format of their own are rounded into that of the run.
 
         Parameters
         ----------
@@ -123,10 +128,17 @@ class NonlinearSystem:
         ValueError, TypeError : inputs of another shape; a step that does not return states (n,) and outputs (p,).
         OverflowError, ZeroDivisionError, NegativeRootError : an operation has no result in the format.
         """
+        states, outputs = self._run_in(fmt, u)
+        if isinstance(states, list):
+            states = np.stack([np.stack([convert(each, outputs.format) for each in row]) for row in states])
+        return cast(Any, np.concatenate)([states, outputs], axis=1)
+
+    def _run_in(self, fmt: Any, u: Any) -> tuple[Any, FloatArray]:
+        """Return states, in rows of entries if they have formats of their own, and outputs after each step."""
         fmt = format_named(fmt) if type(fmt) is str else fmt  # isinstance would ask a traced format for its class
         if type(fmt) is BlockFormats or not callable(getattr(fmt, "array", None)):
             raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or a name")
-        found: FloatArray = self._whole_run(fmt, self.inputs_in(fmt, u))
+        found: tuple[Any, FloatArray] = self._whole_run(fmt, self.inputs_in(fmt, u))
         return found
 
     def advance(self, fmt: Any, x: Any, u: Any) -> FloatArray:
@@ -181,33 +193,39 @@ class NonlinearSystem:
         return TracedFunction(self._run)
 
     def _run(self, fmt: Any, u: Any) -> Any:
-        x, found = fmt.array(self.x0), []
+        x, states, outputs = fmt.array(self.x0), list[Any](), list[Any]()
         for row in u:
-            found.append(self._stepped(fmt, x, row))
-            x = found[-1][: self.n]
-        return np.stack(found)
+            x, output = self._parts(fmt, x, row)
+            states.append(x)
+            outputs.append(output)
+        apart = any(isinstance(each, list) for each in states)
+        return [list(each) for each in states] if apart else np.stack(states), np.stack(outputs)
 
     def _stepped(self, fmt: Any, x: Any, u: Any) -> Any:
+        return np.concatenate(self._parts(fmt, x, u))
+
+    def _parts(self, fmt: Any, x: Any, u: Any) -> tuple[Any, Any]:
+        """Take a step, and return the next state, as a list if it has formats of its own, and the output."""
         returned = self.step(fmt, x, u)
         if type(returned) not in (tuple, list) or len(returned) != 2:
             kind = f"{len(returned)} parts" if isinstance(returned, (tuple, list)) else f"a {type(returned).__name__}"
             raise ValueError(f"got {kind} from the step; needed two, the next state and the output")
-        after, output = map(_joined, returned)
-        if len(after) != self.n or not len(output):
+        after, output = ([each for part in _flat(whole) for each in part] for whole in returned)
+        if len(after) != self.n or not output:
             raise ValueError(
                 f"got {len(after)} states and {len(output)} outputs from the step; needed {self.n} states, as x0 has, "
                 "and at least one output"
             )
-        return np.concatenate([after, output])
+        return after if any(each.format != fmt for each in after) else np.stack(after), np.stack(output)
 
 
-def _joined(part: Any) -> Any:
-    """Return the entries of an array of a format, or of a list of arrays, in one row."""
+def _flat(part: Any) -> list[Any]:
+    """Return the arrays of a part of what a step returns, each in one row."""
     if isinstance(part, (tuple, list)) and part:
-        return np.concatenate([_joined(each) for each in part])
+        return [each for entry in part for each in _flat(entry)]
     if not isinstance(part, FloatArray):
         raise TypeError(
             f"got a {type(part).__name__} from the step; needed arrays of the format that it was given; make constants "
             "with fmt.array(...)"
         )
-    return part.reshape(-1)
+    return [part.reshape(-1)]

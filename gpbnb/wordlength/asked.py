@@ -82,7 +82,7 @@ def tolerances_of(tolerance: Any, count: int, what: str) -> NDArray[np.float64]:
         given = np.asarray(tolerance)
         if given.dtype.kind not in "iufOU":
             raise ValueError("no real numbers")
-        negative = [-_exactly(each) for each in given.ravel().tolist()]
+        negative = [-exactly(each) for each in given.ravel().tolist()]
         above = np.array([each < 0 for each in negative]).reshape(given.shape)
         tolerances = -all_above(np.array(negative, dtype=object)).reshape(given.shape)
     except (TypeError, ValueError, ArithmeticError):
@@ -97,7 +97,7 @@ def tolerances_of(tolerance: Any, count: int, what: str) -> NDArray[np.float64]:
     return np.broadcast_to(tolerances, (count,))
 
 
-def _exactly(number: Any) -> Any:
+def exactly(number: Any) -> Any:
     """Return a number as given, and text as a Fraction, or as infinity."""
     if isinstance(number, bool):
         raise ValueError("a truth value is no number")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 from fractions import Fraction
+from math import floor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -69,7 +70,7 @@ def written_files(
     ----------
     what, bound : what the filter is, and what is proven about its errors, which may be empty, in words.
     bounded : whether its errors can be bounded.
-    sections : those of a cascade in floating point, as stored; else empty.
+    sections : those of a cascade, as stored; else empty.
     """
     name = source.name
     return {
@@ -100,7 +101,7 @@ def _header(source: CodeSource, what: str, bound: str, bounded: bool, sections: 
     flags = "compile with -ffp-contract=off, and never with -ffast-math."
     flags = f"{order}: {flags}" if source.arithmetic.floating else f"{order}."
     program, statuses = source.step.program, source.statuses
-    paragraphs = _comment(f"{what}. {WRITTEN}", flags, bound)
+    paragraphs = _comment(WRITTEN, f"{what}.", flags, bound)
     values = ",\n".join(f"    {status.name} = {status.value}" for status in statuses)
     meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in statuses)
     takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
@@ -131,13 +132,27 @@ void {name}_start({name}_state *state);
 
 
 def _cmsis(source: CodeSource, sections: Sections) -> str:
-    """Return the coefficients of second-order sections in the order of CMSIS-DSP; empty if there are none."""
+    """Return the coefficients of second-order sections in the order of CMSIS-DSP; empty if it does not hold them."""
     if not sections or any(len(b) > 3 or len(a) > 2 for b, a in sections):
         return ""
-    zero, text = [Fraction(0)], source.arithmetic.number_text
+    zero, numbers = [Fraction(0)], source.arithmetic
     rows = [[*b, *zero * (3 - len(b)), *(-each for each in a), *zero * (2 - len(a))] for b, a in sections]
-    lines = ", \\\n    ".join(", ".join(map(text, row)) for row in rows)
-    what = "b0, b1, b2, -a1, -a2 of each section, as CMSIS-DSP takes them: arm_biquad_cascade_df1_f32 and others."
+    if numbers.floating:
+        order, how = "b0, b1, b2", "arm_biquad_cascade_df1_f32 and others"
+        texts = [list(map(numbers.number_text, row)) for row in rows]
+    else:
+        bits = int(numbers.number[3:-2])
+        lowest = Fraction(-1, 2 ** (bits - 1))
+        shift = floor(max(max(each, lowest - each) for row in rows for each in row)).bit_length()
+        integers = [[each * 2 ** (bits - 1 - shift) for each in row] for row in rows]
+        if bits == 64 or any(each.denominator > 1 for row in integers for each in row):
+            return ""
+        gap = ["0"] if bits == 16 else []
+        order = f"b0, {'0, ' if gap else ''}b1, b2"
+        how = f"arm_biquad_cascade_df1_q{bits - 1} with postShift = {shift}; it rounds its sums otherwise"
+        texts = [[str(row[0]), *gap, *map(str, row[1:])] for row in integers]
+    lines = ", \\\n    ".join(map(", ".join, texts))
+    what = f"{order}, -a1, -a2 of each section, as CMSIS-DSP takes them: {how}."
     return f"\n/* {what} */\n#define {source.name.upper()}_CMSIS {{ \\\n    {lines} }}\n"
 
 

@@ -75,7 +75,7 @@ class Prepared(NamedTuple):
     emulate : function that returns the vectors for inputs, (steps, m).
     inputs : function that returns inputs for a number of steps.
     bound : function that returns what is proven about the errors, in words, for limits.
-    sections : those of a cascade in floating point, as stored; else empty.
+    sections : those of a cascade, as stored; else empty.
     """
 
     step: CodeStep
@@ -113,16 +113,16 @@ def write_code(
         :class:`gpbnb.filters.design.FilterDesign`, its structure. The UD form accepts no words of more than 52 bits and
         no words that wrap around.
     name : name of the files, and prefix of every name that the header declares.
-    inputs : (steps, m), inputs or measurements of the test vectors; by default 100 steps of noise, or of simulated
-        measurements.
+    inputs : (steps, m), inputs or measurements of the test vectors, or a number of steps of noise, or of simulated
+        measurements; by default 100.
     within : limits from :func:`gpbnb.bounds.guarantee.limits`; the header states the error bound that holds
         within them.
     overwrite : whether to replace files of these names that gpbnb has not written.
 
     Returns
     -------
-    paths : header, source, test, test vectors and Makefile. The header of a cascade of second-order sections in
-        floating point also has their coefficients in the order of CMSIS-DSP.
+    paths : header, source, test, test vectors and Makefile. The header of a cascade of second-order sections also has
+        their coefficients in the order of CMSIS-DSP, unless words of 16 or 32 bits do not hold all of them.
 
     Raises
     ------
@@ -149,9 +149,8 @@ def write_code(
     if not overwrite:
         refuse_others(target, name)
     found = prepared(given, chosen, form)
-    z = found.inputs(VECTORS) if inputs is None else data_of(given, inputs).z
-    if z is None:
-        raise ValueError(f"got inputs {inputs!r}; needed inputs or measurements, (steps, m)")
+    data = data_of(given, VECTORS if inputs is None else inputs)
+    z = found.inputs(data.steps) if data.z is None else data.z
     if within is not None and isinstance(given, NonlinearSystem):
         raise ValueError(f"got limits for {given.name}; needed none: a step of its own has no bound")
     vectors = found.emulate(z)
@@ -253,10 +252,9 @@ def _stored(numbers: Any, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
 
 
 def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared:
-    made, sections = system.as_filter(), list[Any]()
+    made = system.as_filter()
     if isinstance(fmt, FloatFormat):
         stored = made.stored(fmt)[None]
-        sections = made.cascade.sections(stored[0]) if made.cascade is not None else []
         step = CodeStep(without_exact(made.program, stored), stored, _start(fmt, system.x0))
     else:
         words = _words(fmt)
@@ -264,6 +262,7 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
         # With sums of their own, also a sum with zero may round or overflow.
         program = made.program if words.sums is not None else without_exact(made.program, stored)
         step = CodeStep(program, stored, _start(words.data, system.x0))
+    sections = made.cascade.sections(stored[0]) if made.cascade is not None else []
 
     def emulated(u: Any) -> Vectors:
         u, data = system_inputs(system, u), fmt.data if isinstance(fmt, WordFormats) else fmt

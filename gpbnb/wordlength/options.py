@@ -76,7 +76,7 @@ def parser() -> argparse.ArgumentParser:
         "--tolerance",
         required=True,
         metavar="NUMBERS",
-        help="largest allowed error: one number, or one per state or output, such as 0.01,inf",
+        help="largest allowed error: one number, or one per state or output, such as 0.01,1/3,inf",
     )
     made.add_argument(
         "--measurements",
@@ -192,7 +192,7 @@ def read(arguments: Sequence[str] | None) -> argparse.Namespace:
     """
     given = parser().parse_args(arguments)
     for name in ("tolerance", "level", *QUANTITIES):
-        _replace(given, name, _numbers, "numbers with commas between: 0.01,inf")
+        _replace(given, name, _numbers, "numbers with commas between: 0.01,1/3,inf")
     for name in ("steps", "seed", "digits", "base", "emin", "emax", "coefficients"):
         _replace(given, name, plain_integer, "a whole number")
     _replace(given, "rounding", lambda text: rounding_named(text).value)
@@ -336,7 +336,10 @@ def _numbers(text: str) -> str | list[str]:
     """Check numbers with commas between, and leave them as text, which is read exactly."""
     found = [each.strip() for each in text.split(",")]
     for each in found:
-        plain_number(each)
+        above, slash, below = each.partition("/")
+        plain_number(above)
+        if slash and not (plain_integer(above) and plain_integer(below)):
+            raise ValueError("a part of a fraction is zero")
     return found if len(found) > 1 else found[0]
 
 

@@ -26,7 +26,7 @@ from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.sweeps import machine
 from gpbnb.wordlength.answer import PROOFS, Basis, Requirement, format_in_words
-from gpbnb.wordlength.asked import tolerances_of
+from gpbnb.wordlength.asked import exactly, tolerances_of
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource
 from gpbnb.wordlength.ranges import binary_ranges
@@ -309,7 +309,9 @@ def study(
         base=like.base,
         rounding=like.rounding.value,
         steps=asked.count,
-        tolerance=tuple(_finite(float(each)) for each in np.broadcast_to(asked.tolerance, len(tolerances)).tolist()),
+        tolerance=tuple(
+            _finite(float(exactly(each))) for each in np.broadcast_to(asked.tolerance, len(tolerances)).tolist()
+        ),
         source=source or origin,
         answers=tuple(_plain(part.label, answer) for part, answer in found),
         errors=_errors(model, z, main.format if met else None, asked.form, tolerances),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED, format_text
+from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.guarantee import limits
 from gpbnb.bounds.guess import FilterLimits
@@ -251,7 +252,7 @@ def write_run(asked: CommandInput, report: Report, file: Path) -> None:
 
 
 def _level(given: argparse.Namespace) -> Any:
-    return 1.0 if given.level is None else np.asarray(given.level, dtype=np.float64)
+    return 1.0 if given.level is None else np.asarray(exact(given.level), dtype=np.float64)
 
 
 def _shown(level: Any) -> str:

@@ -291,6 +291,9 @@ def test_a_plant_in_another_format_is_not_rounded_with_its_controller():
 def test_numbers_without_a_format_have_nothing_to_convert():
     with pytest.raises(TypeError, match=r"got a float; needed an array of a format; fmt\.array\(\.\.\.\)"):
         convert(0.5, FMT)
+    with pytest.raises(TypeError, match="got the format 12; needed a FloatFormat, a FixedFormat, or a name such as"):
+        convert(FMT.array(0.5), 12)
+    assert convert(BINARY64.array("0.1"), "Q3.12").to_fractions() == FixedFormat(3, 12).round("0.1")
 
 
 def smoothed(fmt, z, kept):

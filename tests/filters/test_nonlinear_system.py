@@ -7,7 +7,16 @@ import re
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, BINARY64, FixedFormat, NonlinearSystem, required_precision
+from gpbnb import (
+    BINARY32,
+    BINARY64,
+    FixedFormat,
+    FloatFormat,
+    NonlinearSystem,
+    convert,
+    required_precision,
+    write_code,
+)
 from tests.step_functions import SYSTEMS, Native, clipped_controller
 
 needs = pytest.mark.parametrize
@@ -49,6 +58,26 @@ def loop(fmt, u):
         x, y = clipped_controller(fmt, x, row.reshape(1))
         found.append(y)
     return np.stack(found)
+
+
+def plant_beside(fmt, x, u):
+    """A proportional controller, and its plant in a format of its own."""
+    exact = FloatFormat(2, 100)
+    y, plant = (u - convert(x[0], fmt)) * fmt.array("0.7"), convert(x[0], exact)
+    return [plant + (convert(y[0], exact) - plant) * exact.array("0.1")], y
+
+
+def test_a_state_may_keep_a_format_of_its_own(tmp_path):
+    system, fmt, u = NonlinearSystem(plant_beside, [0]), FixedFormat(1, 9), [1] * 50
+    x, found = FloatFormat(2, 100).array(0), []
+    for _ in u:
+        found.append((fmt.array(1) - convert(x, fmt)) * fmt.array("0.7"))
+        x = x + (convert(found[-1], x.format) - x) * x.format.array("0.1")
+    assert system(fmt, u).to_fractions().ravel().tolist() == [each.to_fractions() for each in found]
+    assert system.states(fmt, u).to_fractions()[-1].tolist() == [fmt.round(x.to_fractions()), found[-1].to_fractions()]
+    assert required_precision(system, u, "1/1000", kind="fixed").digits == 10  # 11 if the plant is rounded, too
+    with pytest.raises(ValueError, match="it converts numbers to another format"):
+        write_code(system, fmt, tmp_path)
 
 
 def test_searches_take_a_system():

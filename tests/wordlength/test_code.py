@@ -377,14 +377,32 @@ def test_the_command_writes_code_in_the_format_that_meets_the_tolerance(options,
     assert str(folder / "filter.c") in capsys.readouterr().out
 
 
+def cmsis(system, fmt, folder):
+    """The coefficients that a header lists for CMSIS-DSP, as text, and the sentence about them; None without them."""
+    header = write_code(system, fmt, folder)[0].read_text()
+    found = re.search(r"/\* (b0, [^*]*) \*/\n#define FILTER_CMSIS \{(.*?)\}", header, re.DOTALL)
+    return found and ([each.strip() for each in found[2].replace("\\", "").split(",")], found[1])
+
+
 def test_a_header_has_the_coefficients_of_sections_in_the_order_of_cmsis(tmp_path):
-    sos = [["0.1", "0.2", "0.1", 1, "-0.5", "0.25"], ["0.3", "0.1", 0, 1, "-0.6", 0]]
+    sos = [["0.1", "0.2", "0.1", 1, "-0.5", "0.25"], ["0.3", "-2", 0, 1, "-0.6", 0]]
+    system = LinearSystem.from_sections(sos)
     for fmt, number in (("float32", np.float32), ("float64", np.float64)):
-        header = write_code(LinearSystem.from_sections(sos), fmt, tmp_path)[0].read_text()
-        given = re.search(r"#define FILTER_CMSIS \{(.*?)\}", header, re.DOTALL)[1].replace("\\", "").split(",")
-        found = [float.fromhex(each.strip().removesuffix("f")) for each in given]
+        texts, _ = cmsis(system, fmt, tmp_path)
+        found = [float.fromhex(each.removesuffix("f")) for each in texts]
         b0, b1, b2, _, a1, a2 = np.array([[number(each) for each in row] for row in sos]).T
         assert np.reshape(found, (2, 5)).T.tolist() == [each.tolist() for each in (b0, b1, b2, -a1, -a2)]
+    # Integers n that stand for n / 2**15 or n / 2**31, times 2**postShift; q15 has a zero after b0.
+    b = [["0.1", "0", "0.2", "0.1"], ["0.3", "0", "-2", "0"]]
+    a = [["0.5", "-0.25"], ["0.6", "0"]]
+    texts, what = cmsis(system, "Q3.12", tmp_path)
+    assert "arm_biquad_cascade_df1_q15 with postShift = 1;" in what
+    exactly = [FixedFormat(3, 12).round(each) for above, below in zip(b, a, strict=True) for each in above + below]
+    assert [Fraction(int(each), 2**14) for each in texts] == exactly
+    texts, what = cmsis(system, WordFormats(FixedFormat(3, 28), 12), tmp_path)
+    assert "arm_biquad_cascade_df1_q31 with postShift = 1;" in what
+    assert Fraction(int(texts[0]), 2**30) == FloatFormat(2, 12).round("0.1")
     third = LinearSystem.from_coefficients([1], [1, 0, 0, "0.5"])
-    for system, fmt in ((LinearSystem.from_sections(sos), "Q3.12"), (third, "float32"), (GROWING, "float32")):
-        assert "CMSIS" not in write_code(system, fmt, tmp_path)[0].read_text()
+    short = WordFormats(FixedFormat(3, 12), 12)  # 12 bits of 0.1 do not fit a word of 16 that also holds -2
+    none = [(system, short), (system, "Q3.40"), (third, "float32"), (third, "Q3.12"), (GROWING, "float32")]
+    assert [cmsis(each, fmt, tmp_path) for each, fmt in none] == [None] * 5

@@ -175,8 +175,8 @@ def test_its_own_measurements_are_seeded():
         ({"tolerance": "small"}, "got tolerance 'small'; needed an error above 0 for each of the 2 states"),
         ({"tolerance": None}, "got tolerance None"),
         ({"form": "square"}, "got form 'square'; needed one of 'hung', .*'ud'"),
-        ({"z": 0}, "got 0 steps; needed a whole number, at least 1"),
-        ({"z": 2.5}, "got 2.5 steps; needed a whole number"),
+        ({"z": 0}, "got steps 0; needed a whole number, at least 1"),
+        ({"z": 2.5}, "got steps 2.5; needed a whole number"),
         ({"z": np.where(np.arange(60) == 7, np.inf, 1.0)[:, None]}, "got inf for measurement 0 of step 8; .*or NaN"),
         (
             {"z": np.ones((5, 2))},

@@ -60,7 +60,8 @@ def test_the_light_lists_are_those_of_the_library():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--tolerance", "1_0"], "got --tolerance 1_0; needed numbers with commas between: 0.01,inf"),
+        (["--tolerance", "1_0"], "got --tolerance 1_0; needed numbers with commas between: 0.01,1/3,inf"),
+        (["--tolerance", "1/0"], "got --tolerance 1/0; needed numbers with commas"),
         (["--steps", "1_0"], "got --steps 1_0; needed a whole number"),
         (["--base", "7"], "got --base 7; needed one of 2, 10, 16"),
         (["--rounding", "sideways"], "got rounding 'sideways'; needed"),
@@ -172,8 +173,8 @@ except SystemExit as end:
 def test_numbers_are_read_exactly(folder, computed):
     """The nearest float64 of 0.1 is larger than it."""
     limits = ["--basis", "guarantee", "--state", "9", "--innovation", "0.1"]
-    assert main([str(folder / "filter.toml"), "--tolerance", "0.1,inf", *limits]) == 0
-    assert computed[0].tolerance == ["0.1", "inf"]
+    assert main([str(folder / "filter.toml"), "--tolerance", "1/10,inf", *limits]) == 0
+    assert computed[0].tolerance == ["1/10", "inf"]
     assert computed[0].within.innovation >= Fraction("0.1")
     assert tolerances_of(computed[0].tolerance, 2, "states")[0] <= Fraction("0.1")
     with pytest.raises(ValueError, match=r"got tolerance 1e-400; needed at least 2\*\*-1074"):
