@@ -80,7 +80,7 @@ def test_a_command_of_the_report_says_in_one_line_what_to_install(command, folde
 
 
 def test_an_import_of_the_report_says_what_to_install(folder):
-    done = run("from gpbnb.report.rounding import theory", folder)
+    done = run("from gpbnb.report.rounding import experiment", folder)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith(
         "ImportError: gpbnb.report: got no matplotlib, mpmath, scipy, sympy; needed"

@@ -11,8 +11,6 @@ import sympy as sp
 
 from gpbnb.report.budget import derivation, experiment, theory
 
-DERIVATIONS = steps.Derivations(derivation.equal_sources, derivation.averages)
-
 NAMES = {
     "equal_sources": {
         r"root-sum-square of $N$ errors of $e/\sqrt N$ each": "e",
@@ -27,12 +25,12 @@ NAMES = {
         ),
     },
 }
-"""What each step derives, beside its name; see `steps.check_names`."""
+"""What each step derives, beside its name; see `steps.check`."""
 
 
-@pytest.mark.parametrize("name", DERIVATIONS)
+@pytest.mark.parametrize("name", NAMES)
 def test_each_step_holds_and_is_named_for_what_it_derives(name):
-    steps.check_each(DERIVATIONS[name], NAMES[name])
+    steps.check(getattr(derivation, name), NAMES[name])
 
 
 def test_sources_are_counted():
@@ -40,12 +38,8 @@ def test_sources_are_counted():
     assert derivation.J.is_integer
 
 
-def test_the_derivations_are_those_of_the_chapter():
-    assert steps.lengths(DERIVATIONS) == {"equal_sources": 2, "averages": 4}
-
-
 def test_the_factors_of_theory_are_those_of_the_derivation():
-    constant, _, white, correlated = (step.right for step in derivation.averages().steps)
+    constant, _, white, correlated = (step.right for step in derivation.averages())
     c = next(symbol for symbol in constant.free_symbols if symbol.name == "c")
     for cycles in (0.3, 2.25, 17.9):
         assert theory.cycles_factor(cycles) == pytest.approx(abs(float(constant.doit().subs(c, cycles))), rel=1e-12)

@@ -12,12 +12,6 @@ import sympy as sp
 from gpbnb.report import measurement as m
 from gpbnb.report.geometry import derivation
 
-DERIVATIONS = steps.Derivations(
-    derivation.first_order_effects,
-    derivation.second_order_effects,
-    derivation.precessions,
-)
-
 NAMES = {
     "first_order_effects": {
         "telescope, first row: β is fixed in the spacecraft, so the deroll rotates it": (
@@ -45,16 +39,16 @@ NAMES = {
         "for such a star: frame dragging in the plane of the orbit": "0",
     },
 }
-"""What each step derives, beside its name; see `steps.check_names`."""
+"""What each step derives, beside its name; see `steps.check`."""
 
 
-@pytest.mark.parametrize("name", DERIVATIONS)
+@pytest.mark.parametrize("name", NAMES)
 def test_each_step_holds_and_is_named_for_what_it_derives(name):
-    steps.check_each(DERIVATIONS[name], NAMES[name])
+    steps.check(getattr(derivation, name), NAMES[name])
 
 
 @pytest.mark.parametrize(
-    ("derivation", "name", "integrand"),
+    ("function", "name", "integrand"),
     [
         (
             "first_order_effects",
@@ -66,8 +60,8 @@ def test_each_step_holds_and_is_named_for_what_it_derives(name):
         ("precessions", "mean field across it, in the plane of the orbit", "3*omega_E*cos(u)*sin(u)"),
     ],
 )
-def test_each_mean_is_of_what_its_name_says(derivation, name, integrand):
-    (step,) = (step for step in DERIVATIONS[derivation].steps if step.name == name)
+def test_each_mean_is_of_what_its_name_says(function, name, integrand):
+    (step,) = (step for step in getattr(derivation, function)() if step.name == name)
     (integral,) = step.left.atoms(sp.Integral)
     assert steps.equal(integral.function, steps.written(integrand, step))
 
@@ -89,6 +83,6 @@ def test_the_fewest_signs_are_two_and_only_one_pair_does():
 
 
 def test_a_star_off_the_plane_has_drifts_that_are_not_perpendicular():
-    step = DERIVATIONS["precessions"].steps[2]
+    step = derivation.precessions()[2]
     assert step.right.subs(sp.Symbol("epsilon", real=True), 0) == 0
     assert step.right != 0

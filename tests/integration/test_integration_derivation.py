@@ -10,15 +10,6 @@ import sympy as sp
 from gpbnb.report.integration import derivation, theory
 from gpbnb.report.integration.derivation import MU, T
 
-DERIVATIONS = steps.Derivations(
-    derivation.independent,
-    derivation.transient,
-)
-
-
-#: Where what comes out is already written as it is printed.
-ALIKE = ("the variance starts at zero",)
-
 NAMES = {
     "independent": {
         "$r_0$: variance of the trapezoid, of the integral, and their covariance": (
@@ -42,12 +33,12 @@ NAMES = {
         ),
     },
 }
-"""What each step derives, beside its name; see `steps.check_names`."""
+"""What each step derives, beside its name; see `steps.check`."""
 
 
-@pytest.mark.parametrize("name", DERIVATIONS)
+@pytest.mark.parametrize("name", NAMES)
 def test_each_step_holds_and_is_named_for_what_it_derives(name):
-    steps.check_each(DERIVATIONS[name], NAMES[name], ALIKE)
+    steps.check(getattr(derivation, name), NAMES[name])
 
 
 def test_the_integral_equation_as_printed_lacks_the_identity():

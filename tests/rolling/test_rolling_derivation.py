@@ -8,8 +8,6 @@ import sympy as sp
 
 from gpbnb.report.rolling import derivation
 
-DERIVATIONS = steps.Derivations(derivation.filters)
-
 NAMES = {
     "filters": {
         "single pole: it lags by τ": "tau",
@@ -22,12 +20,12 @@ NAMES = {
         "the least mean square error": "3/4*(k*N_0)**(2/3)",
     },
 }
-"""What each step derives, beside its name; see `steps.check_names`."""
+"""What each step derives, beside its name; see `steps.check`."""
 
 
-@pytest.mark.parametrize("name", DERIVATIONS)
+@pytest.mark.parametrize("name", NAMES)
 def test_each_step_holds_and_is_named_for_what_it_derives(name):
-    steps.check_each(DERIVATIONS[name], NAMES[name])
+    steps.check(getattr(derivation, name), NAMES[name])
 
 
 def test_the_deroll_inverts_the_roll():

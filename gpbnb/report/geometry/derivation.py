@@ -7,7 +7,6 @@ its order. Where the order matters, all six are examined.
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from gpbnb.report.display.derivation import Derivation, Step, over, unevaluated
+from gpbnb.report.display.derivation import Step
 
 P = sp.Symbol("psi", real=True)
 """The roll phase ωt."""
@@ -26,17 +25,6 @@ ALPHA, BETA, GAMMA, DELTA, THETA, PHI = (
 C, S = sp.cos(P), sp.sin(P)
 SEQUENCES = tuple(itertools.permutations((1, 2, 3)))
 E1 = sp.Matrix([1, 0, 0])
-
-
-class RollStep(Step):
-    """A step that shows cosine and sine of the roll phase as C and S, as the report does."""
-
-    def latex(self) -> str:
-        """Typeset the step, with C and S for cosine and sine of the roll phase."""
-        text = super().latex()
-        for name, letter in (("cos", "C"), ("sin", "S")):
-            text = re.sub(rf"\\{name}(\^\{{2\}})?\{{\\left\(\\psi \\right\)\}}", rf"{letter}\1 ", text)
-        return text
 
 
 # -- rotations ------------------------------------------------------------------------------------
@@ -106,7 +94,7 @@ def derolled(y: sp.Expr, z: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
 
 def mean(expression: sp.Expr) -> sp.Expr:
     """Return the mean over a roll, unevaluated."""
-    return over(sp.Integral(expression, (P, 0, 2 * sp.pi)), 2 * sp.pi)
+    return sp.Integral(expression, (P, 0, 2 * sp.pi)) / (2 * sp.pi)
 
 
 def fewest_signs() -> tuple[tuple[int, ...], ...]:
@@ -162,65 +150,55 @@ def drift_errors(order: int) -> tuple[sp.Expr, sp.Expr]:
     return first, second
 
 
-def first_order_effects() -> Derivation:
+def first_order_effects() -> tuple[Step, ...]:
     """Derive the effect of misalignments to first order: (1) and (2) with β and γ, derolled as in (5)-(7)."""
     small = (*ALPHA, *BETA, *GAMMA, *THETA)
     t, r = (vector.applyfunc(lambda e: up_to(1, e, small)) for vector in (star(), spin()))
     drift = {theta: phi + alpha for theta, phi, alpha in zip(THETA, PHI, ALPHA, strict=True)}
     y, z = (sp.expand((r[k] - t[k]).subs(drift)) for k in (1, 2))
     turned = derolled(-GAMMA[2], GAMMA[1])
-    both = sp.collect(sp.expand(derolled(-BETA[2] - GAMMA[2], BETA[1] + GAMMA[1])[0]), (C, S))
-    return Derivation(
-        (
-            RollStep(
-                "telescope, first row: β is fixed in the spacecraft, so the deroll rotates it",
-                unevaluated(C) * unevaluated(t[1]) - unevaluated(S) * unevaluated(t[2]),
-                -ALPHA[2] + sp.expand(derolled(-BETA[2], BETA[1])[0]),
-            ),
-            RollStep(
-                "gyro, first row: β and γ appear",
-                unevaluated(C) * unevaluated(r[1]) - unevaluated(S) * unevaluated(r[2]),
-                -THETA[2] + both,
-            ),
-            RollStep(
-                "gyro less telescope, with $\\varphi=\\theta-\\alpha$, first row: β cancels, γ does not",
-                unevaluated(C) * unevaluated(y) - unevaluated(S) * unevaluated(z),
-                -PHI[2] + turned[0],
-            ),
-            RollStep(
-                "gyro less telescope, second row",
-                unevaluated(S) * unevaluated(y) + unevaluated(C) * unevaluated(z),
-                PHI[1] + turned[1],
-            ),
-            RollStep("mean over a roll of the remaining γ, first row", mean(turned[0]), sp.S.Zero),
-            RollStep("the same for the second row", mean(turned[1]), sp.S.Zero),
-        )
+    both = derolled(-BETA[2] - GAMMA[2], BETA[1] + GAMMA[1])[0]
+    return (
+        Step(
+            "telescope, first row: β is fixed in the spacecraft, so the deroll rotates it",
+            C * t[1] - S * t[2],
+            -ALPHA[2] + derolled(-BETA[2], BETA[1])[0],
+        ),
+        Step(
+            "gyro, first row: β and γ appear",
+            C * r[1] - S * r[2],
+            -THETA[2] + both,
+        ),
+        Step(
+            "gyro less telescope, with $\\varphi=\\theta-\\alpha$, first row: β cancels, γ does not",
+            C * y - S * z,
+            -PHI[2] + turned[0],
+        ),
+        Step(
+            "gyro less telescope, second row",
+            S * y + C * z,
+            PHI[1] + turned[1],
+        ),
+        Step("mean over a roll of the remaining γ, first row", mean(turned[0]), sp.S.Zero),
+        Step("the same for the second row", mean(turned[1]), sp.S.Zero),
     )
 
 
-def second_order_effects() -> Derivation:
+def second_order_effects() -> tuple[Step, ...]:
     """Derive the effect of misalignments that survives the mean over a roll, to second order, with exact rotations."""
     errors = drift_errors(2)
     twist = ALPHA[0] + BETA[0] + GAMMA[0]
-    return Derivation(
-        tuple(
-            RollStep(
-                f"mean error of the difference, {name} row",
-                mean(sp.collect(error, (C, S, phi))),
-                unevaluated(twist) * phi + GAMMA[0] * alpha,
-            )
-            for name, error, phi, alpha in (
-                ("first", errors[0], PHI[1], ALPHA[1]),
-                ("second", errors[1], PHI[2], ALPHA[2]),
-            )
-        )
+    rows = (("first", errors[0], PHI[1], ALPHA[1]), ("second", errors[1], PHI[2], ALPHA[2]))
+    return tuple(
+        Step(f"mean error of the difference, {name} row", mean(error), twist * phi + GAMMA[0] * alpha)
+        for name, error, phi, alpha in rows
     )
 
 
 # -- chapter I: the two precessions ---------------------------------------------------------------
 
 
-def precessions() -> Derivation:
+def precessions() -> tuple[Step, ...]:
     r"""Derive the directions of the two drifts for a polar orbit (Figure I-1).
 
     The Earth rotates about z, and the orbit lies in the x-z plane. The star has the declination δ and lies at an angle
@@ -233,22 +211,20 @@ def precessions() -> Derivation:
     earth, normal = sp.Matrix([0, 0, w]), sp.Matrix([0, 1, 0])
     star = sp.Matrix([sp.cos(e) * sp.cos(d), sp.sin(e), sp.cos(e) * sp.sin(d)])
     field = 3 * r * r.dot(earth) - earth
-    average = [over(sp.Integral(sp.expand(f), (u, 0, 2 * sp.pi)), 2 * sp.pi) for f in field]
+    average = [sp.Integral(sp.expand(f), (u, 0, 2 * sp.pi)) / (2 * sp.pi) for f in field]
     geodetic, motional = normal.cross(star), (earth / 2).cross(star)
-    return Derivation(
-        (
-            Step("mean field along the axis of the Earth", average[2], w / 2),
-            Step("mean field across it, in the plane of the orbit", average[0], sp.S.Zero),
-            Step(
-                "inner product of the two drifts; it vanishes for a star in the plane of the orbit, $\\epsilon=0$",
-                geodetic.dot(motional),
-                -w * sp.sin(2 * e) * sp.sin(d) / 4,
-            ),
-            Step(
-                "for such a star: frame dragging along the normal of the orbit",
-                sp.Limit(motional.dot(normal), e, 0),
-                w * sp.cos(d) / 2,
-            ),
-            Step("for such a star: frame dragging in the plane of the orbit", sp.Limit(motional[0], e, 0), sp.S.Zero),
-        )
+    return (
+        Step("mean field along the axis of the Earth", average[2], w / 2),
+        Step("mean field across it, in the plane of the orbit", average[0], sp.S.Zero),
+        Step(
+            "inner product of the two drifts; it vanishes for a star in the plane of the orbit, $\\epsilon=0$",
+            geodetic.dot(motional),
+            -w * sp.sin(2 * e) * sp.sin(d) / 4,
+        ),
+        Step(
+            "for such a star: frame dragging along the normal of the orbit",
+            sp.Limit(motional.dot(normal), e, 0),
+            w * sp.cos(d) / 2,
+        ),
+        Step("for such a star: frame dragging in the plane of the orbit", sp.Limit(motional[0], e, 0), sp.S.Zero),
     )

@@ -9,7 +9,7 @@ from functools import cache
 
 import sympy as sp
 
-from gpbnb.report.display.derivation import Derivation, Step, over, together
+from gpbnb.report.display.derivation import Step
 
 OMEGA, T, P, TAU, TIME = sp.symbols("omega T P tau t", positive=True)
 MU = sp.Symbol("mu", positive=True)
@@ -134,7 +134,7 @@ def walk() -> sp.Expr:
     return (1 + sp.exp(-MU)) / (1 - sp.exp(-MU)) - 2 / MU
 
 
-def independent() -> Derivation:
+def independent() -> tuple[Step, ...]:
     r"""Derive (35) from the errors of single cycles, without (10)-(34).
 
     With :math:`R(\tau) = Pe^{-\omega|\tau|}`, the error of one cycle has the variance r_0. Its covariance with the
@@ -148,28 +148,26 @@ def independent() -> Derivation:
     drawn = T * (1 + DECAY) / 2 - (1 - DECAY) / OMEGA
     r1 = P * drawn**2
     grow = walk().subs(MU, OMEGA * T)
-    return Derivation(
-        (
-            Step(
-                "$r_0$: variance of the trapezoid, of the integral, and their covariance",
-                together(P * T**2 * (1 + DECAY) / 2, inner, -2 * T * along),
-                r0,
-            ),
-            Step(
-                "$gT$: expected error of the next cycle for a sample of size 1",
-                drawn / T,
-                (1 - DECAY) / 2 * grow,
-            ),
-            Step(
-                "the sum $r_0 + 2r_1/(1-e^{-\\omega T})$ equals (35)",
-                together(r0, over(2 * r1, 1 - DECAY)),
-                P * T**2 * grow,
-            ),
-        )
+    return (
+        Step(
+            "$r_0$: variance of the trapezoid, of the integral, and their covariance",
+            P * T**2 * (1 + DECAY) / 2 + inner - 2 * T * along,
+            r0,
+        ),
+        Step(
+            "$gT$: expected error of the next cycle for a sample of size 1",
+            drawn / T,
+            (1 - DECAY) / 2 * grow,
+        ),
+        Step(
+            "the sum $r_0 + 2r_1/(1-e^{-\\omega T})$ equals (35)",
+            r0 + 2 * r1 / (1 - DECAY),
+            P * T**2 * grow,
+        ),
     )
 
 
-def transient() -> Derivation:
+def transient() -> tuple[Step, ...]:
     r"""Derive the variance at every n for an input in its steady state, with Langevin's L and :math:`φ = e^{-\mu}`."""
     pee = N * L - L**2 / 2 * (1 - PHI**N)
     c = L / 2 * (1 - PHI**N)
@@ -179,22 +177,20 @@ def transient() -> Derivation:
     grown = {r0: r, r1: g**2}
     k = sp.Symbol("k", integer=True, positive=True)
     total = N * r0 + 2 * r1 * (N / (1 - PHI) - (1 - PHI**N) / (1 - PHI) ** 2)
-    return Derivation(
-        (
-            Step("$c_n = E(e_nx_{1n})$ in units of $\\sigma_x^2T$: its recursion", PHI * c + g, c.subs(N, N + 1)),
-            Step("$P_{n+1}$ from $P_n$, in units of $\\sigma_x^2T^2$", together(pee, 2 * g * c, r), pee.subs(N, N + 1)),
-            Step("the variance starts at zero", pee.subs(N, 0), sp.Integer(0)),
-            Step(
-                "the same from $n\\,r_0 + 2\\sum_{k<n}(n-k)\\,r_1\\varphi^{k-1}$, summed",
-                total.subs(grown),
-                pee,
-            ),
-            Step(
-                "that sum, by induction over $n$: one more cycle adds $r_0 + 2r_1(1-\\varphi^n)/(1-\\varphi)$",
-                together(total.subs(N, k + 1), -total.subs(N, k)),
-                r0 + 2 * r1 * (1 - PHI**k) / (1 - PHI),
-            ),
-        )
+    return (
+        Step("$c_n = E(e_nx_{1n})$ in units of $\\sigma_x^2T$: its recursion", PHI * c + g, c.subs(N, N + 1)),
+        Step("$P_{n+1}$ from $P_n$, in units of $\\sigma_x^2T^2$", pee + 2 * g * c + r, pee.subs(N, N + 1)),
+        Step("the variance starts at zero", pee.subs(N, 0), sp.Integer(0)),
+        Step(
+            "the same from $n\\,r_0 + 2\\sum_{k<n}(n-k)\\,r_1\\varphi^{k-1}$, summed",
+            total.subs(grown),
+            pee,
+        ),
+        Step(
+            "that sum, by induction over $n$: one more cycle adds $r_0 + 2r_1(1-\\varphi^n)/(1-\\varphi)$",
+            total.subs(N, k + 1) - total.subs(N, k),
+            r0 + 2 * r1 * (1 - PHI**k) / (1 - PHI),
+        ),
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from gpbnb.report.display.derivation import Derivation, Step, first_order, over, together, unevaluated
+from gpbnb.report.display.derivation import Step, first_order
 
 N, M, K = sp.symbols("n m k", integer=True, positive=True)
 NTH, J = sp.symbols("i j", integer=True, positive=True)
@@ -90,7 +90,7 @@ GROWTH = 3 * N + M + 2
 # -- the contraction bound --------------------------------------------------------------------------------------------
 
 
-def contraction() -> Derivation:
+def contraction() -> tuple[Step, ...]:
     r"""Derive the exact identities behind the contraction bound, for every n and m; symbols do not commute.
 
     For two covariances A and B before the measurement, K and L are the gains, :math:`KS = AH^T` and
@@ -99,65 +99,38 @@ def contraction() -> Derivation:
     """
     a, b, h, ht, r, k, o, lt = sp.symbols("A B H H' R K L L'", commutative=False)
     phi, e, nu = sp.symbols(r"\Phi e \hat{\nu}", commutative=False)
-    one = sp.S.One
+    alpha, t, size = sp.symbols("alpha t q", positive=True)
     s = h * a * ht + r
     after_a, after_b = a - k * h * a, b - b * ht * lt
-    zero_k = unevaluated(after_a * ht - k * r)
-    zero_l = unevaluated(h * after_b - r * lt)
-    return Derivation(
-        (
-            Step(
-                "the two forms of (99) are one: $AH'-KS$ is zero where $(A-KHA)H'-KR$ is zero", a * ht - k * s, zero_k
-            ),
-            Step(
-                "likewise, $HB-TL'$ is zero where $H(B-BH'L')-RL'$ is zero",
-                h * b - unevaluated(h * b * ht + r) * lt,
-                zero_l,
-            ),
-            Step(
-                "two updates, subtracted; the last two terms are zero",
-                after_a - after_b,  # SymPy typesets an unevaluated difference without its parentheses
-                together(
-                    unevaluated(one - k * h) * unevaluated(a - b) * unevaluated(one - ht * lt), zero_k * lt, -k * zero_l
-                ),
-            ),
-            Step(
-                "two gains, subtracted; the last two terms are zero",
-                unevaluated(one - o * h) * unevaluated(a - b) * ht,
-                together(
-                    unevaluated(k - o) * unevaluated(s),
-                    unevaluated(a * ht - k * s),
-                    unevaluated(o * r - (b - o * h * b) * ht),
-                ),
-            ),
-            Step(
-                "two closed loops, subtracted: $F_k - A_k = (K-L)H\\Phi = F_kE_{k-1}G_k$",
-                unevaluated(one - o * h) * phi - unevaluated(one - k * h) * phi,
-                unevaluated(k - o) * h * phi,
-            ),
-            Step(
-                "two states, $\\Phi\\hat x + K\\hat\\nu$ and $\\Phi(\\hat x-e) + L(\\hat\\nu + H\\Phi e)$, subtracted",
-                together(k * nu, phi * e, -o * unevaluated(nu + h * phi * e)),
-                together(unevaluated(one - o * h) * phi * e, unevaluated(k - o) * nu),
-            ),
-        )
-    )
-
-
-def recursion() -> Derivation:
-    r"""Derive the scalar recursion of the contraction bound: the norm of the exact closed loop, and a steady state."""
-    alpha, t, size = sp.symbols("alpha t q", positive=True)
-    return Derivation(
-        (
-            Step(
-                "$f \\le \\alpha + f\\,g\\zeta$, from $F_k = A_k + F_kE_{k-1}G_k$: the largest such $f$",
-                together(alpha, t * over(alpha, 1 - t)),
-                over(alpha, 1 - t),
-            ),
-            Step(
-                "residuals of one size and $\\alpha < 1$: the errors stay at",
-                together(alpha * over(size, 1 - alpha), size),
-                over(size, 1 - alpha),
-            ),
-        )
+    zero_k, zero_l = after_a * ht - k * r, h * after_b - r * lt
+    gains = (k - o) * s + (a * ht - k * s) + (o * r - (b - o * h * b) * ht)
+    return (
+        Step("the two forms of (99) are one: $AH'-KS$ is zero where $(A-KHA)H'-KR$ is zero", a * ht - k * s, zero_k),
+        Step("likewise, $HB-TL'$ is zero where $H(B-BH'L')-RL'$ is zero", h * b - (h * b * ht + r) * lt, zero_l),
+        Step(
+            "two updates, subtracted; the last two terms are zero",
+            after_a - after_b,
+            (1 - k * h) * (a - b) * (1 - ht * lt) + zero_k * lt - k * zero_l,
+        ),
+        Step("two gains, subtracted; the last two terms are zero", (1 - o * h) * (a - b) * ht, gains),
+        Step(
+            "two closed loops, subtracted: $F_k - A_k = (K-L)H\\Phi = F_kE_{k-1}G_k$",
+            (1 - o * h) * phi - (1 - k * h) * phi,
+            (k - o) * h * phi,
+        ),
+        Step(
+            "two states, $\\Phi\\hat x + K\\hat\\nu$ and $\\Phi(\\hat x-e) + L(\\hat\\nu + H\\Phi e)$, subtracted",
+            k * nu + phi * e - o * (nu + h * phi * e),
+            (1 - o * h) * phi * e + (k - o) * nu,
+        ),
+        Step(
+            "$f \\le \\alpha + f\\,g\\zeta$, from $F_k = A_k + F_kE_{k-1}G_k$: the largest such $f$",
+            alpha + t * alpha / (1 - t),
+            alpha / (1 - t),
+        ),
+        Step(
+            "residuals of one size and $\\alpha < 1$: the errors stay at",
+            alpha * size / (1 - alpha) + size,
+            size / (1 - alpha),
+        ),
     )

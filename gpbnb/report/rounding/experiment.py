@@ -5,11 +5,13 @@ Errors and bounds are compared as exact Fractions, so even the smallest violatio
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache
 from typing import Any, cast
 
 import numpy as np
@@ -17,14 +19,11 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounded import BoundedError
+from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.rational import column_sum_norm, integers
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.rounding import theory
-from gpbnb.report.rounding.paths import best_path, partial_sums, product_table
-
-Bounds = Mapping[str, Callable[[], Fraction]]
 
 
 @dataclass(frozen=True)
@@ -71,19 +70,21 @@ def bound_statistics(trials: Sequence[Trial]) -> tuple[BoundStatistics, ...]:
 
 
 def sum_trial(x: FloatArray) -> Trial:
-    """Add the (n,) terms from left to right, and evaluate the bounds of section 6."""
-    terms, beta = x.to_fractions(), x.format.unit_roundoff
-    return _trial(
-        (x,),
-        x.sum(),
-        sum(terms, start=Fraction(0)),
-        {
-            "1982 (18)": lambda: theory.printed_sum_bound_1982(terms, beta),
-            "1984 (18)": lambda: theory.printed_sum_bound(terms, beta),
-            "weights": lambda: theory.sum_bound(terms, beta),
-            "strict": lambda: theory.strict_sum_bound(terms, beta),
-        },
-    )
+    """Add the (n,) terms from left to right, and evaluate the bounds of section 6.
+
+    The bound "weights" multiplies each term by the number of roundings that it passes through: n - 1 for the first two,
+    n + 1 - j for the j-th. "strict" is the same to every order.
+    """
+    terms, beta, n = x.to_fractions(), x.format.unit_roundoff, len(x)
+    true, sizes, weights = sum(terms, start=Fraction(0)), abs(terms), [n - 1, *range(n - 1, 0, -1)]
+    printed_1982 = (n - 1) * beta * abs(true)
+    bounds = {
+        "1982 (18)": printed_1982,
+        "1984 (18)": printed_1982 + beta * sum((j - 2) * sizes[j - 1] for j in range(3, n + 1)),
+        "1984 (18), coarse": printed_1982 + beta * (n - 1) * (n - 2) / 2 * max(sizes),
+        "weights": beta * (weights @ sizes),
+    }
+    return _trial((x,), x.sum(), true, bounds, lambda: [gamma(w, beta) for w in weights] @ sizes)
 
 
 def product_trial(x: FloatArray, y: FloatArray) -> Trial:
@@ -91,98 +92,74 @@ def product_trial(x: FloatArray, y: FloatArray) -> Trial:
 
     The error is relative. The bounds are those of section 6.
     """
-    fmt, n, m = x.format, len(x), len(y)
+    roundings, beta = len(x) + len(y) - 1, x.format.unit_roundoff
     computed = x.prod()
     for divisor in y:
         computed = computed / divisor
     true = Fraction(math.prod(x.to_fractions())) / math.prod(y.to_fractions())
-    beta = fmt.unit_roundoff
-    return _trial(
-        (x, y),
-        computed,
-        true,
-        {
-            "1982 (20)": lambda: theory.product_bound(n, m, beta),
-            "1984 (20)": lambda: theory.printed_product_bound(n, m, beta),
-            "strict": lambda: theory.strict_product_bound(n, m, beta),
-        },
-        error=abs(computed.to_fractions() / true - 1),
-    )
+    bounds = {"1982 (20)": roundings * beta, "1984 (20)": (roundings + 2) * beta}
+    error = abs(computed.to_fractions() / true - 1)
+    return _trial((x, y), computed, true, bounds, lambda: gamma(roundings, beta), error)
 
 
 def dot_trial(a: FloatArray, b: FloatArray) -> Trial:
     """Compute the inner product of two vectors (n,), with the bounds of section 9.1."""
-    fa, fb, beta = a.to_fractions(), b.to_fractions(), a.format.unit_roundoff
-    return _trial(
-        (a, b),
-        a @ b,
-        sum(fa * fb, start=Fraction(0)),
-        {
-            "(26)": lambda: theory.dot_bound(fa, fb, beta),
-            "strict": lambda: theory.strict_dot_bound(fa, fb, beta),
-        },
-    )
+    products, beta, n = a.to_fractions() * b.to_fractions(), a.format.unit_roundoff, len(a)
+    bounds = {"(26)": beta * ([n, *range(n, 1, -1)] @ abs(products))}
+    true = sum(products, start=Fraction(0))
+    return _trial((a, b), a @ b, true, bounds, lambda: gamma(n, beta) * sum(abs(products)))
 
 
 def matrix_sum_trial(a: FloatArray, b: FloatArray) -> Trial:
-    """Add two matrices; the error is the norm (22) of the error matrix, and the bounds are those of section 8."""
-    fa, fb, beta = a.to_fractions(), b.to_fractions(), a.format.unit_roundoff
-    return _trial((a, b), a + b, fa + fb, {"(24)": lambda: theory.matrix_sum_bound(fa, fb, beta)})
+    """Add two matrices; the error is the norm (22) of the error matrix, and the bound is that of section 8."""
+    true = a.to_fractions() + b.to_fractions()
+    return _trial((a, b), a + b, true, {"(24)": a.format.unit_roundoff * column_sum_norm(true)})
 
 
 def chain_trial(matrices: Sequence[FloatArray]) -> Trial:
-    """Multiply matrices from left to right; the error is in norm (22), and the bounds are those of section 9.2."""
-    computed = matrices[0]
+    """Multiply matrices from left to right; the error is in norm (22), and the bounds are those of section 9.2.
+
+    An entry of the product is a sum over paths, each with one entry from every factor. A path passes through at
+    most as many roundings as all factors but the last have columns.
+    """
+    computed, true = matrices[0], matrices[0].to_fractions()
     for matrix in matrices[1:]:
-        computed = computed @ matrix
-    values = [matrix.to_fractions() for matrix in matrices]
-    beta = computed.format.unit_roundoff
-    return _trial(
-        tuple(matrices),
-        computed,
-        theory.product(values),
-        {
-            "(31)": lambda: theory.printed_chain_claim(values, beta),
-            "(32)": lambda: theory.chain_bound(values, beta),
-            "strict": lambda: theory.strict_chain_bound(values, beta),
-        },
-    )
+        computed, true = computed @ matrix, true @ matrix.to_fractions()
+    roundings, beta = sum(matrix.shape[1] for matrix in matrices[:-1]), computed.format.unit_roundoff
+    norms = math.prod(column_sum_norm(matrix) for matrix in matrices)
+    bounds = {"(31)": roundings * beta * column_sum_norm(true), "(32)": roundings * beta * norms}
+    return _trial(tuple(matrices), computed, true, bounds, lambda: gamma(roundings, beta) * norms)
 
 
 def example_trial(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Trial:
     """Compute R = ABC + D, Examples 1 and 2 of section 9.2; the error is in norm (22)."""
-    fa, fb, fc, fd = (matrix.to_fractions() for matrix in (a, b, c, d))
-    beta = a.format.unit_roundoff
-    return _trial(
-        (a, b, c, d),
-        a @ b @ c + d,
-        theory.product([fa, fb, fc]) + fd,
-        {
-            "Examples": lambda: theory.printed_example_bound(fa, fb, fc, fd, beta),
-            "corrected": lambda: theory.example_bound(fa, fb, fc, fd, beta),
-            "strict": lambda: theory.strict_example_bound(fa, fb, fc, fd, beta),
-        },
-    )
+    chain, beta = chain_trial([a, b, c]), a.format.unit_roundoff
+    true = chain.true + d.to_fractions()
+    last = beta * column_sum_norm(true)
+    bounds = {
+        "Examples": chain.bounds["(31)"] + beta * (column_sum_norm(chain.true) + column_sum_norm(d)),
+        "corrected": chain.bounds["(32)"] + last,
+    }
+    if "strict" in chain.bounds:
+        bounds["strict"] = (1 + beta) * chain.bounds["strict"] + last
+    return _trial((a, b, c, d), chain.computed + d, true, bounds)
 
 
 def _trial(
     inputs: tuple[FloatArray, ...],
     computed: FloatArray,
     true: Any,
-    bounds: Bounds,
+    bounds: Mapping[str, Fraction],
+    strict: Callable[[], Fraction] | None = None,
     error: Fraction | None = None,
 ) -> Trial:
     if error is None:
         difference = computed.to_fractions() - true
         error = column_sum_norm(difference) if computed.ndim else abs(difference)
-    evaluated = {}
-    for name, bound in bounds.items():
-        try:
-            evaluated[name] = bound()
-        except ValueError:  # gamma: with so few digits, so many roundings have no strict bound
-            if name != "strict":
-                raise
-    return Trial(computed.format, inputs, computed, true, error, evaluated)
+    if strict:
+        with contextlib.suppress(ValueError):  # gamma: with so few digits, so many roundings have no strict bound
+            bounds = {**bounds, "strict": strict()}
+    return Trial(computed.format, inputs, computed, true, error, bounds)
 
 
 # -- data -----------------------------------------------------------------------------------------
@@ -214,18 +191,6 @@ def random_numbers(
     return numbers
 
 
-def sweep(trial: str, fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[Trial]:
-    """Run random trials of one computation over several sizes and all :data:`KINDS` of data."""
-    # Factors cannot cancel in a product, and its divisors must not be zero.
-    kinds = KINDS[:3] if trial == "product" else KINDS
-    trials = []
-    for size in sizes:
-        for kind in kinds:
-            new = partial(_new, rng, fmt, kind)
-            trials += [_DRAWS[trial](new, size) for _ in range(repeats)]
-    return trials
-
-
 #: The formats of a survey, with few and with many digits, in the bases of old and new computers and in base 3.
 SURVEYED = tuple(
     FloatFormat(base, precision, rounding)
@@ -236,14 +201,18 @@ SURVEYED = tuple(
 
 @cache
 def survey(trial: str, repeats: int = 10, seed: int = 1984) -> tuple[Trial, ...]:
-    """Run :func:`sweep` over all formats in :data:`SURVEYED`."""
+    """Run random trials of one computation over the formats :data:`SURVEYED`, several sizes and kinds of data."""
     sizes = (2, 3, 5, 10) if trial in ("sum", "product", "dot") else (1, 2, 3)
-    rng = np.random.default_rng(seed)
-    return tuple(one for fmt in SURVEYED for one in sweep(trial, fmt, sizes, repeats, rng))
+    # Factors cannot cancel in a product, and its divisors must not be zero.
+    kinds = KINDS[:3] if trial == "product" else KINDS
+    rng, trials = np.random.default_rng(seed), []
+    for fmt, size, kind in itertools.product(SURVEYED, sizes, kinds):
 
+        def new(*shape: int, fmt: FloatFormat = fmt, kind: str = kind) -> FloatArray:
+            return random_numbers(rng, fmt, shape, kind)
 
-def _new(rng: np.random.Generator, fmt: FloatFormat, kind: str, *shape: int) -> FloatArray:
-    return random_numbers(rng, fmt, shape, kind)
+        trials += [_DRAWS[trial](new, size) for _ in range(repeats)]
+    return tuple(trials)
 
 
 _DRAWS: dict[str, Callable[[Callable[..., FloatArray], int], Trial]] = {
@@ -268,64 +237,3 @@ def sum_errors(fmt: FloatFormat, kind: str, n: int, repeats: int, rng: np.random
     terms, unit = integers(x.to_fractions())
     computed = x.sum(axis=1).to_fractions() / unit - terms.sum(axis=1)
     return np.array(computed / (abs(terms).sum(axis=1) * fmt.unit_roundoff), dtype=np.float64)
-
-
-# -- the worst case -------------------------------------------------------------------------------
-
-
-def worst_product(fmt: FloatFormat, factors: int) -> Trial:
-    """Find the factors whose product, from left to right, has the largest relative error of all.
-
-    With unbounded exponents, only the significand of the partial product matters. Dynamic
-    programming over significands therefore covers every chain.
-    """
-    base, t = fmt.base, fmt.precision
-    start = np.arange(base ** (t - 1), base**t)
-    significand, log_error = product_table(fmt)
-    # State 0 is the number one; the first factor leads to its own significand without error.
-    states = len(start)
-    end = np.concatenate([[np.arange(1, states + 1)], significand - start[0] + 1])
-    log_error = np.concatenate([np.zeros((1, states)), log_error])
-    trials = []
-    for sign in (1, -1):  # upward errors, downward errors
-        path = best_path([sign * log_error] * factors, end)
-        trials.append(product_trial(fmt.array([int(start[i]) for i in path]), fmt.array([])))
-    return max(trials, key=lambda trial: trial.error)
-
-
-def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: bool = False) -> Trial:
-    """Find the terms for which the error of a sum is largest relative to its first-order bound.
-
-    Dynamic programming over partial sums covers every sequence of zeros and of terms ``±m * base**e`` with e in
-    `exponents`. Dinkelbach's iteration maximizes the ratio of the error to the bound, "weights" or (26).
-    """
-    factors, sums = partial_sums(fmt, tuple(exponents), products)
-    exact = np.array(list(factors), dtype=object)
-    choices = fmt.array(exact)
-    size = abs(exact).astype(np.float64)
-    own_error = (choices.to_fractions() - exact).astype(np.float64)
-    end, error = sums.table(terms)
-    weights = theory.dot_weights(terms) if products else theory.sum_weights(terms)
-    bound = "(26)" if products else "weights"
-    best: Trial | None = None
-    while True:
-        price = float(fmt.unit_roundoff) * (best.ratio(bound) if best else 0.0)
-        path = best_path([error + own_error - price * w * size for w in weights], end)
-        pairs = [factors[exact[choice]] for choice in path]
-        if products:
-            trial = dot_trial(*(fmt.array(list(side)) for side in zip(*pairs, strict=True)))
-        else:
-            trial = sum_trial(fmt.array([term for term, _ in pairs]))
-        if best and trial.ratio(bound) <= best.ratio(bound):
-            return best
-        best = trial
-
-
-def tie_sum(fmt: FloatFormat, terms: int) -> Trial:
-    r"""Sum 1, β, −β, …, −β, where each addition is a tie that rounds up by β.
-
-    From 5 terms on, the error exceeds the bound of hung1984, ch. II, (18), in every precision, as long as
-    (3n - 8)β < 4. Where the sum is nearly zero, it does so by a factor of nearly 2.
-    """
-    beta = fmt.unit_roundoff
-    return sum_trial(fmt.array([1, beta, *[-beta] * (terms - 2)]))

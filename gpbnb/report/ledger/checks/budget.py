@@ -15,6 +15,7 @@ import numpy as np
 
 from gpbnb.report.budget import derivation, experiment, theory
 from gpbnb.report.budget.theory import ErrorForm, Kind
+from gpbnb.report.display.derivation import hold
 from gpbnb.report.ledger.checks import rolling
 from gpbnb.report.ledger.corrections import intended
 from gpbnb.report.ledger.finding import Verdict
@@ -148,7 +149,7 @@ def averaging() -> Names:
     """What remains of a constant after whole rolls and after an incomplete one, by theory and by simulation."""
     rolls, orbits = theory.cycles_factor(52560), theory.cycles_factor(52560.3)
     simulated = math.isclose(rolled_mean(), theory.cycles_factor(10.3), rel_tol=1e-5)
-    right = rolls == 0 and orbits < 1e-4 and simulated and derivation.averages().steps[1].holds
+    right = rolls == 0 and orbits < 1e-4 and simulated and derivation.averages()[1].holds
     said = "removes some of them" if right else "removes none of them"
     return {"averaging": said, "rolls": rolls, "orbits": orbits}
 
@@ -167,7 +168,7 @@ def processes() -> Names:
     left, slow = theory.correlated_factor(ratio, 1.0), theory.correlated_factor(0.1, 1.0)
     # four standard errors of a standard deviation; the rule of 400 points is 2.4e-4 off
     agree = abs(float(np.sqrt(np.mean(means**2))) / left - 1) < 4 / math.sqrt(2 * trials) + 2.4e-4
-    right = agree and left < 0.5 and derivation.averages().holds
+    right = agree and left < 0.5 and hold(derivation.averages())
     said = "reduces some of their effect" if right else "reduces nothing"
     return {"averaging or filtering": said, "left": left, "slow": slow}
 

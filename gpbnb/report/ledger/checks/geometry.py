@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from gpbnb.report.display.derivation import hold
 from gpbnb.report.geometry import derivation, experiment, theory
 from gpbnb.report.geometry.derivation import PHI, SEQUENCES, H
 from gpbnb.report.ledger.first_order import EPSILON, FirstOrder, matrix, quantity
@@ -394,7 +395,7 @@ def year_of(name: str) -> tuple[bool, float]:
 
 def model_is_right() -> bool:
     cases = ("alpha1", "beta1", "beta3", "gamma1", "gamma3", "gamma1 alpha2")
-    derived = derivation.first_order_effects().holds and derivation.second_order_effects().holds
+    derived = hold(derivation.first_order_effects()) and hold(derivation.second_order_effects())
     return all(year_of(case)[0] for case in cases) and derived
 
 
@@ -406,7 +407,7 @@ ALTITUDES = (0.0, 640e3, 3.6e7)
 
 
 def two_precessions() -> Names:
-    if not derivation.precessions().holds:
+    if not hold(derivation.precessions()):
         return {"geodetic": "", "motional": ""}
     return {"geodetic": "in a plane of orbit", "motional": "perpendicular to"}
 
@@ -458,7 +459,7 @@ def precession_in_orbit() -> Names:
 
 def two_effects() -> Names:
     """The inner product of the two drifts, which is zero only for a star in the plane of the orbit."""
-    (product,) = (step.left for step in derivation.precessions().steps if step.name.startswith("inner product"))
+    (product,) = (step.left for step in derivation.precessions() if step.name.startswith("inner product"))
     apart = sp.simplify(product) != 0 == sp.simplify(product.subs({sp.Symbol("epsilon", real=True): 0}))
     return {"effects": "perpendicular to one another" if apart else "oblique to one another"}
 

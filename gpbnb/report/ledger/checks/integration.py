@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from gpbnb.report.display.derivation import hold
 from gpbnb.report.integration import derivation, experiment, theory
 from gpbnb.report.integration.derivation import MU, OMEGA, P22, TAU, TIME, X2, X3, P, T
 from gpbnb.report.ledger.formula import Relation
@@ -528,7 +529,7 @@ def _summed(mu: float) -> float:
 
 
 def exactness() -> Names:
-    return {"kind": "an exact" if _folded() < SUMMED and derivation.independent().holds else "an approximate"}
+    return {"kind": "an exact" if _folded() < SUMMED and hold(derivation.independent()) else "an approximate"}
 
 
 def is_large_enough(phrase: str) -> bool:
@@ -621,7 +622,7 @@ def transient() -> Names:
     again = float(np.max(abs(theory.error_variance_recursion(40, mu) - closed)))
     run = experiment.simulate(theory.first_order(1.0, mu), 1.0, n, np.random.default_rng(14), 4000)
     away = float(np.max(np.abs(experiment.deviations(run, closed[n]))))
-    return {"right": derivation.transient().holds and again < 1e-12 and away < 4, "away": away}
+    return {"right": hold(derivation.transient()) and again < 1e-12 and away < 4, "away": away}
 
 
 @cache

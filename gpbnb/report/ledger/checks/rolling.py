@@ -19,6 +19,7 @@ import scipy
 import sympy as sp
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.report.display.derivation import hold
 from gpbnb.report.ledger.judge import read
 from gpbnb.report.ledger.statements import load_statements
 from gpbnb.report.measurement import YEAR, spin_in_readout
@@ -482,7 +483,7 @@ def optimum_exists() -> Names:
         method="bounded",
     )
     best, closed = math.exp(found.x), theory.best_bandwidth(DRIFTS[0], FLOWN_DENSITY)
-    one = abs(best / closed - 1) < 1e-3 and derivation.filters().holds
+    one = abs(best / closed - 1) < 1e-3 and hold(derivation.filters())
     return {"choice": "an optimum choice" if one else "every choice", "closed": closed, "best": best}
 
 

@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from gpbnb.arithmetic.bounds import gamma_probabilistic
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm, row_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.report.display.derivation import hold
 from gpbnb.report.ledger.first_order import FirstOrder, looked_up, quantity
 from gpbnb.report.ledger.judge import read
 from gpbnb.report.ledger.quantities import BETA, fractions, numbered, small
 from gpbnb.report.ledger.statements import statement
-from gpbnb.report.rounding import derivation, experiment, theory
+from gpbnb.report.rounding import derivation, experiment
 
 Names = Mapping[str, Any]
 
@@ -48,7 +50,7 @@ def surveyed(trial: str, bound: str) -> tuple[bool, str]:
 @cache
 def derived(*names: str) -> bool:
     """Whether SymPy confirms some derivations."""
-    return all(getattr(derivation, name)().holds for name in names)
+    return all(hold(getattr(derivation, name)()) for name in names)
 
 
 # -- section 1: statistics or bounds --------------------------------------------------------------
@@ -58,7 +60,8 @@ def derived(*names: str) -> bool:
 def beyond_the_law() -> tuple[float, float]:
     """Return the shares of sums of 1000 varied or equal terms whose error exceeds a law meant to fail for 1 %."""
     fmt, n = FloatFormat(2, 11), 1000
-    law = theory.probabilistic_sum_factor(n, fmt.unit_roundoff) / float(fmt.unit_roundoff)
+    # Each of the n terms gets an equal share of the probability.
+    law = gamma_probabilistic(n - 1, fmt.unit_roundoff, 0.01 / n) / float(fmt.unit_roundoff)
     varied, constant = (
         float(np.mean(abs(experiment.sum_errors(fmt, kind, n, 30, np.random.default_rng(1))) > law))
         for kind in ("like signs", "constant")
@@ -368,16 +371,14 @@ def with_errors(instances: Iterable[Names]) -> list[dict[str, Any]]:
 @cache
 def coarse_is_wider() -> bool:
     """Whether the last member of (18), which uses the largest term for all, is never smaller than the one before."""
-    return all(
-        theory.printed_sum_bound_coarse(trial.inputs[0], trial.fmt.unit_roundoff) >= trial.bounds["1984 (18)"]
-        for trial in experiment.survey("sum")
-    )
+    return all(trial.bounds["1984 (18), coarse"] >= trial.bounds["1984 (18)"] for trial in experiment.survey("sum"))
 
 
 @cache
 def tie() -> float:
     """Return error / (18) of a sum of 100 terms in four digits whose additions are all ties."""
-    return experiment.tie_sum(FOUR, 100).ratio("1984 (18)")
+    beta = FOUR.unit_roundoff
+    return experiment.sum_trial(FOUR.array([1, beta, *[-beta] * 98])).ratio("1984 (18)")
 
 
 @cache
@@ -422,8 +423,9 @@ def quotients(sizes: tuple[tuple[int, int], ...]) -> tuple[dict[str, Any], ...]:
 
 @cache
 def worst_twenty() -> experiment.Trial:
-    """Return the twenty factors of two digits whose product has the largest relative error."""
-    return experiment.worst_product(FloatFormat(10, 2), 20)
+    """Multiply twenty factors of two digits that a search found."""
+    fmt = FloatFormat(10, 2)
+    return experiment.product_trial(fmt.array([14, 75, *[96] * 18]), fmt.array([]))
 
 
 SIZES = ((2, 1), (1, 2), (3, 0), (4, 3))
@@ -566,22 +568,23 @@ def dots(sizes: tuple[int, ...]) -> tuple[dict[str, Any], ...]:
 @cache
 def dot_weights(n: int) -> list[int]:
     """Count the roundings of each product in an inner product, from its derived first-order error."""
-    error, products, eps = derivation.dot_error(n)
-    return [derivation.roundings_of(error, product, eps) for product in products]
+    error, products, _ = derivation.dot_error(n)
+    return [len(sp.Add.make_args(error.coeff(p).coeff(q))) for p, q in (product.args for product in products)]
 
 
 @cache
 def worst_twelve() -> float:
-    """Return the largest error / bound (26) for an inner product of 12 terms in three bits."""
-    return experiment.worst_sum(FloatFormat(2, 3), 12, range(-5, 4), products=True).ratio("(26)")
+    """Return error / bound (26) of an inner product of 12 terms in three bits that a search found."""
+    fmt = FloatFormat(2, 3)
+    a = fmt.array([10, 12, "2.5", "2.5", 10, 5, 5, 5, 10, 10, 10, 40])
+    return experiment.dot_trial(a, fmt.array([6] * 12)).ratio("(26)")
 
 
 def relative_dot_bound_holds() -> bool:
     rng, fmt = np.random.default_rng(26), FloatFormat(10, 6)
     for _ in range(200):
-        a, b = experiment.random_numbers(rng, fmt, (2, 5))
-        true = sum(a.to_fractions() * b.to_fractions())
-        if abs((a @ b).to_fractions() / true - 1) > theory.relative_dot_bound(a, b, fmt.unit_roundoff):
+        trial = experiment.dot_trial(*experiment.random_numbers(rng, fmt, (2, 5)))
+        if trial.violates("strict"):  # both divided by |I|
             return False
     return True
 
@@ -725,7 +728,7 @@ def shortcut_text() -> str:
 
 
 def chain_of_scalars() -> float:
-    """Return error / (32) of the twenty factors of two digits whose product has the largest relative error."""
+    """Return error / (32) of the factors of :func:`worst_twenty`."""
     worst = worst_twenty().inputs[0]
     return experiment.chain_trial([worst.format.array([[x]]) for x in worst.to_fractions()]).ratio("(32)")
 
@@ -783,11 +786,10 @@ def joint_use() -> Names:
 
 def dimensions() -> Names:
     """Which dimensions the bounds (32) and (24) contain."""
-    beta = FOUR.unit_roundoff
-    matrices = [exact(np.full(shape, 1)) for shape in ((2, 3), (3, 5), (5, 2))]
-    ratio = theory.chain_bound(matrices, beta) / (beta * math.prod(map(column_sum_norm, matrices)))
-    wide, narrow = exact(np.full((1, 9), 1)), exact(np.full((1, 2), 1))
-    same = theory.matrix_sum_bound(wide, wide, beta) == theory.matrix_sum_bound(narrow, narrow, beta)
+    chain = experiment.chain_trial([FOUR.array(np.full(shape, 1)) for shape in ((2, 3), (3, 5), (5, 2))])
+    ratio = chain.bounds["(32)"] / (FOUR.unit_roundoff * math.prod(map(column_sum_norm, chain.inputs)))
+    additions = (experiment.matrix_sum_trial(*[FOUR.array(np.full((1, columns), 1))] * 2) for columns in (9, 2))
+    same = len({trial.bounds["(24)"] for trial in additions}) == 1
     involved = {3 + 5: "all the interface dimensions", 5: "the largest interface dimension alone"}
     return {"addition": "does not involve" if same else "involves", "product": involved.get(int(ratio), ""),
             "ratio": ratio}  # fmt: skip

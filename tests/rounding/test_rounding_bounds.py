@@ -1,4 +1,4 @@
-"""gpbnb.report.rounding.theory: each bound as printed or derived, and whether it is one."""
+"""Each bound of rounding errors, as printed or derived, and whether it is one."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from flint import fmpq_mat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.rounding import theory
+from gpbnb.report.rounding import experiment
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+FOUR = FloatFormat(10, 4)
 BETA = Fraction(1, 2000)
-X = [Fraction(3), Fraction(-5), Fraction(7, 2), Fraction(-11)]  # sum -19/2
-A = np.array([[1, -2, 3], [4, 5, -6]], dtype=object)
-B = np.array([[2, -1], [3, 7], [-4, 1]], dtype=object)
-C = np.array([[1, -3], [2, 5]], dtype=object)
-D = np.array([[100, -7], [1, 2]], dtype=object)
+X = [3, -5, "3.5", -11]  # sum -19/2
+A = FOUR.array([[1, -2, 3], [4, 5, -6]])
+B = FOUR.array([[2, -1], [3, 7], [-4, 1]])
+C = FOUR.array([[1, -3], [2, 5]])
+D = FOUR.array([[100, -7], [1, 2]])
 
 
 def g(n):
@@ -35,82 +36,56 @@ def g(n):
 
 def test_sums_as_printed():
     s = Fraction(19, 2)
-    assert theory.printed_sum_bound_1982(X, BETA) == 3 * BETA * s
-    assert theory.printed_sum_bound(X, BETA) == 3 * BETA * s + BETA * Fraction(7, 2) + 2 * BETA * 11
-    assert theory.printed_sum_bound_coarse(X, BETA) == 3 * BETA * s + 3 * BETA * 11
-    five = [*X, Fraction(1, 4)]
+    assert experiment.sum_trial(FOUR.array(X)).bounds == {
+        "1982 (18)": 3 * BETA * s,
+        "1984 (18)": 3 * BETA * s + BETA * Fraction(7, 2) + 2 * BETA * 11,
+        "1984 (18), coarse": 3 * BETA * s + 3 * BETA * 11,
+        "weights": BETA * (3 * 3 + 3 * 5 + 2 * Fraction(7, 2) + 11),
+        "strict": g(3) * 3 + g(3) * 5 + g(2) * Fraction(7, 2) + g(1) * 11,
+    }
+    five = experiment.sum_trial(FOUR.array([*X, "0.25"])).bounds
     s = Fraction(37, 4)
-    assert theory.printed_sum_bound_1982(five, BETA) == 4 * BETA * s
-    assert theory.printed_sum_bound(five, BETA) == BETA * (4 * s + Fraction(7, 2) + 2 * 11 + Fraction(3, 4))
-    assert theory.printed_sum_bound_coarse(five, BETA) == BETA * (4 * s + 6 * 11)
+    assert five["1982 (18)"] == 4 * BETA * s
+    assert five["1984 (18)"] == BETA * (4 * s + Fraction(7, 2) + 2 * 11 + Fraction(3, 4))
+    assert five["1984 (18), coarse"] == BETA * (4 * s + 6 * 11)
 
 
-def test_products_as_printed():
-    assert theory.printed_product_bound(2, 1, BETA) == 4 * BETA
-    assert theory.product_bound(2, 1, BETA) == 2 * BETA
-    assert theory.printed_product_bound(5, 3, BETA) == 9 * BETA
-    assert theory.product_bound(5, 3, BETA) == 7 * BETA
-    assert theory.strict_product_bound(5, 3, BETA) == g(7)
-    assert theory.product_bound(1, 0, BETA) == theory.strict_product_bound(1, 0, BETA) == 0
+@pytest.mark.parametrize(("n", "m"), [(2, 1), (5, 3), (1, 0)])
+def test_products_as_printed(n, m):
+    bounds = experiment.product_trial(FOUR.array([3] * n), FOUR.array([7] * m)).bounds
+    assert bounds == {"1982 (20)": (n + m - 1) * BETA, "1984 (20)": (n + m + 1) * BETA, "strict": g(n + m - 1)}
 
 
 def test_inner_products_as_printed():
-    a, b = [1, -2, 3], [4, 5, -6]
-    assert theory.dot_bound(a, b, BETA) == BETA * (3 * 4 + 3 * 10 + 2 * 18)
-    assert theory.strict_dot_bound(a, b, BETA) == g(3) * 32
-    assert theory.relative_dot_bound(a, b, BETA) == g(3) * Fraction(32, 24)
-    assert theory.dot_weights(4) == [4, 4, 3, 2]
-    assert theory.dot_weights(1) == [1]
+    bounds = experiment.dot_trial(FOUR.array([1, -2, 3]), FOUR.array([4, 5, -6])).bounds
+    assert bounds == {"(26)": BETA * (3 * 4 + 3 * 10 + 2 * 18), "strict": g(3) * 32}
+    assert experiment.dot_trial(FOUR.array([3]), FOUR.array([4])).bounds == {"(26)": BETA * 12, "strict": g(1) * 12}
 
 
 def test_matrix_products_as_printed():
     norms = [9, 9, 8]  # of A, B and C
     assert [column_sum_norm(m) for m in (A, B, C)] == norms
     assert column_sum_norm(np.zeros((2, 0))) == column_sum_norm(fmpq_mat(2, 0)) == 0
-    assert theory.chain_bound([A, B], BETA) == 3 * BETA * 81
-    assert theory.chain_bound([A, B, C], BETA) == 5 * BETA * 648
-    assert theory.strict_chain_bound([A, B, C], BETA) == g(5) * 648
-    assert theory.chain_bound([A], BETA) == theory.strict_chain_bound([A], BETA) == 0
-    assert theory.matrix_sum_bound(C, D, BETA) == BETA * 104
+    ab, abc = (experiment.chain_trial(factors) for factors in ([A, B], [A, B, C]))
+    assert ab.bounds["(32)"] == 3 * BETA * 81
+    assert abc.bounds["(32)"] == 5 * BETA * 648
+    assert abc.bounds["strict"] == g(5) * 648
+    assert abc.bounds["(31)"] == 5 * BETA * column_sum_norm(abc.true)
+    assert experiment.chain_trial([A]).bounds == {"(31)": 0, "(32)": 0, "strict": 0}
+    assert experiment.matrix_sum_trial(C, D).bounds == {"(24)": BETA * 104}
 
 
-def test_chains_and_examples_as_printed():
-    abc = A @ B @ C
-    assert theory.printed_chain_claim([A, B, C], BETA) == 5 * BETA * column_sum_norm(abc)
-    assert theory.printed_example_bound(A, B, C, D, BETA) == BETA * (6 * column_sum_norm(abc) + 101)
-    whole = column_sum_norm(abc + D)
-    assert theory.example_bound(A, B, C, D, BETA) == BETA * (5 * 648 + whole)
-    assert theory.strict_example_bound(A, B, C, D, BETA) == (1 + BETA) * g(5) * 648 + BETA * whole
-    square = [C, C, C, C]
-    ccc = column_sum_norm(C @ C @ C)
-    assert theory.printed_example_bound(*square, BETA) == BETA * ((2 * 2 + 1) * ccc + 8)
-
-
-# -- what the weights mean ------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("n", range(8))
-def test_weights_count_the_roundings_of_each_term(n):
-    """Add symbols: a term is the list of the additions that it went through."""
-    passed = dict.fromkeys(range(n), 0)
-    inside = [0] if n else []
-    for j in range(1, n):
-        inside.append(j)
-        for term in inside:
-            passed[term] += 1
-    assert theory.sum_weights(n) == [passed[j] for j in range(n)]
-    assert theory.dot_weights(n) == [passed[j] + 1 for j in range(n)]
-
-
-# -- the root-n law -------------------------------------------------------------------------------
-
-
-def test_the_probabilistic_factor_shares_its_failure_among_the_terms():
-    n, failure, u = 100, 0.05, float(BETA)
-    spread = math.sqrt(2 * math.log(2 * n / failure)) / (1 - u)
-    exponent = spread * math.sqrt(n - 1) * u + (n - 1) * u * u / (1 - u)
-    assert theory.probabilistic_sum_factor(n, BETA, failure) == pytest.approx(math.exp(exponent) - 1, rel=1e-12)
-    assert theory.probabilistic_sum_factor(1, BETA) == 0
+def test_examples_as_printed():
+    a, b, c, d = (each.to_fractions() for each in (A, B, C, D))
+    found = experiment.example_trial(A, B, C, D)
+    product, whole = column_sum_norm(a @ b @ c), column_sum_norm(a @ b @ c + d)
+    assert found.bounds == {
+        "Examples": BETA * (6 * product + 101),
+        "corrected": BETA * (5 * 648 + whole),
+        "strict": (1 + BETA) * g(5) * 648 + BETA * whole,
+    }
+    square = experiment.example_trial(C, C, C, C)
+    assert square.bounds["Examples"] == BETA * ((2 * 2 + 1) * column_sum_norm(c @ c @ c) + 8)
 
 
 # -- exhaustive: all tuples of a small format -----------------------------------------------------
@@ -136,7 +111,7 @@ def all_sums(base, precision, exponents, n, rounding):
 @pytest.mark.parametrize(("base", "precision", "exponents", "n"), SMALL)
 def test_chopping_makes_the_first_order_sum_bounds_strict(base, precision, exponents, n):
     beta = FloatFormat(base, precision, CHOP).unit_roundoff
-    weights = theory.sum_weights(n)
+    weights = [n - 1, *range(n - 1, 0, -1)]
     largest = Fraction(0)
     for terms, computed in all_sums(base, precision, exponents, n, CHOP):
         error = abs(computed - sum(terms))
@@ -176,7 +151,8 @@ def test_18_of_1984_is_reached_with_four_terms_and_exceeded_with_five(base, prec
     ratios = []
     for terms, computed in all_sums(base, precision, exponents, n, NEAREST):
         if computed != sum(terms):
-            ratios.append(abs(computed - sum(terms)) / theory.printed_sum_bound(terms, beta))
+            printed = (n - 1) * abs(sum(terms)) + sum((j - 2) * abs(terms[j - 1]) for j in range(3, n + 1))
+            ratios.append(abs(computed - sum(terms)) / (beta * printed))
     assert max(ratios) == largest
 
 
@@ -200,7 +176,7 @@ def test_products_and_quotients_of_all_significands(base, precision, n, rounding
             error = abs(computed / true - 1)
             assert error <= strict
             if rounding is CHOP:
-                assert error <= theory.product_bound(n - 1, 1, fmt.unit_roundoff)
+                assert error <= (n - 1) * fmt.unit_roundoff
             largest = max(largest, error / ((n - 1) * fmt.unit_roundoff))
     assert largest > Fraction(1, 7)
 
