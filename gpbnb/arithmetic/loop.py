@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.machine import Memory, as_words, code_of, first_without_result, functions, is_far
+from gpbnb.arithmetic.machine import Memory, Addresses, code_of, first_without_result, functions, is_far
 
 
 class Loop:
@@ -114,30 +114,21 @@ class Loop:
         steps, lanes, machine, memory = len(own), self.values.shape[1:], self._machine, self._memory
         kept = np.empty((steps, len(kept_at), *lanes), self.values.dtype)
         held, row = np.ones(steps * memory.lanes, np.uint8), 0
-        run = machine.Stepping(
-            first,
-            steps,
-            cycle,
-            memory.lanes,
-            memory.width,
-            as_words(own),
-            at * memory.width,
-            own.shape[1] * memory.width,
-            as_words(self._table),
-            self._table.shape[1],
-            self._feeds.reshape(-1),
-            *map(memory.places, (self._states, self.after, kept_at)),
-            self._truth,
-            as_words(kept),
-            held,
-            as_words(self._before),
-            np.empty(self._before.size, np.int64),
+        states_at, after_at, places = map(memory.places, (self._states, self.after, kept_at))
+        fed, after = self._table, np.empty(self._before.size, np.int64)
+        # fmt: off
+        run = Addresses(
+            first, steps, cycle, memory.lanes, memory.width, own, at * memory.width, own.shape[1] * memory.width,
+            fed, fed.shape[1], self._feeds, len(self._feeds), states_at, after_at, len(after_at), places, len(places),
+            self._truth, kept, held, self._before, after,
         )
+        # fmt: on
         far = any(self._distant.values()) or self._far(own) or self._far(self.states)
         self._notes[machine.DONE] = 0
+        tables = self._formats.address, self._code.table.address, memory.table.address
         with contextlib.suppress(OverflowError, ZeroDivisionError):
             for execute in functions(self._kind, far, memory.lanes == 1):
-                machine.advance(execute, self._formats, self._code, memory.held, run, self._notes)
+                machine.advance(execute, *tables, run.address, self._notes.ctypes.data)
                 row = int(self._notes[machine.ROW])
                 if row < 0:
                     break

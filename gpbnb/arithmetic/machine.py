@@ -42,6 +42,24 @@ def operands_of(name: str, a: int, b: int, c: int) -> tuple[tuple[int, ...], tup
     return ((), (a,)) if name == "skip" else ((a,), ())
 
 
+class Addresses:
+    """Arrays and integers as compiled functions take them: their addresses, and the integers, in one array.
+
+    Parameters
+    ----------
+    given : arrays whose entries follow each other in memory, and integers.
+    """
+
+    def __init__(self, *given: Any) -> None:
+        self._given = given
+        self._entries = np.array([each if isinstance(each, int) else _address(each) for each in given], np.int64)
+        self.address = _address(self._entries)
+
+
+def _address(array: NDArray[Any]) -> int:
+    return int(array.__array_interface__["data"][0])
+
+
 def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
     """Return the kind of numbers of some formats of one base, None being double-double, and their columns.
 
@@ -56,7 +74,7 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
     state = tags.random_state(tag)
     random = np.zeros(2, np.uint64) if state is None else state
     if formats[0] is None:
-        return tags.DoubleDouble(), machine.Formats(whole.ravel(), numbers.ravel(), random)
+        return tags.DoubleDouble(), Addresses(whole, numbers, random)
     kinds = set()
     for i, fmt in enumerate(formats):
         found = selection.tag_of(fmt.rules)
@@ -71,7 +89,7 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
         made = machine.InPairs(bool(whole[:, _SHORT].all()))
     elif kind == "words":
         made = machine.InTwoWords()
-    return made, machine.Formats(whole.ravel(), numbers.ravel(), random)
+    return made, Addresses(whole, numbers, random)
 
 
 _SHORT = 5  # the column that tells whether a decimal format has few digits and no range
@@ -199,10 +217,15 @@ def packed_constants(fmt: Any, constants: Any) -> NDArray[Any]:
     return np.asarray(array.backend.pack(array.components))
 
 
-def code_of(rows: NDArray[Any], formats: NDArray[np.int64]) -> Any:
-    """Return operations, and the number of the format of each, as the machine takes them."""
-    from gpbnb.arithmetic.kernels import machine
+class Code(NamedTuple):
+    """Operations, and how many there are."""
 
+    table: Addresses
+    rows: int
+
+
+def code_of(rows: NDArray[Any], formats: NDArray[np.int64]) -> Code:
+    """Return operations, and the number of the format of each, as the machine takes them."""
     how = _together(rows)
     skips = np.flatnonzero(rows[:, 0] == _SKIP)
     edges = np.zeros(len(rows) + 1, np.bool_)
@@ -211,10 +234,10 @@ def code_of(rows: NDArray[Any], formats: NDArray[np.int64]) -> Any:
         edges[np.minimum(each, len(rows))] = True
     edges[[0, -1]] = True
     begins = np.flatnonzero(edges) if len(rows) else np.zeros(1, np.int64)
-    _, a, b, c, out = np.ascontiguousarray(rows.T, np.uint32)
+    columns = np.ascontiguousarray(rows.T[1:], np.uint32)
     gathered = np.empty(2 * max(np.diff(begins), default=0))
-    codes, numbers, together = (each[begins[:-1]].astype(np.int64) for each in (rows[:, 0], formats, how & 3))
-    return machine.Code(a, b, c, out, begins, codes, numbers, together, gathered)
+    segments = (each[begins[:-1]].astype(np.int64) for each in (rows[:, 0], formats, how & 3))
+    return Code(Addresses(*columns, begins, *segments, gathered, len(begins) - 1, len(rows)), len(rows))
 
 
 _FEWEST, _MANY = 4, 24
@@ -280,12 +303,9 @@ class Memory:
     """
 
     def __init__(self, values: NDArray[Any], truths: NDArray[np.uint8]) -> None:
-        from gpbnb.arithmetic.kernels import machine
-
         self.values, self.truths = values, truths
         self.width, self.lanes = math.prod(values.shape[1:]), math.prod(truths.shape[1:])
-        words = as_words(values)
-        self.held = machine.Held(words, words.view(np.float64), truths.reshape(-1))
+        self.table = Addresses(values, truths)
 
     def places(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the places of numbers in flat memory, those of all lanes and parts."""
@@ -331,8 +351,8 @@ def _once(kind: Any, formats: Any, code: Any, memory: Memory, far: bool) -> int:
     done = 0
     with contextlib.suppress(OverflowError, ZeroDivisionError):
         for execute in functions(kind, far, memory.lanes == 1):
-            done = machine.once(execute, formats, code, memory.held, memory.lanes)
-            if done == len(code.a):
+            done = machine.once(execute, formats.address, code.table.address, memory.table.address, memory.lanes)
+            if done == code.rows:
                 break
     return int(done)
 
@@ -350,9 +370,7 @@ def rounded(kind: Any, formats: Any, numbers: NDArray[Any]) -> NDArray[Any] | No
 
 
 @lru_cache(maxsize=64)
-def _of_rounding(count: int) -> Any:
-    from gpbnb.arithmetic.kernels import machine
-
+def _of_rounding(count: int) -> Code:
     at, none = np.arange(count, dtype=np.uint32), np.zeros(1, np.int64)
     begins, codes = np.array([0, count]), np.array([CODES["round"]])
-    return machine.Code(at, at, at, at + np.uint32(count), begins, codes, none, none, np.empty(0))
+    return Code(Addresses(at, at, at, at + np.uint32(count), begins, codes, none, none, np.empty(0), 1, count), count)

@@ -84,14 +84,34 @@ def select(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
 
 
 @intrinsic
-def at(typingctx: Any, array: Any, index: Any) -> Any:
-    """The entries of a contiguous array from an index on; whether there are any is not checked."""
+def at(typingctx: Any, entries: Any, index: Any) -> Any:
+    """The entries at an address from an index on."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        data = context.data_model_manager[signature.args[0]].get(builder, args[0], "data")
-        return builder.gep(data, [context.cast(builder, args[1], index, types.intp)])
+        return builder.gep(args[0], [context.cast(builder, args[1], index, types.intp)])
 
-    return types.CPointer(array.dtype)(array, index), codegen
+    return entries(entries, index), codegen
+
+
+@intrinsic
+def entries(typingctx: Any, table: Any, index: Any, kind: Any) -> Any:
+    """The entries of a type, such as ``np.float64``, at the address that an entry of a table holds."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        place = builder.gep(args[0], [context.cast(builder, args[1], index, types.intp)])
+        return builder.inttoptr(builder.load(place), context.get_value_type(signature.return_type))
+
+    return types.CPointer(kind.instance_type)(table, index, kind), codegen
+
+
+@intrinsic
+def words(typingctx: Any, address: Any) -> Any:
+    """The int64 at an address."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
+
+    return types.CPointer(types.int64)(address), codegen
 
 
 @intrinsic

@@ -17,7 +17,7 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba import njit, typeof
+from numba import njit
 from numba.core import typed_passes, untyped_passes
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -100,9 +100,8 @@ def addressed(function: Callable[..., Any]) -> Any:
     return dispatcher
 
 
-def address_of(dispatcher: Any, *given: Any) -> int:
-    """Compile an :func:`addressed` function for the types of these arguments, or load it, and return its address."""
-    kinds = tuple(map(typeof, given))
+def address_of(dispatcher: Any, *kinds: Any) -> int:
+    """Compile an :func:`addressed` function for arguments of these types, or load it, and return its address."""
     dispatcher.compile(kinds)
     found = dispatcher.overloads[kinds]
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))

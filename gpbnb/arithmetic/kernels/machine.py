@@ -17,11 +17,11 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 from numba.extending import overload
-from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import decimal, doubledouble, shortdecimal, wide
-from gpbnb.arithmetic.kernels.bits import at, bits, call, fma, from_bits, select
+from gpbnb.arithmetic.kernels.bits import at, bits, call, entries, fma, from_bits, select, words
 from gpbnb.arithmetic.kernels.careful import carefully, masked
 from gpbnb.arithmetic.kernels.compiling import Compiler, address_of, addressed, borrowing, compiled, inner
 from gpbnb.arithmetic.kernels.processor import fused_sum
@@ -71,71 +71,22 @@ ONE_BY_ONE, GATHERED, NEIGHBOURS = range(3)
 after their operands are gathered; or together, since their operands and results lie one after the other in memory."""
 
 
-class Formats(NamedTuple):
-    """Destination formats, as the machine takes them; what a column means depends on the kind."""
-
-    #: (formats * 16,) and (formats * 7,).
-    whole: NDArray[np.int64]
-    numbers: NDArray[np.float64]
-    #: (2,), seed and count of random numbers, of all formats together.
-    random: NDArray[np.uint64]
-
-
-class Code(NamedTuple):
-    """Operations, as the machine takes them."""
-
-    #: (rows,), the operands and the place of the result.
-    a: NDArray[np.uint32]
-    b: NDArray[np.uint32]
-    c: NDArray[np.uint32]
-    out: NDArray[np.uint32]
-    #: (segments,) and one more for the end of the last: what the rows of each have in common, and how they run.
-    begins: NDArray[np.int64]
-    operations: NDArray[np.int64]
-    formats: NDArray[np.int64]
-    together: NDArray[np.int64]
-    #: (2 * rows,), room for the operands of a segment.
-    gathered: NDArray[np.float64]
-
-
-class Held(NamedTuple):
-    """What a run computes with; numbers of all lanes lie beside each other, and so do the parts of a number."""
-
-    #: The same memory twice.
-    words: NDArray[np.int64]
-    floats: NDArray[np.float64]
-    #: (truths * lanes,).
-    truths: NDArray[np.uint8]
-
-
-class Stepping(NamedTuple):
-    """Steps of a run; a place or a number of each lane counts as one, and so does each of its parts."""
-
-    first: int  # steps taken before those of `own`
-    steps: int
-    cycle: int  # steps after which the model repeats; 0 if states are not to be compared
-    lanes: int
-    width: int  # of a number: its parts in all lanes
-    #: (steps * own_count,), the numbers that each step takes, and the place of the first.
-    own: NDArray[np.int64]
-    own_at: int
-    own_count: int
-    #: (numbers * table_width,), of which steps take some in turn; of all lanes, or of one, to be repeated for each.
-    table: NDArray[np.int64]
-    table_width: int
-    #: (feeds * 4,): the first place, count, number of members of the cycle, and where the first member begins.
-    feeds: NDArray[np.int64]
-    #: places of the states, of their next values, of numbers to keep, and of the truth value to keep.
-    states_at: NDArray[np.int64]
-    after_at: NDArray[np.int64]
-    kept_at: NDArray[np.int64]
-    truth_at: int
-    #: (steps * kept,) and (steps * lanes,), what is kept of each step.
-    kept: NDArray[np.int64]
-    truths: NDArray[np.uint8]
-    #: (states,), the states with which later ones are compared, and room for their next values.
-    before: NDArray[np.int64]
-    after: NDArray[np.int64]
+# Entries of the tables of formats, of a program, of the numbers that it runs on and of a run. Each holds addresses of
+# arrays, and integers; see gpbnb.arithmetic.machine and gpbnb.arithmetic.loop, which make them.
+WHOLE, NUMBER, RANDOM = range(3)
+"""The columns of formats, int64 and float64, whose meaning depends on the kind; seed and count of random numbers."""
+A, B, C, OUT, BEGINS, OPERATIONS, FORMAT, TOGETHER, GATHERED, SEGMENTS, ROWS = range(11)
+"""Operands and results of rows, uint32; where segments begin, and their operations, formats and how their rows run,
+int64; room for the operands of a segment, float64; and how many segments and rows there are."""
+VALUES, TRUTHS = range(2)
+"""Numbers and truth values; those of all lanes lie beside each other, and so do the parts of a number."""
+# fmt: off
+(
+    FIRST, STEPS, CYCLE_OF, LANES, WIDTH, OWN, OWN_AT, OWN_COUNT, GIVEN, GIVEN_WIDTH, FEEDS, FEED_COUNT, STATES_AT,
+    AFTER_AT, STATES, KEPT_AT, KEPT_COUNT, TRUTH_AT, KEPT, KEPT_TRUTHS, BEFORE, AFTER,
+) = range(22)
+# fmt: on
+"""Steps of a run; a place or a number of each lane counts as one, and so does each of its parts."""
 
 
 # -- float64 with masks ------------------------------------------------------------------------------------------------
@@ -296,9 +247,21 @@ def _without_rounding(operation: Any, values: Any, truths: Any, a: Any, b: Any, 
 
 
 @borrowing
+def _column(code: Any, column: Any, begin: Any) -> Any:
+    return at(entries(code, column, np.uint32), begin)
+
+
+@borrowing
+def _row(code: Any, lanes: Any, o: Any) -> Any:
+    """The places of the operands and of the result of a row in the first lane, and its third operand as it stands."""
+    a, b, c = entries(code, A, np.uint32)[o], entries(code, B, np.uint32)[o], np.int64(entries(code, C, np.uint32)[o])
+    return lanes * a, lanes * b, lanes * c, lanes * entries(code, OUT, np.uint32)[o], c
+
+
+@borrowing
 def _limits(formats: Any, f: Any) -> Any:
     """How results of a format are rounded, and the range of their sizes."""
-    whole = at(formats.whole, COLUMNS * f)
+    whole = at(entries(formats, WHOLE, np.int64), COLUMNS * f)
     rule = whole[UNIT], whole[BELOW_ZERO], whole[ABOVE_ZERO], whole[STICKY_BELOW], whole[STICKY_ABOVE], whole[TO_EVEN]
     return rule, whole[HOW], whole[LOW], np.uint64(whole[SPAN])
 
@@ -311,31 +274,38 @@ def _rounds(operation: Any) -> Any:
 
 @addressed
 def _quick_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths = at(held.floats, 0), at(held.truths, 0)
+    values, truths = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8)
+    operations, numbers, together = (
+        entries(code, OPERATIONS, np.int64),
+        entries(code, FORMAT, np.int64),
+        entries(code, TOGETHER, np.int64),
+    )
+    begins, room = entries(code, BEGINS, np.int64), entries(code, GATHERED, np.float64)
     gone, f, after = np.int64(0), np.int64(0), np.int64(0)
     limits = _limits(formats, f)
-    for s in range(code.operations.shape[0]):
-        begin, count, operation = code.begins[s], code.begins[s + 1] - code.begins[s], code.operations[s]
+    for s in range(code[SEGMENTS]):
+        begin, count, operation = begins[s], begins[s + 1] - begins[s], operations[s]
         if begin < after:
             continue
-        if code.formats[s] != f:
-            f = code.formats[s]
+        if numbers[s] != f:
+            f = numbers[s]
             limits = _limits(formats, f)
-        a, b, c, out = at(code.a, begin), at(code.b, begin), at(code.c, begin), at(code.out, begin)
-        if code.together[s] != ONE_BY_ONE and limits[1] != TIED:
-            first, second = at(held.floats, a[0]), at(held.floats, b[0])
-            if code.together[s] == GATHERED:
-                first, second = at(code.gathered, 0), at(code.gathered, count)
+        a, b, out = _column(code, A, begin), _column(code, B, begin), _column(code, OUT, begin)
+        if together[s] != ONE_BY_ONE and limits[1] != TIED:
+            first, second = at(values, a[0]), at(values, b[0])
+            if together[s] == GATHERED:
+                first, second = room, at(room, count)
                 for i in range(count):
                     first[i] = values[a[i]]
                     second[i] = values[b[i]]
-            gone |= _all_along(operation, limits, first, second, at(held.floats, out[0]), count)
+            gone |= _all_along(operation, limits, first, second, at(values, out[0]), count)
         elif operation <= DIVIDE:
             gone |= _one_by_one(operation, limits, a, b, out, count, values)
         elif operation == SKIP:
             if not truths[a[0]]:
                 after = begin + count + np.int64(b[0])
         else:
+            c = _column(code, C, begin)
             for i in range(count):
                 x, y, z = a[i], b[i], c[i]
                 if _rounds(operation):
@@ -345,23 +315,26 @@ def _quick_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
                     values[out[i]] = found + 0.0
                 else:
                     gone |= np.int64(_without_rounding(operation, values, truths, x, y, z, np.int64(z), out[i]))
-    return 0 if gone != 0 else code.a.shape[0]
+    return 0 if gone != 0 else code[ROWS]
 
 
 @addressed
 def _quick_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths = at(held.floats, 0), at(held.truths, 0)
+    values, truths = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8)
+    operations, numbers, begins = (
+        entries(code, OPERATIONS, np.int64),
+        entries(code, FORMAT, np.int64),
+        entries(code, BEGINS, np.int64),
+    )
     gone = np.int64(0)
-    for s in range(code.operations.shape[0]):
-        limits, operation = _limits(formats, code.formats[s]), code.operations[s]
+    for s in range(code[SEGMENTS]):
+        limits, operation = _limits(formats, numbers[s]), operations[s]
         if operation == SKIP:
             continue
-        for o in range(code.begins[s], code.begins[s + 1]):
-            k = np.uint64(o)
-            a, b, c, out = lanes * code.a[k], lanes * code.b[k], lanes * code.c[k], lanes * code.out[k]
+        for o in range(begins[s], begins[s + 1]):
+            a, b, c, out, third = _row(code, lanes, o)
             if operation <= MULTIPLY and limits[1] != TIED:
-                first, second, third = at(held.floats, a), at(held.floats, b), at(held.floats, out)
-                gone |= _all_along(operation, limits, first, second, third, lanes)
+                gone |= _all_along(operation, limits, at(values, a), at(values, b), at(values, out), lanes)
                 continue
             for i in range(lanes):
                 if _rounds(operation):
@@ -370,42 +343,38 @@ def _quick_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
                     gone |= np.int64(_outside(size, limits[2], limits[3]))
                     values[out + i] = found + 0.0
                 else:
-                    third = np.int64(code.c[k])
                     gone |= np.int64(_without_rounding(operation, values, truths, a + i, b + i, c + i, third, out + i))
-    return 0 if gone != 0 else code.a.shape[0]
+    return 0 if gone != 0 else code[ROWS]
 
 
 @borrowing
 def _careful_lane(formats: Any, code: Any, held: Any, lanes: Any, i: Any) -> Any:
     """Run all rows for one lane; return the number of rows that have a result, counted from the first."""
-    values, truths, random = at(held.floats, i), at(held.truths, i), formats.random
-    o, f = np.int64(0), np.int64(0)
-    fmt = masked(at(formats.whole, COLUMNS * f), at(formats.numbers, NUMBERS * f))
-    for s in range(code.operations.shape[0]):
-        operation = code.operations[s]
-        if code.formats[s] != f:
-            f = code.formats[s]
-            fmt = masked(at(formats.whole, COLUMNS * f), at(formats.numbers, NUMBERS * f))
-        while o < code.begins[s + 1]:
-            k = np.uint64(o)
-            a, b, c, out = lanes * code.a[k], lanes * code.b[k], lanes * code.c[k], lanes * code.out[k]
+    values, truths = at(entries(held, VALUES, np.float64), i), at(entries(held, TRUTHS, np.uint8), i)
+    whole, numbers = entries(formats, WHOLE, np.int64), entries(formats, NUMBER, np.float64)
+    begins, random, o = entries(code, BEGINS, np.int64), entries(formats, RANDOM, np.uint64), np.int64(0)
+    for s in range(code[SEGMENTS]):
+        operation, f = entries(code, OPERATIONS, np.int64)[s], entries(code, FORMAT, np.int64)[s]
+        fmt = masked(at(whole, COLUMNS * f), at(numbers, NUMBERS * f))
+        while o < begins[s + 1]:
+            a, b, c, out, third = _row(code, lanes, o)
             if operation == SKIP:
-                o += 0 if truths[a] else np.int64(code.b[k])
+                o += 0 if truths[a] else np.int64(entries(code, B, np.uint32)[o])
             elif _rounds(operation):
                 z = values[c] if operation == FUSED else 0.0
                 found = carefully(fmt, random, operation, values[a], values[b], z)
                 if found != found:
                     return o
                 values[out] = found
-            elif _without_rounding(operation, values, truths, a, b, c, np.int64(code.c[k]), out):
+            elif _without_rounding(operation, values, truths, a, b, c, third, out):
                 return o
             o += 1
-    return code.a.shape[0]
+    return code[ROWS]
 
 
 @addressed
 def _careful_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    least = code.a.shape[0]
+    least = code[ROWS]
     for i in range(lanes):
         least = min(least, _careful_lane(formats, code, held, lanes, i))
     return least
@@ -484,11 +453,10 @@ def _overloaded_compare(fmt: Any, x: Any, y: Any) -> Any:
 
 
 @borrowing(forceinline=True)
-def _run_rows(fmt: Any, operation: Any, parts: Any, code: Any, s: Any, o: Any, values: Any, lanes: Any) -> Any:
+def _run_rows(fmt: Any, operation: Any, parts: Any, code: Any, o: Any, end: Any, values: Any, lanes: Any) -> Any:
     """Run rows of sums or products, so that what depends on the format alone is computed once."""
-    while o < code.begins[s + 1]:
-        k = np.uint64(o)
-        a, b, out = lanes * code.a[k], lanes * code.b[k], lanes * code.out[k]
+    while o < end:
+        a, b, _, out, _ = _row(code, lanes, o)
         for i in range(lanes):
             found = _operate(fmt, operation, False, _load(fmt, values, a + i), _load(fmt, values, b + i))
             _put(fmt, values, out + i, found)
@@ -502,14 +470,13 @@ def _run_rows(fmt: Any, operation: Any, parts: Any, code: Any, s: Any, o: Any, v
 @borrowing
 def _run_segment(fmt: Any, parts: Any, code: Any, s: Any, o: Any, values: Any, truths: Any, lanes: Any) -> Any:
     """Run rows of a segment from row o on for each lane; return the row to go on with, or ~row if one has no result."""
-    operation = code.operations[s]
+    operation, end = entries(code, OPERATIONS, np.int64)[s], entries(code, BEGINS, np.int64)[s + 1]
     if operation == MULTIPLY:
-        return _run_rows(fmt, _MULTIPLY, parts, code, s, o, values, lanes)
+        return _run_rows(fmt, _MULTIPLY, parts, code, o, end, values, lanes)
     if operation <= SUBTRACT:
-        return _run_rows(fmt, operation, parts, code, s, o, values, lanes)
-    while o < code.begins[s + 1]:
-        k = np.uint64(o)
-        a, b, c, out = lanes * code.a[k], lanes * code.b[k], lanes * code.c[k], lanes * code.out[k]
+        return _run_rows(fmt, operation, parts, code, o, end, values, lanes)
+    while o < end:
+        a, b, c, out, third = _row(code, lanes, o)
         holds = operation != SKIP
         for i in range(lanes):
             if operation == SKIP:
@@ -520,7 +487,7 @@ def _run_segment(fmt: Any, parts: Any, code: Any, s: Any, o: Any, values: Any, t
                     values[(out + i) * parts + j] = values[(chosen + i) * parts + j]
             elif operation == COMBINE:
                 table = 2 * np.int64(truths[a + i]) + np.int64(truths[b + i])
-                truths[out + i] = (np.int64(code.c[k]) >> table) & 1
+                truths[out + i] = (third >> table) & 1
             elif operation == NONZERO:
                 if values[(a + i) * parts] == 0:
                     return ~o
@@ -528,7 +495,7 @@ def _run_segment(fmt: Any, parts: Any, code: Any, s: Any, o: Any, values: Any, t
                 x, y = _load(fmt, values, a + i), _load(fmt, values, b + i)
                 below = values[(a + i) * parts] < 0
                 if operation == COMPARE:
-                    truths[out + i] = (np.int64(code.c[k]) >> (_compare(fmt, x, y) + 1)) & 1
+                    truths[out + i] = (third >> (_compare(fmt, x, y) + 1)) & 1
                     continue
                 if (
                     operation == FUSED
@@ -540,15 +507,15 @@ def _run_segment(fmt: Any, parts: Any, code: Any, s: Any, o: Any, values: Any, t
                 first = values[(out + i) * parts]
                 if first != first:
                     return ~o
-        o += 1 if holds else 1 + np.int64(code.b[k])
+        o += 1 if holds else 1 + np.int64(entries(code, B, np.uint32)[o])
     return o
 
 
 @addressed
 def _pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths, o = at(held.words, 0), at(held.truths, 0), np.int64(0)
-    for s in range(code.operations.shape[0]):
-        given = at(formats.whole, COLUMNS * code.formats[s])
+    values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
+    for s in range(code[SEGMENTS]):
+        given = at(entries(formats, WHOLE, np.int64), COLUMNS * entries(code, FORMAT, np.int64)[s])
         fmt = LimitedDecimal(given[1], given[0], given[2], given[3], given[4])
         o = _run_segment(fmt, 2, code, s, o, values, truths, lanes)
         if o < 0:
@@ -558,9 +525,9 @@ def _pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 
 @addressed
 def _short_pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths, o = at(held.words, 0), at(held.truths, 0), np.int64(0)
-    for s in range(code.operations.shape[0]):
-        given = at(formats.whole, COLUMNS * code.formats[s])
+    values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
+    for s in range(code[SEGMENTS]):
+        given = at(entries(formats, WHOLE, np.int64), COLUMNS * entries(code, FORMAT, np.int64)[s])
         o = _run_segment(ShortDecimal(given[0], given[1] == AWAY), 2, code, s, o, values, truths, lanes)
         if o < 0:
             return ~o
@@ -569,10 +536,13 @@ def _short_pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 
 @addressed
 def _two_words(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths, o, given = at(held.words, 0), at(held.truths, 0), np.int64(0), at(formats.whole, 0)
-    lowest, largest = (given[7], given[8], given[9]), (given[10], given[11], given[12])
-    fmt = Wide(given[0], given[1], given[2], given[3], given[4], given[5], given[6], lowest, largest, given[13] != 0)
-    for s in range(code.operations.shape[0]):
+    values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
+    for s in range(code[SEGMENTS]):
+        given = at(entries(formats, WHOLE, np.int64), COLUMNS * entries(code, FORMAT, np.int64)[s])
+        lowest, largest = (given[7], given[8], given[9]), (given[10], given[11], given[12])
+        fmt = Wide(
+            given[0], given[1], given[2], given[3], given[4], given[5], given[6], lowest, largest, given[13] != 0
+        )
         o = _run_segment(fmt, 3, code, s, o, values, truths, lanes)
         if o < 0:
             return ~o
@@ -581,8 +551,8 @@ def _two_words(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 
 @addressed
 def _double_doubles(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths, o = at(held.floats, 0), at(held.truths, 0), np.int64(0)
-    for s in range(code.operations.shape[0]):
+    values, truths, o = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8), np.int64(0)
+    for s in range(code[SEGMENTS]):
         o = _run_segment(DoubleDouble(), 2, code, s, o, values, truths, lanes)
         if o < 0:
             return ~o
@@ -600,11 +570,10 @@ def address(kind: Any, alone: bool) -> int:
 
 @cache
 def _address(function: Any) -> int:
-    words, floats, places = np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.uint32)
-    formats = Formats(words, floats, np.zeros(0, np.uint64))
-    code = Code(places, places, places, places, words, words, words, words, floats)
-    return address_of(function, formats, code, Held(words, floats, np.zeros(0, np.uint8)), 0)
+    return address_of(function, _TABLE, _TABLE, _TABLE, types.int64)
 
+
+_TABLE = types.CPointer(types.int64)
 
 # -- steps -------------------------------------------------------------------------------------------------------------
 
@@ -615,65 +584,83 @@ those of one step."""
 
 
 @compiled
-def once(execute: int, formats: Any, code: Any, held: Any, lanes: int) -> Any:
+def once(execute: int, formats: int, code: int, held: int, lanes: int) -> Any:
     """Run all rows; return how many have results in every lane, counted from the first, or 0."""
-    return call(execute, formats, code, held, lanes)
+    return call(execute, words(formats), words(code), words(held), lanes)
+
+
+@inner
+def _moved(values: Any, places: Any, count: Any, to: Any) -> None:
+    for j in range(count):
+        to[j] = values[places[j]]
+
+
+@inner
+def _feed(run: Any, values: Any, step: Any, begin: Any) -> None:
+    """Bring the numbers that a step takes from the cycles of a run to their places."""
+    given, width, wide = entries(run, GIVEN, np.int64), run[GIVEN_WIDTH], run[WIDTH]
+    for g in range(run[FEED_COUNT]):
+        feed = at(entries(run, FEEDS, np.int64), 4 * g)
+        count, members = feed[1], feed[2]
+        if members > 1 or step == begin:
+            taken = at(given, (feed[3] + count * ((run[FIRST] + step) % members)) * width)
+            to = at(values, feed[0] * wide)
+            for i in range(count):
+                for k in range(0, wide, width):
+                    for m in range(width):
+                        to[i * wide + k + m] = taken[i * width + m]
 
 
 @compiled
-def advance(execute: int, formats: Any, code: Any, held: Any, run: Any, notes: Any) -> None:
+def advance(execute: int, formats: int, code: int, held: int, run: int, notes: int) -> None:
     """Take steps of a run, each of which replaces the states by their next values, from step notes[DONE] on.
 
     Parameters
     ----------
     execute : the address of the kind's function.
-    held, run : see :class:`Held` and :class:`Stepping`.
-    notes : see :data:`DONE` and the following; brought up to date.
+    formats, code, held, run : addresses of tables.
+    notes : the address of the notes, see :data:`DONE` and the following, which are brought up to date.
     """
-    values, rows, own, cycle = at(held.words, 0), code.a.shape[0], run.own_count, run.cycle
-    kept, states = run.kept_at.shape[0], run.after_at.shape[0]
-    after, before, feeds = at(run.after, 0), at(run.before, 0), at(run.feeds, 0)
-    begin = notes[DONE]
-    for step in range(begin, run.steps):
-        for g in range(0, run.feeds.shape[0], 4):
-            count, members = feeds[g + 1], feeds[g + 2]
-            if members > 1 or step == begin:
-                taken = at(run.table, (feeds[g + 3] + count * ((run.first + step) % members)) * run.table_width)
-                to, taken_at = feeds[g] * run.width, np.int64(0)
-                for _ in range(count):
-                    for k in range(0, run.width, run.table_width):
-                        for m in range(run.table_width):
-                            values[to + k + m] = taken[taken_at + m]
-                    to += run.width
-                    taken_at += run.table_width
-        given, found = at(run.own, step * own), at(run.kept, step * kept)
+    formats_at, code_at, held_at, run_at, noted = words(formats), words(code), words(held), words(run), words(notes)
+    values, truths = entries(held_at, VALUES, np.int64), entries(held_at, TRUTHS, np.uint8)
+    own, kept, states, lanes, cycle = (
+        run_at[OWN_COUNT],
+        run_at[KEPT_COUNT],
+        run_at[STATES],
+        run_at[LANES],
+        run_at[CYCLE_OF],
+    )
+    after, before = entries(run_at, AFTER, np.int64), entries(run_at, BEFORE, np.int64)
+    states_at = entries(run_at, STATES_AT, np.int64)
+    begin = noted[DONE]
+    for step in range(begin, run_at[STEPS]):
+        _feed(run_at, values, step, begin)
+        given = at(entries(run_at, OWN, np.int64), step * own)
         for j in range(own):
-            values[run.own_at + j] = given[j]
-        notes[ROW] = 0
-        done = call(execute, formats, code, held, run.lanes)
-        if done < rows:
-            notes[ROW] = done
+            values[run_at[OWN_AT] + j] = given[j]
+        noted[ROW] = 0
+        done = call(execute, formats_at, code_at, held_at, lanes)
+        if done < code_at[ROWS]:
+            noted[ROW] = done
             return
+        _moved(values, entries(run_at, AFTER_AT, np.int64), states, after)
+        _moved(values, entries(run_at, KEPT_AT, np.int64), kept, at(entries(run_at, KEPT, np.int64), step * kept))
         same = cycle > 0
         for j in range(states):
-            after[j] = values[run.after_at[j]]
-        for j in range(kept):
-            found[j] = values[run.kept_at[j]]
-        for j in range(states):
-            values[run.states_at[j]] = after[j]
+            values[states_at[j]] = after[j]
             same &= after[j] == before[j]
-        for i in range(run.lanes):
-            run.truths[step * run.lanes + i] = held.truths[run.truth_at * run.lanes + i]
-        notes[DONE] = step + 1
+        for i in range(lanes):
+            entries(run_at, KEPT_TRUTHS, np.uint8)[step * lanes + i] = truths[run_at[TRUTH_AT] * lanes + i]
+        noted[DONE] = step + 1
         if cycle > 0:
-            notes[SINCE] += 1
-            if notes[SINCE] % cycle == 0 and same:
-                notes[CYCLE] = notes[SINCE]
-                notes[ROW] = -1
+            noted[SINCE] += 1
+            if noted[SINCE] % cycle == 0 and same:
+                noted[CYCLE] = noted[SINCE]
+                noted[ROW] = -1
                 return
-            if notes[SINCE] == notes[LASTS]:
+            if noted[SINCE] == noted[LASTS]:
                 for j in range(states):
                     before[j] = after[j]
-                notes[SINCE] = 0
-                notes[LASTS] += cycle * (notes[LASTS] // (8 * cycle) + 1)
-    notes[ROW] = -1
+                noted[SINCE] = 0
+                noted[LASTS] += cycle * (noted[LASTS] // (8 * cycle) + 1)
+    noted[ROW] = -1
