@@ -33,6 +33,9 @@ def draw(table: Sequence[Row], path: Path) -> None:
     ax.xaxis.set_major_formatter("{x:g}")
     ax.set_ylim(len(tasks) - 0.5, -1.5)
     ax.set_yticks(range(len(tasks)), [task if len(task) < 40 else task.replace(", ", ",\n") for task in tasks])
+    for each in ax.get_yticklabels():
+        if "\n" in each.get_text():
+            each.set(fontsize=0.7 * TEXT, linespacing=1.0)  # two lines in the height of one
     aside = ax.secondary_yaxis("right")
     aside.set_yticks([-1, *range(len(tasks))], ["closest", *names])
     aside.tick_params(length=0)

@@ -33,4 +33,4 @@ def test_a_run_beyond_its_bound_is_wrong(monkeypatch):
 
 def test_nothing_that_the_page_counts_disagrees():
     page = Path(__file__).resolve().parents[1] / "book" / "trust.ipynb"
-    assert "In each row, disagreements: 0." in page.read_text(encoding="utf-8")
+    assert "In all rows: disagreements = 0." in page.read_text(encoding="utf-8")

@@ -20,11 +20,11 @@ MOST_ROWS = 12
 _PLAIN = (1e-5, 1e7)
 """A column whose numbers lie between these limits has no powers of ten."""
 _SHORT = re.compile(
-    r"\$?([+\-−]?)([\d,]*)(\.\d+)?(?:e([+-]?\d+)|\\times10\^\{([+-]?\d+)\})?\$?((?: ?[%°′″].*| [^\d\s.,+−-].*)?)"
+    r"\$?([+\-−]?)([\d,]*)(\.\d+)?(?:e([+-]?\d+)|\\times10\^\{([+-]?\d+)\})?\$?((?: ?[%°′″].*| [^\d\s.,+−-].{0,30})?)"
 )
 _HYPHEN = re.compile(r"(?<![\w.)\]])-(?=\.?\d)")
-_DIGIT, _POINT = "&#8199;", "&#8200;"
-"""Spaces as wide as a digit and as a comma. Entities survive where white space is cut off."""
+_DIGIT, _POINT = "&#8199;", "&#8200;&#8288;"
+"""Spaces as wide as a digit and as a comma, after which no line ends. Entities survive where white space is cut off."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Table:
         shown = [list(map(_cell, columns[k])) if self.header[k] in self.quoted else _aligned(columns[k]) for k in kept]
         text = _lines(header, [list(row) for row in zip(*shown, strict=True)])
         if same:
-            words = "; ".join(f"{_cell(self.header[k])}: {_cell(minus_signs(columns[k][0]))}" for k in same)
-            text += f"\n\nIn each row, {words}."
+            words = "; ".join(f"{_cell(self.header[k])} = {_cell(minus_signs(columns[k][0]))}" for k in same)
+            text += f"\n\nIn all rows: {words}."
         if len(self.body) > MOST_ROWS:
             summary = f"{html.escape(self.title)}, {len(self.body)} rows"
             text = f'<details class="long-table"><summary>{summary}</summary>\n\n{text}\n\n</details>'

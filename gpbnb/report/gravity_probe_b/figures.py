@@ -46,8 +46,8 @@ def answer_line(found: Sequence[YearAnswer], ax: Axes) -> list[Artist]:
         artists.append(name(ax, word, (fmt.precision, -0.75), REFERENCE, (4, 0)))
     for line, word in zip((artists[0], artists[1], every_mark), ("report", "simulated", "every record"), strict=True):
         line.set_label(word)
-    ax.set(xlim=(12, 69), ylim=(-0.9, 2.5), yticks=[1, 0], yticklabels=[f"{DRIFT:,} mas", "1 mas"])
+    ax.set(xlim=(12, 69), ylim=(-0.9, 1.7), yticks=[1, 0], yticklabels=[f"{DRIFT:,} mas", "1 mas"])
     ax.set_xticks(range(20, 70, 10))
-    legend(ax, loc="upper right", ncols=3)
+    legend(ax, loc="lower right", bbox_to_anchor=(1, 0.97), ncols=3)
     label(ax, "bits", "allowed")
     return artists
