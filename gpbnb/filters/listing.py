@@ -25,6 +25,7 @@ from gpbnb.filters.program import (
     DIVISOR,
     EQUAL,
     FLOOR,
+    FUNCTIONS,
     LESS,
     MODULO,
     MULTIPLY,
@@ -103,12 +104,19 @@ class Listing:
     values, coefficients : numbers of values and of coefficients, by their places on the tape; 0 and perhaps 1 are
         coefficients.
     nonzero : places of coefficients that are not zero.
+    exact : whether functions are refused whose digits C's library does not guarantee.
     """
 
     def __init__(
-        self, tape: Tape, build: Builder, values: dict[int, int], coefficients: dict[int, int], nonzero: set[int]
+        self,
+        tape: Tape,
+        build: Builder,
+        values: dict[int, int],
+        coefficients: dict[int, int],
+        nonzero: set[int],
+        exact: bool = True,
     ) -> None:
-        self._tape, self._build, self._nonzero = tape, build, nonzero
+        self._tape, self._build, self._nonzero, self._exact = tape, build, nonzero, exact
         self._values, self._coefficients = values, coefficients
         self._truths = {0: _FALSE, 1: _TRUE}
         #: Comparisons and combinations that have not been needed yet.
@@ -191,17 +199,22 @@ class Listing:
             self._check(self._waiting[a][1], NOT_NEGATIVE)
 
     def _call(self, call: Call) -> None:
-        if call.name not in _CALLS and call.name != "remainder":
+        inexact = call.name in FUNCTIONS
+        if not (call.name in _CALLS or call.name == "remainder" or (inexact and not self._exact)):
             raise ValueError(
                 f"got np.{call.name} in the step, for which C has no function with the digits of the emulation; needed "
                 "+ - * /, comparisons, choices, np.sqrt, np.fmod, np.remainder, np.floor, np.ceil, np.trunc, np.rint; "
-                "write a polynomial or a table in its place"
+                + ("ask with exact=False, or " if inexact else "")
+                + "write a polynomial or a table in its place"
             )
         for *places, out in zip(*(each.tolist() for each in (*call.operands, call.results)), strict=True):
             if call.name == "remainder":
                 self._values[out] = self._remainder(places[0], places[1], -out)
             elif call.name == "fmod":
                 self._values[out] = self._of_two(MODULO, *places)
+            elif inexact:
+                first, last = (self._value(places[i]) for i in (0, -1))
+                self._values[out] = self._build.append(FUNCTIONS[call.name], first if places[1:] else 0, last)
             else:
                 self._values[out] = self._build.append(_CALLS[call.name], 0, self._value(places[0]))
 

@@ -19,9 +19,11 @@ from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import ROOTS, AnyForm, ArrayForm, Form
+from gpbnb.filters.listing import Listing
 from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.opening import double_doubles_of
+from gpbnb.filters.program import Builder, Program, entries
 from gpbnb.filters.recording import block_algebra
 from gpbnb.filters.reference import Step, agreed
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
@@ -122,15 +124,15 @@ class NonlinearRun:
 
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
-        for _ in self._steps_taken(z):
+        for _ in self.steps_taken(z):
             pass
 
     def states(self, z: Any) -> NDArray[np.float64]:
         """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
-        found = [double_doubles_of(self.x) for _ in self._steps_taken(z)]
+        found = [double_doubles_of(self.x) for _ in self.steps_taken(z)]
         return np.array(found, dtype=np.float64).reshape(-1, self.model.n, 2)
 
-    def _steps_taken(self, z: Any) -> Iterator[int]:
+    def steps_taken(self, z: Any) -> Iterator[int]:
         """Take one step after the other, and give the number of those done."""
         self.model.noise.check_measurements(z, self.steps)
         for measured in self._stored(z):
@@ -167,11 +169,67 @@ class NonlinearRun:
 
     # -- one step ---------------------------------------------------------------------------------------
 
-    def _take(self, k: int, z: FloatArray) -> bool:
+    @property
+    def kept(self) -> list[tuple[int, int]]:
+        """The entries of the covariance, its factors or its root that are not always zero."""
+        upper = self.form in (Form.UD, ArrayForm.CARLSON)
+        return [(i, j) for i, j in np.ndindex(self.model.n, self.model.n) if not upper or i <= j]
+
+    def program(self, exact: bool = True) -> tuple[Program, list[NDArray[Any]]]:
+        """Return the operations of a step, and its coefficients but 0 and 1, which are the last, each with its cycle.
+
+        States are x (n), then the entries of P that are kept; inputs are the measurements, then the known inputs.
+
+        Parameters
+        ----------
+        exact : as for :class:`~gpbnb.filters.listing.Listing`.
+
+        Raises
+        ------
+        ValueError : the step cannot be traced, or has a function that C lacks; the message says why.
+        """
+        found = self._step.recorded(self._given(0, self._stored(np.zeros(self.model.m))))
+        tape, (x, P, z, *places) = found.tape, found.places
+        members = [np.stack([each.to_fractions() for each in cycle]) for cycle in (self._Q, self._R)]
+        members += [each.reshape(1, -1).to_fractions() for each in self._weights]
+        u = [each for array in places[len(members) :] for each in array.tolist()]
+        known = [at for array in places[: len(members)] for at in array.ravel().tolist()]
+        constants = {at: value for at, value in tape.constants_in(self.fmt).items() if at not in (0, tape.one)}
+        members.append(np.array([list(constants.values())], dtype=object))
+        order = [*known, *constants, 0, tape.one]
+        states = [*x.tolist(), *(int(P[at]) for at in self.kept)]
+        zeros = {*P.ravel().tolist()} - {*states}
+        coefficients = {at: i for i, at in enumerate(order)} | dict.fromkeys(zeros, len(order) - 2)
+        listing = Listing(
+            tape,
+            Builder(len(states), self.model.m + len(u)),
+            {at: i for i, at in enumerate([*states, *z.tolist(), *u])},
+            coefficients,
+            {tape.one, *(at for at, value in constants.items() if value)},
+            exact,
+        )
+        after, covariance = (each.components[0] for each in found.taken.states)
+        letter = "U" if self.form is Form.UD else "S" if self.form in ROOTS else "P"
+        names = [each for one, cycle in zip("QR", members, strict=False) for each in entries(one, *cycle.shape[1:])]
+        names += [f"c{i}" for i in range(len(order) - len(names) - 2)]
+        program = listing.program(
+            [*after.tolist(), *(int(covariance[at]) for at in self.kept)],
+            len(order),
+            0,
+            [*entries("x", len(x)), *(f"{letter}[{i}][{j}]" for i, j in self.kept)],
+            [*names, "zero", "one"],
+            found.taken.definite,
+        )
+        return program, members
+
+    def _given(self, k: int, z: FloatArray) -> list[FloatArray]:
         known = [] if self._u is None else [self._u[k]]
+        return [z, self._member(self._Q, k), self._member(self._R, k), *self._weights, *known]
+
+    def _take(self, k: int, z: FloatArray) -> bool:
         self._present = self.model.seen(k)
         kind = None if self._present is None else self._present.tobytes()
-        return self._step.take([z, self._member(self._Q, k), self._member(self._R, k), *self._weights, *known], kind)
+        return self._step.take(self._given(k, z), kind)
 
     def _stepped(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
         each = [formats[i] for i in self._blocks_at]

@@ -156,10 +156,10 @@ class NonlinearSystem:
         found: FloatArray = fmt.array(rows)
         return found
 
-    def program(self, fmt: FloatFormat | FixedFormat) -> tuple[Program, NDArray[Any]]:
+    def program(self, fmt: FloatFormat | FixedFormat, exact: bool = True) -> tuple[Program, NDArray[Any]]:
         """Return the operations of a step, and the coefficients as a format stores them, (1, c).
 
-        The last p states of the program are the outputs.
+        The last p states of the program are the outputs. `exact` is that of :class:`~gpbnb.filters.listing.Listing`.
 
         Raises
         ------
@@ -178,6 +178,7 @@ class NonlinearSystem:
             {place: place - 1 if place <= n else place - 1 + p for place in range(1, 1 + inputs)},
             {place: numbers[value] for place, value in constants.items()},
             {place for place, value in constants.items() if value},
+            exact,
         )
         names = ["zero", *(f"c{i}" for i in range(1, len(distinct)))]
         found = listing.program(after, len(distinct), p, [*entries("x", n), *entries("y", p)], names)

@@ -41,10 +41,17 @@ zero, else its second. LESS and EQUAL are one if they hold for two values, else 
 division that truncates its quotient, ROOT a square root, and the last four are the nearest whole number below, above,
 toward zero, and on either side, ties to even."""
 
+_NAMES = (
+    "arctan2", "hypot", "float_power", "exp", "expm1", "exp2", "log", "log1p", "log2", "log10", "cbrt", "sin", "cos",
+    "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh",
+)  # fmt: skip
+FUNCTIONS = {name: NEAREST + 1 + i for i, name in enumerate(_NAMES)}
+"""Codes of functions that C has, by their names in NumPy; the first three take two values."""
+
 LINEAR = (MULTIPLY, ADD, SUBTRACT)
 """Codes of operations that are linear functions of their values."""
 
-_ON_TWO_VALUES = (ADD, SUBTRACT, PRODUCT, DIVIDE, CHOOSE, LESS, EQUAL, MODULO)
+_ON_TWO_VALUES = (ADD, SUBTRACT, PRODUCT, DIVIDE, CHOOSE, LESS, EQUAL, MODULO, *list(FUNCTIONS.values())[:3])
 
 DIVISOR, POSITIVE, NOT_NEGATIVE, RADICAND, IN_RANGE = range(5)
 """Kinds of checks. A divisor of zero and a radicand below zero end a run; a value that should be positive, or not
@@ -83,7 +90,7 @@ class Program:
     ----------
     n, m : number of states and of inputs.
     operations : (o, 3), code and two operands. MULTIPLY, AT_LEAST and AT_MOST take a coefficient and a value, CONSTANT
-        a coefficient; ROOT and the codes after it take a value as second operand; all others take two values.
+        a coefficient; ROOT and the codes after it take a value as second operand, or two values; all others take two.
     outputs : (n,), the values that become the states.
     coefficients : number of coefficients.
     groups : (o,), operations whose rounding errors have the same effect on the result share a number.

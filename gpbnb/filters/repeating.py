@@ -33,7 +33,7 @@ StepFunction = Callable[[Sequence[Any], tuple[Any, ...], Sequence[Any]], StepTak
 """A function of formats, of states, and of what a step is given, that takes a step on arrays of any kind."""
 
 
-class _Recorded(NamedTuple):
+class RecordedArrays(NamedTuple):
     """A recorded step: its tape, the places of what it takes, what it gives, and how it is divided."""
 
     tape: Tape
@@ -98,6 +98,20 @@ class RepeatedStep:
         self._states, self._gain = taken.states, taken.gain
         return bool(taken.definite)
 
+    def recorded(self, given: Sequence[FloatArray]) -> RecordedArrays:
+        """Return the operations of a step in one format, whose numbers are not looked at.
+
+        Raises
+        ------
+        ValueError : no tape can repeat the step; the message says why.
+        """
+        arrays = (*self.states, *given)
+        found, again = (self._recorded(arrays, [0] * len(arrays), True) for _ in range(2))
+        if isinstance(found, str) or isinstance(again, str) or not found.tape.equals(again.tape):
+            why = found if isinstance(found, str) else "its functions depend on more than their arguments"
+            raise ValueError(f"got a step that cannot be traced: {why}; needed one that can, without branches")
+        return found
+
     def _opened(self, given: Sequence[FloatArray], kind: Any) -> _Inside | None:
         """Record a step, and make it ready to run; None if it cannot be repeated."""
         formats, alike = self._formats, True
@@ -110,14 +124,15 @@ class RepeatedStep:
         arrays = (*self.states, *given)
         numbers = [formats.index(each.format) for each in arrays]
         found, again = (self._recorded(arrays, numbers, alike) for _ in range(2))
-        if found is None or again is None or not found.tape.equals(again.tape):
+        if isinstance(found, str) or isinstance(again, str) or not found.tape.equals(again.tape):
             return None
         try:
             return _Inside(found, formats)
         except (ArithmeticError, ValueError, TypeError):
             return None
 
-    def _recorded(self, arrays: Sequence[FloatArray], numbers: Sequence[int], alike: bool) -> _Recorded | None:
+    def _recorded(self, arrays: Sequence[FloatArray], numbers: Sequence[int], alike: bool) -> RecordedArrays | str:
+        """Record a step; return why not, if it does what no tape repeats."""
         tape = Tape(sum(each.size for each in arrays), one=True)
         tape.alike = alike
         formats = [TracedFormat(tape, i) for i in range(len(self._formats))]
@@ -131,17 +146,17 @@ class RepeatedStep:
         try:
             with unseen(formats[0]) as shown:
                 taken = self._function(formats, tuple(made[:count]), made[count:])
-        except Exception:  # the function runs itself, and raises its own error
-            return None
+        except Exception as error:  # the function runs itself, and raises its own error
+            return tape.refusal or f"without numbers it stops: {error}"
         if tape.refusal or shown:
-            return None
-        return _Recorded(tape, places, taken, *tape.divided(np.arange(1, at)))
+            return tape.refusal or "it shows values with peek"
+        return RecordedArrays(tape, places, taken, *tape.divided(np.arange(1, at)))
 
 
 class _Inside:
     """A recorded step with its numbers."""
 
-    def __init__(self, recorded: _Recorded, formats: Sequence[Any]) -> None:
+    def __init__(self, recorded: RecordedArrays, formats: Sequence[Any]) -> None:
         self.recorded, self._formats = recorded, formats
         loops = isinstance(formats[0].backend, Looped)
         tape = recorded.tape

@@ -62,7 +62,13 @@ Sections = Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]]
 
 
 def written_files(
-    source: CodeSource, what: str, bound: str, bounded: bool, sections: Sections, vectors: Vectors
+    source: CodeSource,
+    what: str,
+    bound: str,
+    bounded: bool,
+    sections: Sections,
+    vectors: Vectors,
+    tolerances: NDArray[np.float64] | None,
 ) -> dict[str, str]:
     """Return the text of each file by its name.
 
@@ -71,12 +77,13 @@ def written_files(
     what, bound : what the filter is, and what is proven about its errors, which may be empty, in words.
     bounded : whether its errors can be bounded.
     sections : those of a cascade, as stored; else empty.
+    tolerances : (n,), how far each state may be from its vectors; None if it may not.
     """
     name = source.name
     return {
-        f"{name}.h": _header(source, what, bound, bounded, sections),
+        f"{name}.h": _header(source, what, bound, bounded, sections, tolerances),
         f"{name}.c": _source(source),
-        f"test_{name}.c": _test(source),
+        f"test_{name}.c": _test(source, tolerances),
         f"{name}_vectors.txt": _vectors(source, vectors),
         "Makefile": _makefile(name),
     }
@@ -92,7 +99,14 @@ def _comment(*paragraphs: str) -> str:
     return "\n".join(["/*", *(f" * {line}".rstrip().rstrip("\\") for line in lines), " */", ""])
 
 
-def _header(source: CodeSource, what: str, bound: str, bounded: bool, sections: Sections) -> str:
+def _header(
+    source: CodeSource,
+    what: str,
+    bound: str,
+    bounded: bool,
+    sections: Sections,
+    tolerances: NDArray[np.float64] | None,
+) -> str:
     name, guard = source.name, f"{source.name.upper()}_H"
     order = (
         "Each statement of the step is one operation, rounded once, in the order in which gpbnb emulates the filter"
@@ -101,7 +115,14 @@ def _header(source: CodeSource, what: str, bound: str, bounded: bool, sections: 
     flags = "compile with -ffp-contract=off, and never with -ffast-math."
     flags = f"{order}: {flags}" if source.arithmetic.floating else f"{order}."
     program, statuses = source.step.program, source.statuses
-    paragraphs = _comment(WRITTEN, f"{what}.", flags, bound)
+    functions = ""
+    if tolerances is not None:
+        functions = (
+            "Functions of the platform may have other last digits than those of the emulation, which are correctly "
+            f"rounded. The test allows each state at most {tolerances.max():.2g}: four times what it changes if every "
+            "operation is rounded up, or every one down."
+        )
+    paragraphs = _comment(WRITTEN, f"{what}.", flags, bound, functions)
     values = ",\n".join(f"    {status.name} = {status.value}" for status in statuses)
     meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in statuses)
     takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
@@ -180,7 +201,7 @@ def _source(source: CodeSource) -> str:
     return f"/* {WRITTEN} */\n" + "\n".join(f"{part.rstrip()}\n" for part in parts if part)
 
 
-def _test(source: CodeSource) -> str:
+def _test(source: CodeSource, tolerances: NDArray[np.float64] | None) -> str:
     name, program = source.name, source.step.program
     number = f"{name}_number"
     fields = [f"&state.{place}" for place in source.states] + [f"&output[{i}]" for i in range(program.p)]
@@ -188,18 +209,24 @@ def _test(source: CodeSource) -> str:
     if source.arithmetic.floating:
         read = f'"%{"l" if source.arithmetic.number == "double" else ""}f"'
         variable, convert, same = number, "value", "a == b && !signbit(a) == !signbit(b)"
+        same = same if tolerances is None else "fabs(a - b) <= most"
         include = "#include <math.h>\n"
     else:
         read, variable, convert, same, include = '"%" SCNd64', "int64_t", f"({number})value", "a == b", ""
         include = "#include <inttypes.h>\n"
     output = f"    {number} output[{program.p}] = {{0}};\n" if program.p else ""
     passed = ", output" if program.p else ""
-    return f"""/* Compare {name}.c with the test vectors of its emulation, bit for bit. {WRITTEN} */
+    most, at, digits, table = "", "", "bit for bit", ""
+    if tolerances is not None:
+        texts = [f"{each:.9g}" for each in tolerances.tolist()]
+        table = f"static const double tolerance[] = {{{', '.join(texts)}}};\n\n"
+        most, at, digits = ", double most", ", tolerance[i]", "each within its tolerance"
+    return f"""/* Compare {name}.c with the test vectors of its emulation, {digits}. {WRITTEN} */
 {include}#include <stdio.h>
 
 #include "{name}.h"
 
-static int same({number} a, {number} b)
+{table}static int same({number} a, {number} b{most})
 {{
     return {same};
 }}
@@ -242,14 +269,14 @@ int main(int count, char **arguments)
         for (i = 0; i < {program.n}; i++) {{
             if (!read_number(file, &expected))
                 return 2;
-            if (!same(*found[i], expected)) {{
+            if (!same(*found[i], expected{at})) {{
                 fprintf(stderr, "step %ld: number %d differs\\n", step, i);
                 return 1;
             }}
         }}
     }}
     fclose(file);
-    printf("%ld steps with the digits of the emulation\\n", step);
+    printf("%ld steps {"with the digits" if tolerances is None else "near those"} of the emulation\\n", step);
     return step == 0;
 }}
 """

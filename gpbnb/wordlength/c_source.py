@@ -22,6 +22,7 @@ from gpbnb.filters.program import (
     DIVISOR,
     EQUAL,
     FLOOR,
+    FUNCTIONS,
     IN_RANGE,
     LESS,
     MODULO,
@@ -58,6 +59,11 @@ _FLOATING = _EITHER | {
     ADD: "{a} + {b}", SUBTRACT: "{a} - {b}", PRODUCT: "{a} * {b}", DIVIDE: "{a} / {b}", MULTIPLY: "{c} * {b}",
     ROOT: "sqrt{f}({b})", MODULO: "fmod{f}({a}, {b})", **{code: name + "{f}({b})" for code, name in _WHOLE.items()},
 }  # fmt: skip
+_IN_C = {"arctan2": "atan2", "float_power": "pow"}
+for _name, _code in FUNCTIONS.items():
+    # An emulated zero has no sign; the sum takes it from that of C.
+    _operands = "{a} + 0, {b} + 0" if len(values_of(_code, 0, 0)) > 1 else "{b}"
+    _FLOATING[_code] = _IN_C.get(_name, _name.replace("arc", "a")) + "{f}(" + _operands + ")"
 _INTEGER = _EITHER | {
     ADD: "add({left}, {right}{o})", SUBTRACT: "subtract({left}, {right}{o})", PRODUCT: "multiply({a}, {b}, {shift}{o})",
     DIVIDE: "divide({a}, {b}{o})", MULTIPLY: "multiply({c}, {b}, {shift}{o})", ROOT: "root({b}{o})",
@@ -94,6 +100,11 @@ class CodeStep(NamedTuple):
     def may_stop(self) -> bool:
         """Whether a divisor may be zero, or the argument of a square root negative."""
         return any(kind in _STOPS for _, kind in self.program.checks)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether it calls no function whose digits C's library does not guarantee."""
+        return not np.isin(self.program.operations[:, 0], list(FUNCTIONS.values())).any()
 
     @property
     def may_be_indefinite(self) -> bool:
@@ -148,6 +159,8 @@ class CodeFloats:
         for code, a, b in program.operations.tolist():
             if code in (DIVIDE, MODULO, AT_LEAST, AT_MOST):
                 found[b] = None
+            elif code in FUNCTIONS.values():
+                found |= dict.fromkeys(values_of(code, a, b))
             elif code in (LESS, EQUAL, CHOOSE):
                 found |= {a: None, b: None}
         always = (CONSTANT, LESS, EQUAL)

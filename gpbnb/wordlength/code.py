@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from fractions import Fraction
 from math import lcm
 from pathlib import Path
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import NegativeRootError
+from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
@@ -33,7 +35,9 @@ from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, AnyForm, Form, plain_name
 from gpbnb.filters.listing import kalman_program
 from gpbnb.filters.model import LinearModel, identity_in
-from gpbnb.filters.named import form_with_program
+from gpbnb.filters.named import form_named, form_with_program
+from gpbnb.filters.nonlinear import NonlinearModel
+from gpbnb.filters.nonlinear_run import NonlinearRun, simulated
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.program import without_exact
@@ -54,10 +58,12 @@ from gpbnb.wordlength.tasks import admitted, data_of
 VECTORS = 100
 """Steps of the test vectors."""
 
-STOPS = (OverflowError, ZeroDivisionError, NegativeRootError)
+_WITH_INPUTS = ", whose input holds the measurements, then the known inputs"
+
+STOPS = (OverflowError, ZeroDivisionError, NegativeRootError, DomainError)
 """Errors that end the emulation of a step, as the code ends it with its status."""
 
-Filter = LinearSystem | LinearModel | FilterDesign | NonlinearSystem
+Filter = LinearSystem | LinearModel | FilterDesign | NonlinearSystem | NonlinearModel
 """What code is written for."""
 
 AnyFormat = FloatFormat | FixedFormat | WordFormats
@@ -72,9 +78,9 @@ class Prepared(NamedTuple):
     step, arithmetic : its operations, and how they are written.
     title : what it is.
     structure : its structure or form.
-    emulate : function that returns the vectors for inputs, (steps, m).
+    emulate : function that returns the vectors for inputs, (steps, m), in a format.
     inputs : function that returns inputs for a number of steps.
-    bound : function that returns what is proven about the errors, in words, for limits.
+    bound : function that returns what is proven about the errors, in words, for limits, if anything can be.
     sections : those of a cascade, as stored; else empty.
     """
 
@@ -82,9 +88,9 @@ class Prepared(NamedTuple):
     arithmetic: CodeNumbers
     title: str
     structure: str
-    emulate: Callable[[Any], Vectors]
+    emulate: Callable[[Any, Any], Vectors]
     inputs: Callable[[int], NDArray[np.float64]]
-    bound: Callable[[FilterLimits], str]
+    bound: Callable[[FilterLimits], str] = lambda within: ""
     sections: Sections = ()
 
 
@@ -98,13 +104,14 @@ def write_code(
     inputs: Any = None,
     within: FilterLimits | None = None,
     overwrite: bool = False,
+    exact: bool = True,
 ) -> tuple[Path, ...]:
     """Write a filter as C99 without dependencies; its results agree with the emulation digit for digit.
 
     Parameters
     ----------
-    model : a linear system in its structure, a design, a Kalman filter, perhaps with known inputs, which follow the
-        measurements in the code's input, or a nonlinear system, whose step is a function
+    model : a linear system in its structure, a design, a Kalman filter, linear, extended or unscented, perhaps with
+        known inputs, which follow the measurements in the code's input, or a nonlinear system, whose step is a function
         of your own; or what :func:`gpbnb.read_model` reads.
     fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; a :class:`~gpbnb.filters.words.WordFormats`; or the name
         of a format, such as "float32" or "Q15".
@@ -118,6 +125,10 @@ def write_code(
     within : limits from :func:`gpbnb.bounds.guarantee.limits`; the header states the error bound that holds
         within them.
     overwrite : whether to replace files of these names that gpbnb has not written.
+    exact : whether each digit must be that of the emulation. If not, a step may have functions such as np.sin, which
+        the code takes from C's library (``sinf``), whose last digits differ from one platform to another. The test
+        then allows each state four times the largest difference that it makes to round every operation up, or every
+        one down; the header says how much this is.
 
     Returns
     -------
@@ -129,7 +140,7 @@ def write_code(
     TypeError : `model` or `fmt` is of another type.
     ValueError : a format without a type in C99; a structure or form that the filter does not have; a model that cannot
         be written in C, where the message says what to use; limits for another filter; a step with a function, such as
-        np.sin, that C's library does not round as the emulation does; inputs that do not fit; a name that is not an
+        np.sin, unless `exact` is False; a step that cannot be traced; inputs that do not fit; a name that is not an
         identifier in C; a file of another origin in the way.
     OverflowError : a coefficient or an initial state is beyond the range of the format.
     OSError : a file cannot be written.
@@ -148,24 +159,35 @@ def write_code(
     checked_identifier(name)
     if not overwrite:
         refuse_others(target, name)
-    found = prepared(given, chosen, form)
+    if not exact and not isinstance(chosen, FloatFormat):
+        raise ValueError("got exact=False in fixed point; needed BINARY32 or BINARY64, which C's functions take")
+    found = prepared(given, chosen, form, exact)
     data = data_of(given, VECTORS if inputs is None else inputs)
     z = found.inputs(data.steps) if data.z is None else data.z
-    if within is not None and isinstance(given, NonlinearSystem):
-        raise ValueError(f"got limits for {given.name}; needed none: a step of its own has no bound")
-    vectors = found.emulate(z)
+    bounded = not isinstance(given, NonlinearSystem | NonlinearModel)
+    if within is not None and not bounded:
+        raise ValueError(f"got limits for {given.name}; needed none: functions of your own have no bound")
+    vectors = found.emulate(z, chosen)
+    near = None if found.step.is_exact else _tolerances(found, z, chosen, vectors)
     bound = found.bound(within) if within is not None else ""
     what = ", ".join(dict.fromkeys(each for each in (found.title, found.structure) if each))
     source = CodeSource(found.step, found.arithmetic, name)
-    text, bounded = f"{what}, in {format_words(chosen)}", not isinstance(given, NonlinearSystem)
-    files = written_files(source, text, bound, bounded, found.sections, vectors)
+    text = f"{what}, in {format_words(chosen)}"
+    files = written_files(source, text, bound, bounded, found.sections, vectors, near)
     target.mkdir(parents=True, exist_ok=True)
     for file, text in files.items():
         replace_file(target / file, text.encode())
     return tuple(target / file for file in files)
 
 
-def prepared(given: Filter, fmt: AnyFormat, form: AnyForm | str | None) -> Prepared:
+def _tolerances(found: Prepared, z: Any, fmt: FloatFormat, vectors: Vectors) -> NDArray[np.float64]:
+    """Return four times the largest change of each state if every operation is rounded up, or every one down."""
+    moved = [found.emulate(z, replace(fmt, rounding=each)).states for each in (Rounding.UP, Rounding.DOWN)]
+    steps = min(map(len, (vectors.states, *moved)))
+    return 4 * np.max([np.abs(each[:steps] - vectors.states[:steps]).max(axis=0) for each in moved], axis=0)
+
+
+def prepared(given: Filter, fmt: AnyFormat, form: AnyForm | str | None, exact: bool = True) -> Prepared:
     """Return a filter with what is needed to write its code; for the arguments, see :func:`write_code`."""
     if isinstance(fmt, FloatFormat):
         _type_of(fmt)
@@ -178,6 +200,8 @@ def prepared(given: Filter, fmt: AnyFormat, form: AnyForm | str | None) -> Prepa
             found = _of_system(settled_filter(given), fmt, CONSTANT_GAIN)
             return found._replace(inputs=lambda steps: simulated_measurements(given, steps), title=given.name)
         return _of_model(given, fmt, Form.INNOVATION if form is None else form)
+    if isinstance(given, NonlinearModel):
+        return _of_nonlinear_model(given, fmt, form_named(Form.INNOVATION if form is None else form), exact)
     if isinstance(given, FilterDesign):
         structure = None if form is None else str(form)
         return _of_system(given.system(structure), fmt, given.usual if structure is None else structure)
@@ -187,7 +211,7 @@ def prepared(given: Filter, fmt: AnyFormat, form: AnyForm | str | None) -> Prepa
             f"got {form!r} for a {type(given).__name__}, which has its structure; needed None; "
             f"{order if isinstance(given, LinearSystem) else 'its step is its structure'}"
         )
-    return _of_nonlinear(given, fmt) if isinstance(given, NonlinearSystem) else _of_system(given, fmt, "")
+    return _of_nonlinear(given, fmt, exact) if isinstance(given, NonlinearSystem) else _of_system(given, fmt, "")
 
 
 def format_words(fmt: AnyFormat) -> str:
@@ -264,7 +288,7 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
         step = CodeStep(program, stored, _start(words.data, system.x0))
     sections = made.cascade.sections(stored[0]) if made.cascade is not None else []
 
-    def emulated(u: Any) -> Vectors:
+    def emulated(u: Any, fmt: Any) -> Vectors:
         u, data = system_inputs(system, u), fmt.data if isinstance(fmt, WordFormats) else fmt
         inputs = _stored(data.array(u), data)
         start = np.append(_stored(data.array(system.x0), data), np.zeros(system.p, inputs.dtype))
@@ -311,23 +335,58 @@ def _ended(inputs: NDArray[Any], start: NDArray[Any], states: NDArray[Any], stat
 # -- nonlinear systems ------------------------------------------------------------------------------------------------
 
 
-def _of_nonlinear(system: NonlinearSystem, fmt: AnyFormat) -> Prepared:
-    if isinstance(fmt, WordFormats):
-        raise ValueError(
-            "got formats of words for a nonlinear system; needed BINARY32, BINARY64 or a FixedFormat: all operations "
-            "of its step are in one format"
-        )
-    program, coefficients = system.program(fmt)
+def _of_nonlinear(system: NonlinearSystem, fmt: AnyFormat, exact: bool) -> Prepared:
+    program, coefficients = system.program(_one_format(fmt), exact)
     step = CodeStep(program, coefficients, _start(fmt, system.x0))
     return Prepared(
         step,
         _arithmetic(step, fmt),
         system.name,
         "",
-        lambda u: _nonlinear_vectors(system, u, fmt, program.p),
+        lambda u, fmt: _nonlinear_vectors(system, u, fmt, program.p),
         _noise(fmt, system.m),
-        lambda within: "No bound: the guarantee covers linear systems only.",
     )
+
+
+def _one_format(fmt: AnyFormat) -> FloatFormat | FixedFormat:
+    if isinstance(fmt, WordFormats):
+        raise ValueError(
+            "got formats of words for a nonlinear system; needed BINARY32, BINARY64 or a FixedFormat: all operations "
+            "of its step are in one format"
+        )
+    return fmt
+
+
+def _of_nonlinear_model(model: NonlinearModel, fmt: AnyFormat, form: AnyForm, exact: bool) -> Prepared:
+    run = NonlinearRun(model, _one_format(fmt), form)  # type: ignore[arg-type]
+    program, members = run.program(exact)
+    stored = _coefficients(members)
+    step = CodeStep(without_exact(program, stored), stored, _held(run).to_fractions())
+
+    def emulated(z: Any, fmt: Any) -> Vectors:
+        run = NonlinearRun(model, fmt, form)
+        start = _stored(_held(run), fmt)
+        states = [_stored(_held(run), fmt) for _ in run.steps_taken(z)]
+        inputs = fmt.array(z)
+        if model.u is not None:
+            inputs = np.concatenate([inputs, fmt.array(model.u[: len(z)])], axis=1)
+        kept = np.array(states, start.dtype).reshape(-1, len(start))
+        return _ended(_stored(inputs, fmt), start, kept, _statuses(len(states), run.indefinite))
+
+    return Prepared(
+        step,
+        _arithmetic(step, fmt),
+        model.name,
+        (f"{form} form" if model.method == "extended" else "unscented") + (_WITH_INPUTS if model.u is not None else ""),
+        emulated,
+        lambda steps: simulated(model, min(steps, model.steps or steps)),
+    )
+
+
+def _held(run: NonlinearRun) -> Any:
+    """Return estimate and covariance, or its factors or root, as the states of a program."""
+    at = [i * run.model.n + j for i, j in run.kept]
+    return np.concatenate([run.x, run.P.reshape(-1)[at]])
 
 
 def _nonlinear_vectors(system: NonlinearSystem, u: Any, fmt: FloatFormat | FixedFormat, p: int) -> Vectors:
@@ -384,8 +443,10 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
         step,
         _arithmetic(step, fmt),
         model.name,
-        f"{chosen} form" + (", whose input holds the measurements, then the known inputs" if p else ""),
-        lambda z: _model_vectors(model, z, fmt, chosen) if in_loops else _long_vectors(model, z, fmt, step, chosen),
+        f"{chosen} form" + (_WITH_INPUTS if p else ""),
+        lambda z, fmt: (
+            _model_vectors(model, z, fmt, chosen) if in_loops else _long_vectors(model, z, fmt, step, chosen)
+        ),
         lambda steps: simulated_measurements(model, min(steps, model.steps or steps)),
         bound,
     )

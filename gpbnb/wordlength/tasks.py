@@ -40,7 +40,6 @@ _OBSERVE = 'ask with basis="emulation", and survey_records for many records'
 _OF_SYSTEMS = (FILTER, DRIVEN, NONLINEAR, STEP, SMOOTHER, FUNCTION)
 _WORDS = 'kind="fixed", which finds one format for all numbers'
 _ONE_FORMAT = 'with one format for all numbers, like="Q3.12" (--format Q3.12 in the command)'
-_OWN_STEP = "write its step as a NonlinearSystem, whose code has no functions such as np.sin"
 
 CANNOT: dict[str, Mapping[str, str]] = {
     "be bounded along a run": dict.fromkeys(_RUNS, _OBSERVE),
@@ -56,7 +55,6 @@ CANNOT: dict[str, Mapping[str, str]] = {
     | dict.fromkeys((STEP, SMOOTHER, FUNCTION), "emulate, with a long constant input")
     | {LIMITED: "emulate, with a long constant input"},
     "be written in C": {
-        NONLINEAR: _OWN_STEP,
         SMOOTHER: "write_code of its filter",
         FUNCTION: "write its step as a NonlinearSystem",
     },

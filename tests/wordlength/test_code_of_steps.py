@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 from built_code import disagreement, installed
 
-from gpbnb import BINARY16, BINARY32, BINARY64, FixedFormat, FloatFormat, NonlinearSystem, WordFormats, write_code
+from gpbnb import (
+    BINARY16,
+    BINARY32,
+    BINARY64,
+    FixedFormat,
+    FloatFormat,
+    NonlinearModel,
+    NonlinearSystem,
+    WordFormats,
+    limits,
+    write_code,
+)
 from gpbnb.wordlength.c_files import FLAGS
 from tests.step_functions import SYSTEMS
 
@@ -77,7 +88,6 @@ def test_the_code_ends_in_the_step_in_which_the_emulation_ends(step, status, fmt
     [
         (FloatFormat(2, 24), None, "no type; needed BINARY32, which rounds ties to even"),
         (BINARY16, None, "got BINARY16, for which C99 has no type"),
-        (WordFormats(FixedFormat(10, 21), 12), None, "got formats of words for a nonlinear system"),
         (FixedFormat(10, 21, "stochastic"), None, "stochastic rounding"),
         (BINARY32, "cascade", "got 'cascade' for a NonlinearSystem, which has its structure; needed None; its step"),
     ],
@@ -87,11 +97,92 @@ def test_what_has_no_code_is_refused(fmt, form, message, tmp_path):
         write_code(SYSTEMS[0], fmt, tmp_path, form=form)
 
 
-def test_a_function_without_a_counterpart_is_refused(tmp_path):
-    turning = NonlinearSystem(lambda fmt, x, u: (x + u, np.sin(x)), [0])
-    with pytest.raises(ValueError, match=r"got np\.sin in the step, for which C has no function"):
-        write_code(turning, BINARY32, tmp_path / "code")
-    assert not (tmp_path / "code").exists()
+def turning(fmt, x, u):
+    """A state, and functions of it that C's library does not round correctly."""
+    y = np.stack([np.sin(x[0]), np.arctan2(-u[0] * 0, x[0] - 2), np.exp(-x[0]), np.float_power(x[0] + 3, u[0])])
+    return x / 2 + u, np.append(y, np.hypot(np.cbrt(y[0]), np.arctanh(y[0] / 2)))
+
+
+def test_functions_of_c_are_taken_only_if_digits_may_differ(tmp_path):
+    system, folder = NonlinearSystem(turning, [0]), tmp_path / "code"
+    with pytest.raises(ValueError, match=r"got np\.sin in the step, .* ask with exact=False"):
+        write_code(system, BINARY32, folder)
+    with pytest.raises(ValueError, match="got exact=False in fixed point; needed BINARY32 or BINARY64"):
+        write_code(system, FixedFormat(4, 11), folder, exact=False)
+    degrees = NonlinearSystem(lambda fmt, x, u: (x, np.rad2deg(u)), [0])
+    with pytest.raises(ValueError, match=r"got np\.rad2deg in the step.*np\.rint; write a polynomial"):
+        write_code(degrees, BINARY32, folder, exact=False)
+    assert not folder.exists()
+
+
+@pytest.mark.skipif(not installed(), reason="no gcc and no clang")
+@pytest.mark.parametrize("fmt", [BINARY32, BINARY64], ids=["binary32", "binary64"])
+def test_functions_of_c_stay_within_the_tolerance_that_the_header_states(fmt, tmp_path):
+    """And the test of the code finds a vector that is off by more."""
+    system, u = NonlinearSystem(turning, [0]), np.random.default_rng(1).uniform(-1, 1, (200, 1))
+    header, *_ = write_code(system, fmt, tmp_path, inputs=u, exact=False)
+    stated = float(re.search(r"allows each state at most ([\d.e-]+):", header.read_text().replace("\n * ", " "))[1])
+    unit = float(fmt.unit_roundoff)
+    assert 4 * unit < stated < 1000 * unit  # four times a few roundings of numbers of up to 8
+    command = [installed()[0], *FLAGS.split(), "-Werror", "-O2", "-o", "run", "test_filter.c", "filter.c", "-lm"]
+    subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = subprocess.run(["./run"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "200 steps near those of the emulation\n")
+    rows = [row.split() for row in (tmp_path / "filter_vectors.txt").read_text().splitlines()]
+    for column in range(2, 8):
+        moved = [[*row[:column], (float.fromhex(row[column]) + 1.1 * stated).hex(), *row[column + 1 :]] for row in rows]
+        (tmp_path / "moved.txt").write_text("\n".join(map(" ".join, moved)))
+        done = subprocess.run(["./run", "moved.txt"], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (1, f"step 1: number {column - 2} differs\n")
+
+
+def beacon(method, sight, **options):
+    """A vehicle whose step and sight are functions; its noise has a cycle of two, and it has a known input."""
+
+    def moved(x, u):
+        return np.stack([x[0] + x[1], x[1] / (2 + x[0] * x[0]) + u[0]])
+
+    Q, u = [np.diag([0.01, 2**-10]), np.diag([0.02, 2**-10])], np.linspace(-1, 1, 40).reshape(-1, 1)
+    return NonlinearModel(
+        moved, None, sight, None, Q, np.diag([2**-4, 2**-10]), [0, 1], np.eye(2), u=u, method=method, **options
+    )
+
+
+def seen(x, u):
+    return np.stack([x[0] * x[0] * x.format.array("0.1"), np.sqrt(x[1] * x[1] + 1)])
+
+
+def bearing(x, u):
+    return np.stack([np.hypot(3 - x[0], 4), np.arctan2(4, 3 - x[0])])
+
+
+FORMS = ["innovation", "Joseph", "UD", "symmetrized", "Potter", "Carlson"]
+
+
+@pytest.mark.skipif(not installed(), reason="no gcc and no clang")
+@pytest.mark.parametrize("fmt", [BINARY32, FixedFormat(8, 23, "half up", "saturate")], ids=["binary32", "fixed"])
+def test_nonlinear_filters_have_the_digits_of_their_emulation(fmt):
+    z = np.random.default_rng(4).uniform(-1, 1, (40, 2))
+    assert [disagreement(beacon("extended", seen), fmt, form, z) for form in FORMS] == [""] * 6
+    assert disagreement(beacon("unscented", seen), fmt, None, z) == ""
+    assert disagreement(beacon("extended", bearing, angles=[1]), BINARY32, "UD", z, exact=False) == ""
+
+
+def test_a_filter_without_code_says_why(tmp_path):
+    def branching(x, u):
+        return seen(x, u) if x[0] > 0 else x
+
+    for model, more, message in (
+        (beacon("extended", branching), {}, "got a step that cannot be traced: it branches on a comparison"),
+        (beacon("extended", bearing), {}, r"got np\.hypot in the step, .* ask with exact=False"),
+        (beacon("extended", seen), {"form": "hung"}, "got the Hung .1984. form for a nonlinear filter"),
+        (beacon("extended", seen), {"within": limits(measurement=1)}, "got limits for a nonlinear model; needed none"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            write_code(model, BINARY32, tmp_path, **more)
+    for model in (beacon("extended", seen), SYSTEMS[0]):
+        with pytest.raises(ValueError, match="got formats of words for a nonlinear system"):
+            write_code(model, WordFormats(FixedFormat(3, 12), 9), tmp_path)
 
 
 @pytest.mark.parametrize("fmt", [FixedFormat(40, -8), FixedFormat(0, 63)], ids=str)
