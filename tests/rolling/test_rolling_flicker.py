@@ -1,16 +1,15 @@
-"""rolling.flicker: the response, the density over four decades, causality, reproducibility, bounded memory."""
+"""rolling.flicker: the response, the density over four decades, causality, reproducibility."""
 
 from __future__ import annotations
 
 import math
-import tracemalloc
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from gpbnb.report.rolling import experiment, theory
-from gpbnb.report.rolling.flicker import exponentials, flicker, record
+from gpbnb.report.rolling.flicker import exponentials, record
 
 LEVEL = 7.0
 
@@ -65,14 +64,12 @@ def test_the_noise_is_white_noise_through_the_full_response():
 # -- what a record depends on -----------------------------------------------------------------------
 
 
-def test_blocks_channels_and_length_do_not_change_a_record():
+def test_channels_and_length_do_not_change_a_record():
     whole = record(LEVEL, 1000, 3, rng(5))
-    pieces = np.concatenate(list(flicker(LEVEL, 1000, 3, rng(5), block=37)))
-    assert np.array_equal(whole, pieces)
     assert np.array_equal(whole[:, :1], record(LEVEL, 1000, 1, rng(5)))
     assert np.array_equal(whole[:400], record(LEVEL, 400, 3, rng(5)))
     assert not np.array_equal(whole, record(LEVEL, 1000, 3, rng(6)))
-    assert [len(b) for b in flicker(LEVEL, 100, 1, rng(), block=40)] == [40, 40, 20]
+    assert not np.any(record(0.0, 100, 1, rng()))
 
 
 # -- the density --------------------------------------------------------------------------------------
@@ -88,23 +85,3 @@ def test_the_slope_over_four_decades():
     # 24 nearly normal values: their mean square has the standard error sqrt(2/24) = 0.3.
     assert 0.1 < np.mean(z**2) < 1.9
     assert np.max(abs(z)) < 4
-
-
-# -- memory and refusals --------------------------------------------------------------------------------
-
-
-def peak(samples):
-    tracemalloc.start()
-    try:
-        for _ in flicker(1.0, samples, 2, rng(), block=2**12):
-            pass
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-
-
-def test_memory_does_not_grow_with_the_length():
-    peak(10)
-    short, long = peak(2**13), peak(2**17)
-    assert long < 1.2 * short
-    assert short < 2**20

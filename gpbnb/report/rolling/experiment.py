@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.conversion import MaybeNone
-from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
-from gpbnb.report.rolling.flicker import flicker, record
+from gpbnb.report.rolling.flicker import record
 from gpbnb.report.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
 from gpbnb.sweeps import Column, Sweep
 
@@ -69,12 +67,6 @@ def clean_drift_error(
         drift, 0.0, period, np.random.default_rng(0), round(duration / interval), interval, phase_error
     )
     return fit_drift(stages["derolled"], interval) - np.array(drift)
-
-
-def rounded_rate_error(period: float, fmt: FloatFormat) -> float:
-    """Return the rounding error of ω_r = 2π/T in a register: rounded rate minus true rate, rad/s."""
-    rate = theory.roll_rate(period)
-    return float(fmt.round(rate) - rate)
 
 
 # -- spectra -------------------------------------------------------------------------------------
@@ -156,16 +148,16 @@ def noise_spectrum(
 
 @dataclass(frozen=True)
 class Spectra:
-    """One-sided densities in mas²/Hz: drift and noise in bands, and the noise at single frequencies.
+    """One-sided densities in mas²/Hz of a record of `duration` s, from one cycle per record on.
 
-    `line_noise` is the noise of a readout around the roll frequency; `base_noise` is that of a derolled component, from
-    one cycle per record on.
+    `ramp` is a drift, `noise` that of a readout, `line_noise` the same around the roll frequency, and `base_noise` that
+    of a derolled component.
     """
 
     level: float
     duration: float
-    ramp: Spectrum
-    noise: Spectrum
+    ramp: NDArray[np.float64]
+    noise: NDArray[np.float64]
     line_noise: NDArray[np.float64]
     base_noise: NDArray[np.float64]
 
@@ -184,31 +176,19 @@ def spectra(
     samples: int = YEAR_SAMPLES,
     interval: float = INTERVAL,
     offsets: int = 25,
-    bands: int = 40,
 ) -> Spectra:
     """Simulate a drift, and the noise of gyros with two readouts each, for a whole number of turns."""
     duration = samples * interval
     turns = round(duration / period)
     offset = np.concatenate([np.arange(-offsets, 0), np.arange(1, offsets + 1)])
-    frequency = np.arange(1, samples // 2 + 1) / duration
-
-    def banded(density: NDArray[np.float64], averages: int) -> Spectrum:
-        return in_bands(frequency, density, averages, 0.99 / duration, 0.5 / interval, bands)
-
     before, after = np.zeros((2, samples // 2))
     for child in rng.spawn(gyros):
         stages = derolled_record((0.0, 0.0), level, period, child, samples, interval)
         before += (_periodogram(stages["noise"].real, interval) + _periodogram(stages["noise"].imag, interval)) / 2
         after += (_periodogram(stages["derolled"].real, interval) + _periodogram(stages["derolled"].imag, interval)) / 2
     ramp = _periodogram(np.asarray(drift * (np.arange(samples) * interval / YEAR)), interval)
-    return Spectra(
-        level,
-        duration,
-        banded(ramp, 1),
-        banded(before / gyros, 2 * gyros),
-        before[turns + offset - 1] / gyros,
-        after[:offsets] / gyros,
-    )
+    around, below = before[turns + offset - 1] / gyros, after[:offsets] / gyros
+    return Spectra(level, duration, ramp, before / gyros, around, below)
 
 
 # -- drift rates ---------------------------------------------------------------------------------
@@ -233,21 +213,6 @@ class DriftStudy:
         return 1 / math.sqrt(2 * self.errors[0].size)
 
 
-@compiled
-def _add_sums(first, noise, cosines, sines, slope, kx, ky, sums):  # type: ignore[no-untyped-def]
-    # One pass rolls the signal, adds noise, derolls, and sums with the centred and scaled times.
-    for p in range(cosines.shape[0]):
-        for i in range(noise.shape[0]):
-            t = slope * (first + i) - 1.0
-            c, s = cosines[p, i], sines[p, i]
-            x, y = kx * t, ky * t
-            for g in range(noise.shape[1] // 2):
-                m1 = c * x + s * y + noise[i, 2 * g]
-                m2 = -s * x + c * y + noise[i, 2 * g + 1]
-                sums[p, g, 0] += t * (c * m1 - s * m2)
-                sums[p, g, 1] += t * (s * m1 + c * m2)
-
-
 def drift_rates(
     periods: Sequence[float | None],
     gyros: int,
@@ -258,25 +223,18 @@ def drift_rates(
     drift: tuple[float, float] = theory.DRIFTS,
     progress: bool = False,
 ) -> DriftStudy:
-    """Roll, measure, deroll and fit both drifts of gyros with two readouts each, in blocks that bound the memory.
-
-    All periods use the same noise.
-    """
+    """Roll, measure, deroll and fit both drifts of gyros with two readouts each; all periods use the same noise."""
     n = round(duration / interval)
-    sums = np.zeros((len(periods), gyros, 2))
-    slope = 2 / (n - 1)  # times run from -1 to 1
-    half = (n - 1) * interval / YEAR / 2  # length of the record in years
-    first = 0
-    block = max(1, 2**18 // gyros)
-    blocks = flicker(level, n, 2 * gyros, rng, block)
-    for noise in tqdm(blocks, total=-(-n // block), desc=f"{gyros} gyros", ncols=80, disable=not progress):
-        index = np.arange(first, first + len(noise))
-        phases = [np.zeros(len(noise)) if p is None else theory.roll_phase(index, p, interval) for p in periods]
-        _add_sums(first, noise, np.cos(phases), np.sin(phases), slope, drift[0] * half, drift[1] * half, sums)
-        first += len(noise)
-    squares = n * (n + 1) / (3 * (n - 1))  # sum of squares of the times
-    rates = sums / squares / half
-    return DriftStudy(tuple(periods), level, n, interval, rates - np.array(drift))
+    index = np.arange(n)
+    ramp = complex(*drift) * (index * interval / YEAR)
+    phases = [np.zeros(n) if p is None else theory.roll_phase(index, p, interval) for p in periods]
+    errors = np.empty((len(periods), gyros, 2))
+    for g in tqdm(range(gyros), desc="gyros", ncols=80, disable=not progress):
+        noise = record(level, n, 2, rng) @ (1, 1j)
+        for p, phase in enumerate(phases):
+            turn = np.exp(1j * phase)
+            errors[p, g] = fit_drift((ramp * turn.conj() + noise) * turn, interval) - np.array(drift)
+    return DriftStudy(tuple(periods), level, n, interval, errors)
 
 
 SURVEY = Path(__file__).with_name("drift_rates.csv")
@@ -336,15 +294,12 @@ SWEEP: Sweep[int] = Sweep(
 class FilterStudy:
     """Mean square errors (filters, records) in mas², after low-pass filters that have settled.
 
-    `kinds` are "single pole" or "moving average", and `lag` and `bandwidth` those of the filters; `error` is the mean
-    over the records.
+    `filters` are their weights, newest first; `error` is the mean over the records.
     """
 
     drift: float
     period: float
-    kinds: tuple[str, ...]
-    lag: NDArray[np.float64]
-    bandwidth: NDArray[np.float64]
+    filters: tuple[NDArray[np.float64], ...]
     squares: NDArray[np.float64]
 
     @property
@@ -373,25 +328,16 @@ def filter_study(
     Each component of each gyro, rolled and derolled, is a record. Averages start after ten time constants.
     """
     n = round(duration / interval)
-    kinds = ("single pole",) * len(bandwidths) + ("moving average",) * len(bandwidths)
     skip = math.ceil(10 / (4 * min(bandwidths)) / interval)
-    squares = np.zeros((len(kinds), 2 * gyros))
     filters = [theory.single_pole(1 / (4 * b), interval) for b in bandwidths]
     filters += [theory.moving_average(1 / (2 * b), interval) for b in bandwidths]
+    squares = np.zeros((len(filters), 2 * gyros))
     for g, child in enumerate(rng.spawn(gyros)):
         stages = derolled_record((drift, drift), level, period, child, n, interval)
-        for c, part in enumerate((np.real, np.imag)):
-            derolled, truth = part(stages["derolled"]), part(stages["signal"])
-            for i, weights in enumerate(filters):
-                if kinds[i] == "single pole":
-                    out = scipy.signal.lfilter([weights[0]], [1, weights[0] - 1], derolled)
-                else:
-                    total = np.concatenate([np.zeros(len(weights)), np.cumsum(derolled)])
-                    out = (total[len(weights) :] - total[: -len(weights)]) / len(weights)
-                squares[i, 2 * g + c] = np.mean((out - truth)[skip:] ** 2)
-    lag = np.array([theory.filter_lag(weights, interval) for weights in filters])
-    width = np.array([theory.noise_bandwidth(weights, interval) for weights in filters])
-    return FilterStudy(drift, period, kinds, lag, width, squares)
+        for i, weights in enumerate(filters):
+            late = scipy.signal.oaconvolve(stages["derolled"], weights)[:n] - stages["signal"]
+            squares[i, 2 * g : 2 * g + 2] = np.mean(late.real[skip:] ** 2), np.mean(late.imag[skip:] ** 2)
+    return FilterStudy(drift, period, tuple(filters), squares)
 
 
 # -- an uneven roll rate -------------------------------------------------------------------------
@@ -399,34 +345,27 @@ def filter_study(
 
 def roll_rate_errors(
     drift: float,
-    rates: Iterator[NDArray[np.float64]],
+    intensity: float,
+    trials: int,
+    steps: int,
     step: float,
     resets: Sequence[int | None],
+    rng: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Fit the cross drift rates (resets, trials) of a ramp that is derolled at the nominal rate; mas a year.
 
-    Each trial has deviations of the roll rate in rad/s, one for each step of `step` s. `resets` are steps between
-    resets of the phase by the star sensor; None for never.
+    The roll rate is a random walk from zero in steps of `step` s; its variance is `intensity` (rad²/s³) times the time.
+    `resets` are steps between resets of the phase by the star sensor; None for never.
     """
-    errors = []
-    for rate in rates:
-        n = len(rate)
-        weights = theory.slope_weights(n, step)
+    weights = theory.slope_weights(steps, step)
+    ramp = drift * step * (np.arange(steps) + 0.5)
+    errors = np.empty((len(resets), trials))
+    for trial in range(trials):
+        rate = np.cumsum(rng.standard_normal(steps)) * math.sqrt(intensity * step)
         begin = np.concatenate([[0.0], np.cumsum(rate)[:-1]]) * step
         middle = begin + rate * (step / 2)
-        ramp = drift * step * (np.arange(n) + 0.5)
-        line = []
-        for reset in resets:
+        for i, reset in enumerate(resets):
             # A reset sets the phase to that of the spacecraft.
-            wrong = middle if reset is None else middle - np.repeat(begin[::reset], reset)[:n]
-            line.append(float(np.sum(weights * ramp * np.sin(-wrong))))
-        errors.append(line)
-    return np.array(errors).T
-
-
-def rate_walks(
-    intensity: float, trials: int, steps: int, step: float, rng: np.random.Generator
-) -> Iterator[NDArray[np.float64]]:
-    """Draw roll rates that are random walks from zero, whose variance is `intensity` (rad²/s³) times the time."""
-    for _ in range(trials):
-        yield np.cumsum(rng.standard_normal(steps)) * math.sqrt(intensity * step)
+            wrong = middle if reset is None else middle - np.repeat(begin[::reset], reset)[:steps]
+            errors[i, trial] = np.sum(weights * ramp * np.sin(-wrong))
+    return errors

@@ -1,4 +1,4 @@
-r"""Causal 1/f noise, sample by sample: reproducible, with a stated density, in bounded memory for any length.
+r"""Causal 1/f noise: reproducible, with a stated density.
 
 White noise passes through the fractional difference of order one half, whose response is
 :math:`h_k = \binom{2k}{k}/4^k` (Kasdin 1995). As an integral over decays,
@@ -12,7 +12,6 @@ the response is a sum of some hundred exponentials. The trapezoidal rule gives t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,51 +39,30 @@ def exponentials(accuracy: float = ACCURACY, longest: int = LONGEST) -> tuple[ND
 
 
 @compiled
-def _filter(poles, weights, states, white, out):  # type: ignore[no-untyped-def]
+def _filter(poles, weights, white, out):  # type: ignore[no-untyped-def]
     out[:] = white
-    four = len(poles) // 4 * 4
     for c in range(white.shape[1]):
-        for j in range(0, four, 4):  # four at a time, because each waits for its previous state
+        for j in range(0, len(poles), 4):  # four at a time, because each waits for its previous state
             p0, p1, p2, p3 = poles[j], poles[j + 1], poles[j + 2], poles[j + 3]
             w0, w1, w2, w3 = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
-            s0, s1, s2, s3 = states[j, c], states[j + 1, c], states[j + 2, c], states[j + 3, c]
+            s0 = s1 = s2 = s3 = 0.0
             for i in range(len(white)):
                 x = white[i, c]
                 out[i, c] = (((out[i, c] + w0 * s0) + w1 * s1) + w2 * s2) + w3 * s3
                 s0, s1, s2, s3 = p0 * (s0 + x), p1 * (s1 + x), p2 * (s2 + x), p3 * (s3 + x)
-            states[j, c], states[j + 1, c], states[j + 2, c], states[j + 3, c] = s0, s1, s2, s3
-        for j in range(four, len(poles)):
-            p, w, s = poles[j], weights[j], states[j, c]
-            for i in range(len(white)):
-                out[i, c] += w * s
-                s = p * (s + white[i, c])
-            states[j, c] = s
-
-
-def flicker(
-    level: float, samples: int, channels: int, rng: np.random.Generator, block: int = 2**15
-) -> Iterator[NDArray[np.float64]]:
-    r"""Generate independent records of 1/f noise, block by block; each starts at rest.
-
-    The one-sided density of samples taken Δt apart is :math:`\pi A\,\Delta t/\sin(\pi f\Delta t)`, and A/f at low
-    frequencies, whatever Δt. A channel's noise depends neither on the number of channels nor on the block.
-    """
-    sources = rng.spawn(channels)
-    if level == 0:
-        yield from (np.zeros((min(block, samples - start), channels)) for start in range(0, samples, block))
-        return
-    poles, weights = exponentials()
-    states = np.zeros((len(poles), channels))
-    scale = math.sqrt(math.pi * level)
-    for start in range(0, samples, block):
-        length = min(block, samples - start)
-        white, out = np.empty((length, channels)), np.empty((length, channels))
-        for c, source in enumerate(sources):
-            white[:, c] = scale * source.standard_normal(length)
-        _filter(poles, weights, states, white, out)
-        yield out
 
 
 def record(level: float, samples: int, channels: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Return the noise of :func:`flicker` in one array (samples, channels)."""
-    return np.concatenate(list(flicker(level, samples, channels, rng)))
+    r"""Generate independent records of 1/f noise (samples, channels); each starts at rest.
+
+    The one-sided density of samples taken Δt apart is :math:`\pi A\,\Delta t/\sin(\pi f\Delta t)`, and A/f at low
+    frequencies, whatever Δt. A channel's noise does not depend on the number of channels.
+    """
+    white = np.stack([source.standard_normal(samples) for source in rng.spawn(channels)], axis=1)
+    if level == 0:
+        return 0 * white
+    poles, weights = (np.pad(each, (0, -len(each) % 4)) for each in exponentials())
+    white *= math.sqrt(math.pi * level)
+    out = np.empty_like(white)
+    _filter(poles, weights, white, out)
+    return out

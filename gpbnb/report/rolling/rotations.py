@@ -22,12 +22,11 @@ from gpbnb.report.rolling.theory import INTERVAL
 
 
 class Rotation(NamedTuple):
-    """The error of a rotation (cos nδ, sin nδ) computed in a format after some samples n, and its bound."""
+    """The error of a rotation (cos nδ, sin nδ) computed in a format after some samples n."""
 
     interval: float
     step: NDArray[np.int64]
     size: NDArray[np.float64]
-    bound: NDArray[np.float64]
 
     def drift_error(self, drift: float) -> float:
         """Return the largest error in mas of a ramp of `drift` mas a year that is derolled with this rotation."""
@@ -64,14 +63,14 @@ def _fraction(x: Any) -> Fraction:
     return Fraction(-int(mantissa) if sign else int(mantissa)) * Fraction(2) ** exponent
 
 
-def _compared(period: float, interval: float, steps: Any, values: Any, bounds: Any) -> Rotation:
+def _compared(period: float, interval: float, steps: Any, values: Any) -> Rotation:
     """Return the errors of computed pairs (m, 2) of exact Fractions."""
     errors = []
     for n, (c, s) in zip(steps, values, strict=True):
         cosine, sine = _exact_turn(int(n), period, interval)
         # z e^{-inδ} - 1, without cancellation
         errors.append(complex((c - cosine) * cosine + (s - sine) * sine, (s - sine) * cosine - (c - cosine) * sine))
-    return Rotation(interval, np.asarray(steps), np.abs(np.array(errors)), bounds)
+    return Rotation(interval, np.asarray(steps), np.abs(np.array(errors)))
 
 
 def recursion(
@@ -92,9 +91,7 @@ def recursion(
     step, state = (backend.pack(a.components) for a in (angle, start))
     out = np.empty((len(marks), *step.shape), dtype=step.dtype)
     _rotate(backend.tag, step, state, marks, out)
-    values = FloatArray.from_packed(out, fmt).to_fractions()
-    bounds = np.array([theory.recursion_bound(int(n), fmt.unit_roundoff) for n in marks])
-    return _compared(period, interval, marks, values, bounds)
+    return _compared(period, interval, marks, FloatArray.from_packed(out, fmt).to_fractions())
 
 
 def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: float = INTERVAL) -> Rotation:
@@ -107,6 +104,4 @@ def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: floa
         with mpmath.workdps(60):
             x = mpmath.mpf(angle.numerator) / angle.denominator
             values.append([fmt.round(_fraction(mpmath.cos(x))), fmt.round(_fraction(mpmath.sin(x)))])
-    phases = 2 * np.pi * marks * (interval / period)
-    bounds = np.array([theory.direct_bound(float(phase), fmt.unit_roundoff) for phase in phases])
-    return _compared(period, interval, marks, values, bounds)
+    return _compared(period, interval, marks, values)

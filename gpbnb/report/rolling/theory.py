@@ -35,8 +35,6 @@ INTERVAL = 10.0
 LEVEL = 200.0**2 / PERIOD_FLOWN
 """Example of a noise level in mas². It gives 200 mas/√Hz at the roll frequency flown. No document states a level."""
 
-_points_and_weights = lru_cache(np.polynomial.legendre.leggauss)
-
 
 # -- roll and deroll -----------------------------------------------------------------------------
 
@@ -75,7 +73,7 @@ def fitted_drift(
 
     The integral is evaluated by 400-point Gauss-Legendre quadrature, for phase errors below some hundred radians.
     """
-    nodes, weights = _points_and_weights(400)
+    nodes, weights = np.polynomial.legendre.leggauss(400)
     x = (nodes + 1) / 2
     value = complex(*drift) * np.sum(weights * 6 * (x - 0.5) * x * np.exp(1j * np.asarray(phase(duration * x))))
     return np.array([value.real, value.imag])
@@ -212,16 +210,6 @@ def single_pole(time_constant: float, interval: float = INTERVAL) -> NDArray[np.
     return np.asarray((1 - keep) * keep ** np.arange(math.ceil(37 * time_constant / interval) + 1))
 
 
-def filter_lag(weights: Any, interval: float = INTERVAL) -> float:
-    """Time, in s, by which a filter lags behind a ramp."""
-    return float(np.sum(np.arange(len(weights)) * np.asarray(weights)) * interval)
-
-
-def noise_bandwidth(weights: Any, interval: float = INTERVAL) -> float:
-    """Bandwidth, in Hz, of the ideal low-pass filter that passes as much white noise."""
-    return float(np.sum(np.asarray(weights) ** 2) / (2 * interval))
-
-
 def filtered_variance(
     weights: Any, level: float, samples: int, period: float | None, interval: float = INTERVAL
 ) -> float:
@@ -290,11 +278,3 @@ def recursion_bound(steps: int, beta: Fraction) -> float:
     """
     growth = steps * (math.log1p(float(beta)) + math.log1p(math.sqrt(2) * float(gamma(2, beta))))
     return math.expm1(growth) if growth < 700 else math.inf
-
-
-def direct_bound(phase: float, beta: Fraction) -> float:
-    r"""Bound on the error of cosine and sine of a rounded product, :math:`\omega t\,\gamma_3 + \beta`.
-
-    The rate, the time and their product are rounded, then the cosine and sine.
-    """
-    return abs(phase) * float(gamma(3, beta)) + float(beta)

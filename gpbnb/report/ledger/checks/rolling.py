@@ -64,8 +64,7 @@ def filter_study() -> experiment.FilterStudy:
 @cache
 def walk_errors() -> np.ndarray:
     """Return drift errors for 200 random walks of the roll rate, without resets and with one per 100 steps of 600 s."""
-    walks = experiment.rate_walks(WALK, 200, 52560, 600.0, np.random.default_rng(9))
-    return experiment.roll_rate_errors(DRIFTS[0], walks, 600.0, [None, 100])
+    return experiment.roll_rate_errors(DRIFTS[0], WALK, 200, 52560, 600.0, [None, 100], np.random.default_rng(9))
 
 
 WALK = 3e-6 / YEAR**3
@@ -85,19 +84,11 @@ def expected_squares(study: experiment.FilterStudy, duration: float = YEAR / 16)
     """
     middle = round(duration / theory.INTERVAL / math.e)
     expected = []
-    for kind, lag, width in zip(study.kinds, study.lag, study.bandwidth, strict=True):
-        if kind == "single pole":
-            weights = theory.single_pole(lag_constant(lag))
-        else:
-            weights = theory.moving_average(1 / (2 * width))
+    for weights in study.filters:
+        lag = float(np.arange(len(weights)) @ weights) * theory.INTERVAL
         noise = theory.filtered_variance(weights, LEVEL, middle, study.period)
         expected.append((study.drift / YEAR * lag) ** 2 + noise)
     return np.array(expected)
-
-
-def lag_constant(lag: float, interval: float = theory.INTERVAL) -> float:
-    """Return the time constant of a single pole with a given lag."""
-    return interval / math.log1p(interval / lag)
 
 
 # -- section 1: signal and noise ------------------------------------------------------------------
@@ -162,14 +153,14 @@ def density_of_noise() -> Names:
     found, slope = noise_spectrum()
     slopes = {"inversely proportional to the frequency": -1, "independent of the frequency": 0,
               "proportional to the frequency": 1}  # fmt: skip
-    heaviest = int(np.argmax(found.density)) == 0 == int(np.argmax(spectra().ramp.density))
+    heaviest = int(np.argmax(found.density)) == 0 == int(np.argmax(spectra().ramp))
     return {"density": {name for name, each in slopes.items() if abs(slope.value - each) < 3 * slope.error},
             "place": "near the zero frequency" if heaviest else "elsewhere", "slope": slope}  # fmt: skip
 
 
 def much_less() -> Names:
     found = spectra()
-    simulated = float(found.noise.density[0] / np.mean(found.line_noise))
+    simulated = float(found.noise[0] / np.mean(found.line_noise))
     year = float(theory.flicker_density(LEVEL, 1 / YEAR) / theory.flicker_density(LEVEL, 1 / PERIOD))
     ratio = min(simulated, year)
     return {"density": "much less" if ratio > 100 else "much more" if ratio < 0.01 else "the same", "year": year,
@@ -200,7 +191,8 @@ def recursion() -> tuple[rotations.Rotation, bool]:
     n, step = sp.symbols("n delta", real=True)
     one_more = derivation.deroll(step) * derivation.deroll(n * step) - derivation.deroll((n + 1) * step)
     found = rotations.recursion(TEN, PERIOD, (60, 3600))
-    return found, bool(sp.simplify(one_more) == sp.zeros(2, 2) and np.all(found.size <= found.bound))
+    bound = [theory.recursion_bound(int(steps), TEN.unit_roundoff) for steps in found.step]
+    return found, bool(sp.simplify(one_more) == sp.zeros(2, 2) and np.all(found.size <= bound))
 
 
 def recursively() -> Names:
@@ -346,7 +338,8 @@ def half_unit(fmt: FloatFormat) -> Fraction:
 
 def real_error(fmt: FloatFormat) -> float:
     """Return the rounding error of ω_r in a format, in rad/s."""
-    return experiment.rounded_rate_error(PERIOD, fmt)
+    rate = theory.roll_rate(PERIOD)
+    return float(fmt.round(rate) - rate)
 
 
 def of_rate(fmt: FloatFormat) -> Names:
