@@ -22,6 +22,7 @@ matrix as its Jacobian.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,6 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.elementary import elementary
-from gpbnb.arithmetic.fixed import FixedArray
 from gpbnb.arithmetic.functions import lines
 
 SLOPES: dict[str, Callable[[Any, Any], Any]] = {
@@ -80,7 +80,8 @@ class Dual(FloatArray):
     @classmethod
     def of(cls, value: Any, slope: Any) -> Dual:
         """Join an array, and its derivatives along a first axis."""
-        self = object.__new__(_FixedDual if isinstance(value, FixedArray) else cls)
+        kind: Any = type(value)
+        self = object.__new__(_dual(kind))
         self.value, self.slope, self._format = value, slope, value.format
         return self
 
@@ -255,10 +256,10 @@ def _no_rule(what: str) -> TypeError:
     )
 
 
-class _FixedDual(Dual, FixedArray):
-    """An array in fixed point with its derivatives; as a :class:`FixedArray`, it takes operations with one first."""
-
-    __slots__ = ()
+@cache
+def _dual(kind: Any) -> type[Dual]:
+    """Return the class for arrays of a kind with derivatives, which takes operations with one of this kind first."""
+    return Dual if kind is FloatArray else type(f"{kind.__name__}Dual", (Dual, kind), {"__slots__": ()})
 
 
 def jacobian(function: Callable[[Any], Any], x: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -431,14 +431,20 @@ class TracedTruth(ComponentArray):
 
     def choose(self, a: Any, b: Any) -> TracedArray:
         """Return entries of the first array where the truth values hold, and of the second elsewhere."""
-        array = next((each for each in (a, b) if isinstance(each, TracedArray)), None)
-        if array is None:
+        array = self._array(a, b)
+
+        def chosen(places: Sequence[Places]) -> Places:
+            parts = np.broadcast_arrays(self.components[0], *places)
+            return array.tape.record("choose", *parts, fmt=array.format.number)
+
+        return cast(TracedArray, array.joined(chosen, [array.operand(each) for each in (a, b)]))
+
+    def _array(self, *choices: Any) -> TracedArray:
+        """Return an array among choices, with its derivatives if one has them."""
+        arrays = [each for each in choices if isinstance(each, TracedArray)]
+        if not arrays:
             self.format.tape.refuse("it chooses between plain numbers")
-        places: Sequence[Places] = [self.components[0], *(array.operand(each).components[0] for each in (a, b))]
-        if not places[0].shape == places[1].shape == places[2].shape:
-            places = np.broadcast_arrays(*places)
-        made: TracedArray = array.format.made(self.format.tape.record("choose", *places, fmt=array.format.number))
-        return made
+        return next((each for each in arrays if type(each) is not TracedArray), arrays[0])
 
     def _refuse(self, *given: Any) -> NoReturn:
         self.format.tape.refuse("it branches on a comparison, or counts or converts it")
@@ -466,10 +472,7 @@ class TracedTruth(ComponentArray):
         self._refuse()
 
     def _selected(self, condlist: Any, choicelist: Any, default: Any = 0) -> Any:
-        array = next((each for each in (*choicelist, default) if isinstance(each, TracedArray)), None)
-        if array is None:
-            self.format.tape.refuse("it chooses between plain numbers")
-        return functions.select(array, condlist, choicelist, default)
+        return functions.select(self._array(*choicelist, default), condlist, choicelist, default)
 
 
 _OF_TRUTHS: dict[str, Callable[..., Any]] = {

@@ -44,6 +44,22 @@ def test_an_unscented_and_an_iterated_filter_in_each_kind_of_numbers(fmt, monkey
         assert repeats(run)
 
 
+def coasting(x):
+    step = x.format.array("0.25")
+    fast = np.where(x[2:] > x.format.array("0.6"), x.format.array("0.6"), x[2:])
+    return np.concatenate([step * fast + x[:2], np.stack([step, x[2]])[1:], x[3:]])
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_functions_with_constants_on_the_left_and_choices_are_repeated_with_their_derivatives(fmt, monkeypatch):
+    model = NonlinearModel(coasting, None, tracked_sight, None, **PLANE, angles=[1])
+    model, z = model.without_missing(np.array(Z, dtype=float))
+    run = NonlinearRun(model, fmt)
+    states = run.states(z)
+    assert np.array_equal(states, by_operations(monkeypatch, lambda: NonlinearRun(model, fmt), z))
+    assert repeats(run)
+
+
 def test_a_function_that_depends_on_more_than_its_arguments_is_called_in_each_step(monkeypatch):
     calls = []
 
