@@ -29,17 +29,26 @@ CODES = {
 NAMES = {code: name for name, code in CODES.items()}
 
 
-def operands_of(name: str, a: int, b: int, c: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+_TAKEN = [
+    {"fused": ((0, 1, 2), ()), "choose": ((1, 2), (0,)), "combine": ((), (0, 1)), "skip": ((), (0,))}.get(
+        name, ((0, 1) if name in ("add", "subtract", "multiply", "divide", "compare") else (0,), ())
+    )
+    for name in CODES
+]
+"""For each code, which of the three operands are places of numbers, and which of truth values."""
+
+_NUMBERS = np.array([[i in numbers for i in range(3)] for numbers, _ in _TAKEN])
+
+
+def operands_of(code: int, *given: int) -> tuple[list[int], list[int]]:
     """Return the numbers and the truth values that an operation takes."""
-    if name in ("add", "subtract", "multiply", "divide", "compare"):
-        return (a, b), ()
-    if name == "fused":
-        return (a, b, c), ()
-    if name == "choose":
-        return (b, c), (a,)
-    if name == "combine":
-        return (), (a, b)
-    return ((), (a,)) if name == "skip" else ((a,), ())
+    numbers, truths = _TAKEN[code]
+    return [given[i] for i in numbers], [given[i] for i in truths]
+
+
+def takes_numbers(codes: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which operands of each operation are places of numbers, (o, 3)."""
+    return np.asarray(_NUMBERS[codes])
 
 
 class Addresses:

@@ -278,8 +278,8 @@ class Tape:
             late, guarded = np.zeros(len(rows), np.bool_), 0
             for o, (code, a, b, c, out) in enumerate(rows.tolist()):
                 name = NAMES[code]
-                numbers, truths = operands_of(name, a, b, c)
-                late[o] = guarded > 0 or name == "skip" or any(varies[list(numbers)]) or any(chosen[list(truths)])
+                numbers, truths = operands_of(code, a, b, c)
+                late[o] = guarded > 0 or name == "skip" or any(varies[numbers]) or any(chosen[truths])
                 guarded = b if name == "skip" else guarded - 1
                 if name not in ("nonzero", "skip"):
                     (chosen if name in ("compare", "combine") else varies)[out] = late[o]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
 from gpbnb.arithmetic.interpreting import Constants
-from gpbnb.arithmetic.machine import CODES, NAMES, operands_of, packed_one
+from gpbnb.arithmetic.machine import CODES, operands_of, packed_one, takes_numbers
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
@@ -197,7 +197,7 @@ def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], f
         late[places.get(letter, [])] = True
     late_truths, later = np.zeros(truths, np.bool_), np.zeros(len(rows), np.bool_)
     for o, (code, a, b, c, out) in enumerate(rows.tolist()):
-        of = operands_of(NAMES[code], a, b, c)
+        of = operands_of(code, a, b, c)
         if any(late[each] for each in of[0]) or any(late_truths[each] for each in of[1]):
             later[o] = True
             (late_truths if code in _TRUTHS else late)[out] = True
@@ -214,9 +214,7 @@ def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], f
     mine = ~later & ~np.isin(rows[:, 0], (*_TRUTHS, CODES["nonzero"], CODES["skip"]))
     made[rows[mine, 4]] = True
     used = np.zeros(values, np.bool_)
-    for code, a, b, c, _ in rows[later].tolist():
-        for each in operands_of(NAMES[code], a, b, c)[0]:
-            used[each] = True
+    used[rows[later, 1:4][takes_numbers(rows[later, 0])]] = True
     used[np.concatenate([x.ravel(), carried.ravel()])] = True
     shared = np.flatnonzero(made & used)
     early, rest = (ProgramPart(rows[chosen], formats[chosen], np.flatnonzero(chosen)) for chosen in (~later, later))

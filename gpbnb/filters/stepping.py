@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.loop import Loop
-from gpbnb.arithmetic.machine import Fault, fault_of, packed_constants, tables
+from gpbnb.arithmetic.machine import Fault, fault_of, packed_constants, tables, takes_numbers
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.recording import ProgramPart, RecordedStep
 from gpbnb.interrupts import slices
@@ -100,9 +100,8 @@ class Stepper:
         moved = np.arange(step.sizes[0] + len(step.shared))
         moved[step.shared] = self._shared_at
         rows = step.estimate.rows.copy()
-        codes = rows[:, 0]
-        for column, has in ((1, ~np.isin(codes, (7, 9, 13))), (2, codes != 9), (3, np.isin(codes, (7, 11)))):
-            rows[has, column] = moved[rows[has, column]]
+        given, taken = rows[:, 1:4], takes_numbers(rows[:, 0])
+        given[taken] = moved[given[taken]]
         late = step._replace(after={**step.after, **{each: moved[step.after[each]] for each in _ESTIMATE}})
         loaded = tables(formats, tag)
         self._gain = _loop(step, step.gain, formats, alone, _GAIN, loaded)
