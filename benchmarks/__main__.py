@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from benchmarks import integration, kalman, matrices, multiply_add, rounding
+from benchmarks import kalman, matrices, multiply_add, rounding
 from benchmarks.figure import amount, draw
 from benchmarks.timing import Row, machine
 from gpbnb.report.display.tables import Table
@@ -59,7 +59,7 @@ def main() -> int:
     about = machine()
     print(", ".join(f"{name} {value}" for name, value in about.items()), flush=True)
     table: list[Row] = []
-    for part in tqdm((rounding, multiply_add, matrices, kalman, integration), desc="benchmarks", unit="part"):
+    for part in tqdm((rounding, multiply_add, matrices, kalman), desc="benchmarks", unit="part"):
         found = part.measure()
         tqdm.write("\n".join(map(line, found)))
         table += found

@@ -23,32 +23,10 @@ def rng(seed):
 # -- simulation -----------------------------------------------------------------------------------
 
 
-def test_advance_is_the_recursion():
-    """Against the slow, obvious one."""
-    step, normal = theory.exact_step(FIRST, 2.0), rng(1).standard_normal((7, 3, 2))
-    state = rng(2).standard_normal(3)
-    slow = state[:, np.newaxis].copy()
-    x, d = experiment.advance(step, state, normal)
-    for k in range(7):
-        new = slow @ step.a.T + normal[k] @ step.b.T
-        assert x[k] == pytest.approx(new[:, 0], rel=1e-12, abs=1e-14)
-        assert d[k] == pytest.approx(new[:, 1], rel=1e-12, abs=1e-14)
-        slow = new[:, :1]
-    assert state == pytest.approx(slow[:, 0], rel=1e-12)
-
-
-def test_numbers_do_not_depend_on_the_pieces(monkeypatch):
-    whole = experiment.simulate(FIRST, 2.0, [10, 100], rng(3), 5)
-    monkeypatch.setattr(experiment, "CHUNK", 70)
-    cut = experiment.simulate(FIRST, 2.0, [10, 100], rng(3), 5)
-    assert len(list(experiment.chunks(FIRST, 2.0, 100, rng(3), 5))) > 10
-    assert cut == pytest.approx(whole, rel=1e-12, abs=1e-14)
-
-
 def test_samples_have_the_autocovariance():
-    chunk = next(experiment.chunks(FIRST, 2.0, 4, rng(5), 20_000))
+    x, _ = experiment.simulate(FIRST, 2.0, 4, rng(5), 20_000)
     for lag in range(4):
-        observed = float(np.mean(chunk.x[0] * chunk.x[lag]))
+        observed = float(np.mean(x[0] * x[lag]))
         error = 1.7**2 * math.sqrt(2 / 20_000)  # at most, of a product of two normal numbers
         assert abs(observed - 1.7**2 * math.exp(-3.0 * lag / 2.0)) < 4 * error
 
@@ -59,18 +37,14 @@ def test_the_error_of_a_trapezoid_is_that_beside_a_fine_integral():
     A coarse cycle of k fine ones: its trapezoid less the sum of the fine trapezoids less the fine errors.
     """
     k, fine = 8, 16.0
-    chunk = next(experiment.chunks(FIRST, fine, k, rng(6), 20_000))
-    integral = (chunk.x[:-1] / 2 + chunk.x[1:] / 2).sum(axis=0) / fine - chunk.d.sum(axis=0)
-    coarse = (chunk.x[0] + chunk.x[-1]) / 2 * k / fine - integral
-    one = next(experiment.chunks(FIRST, fine / k, 1, rng(7), 20_000))
+    x, d = experiment.simulate(FIRST, fine, k, rng(6), 20_000)
+    integral = (x[:-1] / 2 + x[1:] / 2).sum(axis=0) / fine - d.sum(axis=0)
+    coarse = (x[0] + x[-1]) / 2 * k / fine - integral
+    (first, last), (one,) = experiment.simulate(FIRST, fine / k, 1, rng(7), 20_000)
     spread = math.sqrt(2 / 20_000)
-    assert np.mean(coarse**2) == pytest.approx(np.mean(one.d**2), rel=4 * math.sqrt(2) * spread)
-    assert np.mean(coarse * chunk.x[0]) == pytest.approx(
-        np.mean(one.d[0] * one.x[0]), abs=8 * spread * np.std(coarse) * 1.7
-    )
-    assert np.mean(coarse * chunk.x[-1]) == pytest.approx(
-        np.mean(one.d[0] * one.x[1]), abs=8 * spread * np.std(coarse) * 1.7
-    )
+    assert np.mean(coarse**2) == pytest.approx(np.mean(one**2), rel=4 * math.sqrt(2) * spread)
+    assert np.mean(coarse * x[0]) == pytest.approx(np.mean(one * first), abs=8 * spread * np.std(coarse) * 1.7)
+    assert np.mean(coarse * x[-1]) == pytest.approx(np.mean(one * last), abs=8 * spread * np.std(coarse) * 1.7)
 
 
 def test_a_sweep_agrees_with_the_exact_variance_and_tells_39_apart():
@@ -89,14 +63,12 @@ def test_a_sweep_agrees_with_the_exact_variance_and_tells_39_apart():
 
 def emulated(omega, f_c, duration, fmt, draw, paths):
     """RMS of the discretization error, of the rounding error and of both, with each sample and operation rounded."""
-    discretization, unrounded, total = np.zeros(paths), np.zeros(paths), fmt.array(np.zeros(paths))
+    x, d = experiment.simulate(theory.first_order(1.0, omega), f_c, round(duration * f_c), draw, paths)
+    discretization, unrounded = d.sum(axis=0), (x[:-1] + x[1:]).sum(axis=0) / 2 / f_c
+    total = fmt.array(np.zeros(paths))
     half = fmt.array(0.5 / f_c)
-    for chunk in experiment.chunks(theory.first_order(1.0, omega), f_c, round(duration * f_c), draw, paths):
-        discretization += chunk.d.sum(axis=0)
-        unrounded += (chunk.x[:-1] + chunk.x[1:]).sum(axis=0) / 2 / f_c
-        samples = [fmt.array(x) for x in chunk.x]
-        for old, new in pairwise(samples):
-            total = total + half * (old + new)
+    for old, new in pairwise(fmt.array(each) for each in x):
+        total = total + half * (old + new)
     rounding = total.to_float() - unrounded
     return [math.sqrt(np.mean(each**2)) for each in (discretization, rounding, discretization + rounding)]
 

@@ -30,25 +30,20 @@ MU = np.concatenate(
         [1e-300, 1e300, 4.0, np.nextafter(4.0, 5.0), 1e-154, 1e154],
     ]
 )
-#: Of few roundings each; the largest seen are 1.2, 0.7, 1.4, 0.5, 2.2, 2.6 and 2.3.
-MOST_ULP = {"walk": 1.5, "phi11": 1.0, "phi21": 2.0, "q11": 1.0, "q12": 3.0, "q22": 4.0, "bridge": 4.0}
+MOST_ULP = {"walk": 1.5, "q22": 4.0}
+"""Of few roundings each."""
 
 
 def off(name, mu):
     """Error of the closed form or of an entry of the discretization, in units in the last place of float64."""
-    found = float(theory.walk_factor(mu) if name == "walk" else getattr(theory.discretize(mu), name))
+    found = float(theory.walk_factor(mu) if name == "walk" else theory.integral_variance(mu))
     with mpmath.workdps(60 + 3 * max(0, math.ceil(-math.log10(mu)))):
         m = mpmath.mpf(mu)
         phi = mpmath.exp(-m)
         walk = (1 + phi) / (1 - phi) - 2 / m
         exact = {
             "walk": lambda: walk,
-            "phi11": lambda: phi,
-            "phi21": lambda: (1 - phi) / m,
-            "q11": lambda: 1 - phi**2,
-            "q12": lambda: (1 - phi) ** 2 / m,
             "q22": lambda: (2 * m - 3 + 4 * phi - phi**2) / m**2,
-            "bridge": lambda: walk * mpmath.tanh(m / 2) / (m / 2),
         }[name]()
         unit = np.spacing(max(float(exact), np.finfo(float).tiny))
         return float(abs(mpmath.mpf(found) - exact) / mpmath.mpf(float(unit)))
@@ -106,18 +101,11 @@ def test_the_required_rate_meets_the_limit(limit):
 # -- the discretization ---------------------------------------------------------------------------
 
 
-def test_covariances_are_the_integrals_that_they_stand_for():
+def test_the_variance_is_the_integral_that_it_stands_for():
     omega, sigma, period = 3.0, 1.7, 0.4
-    one = theory.discretize(omega * period)
-    density = 2 * omega * sigma**2
-    first = integrate.quad(lambda s: math.exp(-2 * omega * s), 0, period)[0]
-    mixed = integrate.quad(lambda s: math.exp(-omega * s) * (1 - math.exp(-omega * s)) / omega, 0, period)[0]
     second = integrate.quad(lambda s: ((1 - math.exp(-omega * s)) / omega) ** 2, 0, period)[0]
-    assert float(one.q11) * sigma**2 == pytest.approx(density * first, rel=1e-12)
-    assert float(one.q12) * sigma**2 * period == pytest.approx(density * mixed, rel=1e-12)
-    assert float(one.q22) * sigma**2 * period**2 == pytest.approx(density * second, rel=1e-12)
-    assert float(one.phi21) * period == pytest.approx((1 - math.exp(-omega * period)) / omega, rel=1e-14)
-    assert float(one.bridge) == pytest.approx(float(one.q22 - one.q12**2 / one.q11), rel=1e-12)
+    found = float(theory.integral_variance(omega * period)) * sigma**2 * period**2
+    assert found == pytest.approx(2 * omega * sigma**2 * second, rel=1e-12)
 
 
 @pytest.mark.parametrize("f_c", [0.3, 5.0, 200.0])
@@ -204,7 +192,7 @@ BAD = [
     (lambda: theory.langevin(0.0), "got x = 0.0; needed a positive, finite number"),
     (lambda: theory.walk_factor([1.0, -2.0]), r"got mu = -2.0; needed a positive"),
     (lambda: theory.walk_factor(NAN), "got mu = nan"),
-    (lambda: theory.discretize(-1.0), "got mu = -1.0"),
+    (lambda: theory.integral_variance(-1.0), "got mu = -1.0"),
     (lambda: theory.random_walk(-1.0, 1.0, 1.0), "got sigma_x = -1.0"),
     (lambda: theory.random_walk(1.0, 0.0, 1.0), "got omega_bw = 0.0"),
     (lambda: theory.required_rate(1.0, 1.0, -0.1), "got limit = -0.1"),

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text, rounding_named
 from gpbnb.arithmetic.search import smallest_precision
-from gpbnb.report.integration.theory import Floats, discretize, error_variance, positive
+from gpbnb.report.integration.theory import Floats, error_variance, integral_variance, positive
 
 # -- both errors, in t-digit arithmetic ----------------------------------------------------------
 
@@ -98,7 +98,7 @@ def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt
     share = mean_chopping(fmt)
     if fmt.rounding is Rounding.CHOP:
         leak = share * n
-        variance = sigma_x**2 * duration / omega_bw * leak * float(discretize(leak).q22) * excess
+        variance = sigma_x**2 * duration / omega_bw * leak * float(integral_variance(leak)) * excess
         return Errors(discretization, math.sqrt(variance))
     before = mean_square_rounding(fmt) * (period * sigma_x) ** 2 * (2 + phi)
     nodes, weights = np.polynomial.legendre.leggauss(24)

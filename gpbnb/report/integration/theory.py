@@ -120,41 +120,18 @@ def required_rate(sigma_x: float, omega_bw: float, limit: float) -> float:
     return math.exp(root)
 
 
-# -- exact discretization -------------------------------------------------------------------------
+def integral_variance(mu: ArrayLike) -> Floats:
+    r"""Return the variance of the integral over a cycle that starts from a known sample, over :math:`\sigma_x^2T^2`.
 
+    .. math:: q_{22} = \frac{2\mu - 3 + 4\varphi - \varphi^2}{\mu^2}
+        = L(\tfrac\mu2)\frac{\tanh(\mu/2)}{\mu/2} + \frac{(1-\varphi)^3}{\mu^2(1+\varphi)}, \qquad \varphi = e^{-\mu}
 
-class Discretization(NamedTuple):
-    r"""Coefficients of one cycle of (10) in units of :math:`\sigma_x` and T, exact at the sampling times.
-
-    `bridge` is the variance of the integral over a cycle if the input at both ends is known,
-    :math:`L(\mu/2)\tanh(\mu/2)/(\mu/2)`.
-    """
-
-    phi11: NDArray[np.float64]
-    phi21: NDArray[np.float64]
-    q11: NDArray[np.float64]
-    q12: NDArray[np.float64]
-    q22: NDArray[np.float64]
-    bridge: NDArray[np.float64]
-
-
-def discretize(mu: ArrayLike) -> Discretization:
-    r"""Discretize (1) over one cycle, each entry to a few units in the last place for every :math:`\mu`.
-
-    .. math:: q_{11} = 1-\varphi^2, \quad q_{12} = \frac{(1-\varphi)^2}{\mu}, \quad
-        q_{22} = \frac{2\mu - 3 + 4\varphi - \varphi^2}{\mu^2}
-        = L(\tfrac\mu2)\frac{\tanh(\mu/2)}{\mu/2} + \frac{q_{12}^2}{q_{11}}, \qquad \varphi = e^{-\mu}
-
-    The last form has only positive terms.
+    The last form has only positive terms: it is right to a few units in the last place for every :math:`\mu`.
     """
     mu = positive("mu", mu)
-    phi = np.exp(-mu)
     lost = -np.expm1(-mu)  # 1 - φ
-    phi21 = lost / mu
-    bridge = walk_factor(mu) * (np.tanh(mu / 2) / (mu / 2))  # in this order nothing underflows
-    return Discretization(
-        phi, phi21, -np.expm1(-2 * mu), phi21 * lost, bridge + phi21 * phi21 * (lost / (1 + phi)), bridge
-    )
+    between = walk_factor(mu) * (np.tanh(mu / 2) / (mu / 2))  # in this order nothing underflows
+    return np.asarray(between + (lost / mu) ** 2 * (lost / (1 + np.exp(-mu))))
 
 
 # -- before the steady state ----------------------------------------------------------------------
@@ -276,18 +253,17 @@ class Cycle(NamedTuple):
 def exact_step(process: Process, f_c: float) -> Cycle:
     r"""Discretize a process together with the error of the trapezoidal rule, exact at the sampling times.
 
-    First-order inputs have a closed form. With :math:`h = L\tanh(\mu/2)`,
-    :math:`d_n = \tfrac12Th(x_{n-1}+x_n) + b`, where b has the variance ``bridge`` of :func:`discretize`. For others,
-    one exponential of a block matrix gives transition and covariance of z and of the integral (Van Loan, 1978).
+    First-order inputs have a closed form, in which nothing cancels: :math:`d_n = \tfrac12Th(x_{n-1}+x_n) + b` with
+    :math:`h = L\tanh(\mu/2)`, where b has the variance :math:`2h/\mu` over :math:`\sigma_x^2T^2`. For others, one
+    exponential of a block matrix gives transition and covariance of z and of the integral (Van Loan, 1978).
     """
     period, sigma, m = 1 / f_c, process.sigma, len(process.drift)
     if m == 1:
         mu = -process.drift[0][0] * period
-        one = discretize(mu)
-        half = float(walk_factor(mu) * np.tanh(mu / 2)) / 2 * period
-        phi, root = float(one.phi11), math.sqrt(float(one.q11)) * sigma
-        a = np.array([[phi], [half * (1 + phi)]])
-        return Cycle(a, np.array([[root, 0.0], [half * root, sigma * period * math.sqrt(float(one.bridge))]]))
+        h = float(walk_factor(mu)) * math.tanh(mu / 2)
+        phi, root = math.exp(-mu), math.sqrt(-math.expm1(-2 * mu)) * sigma
+        a = np.array([[phi], [h / 2 * period * (1 + phi)]])
+        return Cycle(a, np.array([[root, 0.0], [h / 2 * period * root, sigma * period * math.sqrt(2 * h / mu)]]))
     drift, augmented, noise = np.array(process.drift), np.zeros((m + 1, m + 1)), np.zeros((m + 1, m + 1))
     augmented[:m, :m], augmented[m, 0], noise[:m, :m] = drift, 1, -(drift + drift.T)
     power = scipy.linalg.expm(period * np.block([[-augmented, noise], [0 * noise, augmented.T]]))
