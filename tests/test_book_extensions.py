@@ -32,6 +32,13 @@ search, weight = load("gpbnb_search"), load("gpbnb_weight")
 # -- docstrings, labels, first page --------------------------------------------------------------------
 
 
+def test_links_to_the_bibliography_in_brackets_become_citations():
+    works = "[[Hung, 1982](bibliography.md#hung1982), [Everitt *et al.*, 2011](bibliography.md#everitt2011)]"
+    source = [f"as {works} and [a term](notation.md#term-tie)"]
+    book.cite_works(None, "book/page", source)
+    assert source == ["as {cite:p}`hung1982,everitt2011` and [a term](notation.md#term-tie)"]
+
+
 def unfolded(*lines):
     found = list(lines)
     book.unfold_fields(None, "function", "f", None, None, found)

@@ -37,6 +37,11 @@ def code_cells(path: Path) -> list[dict]:
     return [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
 
 
+def prose(path: Path) -> str:
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    return "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+
+
 def texts(path: Path) -> list[str]:
     """Everything a reader sees of a notebook, pictures aside."""
     found = ["".join(cell["source"]) for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]]
@@ -104,10 +109,19 @@ def test_a_page_shows_its_code_and_all_that_the_code_uses(path):
 
 @each_notebook
 def test_a_page_glues_nothing_into_its_text_and_a_chapter_ends_with_exercises(path):
-    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-    text = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    text = prose(path)
     assert "{glue:" not in text
     assert "## Exercises" in text or path.stem not in OPEN
+
+
+@each_notebook
+def test_jupyter_shows_terms_works_and_pages_without_an_extension(path):
+    text = prose(path)
+    assert re.findall(r"\{(?:term|cite)|\[\]\(", text) == []
+    works = dict(re.findall(r"@\w+\{(\w+),(.*?)\n\}", (BOOK / "references.bib").read_text(encoding="utf-8"), re.DOTALL))
+    for name, year, key in re.findall(r"\[([A-Za-z]+)[^\]]*, (\d{4})\]\(bibliography\.md#(\w+)\)", text):
+        assert name in works[key]
+        assert f"{{{year}}}" in works[key]
 
 
 @each_notebook

@@ -28,6 +28,7 @@ NOT_PROSE = re.compile(
             r"^:{3,}.*?$|^:\w+:.*?$",  # directives and their options
             r"\$\$.*?\$\$|\$[^$]*\$",  # math
             r"\{[\w:-]+\}`[^`]*`|`[^`]*`",  # roles and inline code
+            r"\[[^\]]*\]\(bibliography\.md#\w+\)",  # works
             r"(?<=\])\([^)\s]*\)",  # where a link leads
             r'"[^"\n]{,200}"',  # quotations
             r"\(\d{1,3}[a-z]?\)",  # numbers of equations

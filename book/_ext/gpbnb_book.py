@@ -38,6 +38,7 @@ MOVED = {
     "year": "kalman.html#a-year-at-t-bits",
 }
 """Pages that are now part of another, in the folder of the book, and where their content is."""
+CITED = re.compile(r"\[(?:\[[^\]]+\]\(bibliography\.md#\w+\)(?:, )?)+\]")
 
 
 class KeyLabels(BaseLabelStyle):
@@ -101,6 +102,18 @@ def write_powers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
                 written.append(nodes.superscript("", str(int(number[2])).replace("-", "−")))
                 end = number.end()
             text.parent.replace(text, [*written, nodes.Text(text.astext()[end:])])
+
+
+def cite_works(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Turn links to the bibliography in brackets, which Jupyter shows, into citations."""
+    source[0] = CITED.sub(lambda links: "{cite:p}`" + ",".join(re.findall(r"md#(\w+)", links[0])) + "`", source[0])
+
+
+def name_terms(app: Sphinx, env: BuildEnvironment) -> None:
+    """Let links such as ``notation.md#term-tie``, which Jupyter shows, lead to terms of the glossary."""
+    for (kind, _), (page, place) in env.get_domain("std").objects.items():
+        if kind == "term":
+            env.metadata[page]["myst_slugs"][place] = (None, place, "")
 
 
 def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:
@@ -197,6 +210,8 @@ def setup(app: Sphinx) -> dict:
     app.connect("missing-reference", link_public_name)
     app.connect("doctree-resolved", write_powers)
     app.connect("doctree-resolved", mend_links)
+    app.connect("source-read", cite_works)
+    app.connect("env-updated", name_terms)
     # Sphinx numbers the figures with the priority 500.
     app.connect("env-get-updated", number_figures, priority=900)
     app.connect("env-updated", write_in_parallel)

@@ -75,7 +75,9 @@ def column(*given, header="h", quoted=()):
     """The cells of a column as a page shows them, beside a column of names; spaces as wide as a digit are `_`."""
     body = tuple((f"row {chr(65 + i)}", cell) for i, cell in enumerate(given))
     text = html.unescape(Table("t", ("name", header), body, quoted).page())
-    return [line.split(" | ")[1][:-2].replace("\u2007", "_").replace("\u2008\u2060", ",") for line in text.splitlines()[2:]]
+    return [
+        line.split(" | ")[1][:-2].replace("\u2007", "_").replace("\u2008\u2060", ",") for line in text.splitlines()[2:]
+    ]
 
 
 @pytest.mark.parametrize(
@@ -106,7 +108,10 @@ def column(*given, header="h", quoted=()):
         (("2/3", "1"), ["2/3", "1"]),
         (("5.6, -11", "a-1", "16-bit"), ["5.6, −11", "a-1", "16-bit"]),
         (("-12 -11; -17 83", "5"), ["−12 −11; −17 83", "5"]),
-        (("7 km/s over the speed of light, as in flight", "1000 m"), ["7 km/s over the speed of light, as in flight", "1000 m"]),
+        (
+            ("7 km/s over the speed of light, as in flight", "1000 m"),
+            ["7 km/s over the speed of light, as in flight", "1000 m"],
+        ),
     ],
 )
 def test_a_page_aligns_the_numbers_of_a_column_in_one_notation(given, shown):
