@@ -73,6 +73,20 @@ def fixed_kalman(draw: Draw, i: int) -> Case:
     return Case(f"{form} as functions, {fmt}, n {n}, m {m}", "as_functions", (model, draw.signal(8, m), fmt, form))
 
 
+def decayed(draw: Draw, i: int) -> Case:
+    """An estimate whose first entry fades below the range of float64 while the gain still changes."""
+    form, base = FORMS[i % 7], (2, 16, 10)[i // 7 % 3]
+    digits = draw.pick({2: (24, 25, 33), 16: (6, 9), 10: (7, 8, 12)}[base])
+    fmt = draw.ranged(Float(base, digits, ROUNDINGS[i % 6]), 0.25)
+    fades = Fraction(draw.between(1, 4), 1000)
+    Phi, H = [[fades, 0], [0, Fraction(999, 1000)]], [[1, 0], [0, 1]]
+    Q = [[Fraction(1, 1000), 0], [0, Fraction(draw.between(1, 4), 1000)]]
+    given = [[list(map(Fraction, row)) for row in each] for each in (Phi, H, Q, H, [[1, 0], [0, 100]])]
+    model = Model(*([each] for each in given[:4]), [draw.number(5) + 6, draw.number()], given[4])
+    z = [[Fraction(0), draw.number(4)] for _ in range(200)]
+    return Case(f"{form}, {fmt}, fading by {fades}", "filtered", (model, z, fmt, form))
+
+
 def named_kalman(draw: Draw, i: int) -> Case:
     names = ("BINARY16", "BINARY32", "BINARY64", "BFLOAT16", "TF32", "FP8_E5M2", "DECIMAL32", "DECIMAL64", "IBM_HEX32")
     name, form = names[i % 9], LOOPS[(i + i // 9) % 5]
@@ -445,7 +459,7 @@ class Family(NamedTuple):
 
 FAMILIES = {
     "kalman": Family(90, kalman), "odd sizes": Family(10, odd_sizes), "stochastic": Family(9, stochastic),
-    "fixed kalman": Family(27, fixed_kalman), "named kalman": Family(18, named_kalman),
+    "fixed kalman": Family(27, fixed_kalman), "decayed": Family(21, decayed), "named kalman": Family(18, named_kalman),
     "long kalman": Family(24, long_kalman), "known inputs": Family(14, known_inputs), "sums": Family(8, sums),
     "compensated": Family(6, compensated), "records": Family(12, records), "blocks": Family(18, blocks),
     "extended": Family(24, extended), "unscented": Family(11, unscented), "smoother": Family(16, smoother),

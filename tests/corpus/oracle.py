@@ -59,6 +59,9 @@ class Numbers(independent_filter.Arithmetic):
     def __init__(self, fmt: Format) -> None:
         super().__init__(fmt.base if isinstance(fmt, Float) else 2, fmt.precision if isinstance(fmt, Float) else 1)
         self.r, self.spacing = rounds(fmt), None
+        #: Whether numbers are kept in float64, and whether one has left its range.
+        self.by_float64 = isinstance(fmt, Float) and fmt.base != 10 and fmt.emin is None
+        self.left = False
         if isinstance(fmt, Fixed):
             self.spacing, self.rounding = fmt.fraction, fmt.rounding
             self.digits = fmt.integer + fmt.fraction
@@ -69,12 +72,31 @@ class Numbers(independent_filter.Arithmetic):
         x = self.r(Fraction(p, q) * Fraction(self.base) ** e)
         if not x:
             return 0, 0
+        self.left |= self.by_float64 and abs(x) < _LEAST
         e = -self.spacing if self.spacing is not None else exponent(x, self.base) - self.digits + 1
         return int(x / Fraction(self.base) ** e), e
 
 
+_LEAST, _DECAYED = Fraction(1, 2**960), Fraction(1, 2**700)
+
+
 class Filter(independent_filter.Filter):
-    """The independent filter with the further forms that update a covariance."""
+    """The independent filter with the further forms that update a covariance.
+
+    Where a step would leave the range of float64, entries of the estimate below 2**-700 become zero before it.
+    """
+
+    def step(self, z: Any) -> list[Fraction]:
+        fmt, before = self.fmt, dict(vars(self))
+        fmt.left = False
+        found = super().step(z)
+        if not fmt.left:
+            return found
+        vars(self).update(before)
+        for name in ("x", "carried"):
+            kept = zip(getattr(self, name), before["x"], strict=True)
+            setattr(self, name, [a if abs(fmt.value(x[0])) >= _DECAYED else [(0, 0)] for a, x in kept])
+        return super().step(z)
 
     def _step(self, k: int, z: Any) -> None:
         fmt = self.fmt
