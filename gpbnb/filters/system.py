@@ -54,7 +54,7 @@ from gpbnb.filters.structures import (
 )
 
 _WORDS = (
-    "; coefficients may have a format of their own: WordFormats(data, coefficients), or --fixed --mixed in the command"
+    "; coefficients may have a format of their own: WordFormats(data, coefficients), or --kind words in the command"
 )
 
 BLOCK = 32

@@ -22,7 +22,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         given = read(arguments)
         # These imports take a second, and help and refusals need none of them.
-        from gpbnb.arithmetic.named import format_text
+        from gpbnb.wordlength.answer import format_in_words
         from gpbnb.wordlength.report import study
         from gpbnb.wordlength.running import certificate, read_files, uncovered, write, write_code_of, write_run
 
@@ -34,8 +34,6 @@ def _run(arguments: Sequence[str] | None) -> int:
         print(f"{program}: {error}", file=sys.stderr)
         return 2
     print(report.text, flush=True)
-    if report.mixed:
-        print(report.mixed, flush=True)
     if report.shortest:
         print(report.shortest, flush=True)
     try:
@@ -44,16 +42,16 @@ def _run(arguments: Sequence[str] | None) -> int:
             write(report, given.report)
         option = f"--certificate {given.certificate}"
         if proof is not None:
-            replace_file(given.certificate, proof.text.encode())
-            print(f"certificate: {given.certificate}, for {format_text(proof.fmt)}", flush=True)
+            replace_file(given.certificate, proof.certificate().encode())
+            print(f"certificate: {given.certificate}, for {format_in_words(proof.format)}", flush=True)
         option = f"--csv {given.csv}"
         if given.csv and report.met:
             write_run(asked, report, given.csv)
         option = f"--code {given.code}"
         if given.code and report.met:
-            code = write_code_of(asked, report)
-            print("code:", *code.files)
-            if other := uncovered(proof, code):
+            files, fmt = write_code_of(asked, report)
+            print("code:", *files)
+            if proof is not None and (other := uncovered(proof.format, fmt)):
                 print(other)
         elif given.code:
             print(f"{program}: no code, since no format is known to meet the tolerance", file=sys.stderr)

@@ -20,8 +20,11 @@ from gpbnb.sweeps.numbers import plain_integer, plain_number
 BASES = ("emulation", "bound", "guarantee", "probable")
 """What an answer may be based on, as in ``gpbnb.wordlength.answer.Basis``."""
 
-FIXED_BASES = ("emulation", "guarantee")
-"""What an answer in fixed point may be based on."""
+KINDS = ("float", "fixed", "words", "blocks")
+"""What is searched, as in ``gpbnb.wordlength.answer.Kind``."""
+
+IN_FIXED_POINT = ("fixed", "words")
+"""Kinds of searches in fixed point."""
 
 BASES_OF_NUMBERS = (2, 10, 16)
 """Bases of the formats that are searched."""
@@ -114,7 +117,19 @@ def parser() -> argparse.ArgumentParser:
         help='form of the covariance update of a Kalman filter, such as "innovation", "Joseph", "UD" or "Cholesky", or '
         '"constant gain" for the linear system with the gain that the filter approaches; default: innovation',
     )
-    _add_kinds(made)
+    made.add_argument(
+        "--kind",
+        choices=KINDS,
+        help="what is searched: digits of floating point; fraction bits of fixed point; for a linear system, words of "
+        "data, coefficients and sums; for a Kalman filter, the precision of each block (state, gain, covariance, "
+        "innovation covariance), which names the block that limits the filter; default: float",
+    )
+    made.add_argument(
+        "--coefficients",
+        metavar="N",
+        help="for a linear system in fixed point: significant bits of each coefficient, which has its own binary "
+        "point; default: 15; with --kind words, the most to try; default: 24",
+    )
     made.add_argument(
         "--basis",
         action="append",
@@ -154,29 +169,8 @@ def _add_files(made: argparse.ArgumentParser) -> None:
         "--code",
         type=Path,
         metavar="DIR",
-        help="folder for the filter as C99 with test vectors, in the format judged, in the answer of --fixed, or in "
-        "binary32 or binary64 if one of them meets the tolerance",
-    )
-
-
-def _add_kinds(made: argparse.ArgumentParser) -> None:
-    """Add the options for fixed point, and for several formats in one filter."""
-    made.add_argument(
-        "--fixed",
-        action="store_true",
-        help="answer for a linear system in fraction bits of fixed point, by emulation and by a guarantee for inputs "
-        "no larger than these; with --mixed, find formats of data, coefficients and sums",
-    )
-    made.add_argument(
-        "--coefficients",
-        metavar="N",
-        help="with --fixed: significant bits of each coefficient, which has its own binary point; default: 15",
-    )
-    made.add_argument(
-        "--mixed",
-        action="store_true",
-        help="also lower each block of a Kalman filter (state, gain, covariance, innovation covariance) to its "
-        "smallest precision, and name the block that limits the filter",
+        help="folder for the filter as C99 with test vectors, in the format judged, in the answer in fixed point, or "
+        "in binary32 or binary64 if one of them meets the tolerance",
     )
 
 
@@ -201,6 +195,7 @@ def read(arguments: Sequence[str] | None) -> argparse.Namespace:
     else:
         form_named(given.form or "innovation")
     _replace(given, "format", format_parts)
+    given.kind = given.kind or "float"
     if given.format in WITHOUT_LOOPS:
         raise ValueError(
             f"got --format {given.format}, which has no compiled loops; needed one of {', '.join(_FORMATS)}, Q15, or "
@@ -223,51 +218,26 @@ def _check(given: argparse.Namespace) -> None:
         raise ValueError(f"got --base {given.base}; needed one of {', '.join(map(str, BASES_OF_NUMBERS))}")
     if (given.emin is None) != (given.emax is None):
         raise ValueError("got one of --emin and --emax; needed both, or neither for unlimited exponents")
-    others = [f"--{name}" for name in ("digits", "base", "emin", "emax") if getattr(given, name) is not None]
-    if given.format and others:
-        raise ValueError(f"got --format and {', '.join(others)}; needed --format alone, which sets them all")
-    if given.simulate and given.measurements:
-        raise ValueError("got --simulate and --measurements; needed one of them")
-    if given.seed is not None and given.measurements:
-        raise ValueError("got --seed and --measurements; needed one of them: a seed is for what is simulated")
     if given.code and given.code.exists() and not given.code.is_dir():
         raise ValueError(f"got --code {given.code}, which is a file; needed a folder")
-    if given.level is not None and not given.simulate:
-        raise ValueError(f"got --level without --simulate; needed --simulate with one of {', '.join(SIGNALS)}")
-    if given.fixed:
-        if given.certificate:
-            raise ValueError(
-                "got --fixed and --certificate; needed floating point for a certificate: the command writes none for "
-                "words; leave out one of the two, or call WordGuarantee(...).proof(...) from Python"
-            )
-        names = ("format", "digits", "base", "emin", "emax")
-        if others := [f"--{name}" for name in names if getattr(given, name) is not None]:
-            raise ValueError(
-                f"got --fixed and {', '.join(others)}; needed --fixed alone, which searches the fraction bits; to "
-                "judge one format, leave out --fixed and write --format Q15 or --format Q3.12"
-            )
-        if others := [f"--basis {each}" for each in given.basis or () if each not in FIXED_BASES]:
-            raise ValueError(
-                f"got --fixed and {', '.join(others)}; needed --basis emulation or guarantee, the bases of fixed point"
-            )
-    if given.coefficients is not None:
-        if given.mixed or not given.fixed:
-            raise ValueError(
-                f"got --coefficients{' and --mixed' if given.mixed else ''}; needed --fixed with it, without --mixed, "
-                "which finds the bits of the coefficients itself"
-            )
-        if not 1 <= given.coefficients <= 53:
-            raise ValueError(f"got --coefficients {given.coefficients}; needed 1 to 53 significant bits")
-    if given.mixed and (given.format or given.digits is not None):
-        raise ValueError("got --mixed and one format; needed a search: leave out --format and --digits")
-    if given.certificate and "guarantee" not in (given.basis or ()):
-        raise ValueError(f"got --certificate {given.certificate} without a guarantee; needed --basis guarantee")
-    limited = ", ".join(f"--{each}" for each in QUANTITIES if getattr(given, each) is not None)
-    if given.fixed and limited:
-        raise ValueError(f"got --fixed and {limited}; needed none: the guarantee takes the largest of the inputs")
+    kind, sizes = f"--kind {given.kind}", ("base", "emin", "emax")
+    excluded: list[tuple[Any, str, Sequence[str], str]] = [
+        (given.format, "--format", ("digits", *sizes), "--format alone, which sets them all"),
+        (given.simulate, "--simulate", ("measurements",), "one of them"),
+        (given.measurements, "--measurements", ("seed",), "one of them: a seed is for what is simulated"),
+        (given.kind != "float", kind, ("format", "digits"), "one of them: --kind searches, and --format judges"),
+        (given.kind in IN_FIXED_POINT, kind, sizes, "--kind alone: fixed point has base 2 and no exponents"),
+        (not given.simulate, "no --simulate", ("level",), f"--simulate with one of {', '.join(SIGNALS)}"),
+        (given.kind not in IN_FIXED_POINT, kind, ("coefficients",), "--kind fixed or --kind words with them"),
+    ]
     asked = [each for each in given.basis or () if each in ("guarantee", "probable")]
-    if limited and not asked:
-        raise ValueError(f"got {limited} without a basis that uses limits; needed --basis guarantee or probable")
+    excluded.append((not asked, "no basis that uses limits", QUANTITIES, "--basis guarantee or probable"))
+    without = "guarantee" not in (given.basis or ())
+    excluded.append((without, "no guarantee", ("certificate",), "--basis guarantee"))
+    for holds, what, names, needed in excluded:
+        others = [f"--{name}" for name in names if getattr(given, name) is not None]
+        if holds and others:
+            raise ValueError(f"got {what} and {', '.join(others)}; needed {needed}")
 
 
 WRITTEN = "# Written by gpbnb"

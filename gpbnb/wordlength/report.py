@@ -6,7 +6,7 @@ import html
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,10 +25,11 @@ from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.sweeps import machine
-from gpbnb.wordlength.answer import PROOFS, Basis, Requirement, format_in_words
+from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, format_in_words
 from gpbnb.wordlength.asked import exactly, tolerances_of
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource
+from gpbnb.wordlength.options import IN_FIXED_POINT
 from gpbnb.wordlength.ranges import binary_ranges
 from gpbnb.wordlength.required import judge, required_precision
 
@@ -50,13 +51,17 @@ def usual_steps(model: LinearModel | LinearSystem) -> int:
 
 @dataclass(frozen=True)
 class Answer:
-    """One search as plain numbers; `tried` holds precision and error / tolerance, None if there is no number."""
+    """One search as plain numbers; `tried` holds precision and error / tolerance, None if there is no number.
+
+    `formats` are those of the answer, which are not in the files.
+    """
 
     label: str
     basis: str
     digits: int | None
     text: str
     tried: tuple[tuple[int, float | None], ...]
+    formats: Any = None
 
 
 @dataclass(frozen=True)
@@ -83,14 +88,14 @@ class Report:
     measurement_names : names of the measurements, or of the inputs of a linear system.
     exponents : the range of the exponents; empty if it is unlimited.
     fixed : whether digits are fraction bits of fixed point.
-    mixed : the answer for the blocks of a Kalman filter in words; empty if it was not asked for.
-    blocks : name of each block, its digits together with the others, and alone; None if there is no answer.
+    blocks : name of each block of a Kalman filter, its digits together with the others, and alone; None if there is no
+        answer; empty if they were not asked for.
     structure : structure that gives the answer for a digital filter or a constant gain; empty for another model.
     lacking : structures that the filter does not have, each with the reason.
     stored : what storing the coefficients does to a linear system at the answer; empty for another model.
     shortest : structure that needs fewer digits than the answer, or that meets the tolerance where there is no answer,
         and how to ask for it; empty if there is none.
-    formats : the format, or the formats of words, of the answer; not in the files.
+    formats : the format or formats of the answer; not in the files.
     """
 
     name: str
@@ -114,7 +119,6 @@ class Report:
     measurement_names: tuple[str, ...] = ()
     exponents: str = ""
     fixed: bool = False
-    mixed: str = ""
     blocks: tuple[tuple[str, int | None, int | None], ...] = ()
     structure: str = ""
     lacking: dict[str, str] = field(default_factory=dict)
@@ -130,8 +134,11 @@ class Report:
 
     def to_json(self) -> str:
         """Return the report as JSON, with the limiting state and without NaN or infinity."""
-        entries = {key: value for key, value in asdict(self).items() if key != "formats"}
-        return json.dumps({**entries, "limiting": self.limiting}, indent=1, ensure_ascii=False, allow_nan=False)
+        plain = replace(self, formats=None, answers=tuple(replace(each, formats=None) for each in self.answers))
+        entries = {**asdict(plain), "limiting": self.limiting}
+        for each in (entries, *entries["answers"]):
+            del each["formats"]
+        return json.dumps(entries, indent=1, ensure_ascii=False, allow_nan=False)
 
     def to_html(self) -> str:
         """Return the report as one HTML page that needs no other file."""
@@ -151,10 +158,7 @@ class Question:
     steps : number of steps to simulate; by default the number of measurements, or :data:`DEFAULT_STEPS`.
     like : a format with the base, the rounding and the range of those to search.
     fmt : the one format to judge, in place of a search.
-    mixed : whether to find the digits of each block of a Kalman filter as well. In fixed point, the formats of data,
-        coefficients and sums of a linear system.
-    fixed : whether to count fraction bits of fixed point, of a linear system.
-    coefficient_bits : significant bits of each coefficient in fixed point.
+    kind, coefficient_bits : what is searched, as in :func:`gpbnb.required_precision`.
     seed : seed of simulated measurements.
     """
 
@@ -167,8 +171,7 @@ class Question:
     within: FilterLimits | None = None
     like: FloatFormat = BITS
     fmt: FloatFormat | FixedFormat | None = None
-    mixed: bool = False
-    fixed: bool = False
+    kind: Kind = "float"
     coefficient_bits: int | None = None
     seed: int = 0
 
@@ -190,16 +193,9 @@ class Question:
         return self.count if self.z is None else self.z
 
     def parts(self) -> list[Part]:
-        """Return the single questions, one for each basis and form or structure.
-
-        Raises
-        ------
-        ValueError : a form for a linear system; a model whose matrices are too large.
-        """
+        """Return the single questions, one for each basis and form or structure."""
         model, form = self.model, form_named(self.form)
         if isinstance(model, LinearSystem):
-            if form is not Form.INNOVATION:
-                raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
             systems = self.source.structures or {"": model}
             return [
                 Part(f"{name}, {basis}" if name else basis, basis, each, None, name)
@@ -207,48 +203,27 @@ class Question:
                 for basis in self.bases
             ]
         model.check_sizes()
-        forms = [form, *(each for each in SIDE_BY_SIDE if each is not form)]
+        forms = [form, *(each for each in SIDE_BY_SIDE if each is not form and self.kind != "blocks")]
         return [Part(f"{each}, {basis}", basis, model, each) for each in forms for basis in self.bases]
 
     def measured(self) -> Any:
-        """Return the measurements or inputs; those of a Kalman filter are simulated if there are none.
-
-        Raises
-        ------
-        ValueError : missing measurements with a basis that holds for all of them.
-        """
-        if isinstance(self.model, LinearSystem):
+        """Return the measurements or inputs; those of a Kalman filter are simulated if there are none."""
+        if isinstance(self.model, LinearSystem) or self.z is not None:
             return self.z
-        if self.z is None:
-            return simulated_measurements(self.model, whole_number("steps", self.count), self.seed)
-        if {*self.bases} & {"guarantee", "probable"} and self.model.without_missing(self.z)[0] is not self.model:
-            raise ValueError(
-                "got measurements of which some are missing, and a basis that holds for ever; needed measurements "
-                "without gaps; leave them out for this basis, which does not depend on them"
-            )
-        return self.z
+        return simulated_measurements(self.model, whole_number("steps", self.count), self.seed)
 
     def answer(self, part: Part, z: Any) -> Requirement:
         """Answer one of the single questions, by a search or by judging the one format."""
         basis, data = part.basis, self.count if z is None else z
-        if self.fixed:
-            more = {"rounding": self.like.rounding, "coefficient_bits": self.coefficient_bits}
-            return required_precision(part.model, data, self.tolerance, kind="fixed", basis=basis, **more)  # type: ignore[arg-type]
-        within = self.within if basis in ("guarantee", "probable") else None
+        asked: dict[str, Any] = {"form": part.form, "basis": basis}
+        asked["within"] = self.within if basis in ("guarantee", "probable") else None
         if self.fmt is not None:
-            return judge(part.model, self.fmt, data, self.tolerance, form=part.form, basis=basis, within=within)
-        return required_precision(
-            part.model, data, self.tolerance, like=self.like, basis=basis, within=within, form=part.form
-        )
-
-    def blocks(self, z: Any, structure: str = "") -> Requirement | None:
-        """Find the digits of each block of a Kalman filter, or of words in fixed point, if they are asked for."""
-        if not self.mixed:
-            return None
-        if isinstance(self.model, LinearSystem):
-            system, rounding = self.source.structures.get(structure, self.model), self.like.rounding
-            return required_precision(system, z, self.tolerance, kind="words", basis=self.bases[0], rounding=rounding)
-        return required_precision(self.model, z, self.tolerance, kind="blocks", form=self.form, like=self.like)
+            return judge(part.model, self.fmt, data, self.tolerance, **asked)
+        if self.kind in IN_FIXED_POINT:
+            asked |= {"rounding": self.like.rounding, "coefficient_bits": self.coefficient_bits}
+        else:
+            asked["like"] = self.like
+        return required_precision(part.model, data, self.tolerance, kind=self.kind, **asked)
 
 
 class Part(NamedTuple):
@@ -289,8 +264,6 @@ def study(
     for name, why in lacking.items():
         tell(f"{name}, left out: {why}")
     first, main = _fewest(found) if asked.source.compares_all else found[0]
-    if (blocks := asked.blocks(z, first.structure)) is not None:
-        tell(f"blocks: {blocks}")
     met, model, fmt, within = main.met, asked.model, asked.fmt, asked.within
     stored = _stored(structures.get(first.structure), main) if met else ""
     if stored:
@@ -324,14 +297,13 @@ def study(
         names=model.state_names if isinstance(model, LinearModel) else model.output_names,
         measurement_names=model.measurement_names if isinstance(model, LinearModel) else model.input_names,
         exponents=_exponents(like),
-        fixed=asked.fixed,
-        mixed="" if blocks is None else str(blocks),
-        blocks=() if blocks is None else _digits_of_blocks(blocks),
+        fixed=asked.kind in IN_FIXED_POINT,
+        blocks=_digits_of_blocks(main),
         structure=first.structure,
         lacking=lacking,
         stored=stored,
         shortest=_shorter(found, main, fmt is not None),
-        formats=(main if blocks is None or not asked.fixed else blocks).format,
+        formats=main.format,
     )
 
 
@@ -425,7 +397,7 @@ def _finite(number: float) -> float | None:
 
 def _plain(label: str, answer: Requirement) -> Answer:
     tried = tuple((digits, _finite(ratio)) for digits, ratio in answer.tried)
-    return Answer(label, answer.basis, answer.digits if answer.met else None, str(answer), tried)
+    return Answer(label, answer.basis, answer.digits if answer.met else None, str(answer), tried, answer.format)
 
 
 # -- the page -------------------------------------------------------------------------------------------------
@@ -507,7 +479,7 @@ def page(report: Report) -> str:
     if report.blocks:
         columns = ("block of the filter", f"{unit}, with the others", f"{unit}, alone")
         cells = [(name, *("none" if each is None else str(each) for each in digits)) for name, *digits in report.blocks]
-        parts += ["<h2>Precision of each block</h2>", _table(columns, cells), f"<p>{html.escape(report.mixed)}.</p>"]
+        parts += ["<h2>Precision of each block</h2>", _table(columns, cells)]
     if report.errors:
         states = report.names or [str(i + 1) for i in range(len(report.errors))]
         body = [

@@ -6,17 +6,17 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED, format_text
+from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.guarantee import limits
+from gpbnb.bounds.guarantee import Guarantee, limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.files import replace_file
 from gpbnb.filters.forms import CONSTANT_GAIN
@@ -24,14 +24,13 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_inputs, simulated_measurements
 from gpbnb.filters.system import LinearSystem
-from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.answer import Basis
+from gpbnb.wordlength.answer import Basis, format_in_words
 from gpbnb.wordlength.bounding import guarantee
 from gpbnb.wordlength.c_files import refuse_others
 from gpbnb.wordlength.code import VECTORS, write_code
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
-from gpbnb.wordlength.options import QUANTITIES, WRITTEN
+from gpbnb.wordlength.options import IN_FIXED_POINT, QUANTITIES, WRITTEN
 from gpbnb.wordlength.report import DEFAULT_STEPS, Part, Question, Report, usual_steps
 
 
@@ -52,110 +51,73 @@ class CommandInput(NamedTuple):
     origin: str
 
 
-class Certified(NamedTuple):
-    """The text of a certificate, and the format for which it proves a guarantee."""
-
-    text: str
-    fmt: FloatFormat | FixedFormat
-
-
-class WrittenCode(NamedTuple):
-    """The files of a filter in C, and the format in which it computes."""
-
-    files: tuple[Path, ...]
-    fmt: FloatFormat | FixedFormat | WordFormats
-
-
 def read_files(options: argparse.Namespace) -> CommandInput:
     """Read the files of a command line, and reject those that do not fit the others or its options."""
     if options.code:
         refuse_others(options.code, "filter")
-    source, own = _filter(options)
-    bases: Sequence[Basis] = options.basis or ("emulation", "guarantee" if options.fixed else "bound")
-    z, origin = _inputs(options, source.model, bases, own)
-    fmt, rounding = _format(options), Rounding(options.rounding or "nearest")
+    source = read_filter(options.model, read_measurements(options.inputs) if options.inputs else None)
+    own, settles = source.model, options.form == CONSTANT_GAIN
+    if isinstance(own, LinearSystem):
+        if options.form:
+            raise ValueError(
+                f"got --form {options.form} for a linear system; needed none: only a Kalman filter has forms"
+            )
+    elif settles:
+        settled = settled_filter(own)
+        source = FilterSource(settled, {CONSTANT_GAIN: settled})
+    of_system = isinstance(source.model, LinearSystem)
+    usual = {"float": "bound", "blocks": ""}.get(options.kind, "guarantee" if of_system else "bound")
+    bases: Sequence[Basis] = options.basis or tuple(filter(None, ("emulation", usual)))
+    z, origin = _data(options, source.model, own)
+    if z is None and of_system and {"emulation", "bound"} & {*bases}:
+        raise ValueError(
+            "got a linear system without inputs; needed --measurements, a CSV file with its inputs, or --simulate"
+        )
+    rounding = Rounding(options.rounding or "nearest")
     question = Question(
         source,
         options.tolerance,
         z,
         options.steps,
-        "innovation" if options.form in (None, CONSTANT_GAIN) else options.form,
+        "innovation" if settles or not options.form else options.form,
         bases,
-        None if options.fixed else _limits(options, bases, source.model),
+        _limits(options, bases, of_system, z),
         FloatFormat(options.base or 2, 2, rounding, options.emin, options.emax),
-        fmt,
-        options.mixed,
-        options.fixed,
+        _format(options),
+        options.kind,
         options.coefficients,
         options.seed or 0,
     )
     return CommandInput(options, own, question, origin)
 
 
-def _filter(given: argparse.Namespace) -> tuple[FilterSource, LinearModel | LinearSystem]:
-    """Return the filter of a command line, with a constant gain as a linear system; and the model in its file."""
-    read = read_filter(given.model, read_measurements(given.inputs) if given.inputs else None)
-    if given.form != CONSTANT_GAIN:
-        return read, read.model
-    if isinstance(read.model, LinearSystem):
-        raise _no_form(given)
-    settled = settled_filter(read.model)
-    return FilterSource(settled, {CONSTANT_GAIN: settled}), read.model
-
-
-def _no_form(given: argparse.Namespace) -> ValueError:
-    return ValueError(f"got --form {given.form} for a linear system; needed none: only a Kalman filter has forms")
-
-
-def _inputs(
-    given: argparse.Namespace,
-    model: LinearModel | LinearSystem,
-    bases: Sequence[Basis],
-    own: LinearModel | LinearSystem,
-) -> tuple[Any, str]:
+def _data(given: argparse.Namespace, model: LinearModel | LinearSystem, own: LinearModel | LinearSystem) -> Any:
     """Return the measurements or inputs of a command line, None if a model simulates them, and their origin.
 
     `own` is the model in its file, which simulates the measurements of its filter with a constant gain.
     """
-    z = read_measurements(given.measurements) if given.measurements else None
-    source = (
-        str(given.measurements).encode(errors="surrogateescape").decode(errors="backslashreplace")
-        if z is not None
-        else ""
-    )
-    if z is not None:
+    if given.measurements:
+        z = read_measurements(given.measurements)
         _check_rows(given, z, model)
-    if isinstance(model, LinearSystem):
-        if given.form not in (None, CONSTANT_GAIN):
-            raise _no_form(given)
-        if given.mixed and not given.fixed:
-            raise ValueError("got --mixed for a linear system; needed --fixed with it: only a Kalman filter has blocks")
-        if given.simulate and given.form == CONSTANT_GAIN:
-            raise _simulates_itself(given)
-        if given.form == CONSTANT_GAIN and z is None:
-            z = simulated_measurements(cast(LinearModel, own), given.steps or usual_steps(own), given.seed or 0)
-            return z, f"simulated by the model, seed {given.seed or 0}"
+        return z, str(given.measurements).encode(errors="surrogateescape").decode(errors="backslashreplace")
+    seed = given.seed or 0
+    if not isinstance(own, LinearSystem):
         if given.simulate:
-            z = simulated_inputs(given.simulate, _level(given), given.steps or DEFAULT_STEPS, model.m, given.seed or 0)
-            source = f"simulated, {given.simulate} of level {_shown(_level(given))}"
-        if z is None and (given.fixed or {"emulation", "bound"} & {*bases}):
             raise ValueError(
-                "got a linear system without inputs; needed --measurements, a CSV file with its inputs, or --simulate"
+                f"got --simulate {given.simulate} for a Kalman filter; needed none: its model simulates its "
+                "measurements"
             )
-    elif given.fixed:
-        raise ValueError(
-            "got --fixed for a Kalman filter; needed --format, such as --format Q15, to judge fixed point, or --form "
-            '"constant gain"'
-        )
-    elif given.simulate:
-        raise _simulates_itself(given)
-    return z, source
-
-
-def _simulates_itself(given: argparse.Namespace) -> ValueError:
-    return ValueError(
-        f"got --simulate {given.simulate} for a Kalman filter; needed none: its model simulates its measurements"
-    )
+        if own is model:
+            return None, ""
+        return simulated_measurements(
+            own, given.steps or usual_steps(own), seed
+        ), f"simulated by the model, seed {seed}"
+    if not given.simulate:
+        return None, ""
+    level = 1.0 if given.level is None else np.asarray(exact(given.level), dtype=np.float64)
+    shown = ", ".join(f"{each:.6g}" for each in np.ravel(level).tolist())
+    z = simulated_inputs(given.simulate, level, given.steps or DEFAULT_STEPS, model.m, seed)
+    return z, f"simulated, {given.simulate} of level {shown}"
 
 
 def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: LinearModel | LinearSystem) -> None:
@@ -174,15 +136,19 @@ def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: Linear
         )
 
 
-def certificate(asked: CommandInput, report: Report) -> Certified:
-    """Return the certificate of the first guarantee in a report, or reject a report without one."""
+def certificate(asked: CommandInput, report: Report) -> Guarantee:
+    """Return the first guarantee in a report, which has a certificate, or reject a report without one."""
     part = _part(asked, report, "guarantee")
-    digits = next(each.digits for each in report.answers if each.label == part.label)
-    if digits is None:
+    fmt = next(each.formats for each in report.answers if each.label == part.label)
+    if fmt is None:
         raise ValueError("got no precision with a guarantee; needed one for a certificate; allow a larger tolerance")
-    fmt = asked.question.fmt or replace(asked.question.like, precision=digits)
-    found = guarantee(part.model, fmt, limits(**_sizes(asked.options)), form=part.form, horizon=report.steps)
-    return Certified(found.certificate(), fmt)
+    within: Any = asked.question.within or _of_inputs(asked)
+    return guarantee(part.model, fmt, within, form=part.form, horizon=report.steps)
+
+
+def _of_inputs(asked: CommandInput) -> FilterLimits:
+    """Return limits on the inputs of a linear system that are no larger than those given."""
+    return limits(measurement=np.abs(asked.question.z).max(axis=0))
 
 
 def _part(asked: CommandInput, report: Report, basis: str) -> Part:
@@ -190,24 +156,27 @@ def _part(asked: CommandInput, report: Report, basis: str) -> Part:
     return next(each for each in asked.question.parts() if each.basis == basis and each.structure == report.structure)
 
 
-def write_code_of(asked: CommandInput, report: Report) -> WrittenCode:
-    """Write the filter of a command line as C, into the folder of its option ``--code``.
+def write_code_of(asked: CommandInput, report: Report) -> tuple[tuple[Path, ...], Any]:
+    """Write the filter of a command line as C, into the folder of its option ``--code``; return files and format.
 
     The format is the one that is judged, or the answer in fixed point, or else the first of binary32 and binary64 that
     meets the tolerance, on the first basis. A digital filter has the structure that gives the answer of the report.
     """
     folder, form, own, question, z = asked.options.code, asked.options.form, asked.own, asked.question, asked.question.z
-    fmt: Any = report.formats if question.fixed else question.fmt or _type_within_tolerance(asked, report)
-    within = limits(measurement=np.abs(z).max(axis=0)) if question.fixed else question.within
+    fixed = question.kind in IN_FIXED_POINT
+    fmt: Any = report.formats if fixed else question.fmt or _type_within_tolerance(asked, report)
+    within = question.within
+    if within is None and fixed and isinstance(question.model, LinearSystem):
+        within = _of_inputs(asked)
     if not isinstance(own, LinearModel):
         design, structures = question.source.design, question.source.structures
         model: Any = design or structures.get(report.structure) or question.model
         form = report.structure if design else None
-        return WrittenCode(write_code(model, fmt, folder, form=form, within=within), fmt)
+        return write_code(model, fmt, folder, form=form, within=within), fmt
     if z is None:
         z = simulated_measurements(own, question.count, question.seed)
     vectors = None if np.isnan(z[:VECTORS]).any() else z[:VECTORS]
-    return WrittenCode(write_code(own, fmt, folder, form=form, inputs=vectors, within=within), fmt)
+    return write_code(own, fmt, folder, form=form, inputs=vectors, within=within), fmt
 
 
 def _type_within_tolerance(asked: CommandInput, report: Report) -> FloatFormat:
@@ -223,11 +192,11 @@ def _type_within_tolerance(asked: CommandInput, report: Report) -> FloatFormat:
     )
 
 
-def uncovered(proof: Certified | None, code: WrittenCode) -> str:
-    """Say that a certificate does not cover code in another format; empty if it does, or if there is none."""
-    if proof is None or code.fmt == proof.fmt or isinstance(code.fmt, WordFormats):
+def uncovered(proved: Any, written: Any) -> str:
+    """Say that a certificate for one format does not cover code in another; empty if it does."""
+    if written == proved:
         return ""
-    name = format_text(code.fmt)
+    name = format_in_words(written)
     return f"the certificate does not cover this code, which is in {name}: add --format {name} for both in one format"
 
 
@@ -251,14 +220,6 @@ def write_run(asked: CommandInput, report: Report, file: Path) -> None:
     replace_file(file, ("\n".join(lines) + "\n").encode())
 
 
-def _level(given: argparse.Namespace) -> Any:
-    return 1.0 if given.level is None else np.asarray(exact(given.level), dtype=np.float64)
-
-
-def _shown(level: Any) -> str:
-    return ", ".join(f"{each:.6g}" for each in np.ravel(level).tolist())
-
-
 def _format(given: argparse.Namespace) -> FloatFormat | FixedFormat | None:
     """Return the one format that is judged; None for a search."""
     rounding = None if given.rounding is None else Rounding(given.rounding)
@@ -270,19 +231,12 @@ def _format(given: argparse.Namespace) -> FloatFormat | FixedFormat | None:
     return fmt if rounding is None else replace(fmt, rounding=rounding)
 
 
-def _sizes(given: argparse.Namespace) -> dict[str, Any]:
-    """Return the largest sizes of a command line, by the quantity that each limits."""
-    return {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
-
-
-def _limits(
-    given: argparse.Namespace, bases: Sequence[Basis], model: LinearModel | LinearSystem
-) -> FilterLimits | None:
-    """Return the limits that the bases need; None if they need none."""
+def _limits(given: argparse.Namespace, bases: Sequence[Basis], of_system: bool, z: Any) -> FilterLimits | None:
+    """Return the limits that the bases need; None if they need none, or if those of the inputs serve."""
     bounds = [each for each in bases if each in ("guarantee", "probable")]
-    if not bounds:
+    sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
+    if not bounds or (not sizes and of_system and z is not None):
         return None
-    of_system, sizes = isinstance(model, LinearSystem), _sizes(given)
     needed = "--measurement" if of_system else "--state and --innovation, or --measurement"
     if not sizes or (of_system and set(sizes) != {"measurement"}):
         options = ", ".join(f"--{each}" for each in sizes)

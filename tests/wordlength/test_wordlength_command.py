@@ -165,7 +165,7 @@ def test_a_guarantee_refuses_measurements_with_gaps(files, capsys):
     """The gaps would become a part of the model that repeats for ever."""
     given = [str(files[0] / "model.toml"), "--tolerance", "0.01,inf", "--basis", "guarantee", "--measurement", "9"]
     assert main([*given, "--measurements", str(files[0] / "z.csv")]) == 2
-    assert "got measurements of which some are missing, and a basis that holds for ever" in capsys.readouterr().err
+    assert 'got missing measurements and basis "guarantee"; needed none: it does' in capsys.readouterr().err
 
 
 def test_a_guarantee_for_a_system_takes_limits_on_the_measurement(tmp_path, capsys):
@@ -196,7 +196,7 @@ def test_a_guarantee_for_a_system_takes_limits_on_the_measurement(tmp_path, caps
         (["--basis", "guarantee", "--state", "5,x"], "got --state 5,x; needed numbers with commas between"),
         (["--basis", "guarantee", "--measurement", "1,2,3"], "got 3 limits on the measurement; needed one, or 1"),
         (["--basis", "guarantee", "--measurement=-1"], "on the measurement; needed numbers that are not negative"),
-        (["--basis", "bound", "--measurement", "5"], "got --measurement without a basis that uses limits; needed --ba"),
+        (["--basis", "bound", "--measurement", "5"], "got no basis that uses limits and --measurement; needed --ba"),
         (["--basis", "guarantee", "--measurement", "5", "--form", "Cholesky"], "got the Carlson form and basis"),
     ],
 )

@@ -75,20 +75,29 @@ def test_a_cascade_says_what_scaling_its_sections_saves(basis):
 def test_the_command_takes_the_bits_of_coefficients(tmp_path, capsys):
     rows = ", ".join(str([float(c) for c in row]) for row in SECTIONS)
     (tmp_path / "low.toml").write_text(f"sos = [{rows}]\n")
-    given = [str(tmp_path / "low.toml"), "--tolerance", "0.001", "--simulate", "step", "--steps", "3000", "--fixed"]
+    given = [
+        str(tmp_path / "low.toml"),
+        "--tolerance",
+        "0.001",
+        "--simulate",
+        "step",
+        "--steps",
+        "3000",
+        "--kind=fixed",
+    ]
     assert main([*given, "--basis", "emulation"]) == 1
     assert "--coefficients in the command" in capsys.readouterr().out
     assert main([*given, "--basis", "emulation", "--coefficients", "24", "--code", str(tmp_path / "code")]) == 0
     assert "fraction bits in a word of" in capsys.readouterr().out
     assert (tmp_path / "code").is_dir()
     for more, message in (
-        (["--coefficients", "54"], "got --coefficients 54; needed 1 to 53 significant bits"),
-        (["--coefficients", "24", "--mixed"], "got --coefficients and --mixed; needed --fixed with it, without"),
+        (["--coefficients", "54"], "got coefficient_bits 54; needed a whole number, at least 1 and at most 53"),
+        (["--base", "10"], "got --kind fixed and --base; needed --kind alone: fixed point has base 2"),
     ):
         assert main([*given, *more]) == 2
         assert message in capsys.readouterr().err
     assert main([*given[:-1], "--coefficients", "24"]) == 2
-    assert "got --coefficients; needed --fixed with it" in capsys.readouterr().err
+    assert "got --kind float and --coefficients; needed --kind fixed or --kind words" in capsys.readouterr().err
 
 
 # -- what a refusal says ----------------------------------------------------------------------------------------------

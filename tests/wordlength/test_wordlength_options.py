@@ -28,9 +28,7 @@ from gpbnb.wordlength.asked import tolerances_of
 
 SYSTEM = 'A = [[0.875]]\nB = [[0.125]]\ninputs = ["sensor (V)"]\noutputs = ["level (V)"]\n'
 FILTER = "Phi = [[1]]\nH = [[1]]\nQ = [[0.01]]\nR = [[1]]\nx0 = [0]\nP0 = [[1]]\n"
-REPORT = SimpleNamespace(
-    text="12 bits", mixed="", shortest="", met=True, to_html=lambda: "<p>new</p>", to_json=lambda: "{}"
-)
+REPORT = SimpleNamespace(text="12 bits", shortest="", met=True, to_html=lambda: "<p>new</p>", to_json=lambda: "{}")
 
 
 @pytest.fixture
@@ -70,8 +68,8 @@ def test_the_light_lists_are_those_of_the_library():
         (["--format", "Q15", "--digits", "9"], "got --format and --digits; needed --format alone"),
         (["--emin", "-5"], "got one of --emin and --emax; needed both"),
         (["--simulate", "sine", "--measurements", "{z}"], "got --simulate and --measurements; needed one of them"),
-        (["--level", "2"], "got --level without --simulate; needed --simulate with one of step, sine, noise"),
-        (["--state", "5"], "got --state without a basis that uses limits; needed --basis guarantee or probable"),
+        (["--level", "2"], "got no --simulate and --level; needed --simulate with one of step, sine, noise"),
+        (["--state", "5"], "got no basis that uses limits and --state; needed --basis guarantee or probable"),
         (["--measurements", "{absent}"], "absent.csv, which cannot be read: No such file or directory; needed a file"),
         (["--report", "{folder}/own.html"], "own.json, which is no report of this command; needed another name"),
     ],
