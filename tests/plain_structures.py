@@ -1,4 +1,4 @@
-"""Structures of digital filters as plain loops over fractions, and roundings from their definitions.
+"""Structures of digital filters as plain loops over fractions.
 
 Nothing is taken from the package. Each loop is written from the textbook equations of its structure; an
 :class:`Arithmetic` rounds.
@@ -7,79 +7,9 @@ Nothing is taken from the package. Each loop is written from the textbook equati
 from __future__ import annotations
 
 from collections.abc import Callable
-from fractions import Fraction
-from math import log2
 from typing import NamedTuple
 
-ZERO = Fraction(0)
-
-
-def to_multiple(x, base, power, mode):
-    """The multiple of base**power that a rounding mode gives for x."""
-    p, q = x.numerator * base ** max(-power, 0), x.denominator * base ** max(power, 0)
-    low, rest = divmod(p, q)
-    up = (
-        rest > 0
-        and {
-            "down": False,
-            "up": True,
-            "chop": x < 0,
-            "odd": low % 2 == 0,
-            "even": 2 * rest > q or (2 * rest == q and low % 2 == 1),
-            "nearest": 2 * rest > q or (2 * rest == q and x > 0),
-            "half up": 2 * rest >= q,
-        }[mode]
-    )
-    return Fraction((low + up) * base ** max(power, 0), base ** max(-power, 0))
-
-
-def exponent(x, base):
-    """The largest e for which base**e is not above the size of x, which is not zero."""
-    p, q = abs(x.numerator), x.denominator
-    e = int((p.bit_length() - q.bit_length()) / log2(base))  # roughly
-    while p * base ** max(-e - 1, 0) >= q * base ** max(e + 1, 0):
-        e += 1
-    while p * base ** max(-e, 0) < q * base ** max(e, 0):
-        e -= 1
-    return e
-
-
-def floating(base, digits, mode, emin=None, subnormal=True):
-    """A function that rounds to digits of a base; below base**emin with the spacing there, or to zero."""
-
-    def r(x):
-        if not x:
-            return ZERO
-        e = exponent(x, base)
-        if emin is not None and subnormal:
-            e = max(e, emin)
-        found = to_multiple(x, base, e - digits + 1, mode)
-        if emin is not None and not subnormal and abs(found) < Fraction(base) ** emin:
-            return ZERO
-        return found
-
-    return r
-
-
-def fixed(bits, mode):
-    """A function that rounds to fraction bits."""
-    return lambda x: to_multiple(x, 2, -bits, mode)
-
-
-def limited(fmt_bits, integer_bits, overflow):
-    """A function that limits a number to a two's complement word, or wraps it, or raises OverflowError."""
-    low, high = -(Fraction(2) ** integer_bits), Fraction(2) ** integer_bits - Fraction(1, 2**fmt_bits)
-
-    def keep(x):
-        if low <= x <= high:
-            return x
-        if overflow == "saturate":
-            return high if x > 0 else low
-        if overflow == "wrap":
-            return (x - low) % (2 * -low) + low
-        raise OverflowError
-
-    return keep
+from tests.oracles import ZERO, fixed, limited
 
 
 class Arithmetic(NamedTuple):

@@ -11,7 +11,6 @@ from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
-import oracles
 import pytest
 import scipy.fft
 import scipy.linalg
@@ -21,6 +20,7 @@ from hypothesis import strategies as st
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
+from tests import oracles
 
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=1000)
 
@@ -221,7 +221,7 @@ class TestArithmetic:
         assert str(D4.array(["1.001", "1.001", "1000"]).prod()) == "1002"
         rng = np.random.default_rng(3)
         x = B8.array(rng.normal(size=(4, 3, 2)))
-        arithmetic = oracles.Arithmetic(2, 8, True)
+        arithmetic = oracles.Numbers(oracles.floating(2, 8, "nearest"))
         f = x.to_fractions()
         for axis in (0, 1, 2, -1):
             expected = np.apply_along_axis(lambda line: [arithmetic.total(list(line))], axis, f).squeeze(axis)

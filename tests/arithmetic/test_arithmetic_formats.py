@@ -10,7 +10,6 @@ from fractions import Fraction
 import gmpy2
 import mpmath
 import numpy as np
-import oracles
 import pytest
 import sympy
 from flint import arb
@@ -22,6 +21,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
+from tests import oracles
 
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
 
@@ -47,7 +47,7 @@ texts = st.builds(
 
 
 def oracle(x: Fraction, fmt: FloatFormat) -> Fraction:
-    return oracles.rounded(x, fmt.base, fmt.precision, fmt.rounding is NEAREST)
+    return oracles.rounds(fmt)(x)
 
 
 @pytest.mark.parametrize("name", ["nearest", "CHOP", " even ", "stochastic"])

@@ -7,7 +7,6 @@ from fractions import Fraction
 from functools import cache
 
 import numpy as np
-import oracles
 import pytest
 
 from gpbnb.arithmetic import linalg
@@ -15,6 +14,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
+from tests import oracles
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = [FloatFormat(2, 6), FloatFormat(3, 4, CHOP), FloatFormat(10, 3, CHOP), FloatFormat(10, 3)]
@@ -24,8 +24,8 @@ each_size = pytest.mark.parametrize("n", [1, 3, 5])
 each_pivoting = pytest.mark.parametrize("pivot", [False, True], ids=["in order", "pivoting"])
 
 
-def arithmetic(fmt: FloatFormat) -> oracles.Arithmetic:
-    return oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST)
+def arithmetic(fmt: FloatFormat) -> oracles.Numbers:
+    return oracles.Numbers.of(fmt)
 
 
 def exact(x: FloatArray) -> list:
@@ -48,7 +48,7 @@ def samples(fmt: FloatFormat, n: int) -> list[tuple[FloatArray, FloatArray]]:
 class TestDigitForDigit:
     def test_matmul(self, fmt: FloatFormat, n: int) -> None:
         for a, b in samples(fmt, n):
-            expected = arithmetic(fmt).matmul(exact(a), exact(b))
+            expected = arithmetic(fmt).times(exact(a), exact(b))
             assert exact(linalg.matmul(a, b)) == exact(a @ b) == expected
             assert linalg.dot(a[0], b[:, 1]).to_fractions() == expected[0][1]
 

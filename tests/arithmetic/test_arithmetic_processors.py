@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plain_structures import floating
 
 from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
+from tests.oracles import floating
 
 TRUEDIV = operator.truediv
 BINARY = [operator.add, operator.sub, operator.mul, TRUEDIV]

@@ -10,7 +10,7 @@ import pytest
 from gpbnb import BINARY32, FixedFormat, FloatFormat, peek, required_precision
 from gpbnb.arithmetic import linalg, tape
 from gpbnb.arithmetic.traced import TracedFunction
-from tests.plain_structures import fixed, floating, limited
+from tests.oracles import fixed, floating, limited
 
 FORMATS = {
     "24 bits, away": FloatFormat(2, 24),

@@ -9,7 +9,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.machine import CODES, OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT, code_of, evaluate, fault_of, tables
-from tests.plain_structures import floating
+from tests.oracles import floating
 
 INPUTS, ROWS = 12, 150
 OPERATIONS = {

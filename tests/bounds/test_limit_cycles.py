@@ -5,12 +5,12 @@ from __future__ import annotations
 from fractions import Fraction
 from itertools import product
 
-import plain_structures as plain
 import pytest
 
 from gpbnb import FixedFormat, LinearSystem
 from gpbnb.bounds.limit_cycles import limit_cycles
 from gpbnb.filters.words import WordFormats
+from tests.oracles import fixed, limited
 
 MODES = ["nearest", "even", "half up", "chop", "up", "down", "odd"]
 
@@ -37,8 +37,8 @@ def test_cycles_are_those_in_which_runs_from_every_state_end(mode, a1, a2):
     """A section of second order in direct form I with one rounding for each output; words of 7 bits."""
     system = LinearSystem.from_coefficients([1], [1, a1, a2], "direct form I")
     words = WordFormats(FixedFormat(6, 0, mode, "saturate"), FixedFormat(2, 8), FixedFormat(12, 8))
-    r, keep = plain.fixed(0, mode), plain.limited(0, 6, "saturate")
-    c1, c2 = (plain.fixed(8, "nearest")(Fraction(each)) for each in (a1, a2))
+    r, keep = fixed(0, mode), limited(0, 6, "saturate")
+    c1, c2 = (fixed(8, "nearest")(Fraction(each)) for each in (a1, a2))
 
     def step(state):
         y = keep(r(Fraction(0) - c1 * state[0] - c2 * state[1]))

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from flint import ctx
-from plain_structures import floating
 from scipy import signal
 
 from gpbnb import FloatFormat, LinearSystem, limits, required_precision
@@ -23,6 +22,7 @@ from gpbnb.bounds.guarantee import from_schedule
 from gpbnb.bounds.linear import peak_gain
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.poles import eigenvalues
+from tests.oracles import floating
 
 ONE = 2**300
 """A unit of fixed point, whose rounding errors are far below those that are measured."""

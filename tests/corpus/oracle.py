@@ -8,211 +8,92 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from fractions import Fraction
-from functools import cache
-from math import ceil, floor, isqrt, trunc
+from math import ceil, floor, trunc
 from typing import Any
 
-import gmpy2
-import mpmath
 from gmpy2 import mpq
 
-from tests import independent_filter, plain_blocks, plain_nonlinear, plain_structures
-from tests.corpus.draw import Fixed, Float, Format, Model
-from tests.plain_smoothing import Plain
-from tests.plain_structures import exponent, fixed, floating, limited
+from tests import oracles, plain_filters, plain_steps, plain_structures
+from tests.corpus.draw import Fixed, Format, Model
+from tests.oracles import Numbers, elementary, exactly, floating, of_factors, root
 
 Steps = Iterator[dict[str, Any]]
-Rounding = Callable[[Fraction], Fraction]
+Rounding = Callable[[Any], Any]
 
 
-def rounds(fmt: Format) -> Rounding:
-    """A function that rounds a number to a format; OverflowError beyond the range of one that raises."""
-    if fmt.rounding == "stochastic":
-        raise NotImplementedError("random numbers of the package")
-    if isinstance(fmt, Fixed):
-        r, keep = fixed(fmt.fraction, fmt.rounding), limited(fmt.fraction, fmt.integer, fmt.overflow)
-        return lambda x: keep(r(x))
-    r = floating(fmt.base, fmt.precision, fmt.rounding, fmt.emin, fmt.subnormal)
-    if fmt.emax is None:
-        return r
-    top = fmt.largest
-    if top is None:
-        top = (fmt.base**fmt.precision - 1) * Fraction(fmt.base) ** (fmt.emax - fmt.precision + 1)
-
-    def in_range(x: Fraction) -> Fraction:
-        found = r(x)
-        if abs(found) <= top:
-            return found
-        if fmt.overflow == "saturate":
-            return top if found > 0 else -top
-        raise OverflowError
-
-    return in_range
+def rounds(fmt: Format) -> Callable[[Any], Fraction]:
+    """A function that rounds to a format, and gives Python's fractions."""
+    r = oracles.rounds(fmt)
+    return lambda x: exactly(r(x))
 
 
 # -- filters ----------------------------------------------------------------------------------------------------------
 
 
-class Numbers(independent_filter.Arithmetic):
-    """The arithmetic of the independent filter, in any format."""
-
-    def __init__(self, fmt: Format) -> None:
-        super().__init__(fmt.base if isinstance(fmt, Float) else 2, fmt.precision if isinstance(fmt, Float) else 1)
-        self.r, self.spacing = rounds(fmt), None
-        #: Whether numbers are kept in float64, and whether one has left its range.
-        self.by_float64 = isinstance(fmt, Float) and fmt.base != 10 and fmt.emin is None
-        self.left = False
-        if isinstance(fmt, Fixed):
-            self.spacing, self.rounding = fmt.fraction, fmt.rounding
-            self.digits = fmt.integer + fmt.fraction
-        else:
-            self.rounding = fmt.rounding
-
-    def fit(self, p: int, q: int = 1, e: int = 0) -> tuple[int, int]:
-        x = self.r(Fraction(p, q) * Fraction(self.base) ** e)
-        if not x:
-            return 0, 0
-        self.left |= self.by_float64 and abs(x) < _LEAST
-        e = -self.spacing if self.spacing is not None else exponent(x, self.base) - self.digits + 1
-        return int(x / Fraction(self.base) ** e), e
-
-
 _LEAST, _DECAYED = Fraction(1, 2**960), Fraction(1, 2**700)
 
 
-class Filter(independent_filter.Filter):
-    """The independent filter with the further forms that update a covariance.
+class Fading(plain_filters.Filter):
+    """A filter whose numbers are kept in float64.
 
-    Where a step would leave the range of float64, entries of the estimate below 2**-700 become zero before it.
+    Where a step would leave its range, entries of the estimate below 2**-700 become zero before it.
     """
 
-    def step(self, z: Any) -> list[Fraction]:
-        fmt, before = self.fmt, dict(vars(self))
-        fmt.left = False
+    def __init__(self, model: Model, numbers: Numbers, *others: Any) -> None:
+        r = numbers.r
+
+        def watched(x: Any) -> Any:
+            found = r(x)
+            self.left |= 0 < abs(found) < _LEAST
+            return found
+
+        self.left, numbers.r = False, watched
+        numbers.sums = watched if numbers.sums is r else numbers.sums
+        super().__init__(model, numbers, *others)
+
+    def step(self, z: Any) -> list[Any]:
+        self.left = False
+        before = dict(vars(self))
         found = super().step(z)
-        if not fmt.left:
+        if not self.left:
             return found
         vars(self).update(before)
         for name in ("x", "carried"):
-            kept = zip(getattr(self, name), before["x"], strict=True)
-            setattr(self, name, [a if abs(fmt.value(x[0])) >= _DECAYED else [(0, 0)] for a, x in kept])
+            if getattr(self, name) is not None:
+                kept = zip(getattr(self, name), before["x"], strict=True)
+                setattr(self, name, [a if abs(x[0]) >= _DECAYED else [mpq(0)] for a, x in kept])
         return super().step(z)
-
-    def _step(self, k: int, z: Any) -> None:
-        fmt = self.fmt
-        if self.form == "compensated":
-            Phi, before = self.Phi[k % len(self.Phi)], self.x
-            super()._step(k, z)
-            H, unit = self.H[k % len(self.H)], fmt.values(fmt.unit(len(Phi)))
-            exact = self.exact_Phi[k % len(self.exact_Phi)]
-            increment = fmt.stored(
-                [[a - b for a, b in zip(*rows, strict=True)] for rows in zip(exact, unit, strict=True)]
-            )
-            d = fmt.product(increment, before)
-            innovation = fmt.difference(z, fmt.product(H, fmt.sum(before, d)))
-            d = fmt.difference(fmt.sum(d, fmt.product(self.K, innovation)), self.carried)
-            self.x = fmt.sum(before, d)
-            self.carried = fmt.difference(fmt.difference(self.x, before), d)
-            return
-        super()._step(k, z)
-        if self.form == "symmetrized":
-            P, n = self.P, len(self.P)
-            self.P = [
-                [fmt.divide(fmt.add(P[i][j], P[j][i]), fmt.store(Fraction(2))) for j in range(n)] for i in range(n)
-            ]
-
-
-class Summed(Numbers):
-    """Sums of products in another order, with fused multiply-add, or in more digits."""
-
-    def __init__(self, fmt: Float, order: str, fused: bool, block: int, wider: Float | None) -> None:
-        super().__init__(fmt)
-        self.inner, self.sums = Numbers(wider or fmt), (order, fused, block)
-
-    def dot(self, row: Any, column: Any) -> tuple[int, int]:
-        order, fused, block = self.sums
-        x, y = ([self.value(each) for each in part] for part in (row, column))
-        return self.store(summed(self.inner.r, x, y, order, fused, block))
-
-
-def summed(r: Any, x: Any, y: Any, order: str, fused: bool, block: int) -> Any:
-    """An inner product, each result rounded by r."""
-
-    def in_a_row(first: int, end: int) -> Any:
-        total = r(x[first] * y[first])
-        for k in range(first + 1, end):
-            total = r(x[k] * y[k] + total) if fused else r(total + r(x[k] * y[k]))
-        return total
-
-    def halved(first: int, end: int) -> Any:
-        middle = (first + end) // 2
-        return r(x[first] * y[first]) if end - first == 1 else r(halved(first, middle) + halved(middle, end))
-
-    if order == "pairwise":
-        return halved(0, len(x))
-    step = block if order == "blocked" else len(x)
-    total, *others = (in_a_row(k, min(k + step, len(x))) for k in range(0, len(x), step))
-    for each in others:
-        total = r(total + each)
-    return total
 
 
 def filtered(model: Model, z: Any, fmt: Format, form: str, **options: Any) -> Steps:
-    if options.get("compensated") and form == "innovation":
-        form, options = "compensated", {}
-    if "blocks" in options:
-        yield from _in_blocks(model, z, form, **options["blocks"])
-        return
-    if options.get("compensated") or model.inputs or form in ("Potter", "Carlson"):
+    if model.inputs or form in ("Potter", "Carlson"):
         raise NotImplementedError
-    numbers = Summed(fmt, *options["sums"]) if "sums" in options else Numbers(fmt)
-    found = Filter(independent_filter.Model(*model[:6]), numbers, form.lower())
-    found.exact_Phi, found.carried = model.Phi, [[(0, 0)] for _ in model.x0]
+    numbers, each = Numbers.of(fmt), None
+    if "sums" in options:
+        order, fused, block, wider = options["sums"]
+        numbers = Numbers.of(fmt, wider, order=order, fused=fused, block=block)
+    if "blocks" in options:
+        formats = {name: given for name, given in options["blocks"].items() if name != "sums"}
+        numbers = Numbers.of(max(formats.values(), key=lambda given: given.precision))
+        each = {name: Numbers.of(given, options["blocks"].get("sums")) for name, given in formats.items()}
+    compensated = form == "compensated" or options.get("compensated", False)
+    kind = plain_filters.Filter
+    if isinstance(fmt, Float) and fmt.base != 10 and fmt.emin is None and each is None:
+        kind = Fading
+    found = kind(model, numbers, "innovation" if form == "compensated" else form, each, compensated)
     for row in z:
         try:
             x = found.step(row)
         except (OverflowError, ZeroDivisionError):
             return
-        if form == "UD":
-            yield {"x": x, "P": _of_factors(numbers.values(found.U))}
-        else:
-            yield {"x": x, "K": numbers.values(found.K), "P": numbers.values(found.P)}
-
-
-def _in_blocks(model: Model, z: Any, form: str, sums: Float | None = None, **formats: Float) -> Steps:
-    """The model is stored with the digits of the widest block."""
-    widest = max(formats.values(), key=lambda each: each.precision)
-    stored = definite(model, widest)
-    each = {name: plain_blocks.Rounds(rounds(fmt), rounds(sums or fmt)) for name, fmt in formats.items()}
-    given = {**dict(zip(("Phi", "H", "Q", "R"), (cycle[0] for cycle in stored[:4]), strict=True)), "x0": stored.x0}
-    plain = plain_blocks.Filter({**given, "P0": stored.P0}, form, rounds(widest), each)
-    cycles = [[[list(map(plain.model, row)) for row in one] for one in cycle] for cycle in stored[:4]]
-    factored = [plain_blocks.factors(plain.model, one) for one in cycles[2]]
-    for k, row in enumerate(z):
-        plain.Phi, plain.H, plain.Q, plain.R = (cycle[k % len(cycle)] for cycle in cycles)
-        plain.UQ = factored[k % len(factored)]
-        measured = [[each["state"].store(a)] for a in row]
-        step = plain.step_ud if form == "UD" else plain.step_with_covariance
-        try:
-            K = step(plain.H, plain.R, measured)
-        except (OverflowError, ZeroDivisionError):
-            return
-        x = [row[0] for row in plain.x]
-        yield {"x": x, "P": _of_factors(plain.P)} if form == "UD" else {"x": x, "K": K, "P": plain.P}
+        yield {"x": x, "P": of_factors(found.P)} if form == "UD" else {"x": x, "K": found.K, "P": found.P}
 
 
 def recorded(model: Model, records: Any, fmt: Format, form: str) -> Steps:
     each = [filtered(model, [[Fraction(float(a)) for a in row] for row in z], fmt, form) for z in records]
     for steps in zip(*each, strict=True):
         columns = [step["x"] for step in steps]
-        yield {"x": [[str(float(a)) for a in row] for row in zip(*columns, strict=True)]}
-
-
-def _of_factors(U: Any) -> Any:
-    """U D U', with D on the diagonal of U."""
-    n = len(U)
-    unit = [[U[i][j] if i < j else Fraction(i == j) for j in range(n)] for i in range(n)]
-    return [[sum(unit[i][k] * U[k][k] * unit[j][k] for k in range(n)) for j in range(n)] for i in range(n)]
+        yield {"x": [[str(float(exactly(a))) for a in row] for row in zip(*columns, strict=True)]}
 
 
 class Linear:
@@ -222,59 +103,29 @@ class Linear:
         self.matrix = matrix
 
     def plain(self, r: Rounding, x: Any, u: Any) -> Any:
-        given = [[r(each) for each in row] for row in self.matrix]
-        return [row[0] for row in plain_nonlinear.PlainMatrices(r).times(given, [[each] for each in x])], given
-
-
-class Extended(plain_nonlinear.PlainFilter):
-    """An extended filter, whose last measurement is an angle or not."""
-
-    angle = True
-
-    def step(self, z: Any, u: Any) -> None:
-        if self.angle:
-            super().step(z, u)
-            return
-        r = self.r
-        z = [r(Fraction(each)) for each in z]
-        ahead, F = self.motion.plain(r, self.x, u)
-        V = self.predicted(self.covariance.take(F))
-        expected, H = self.sight.plain(r, ahead, u)
-        self.x, self.P = self.updated(ahead, V, H, [r(a - b) for a, b in zip(z, expected, strict=True)])
+        numbers = Numbers(r)
+        given = numbers.store(self.matrix)
+        return [row[0] for row in numbers.times(given, [[each] for each in x])], given
 
 
 PLAIN_FORMS = ("innovation", "Joseph", "UD")
 
 
 def as_functions(model: Model, z: Any, fmt: Format, form: str) -> Steps:
-    if form in ("Potter", "Carlson", "symmetrized"):
+    if form not in PLAIN_FORMS:
         raise NotImplementedError
-    parts = (Linear(model.Phi[0]), Linear(model.H[0]))
-    plain, *others = (Extended(*parts, (Q, R, model.x0, model.P0), form, rounds(fmt)) for Q in model.Q for R in model.R)
-    plain.angle, noise = False, [(each.Q, each.R) for each in (plain, *others)]
-    for k, row in enumerate(z):
-        plain.Q = noise[k % len(model.Q) * len(model.R)][0]
-        plain.R = noise[k % len(model.R)][1]
-        try:
-            plain.step(row, [])
-        except (OverflowError, ZeroDivisionError, ValueError):
-            return
-        yield {"x": list(plain.x), "P": _of_factors(plain.P) if form == "UD" else plain.P}
+    parts, given = (Linear(model.Phi[0]), Linear(model.H[0])), (model.Q, model.R, model.x0, model.P0)
+    plain = plain_filters.Extended(*parts, given, form, Numbers.of(fmt), angle=False)
+    yield from _followed(plain, z, [[] for _ in z], form)
 
 
 def tracked(motion: str, given: Any, z: Any, u: Any, fmt: Format, form: str, **options: Any) -> Steps:
-    sight = plain_nonlinear.Ranges([Fraction(3, 10), Fraction(1, 5)])
-    moved = {"moving": plain_nonlinear.Moving, "turning": plain_nonlinear.Turning, "coasting": plain_nonlinear.Coasting}
-    blocks = options.get("blocks")
-    if form not in PLAIN_FORMS:
+    if form not in PLAIN_FORMS or options.get("blocks"):  # with blocks, the model is stored in the widest format first
         raise NotImplementedError
-    if blocks:  # the model is stored in the widest format first
-        raise NotImplementedError
-    r = rounds(fmt)
-    if options.get("method") == "unscented":
-        plain: Any = plain_nonlinear.PlainUnscented(moved[motion](), sight, given, form, r)
-    else:
-        plain = Extended(moved[motion](), sight, given, form, r, iterations=options["iterations"])
+    parts = getattr(plain_steps, motion.title())(), plain_steps.Ranges([Fraction(3, 10), Fraction(1, 5)])
+    kind = plain_filters.Unscented if options.get("method") == "unscented" else plain_filters.Extended
+    Q, R, x0, P0 = given
+    plain = kind(*parts, ([Q], [R], x0, P0), form, Numbers.of(fmt), iterations=options.get("iterations", 1))
     yield from _followed(plain, z, u, form)
 
 
@@ -284,58 +135,17 @@ def _followed(plain: Any, z: Any, u: Any, form: str) -> Steps:
             plain.step(measured, known)
         except (OverflowError, ZeroDivisionError, ValueError):
             return
-        yield {"x": list(plain.x), "P": _of_factors(plain.P) if form == "UD" else plain.P}
-
-
-class Rounded(Plain):
-    """Loops over matrices in any format."""
-
-    def __init__(self, fmt: Format) -> None:
-        self.r = rounds(fmt)
-        self.fl = lambda x: mpq(self.r(exactly(x)))
-        self.root = lambda x: mpq(self.r(root(exactly(x))))
-
-
-class Smoother(Rounded):
-    """The same, with an inverse that subtracts products in place of adding negative ones."""
-
-    def inv(self, a: Any, pivot: bool) -> Any:
-        return plain_nonlinear.inverse(self.fl, a)
-
-
-def exactly(x: Any) -> Fraction:
-    return Fraction(int(x.numerator), int(x.denominator))
-
-
-def root(x: Fraction) -> Fraction:
-    """The square root, or a number that rounds as it does."""
-    p, q = isqrt(x.numerator), isqrt(x.denominator)
-    if p * p == x.numerator and q * q == x.denominator:
-        return Fraction(p, q)
-    shift = 900 - (x.numerator.bit_length() - x.denominator.bit_length()) // 2
-    scale = Fraction(2) ** shift
-    return Fraction(2 * isqrt(floor(x * scale**2)) + 1, 2) / scale
+        yield {"x": list(plain.x), "P": of_factors(plain.P) if form == "UD" else plain.P}
 
 
 def smoothed(model: Model, z: Any, fmt: Format, form: str) -> Steps:
-    plain = Smoother(fmt)
     try:
-        if form == "square root":
-            found = plain.by_roots(model, z)
-        else:
-            found = plain.by_covariances(definite(model, fmt), z, form == "Joseph")
+        found = plain_filters.smoothed(model, Numbers.of(fmt), z, form)
     except (OverflowError, ZeroDivisionError) as error:
         yield {"end": ended(error)}
         return
     for x, P in found:
-        yield {"x": [exactly(row[0]) for row in x], "P": [[exactly(each) for each in row] for row in P]}
-
-
-def definite(model: Model, fmt: Format) -> Model:
-    """The model whose covariances stay definite when the format stores them."""
-    numbers, to = Numbers(fmt), independent_filter.storable
-    Q, R = [to(numbers, each, False) for each in model.Q], [to(numbers, each, True) for each in model.R]
-    return model._replace(Q=Q, R=R, P0=to(numbers, model.P0, False))
+        yield {"x": [row[0] for row in x], "P": P}
 
 
 def ended(error: Exception) -> str:
@@ -413,7 +223,7 @@ def _reflections(b: Any, a: Any) -> tuple[list[Fraction], list[Fraction]]:
 def stepped(index: int, u: Any, fmt: Format) -> Steps:
     if index < 4:
         raise NotImplementedError
-    step, r = plain_nonlinear.drawn(index)[1], rounds(fmt)
+    step, r = plain_steps.drawn(index)[1], rounds(fmt)
     try:
         x, rows = [r(Fraction(each)) for each in ("0.3", "-0.2", "0")], []
         for row in u:
@@ -474,44 +284,6 @@ def applied(fmt: Format, operation: str, operands: Any) -> list[Fraction] | str:
         return ended(error)
 
 
-MPMATH = {
-    "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arcsinh": "asinh", "arccosh": "acosh", "arctanh": "atanh",
-    "arctan2": "atan2", "deg2rad": "radians", "rad2deg": "degrees",
-}  # fmt: skip
-
-
-@cache
-def _precise() -> Any:
-    context = mpmath.mp.clone()
-    context.prec = 1000
-    return context
-
-
-def elementary(name: str, *arguments: Fraction) -> Fraction:
-    """The value of a function with 900 bits; exactly, where it has fewer than 600."""
-    mp = _precise()
-    x = [mp.mpf(each.numerator) / each.denominator for each in arguments]
-    if name == "exp2":
-        found = mp.power(2, x[0])
-    elif name == "log2":
-        found = mp.log(x[0]) / mp.log(2)
-    elif name == "cbrt":
-        found = mp.sign(x[0]) * mp.root(abs(x[0]), 3)
-    elif name == "float_power":
-        found = mp.power(*x)
-    else:
-        found = getattr(mp, MPMATH.get(name, name))(*x)
-    value = exactly(gmpy2.mpq(Fraction(*_ratio(found))))
-    short = floating(2, 600, "even")(value)
-    return short if short and abs(value / short - 1) < Fraction(1, 2**900) else value
-
-
-def _ratio(value: Any) -> tuple[int, int]:
-    sign, mantissa, e, _ = value._mpf_
-    whole = (-1) ** sign * int(mantissa)
-    return (whole << e, 1) if e >= 0 else (whole, 1 << -e)
-
-
 def converted(fmt: Format, numbers: Any, kind: str) -> list[Any] | str:
     r = rounds(fmt)
     try:
@@ -522,63 +294,42 @@ def converted(fmt: Format, numbers: Any, kind: str) -> list[Any] | str:
 
 
 def computed(fmt: Format, operation: str, matrices: Any, **options: Any) -> list[Any] | str:
-    plain = Rounded(fmt)
+    plain = Numbers.of(fmt)
     try:
-        given = [[[plain.fl(mpq(a)) for a in row] if isinstance(row, list) else plain.fl(mpq(row)) for row in each]
-                 for each in matrices]  # fmt: skip
-        return [_plainly(each) for each in COMPUTED[operation](plain, *given, **options)]
+        given = [plain.store(each) if isinstance(each[0], list) else plain.store([each])[0] for each in matrices]
+        return list(COMPUTED[operation](plain, *given, **options))
     except ZeroDivisionError:
         return "singular"
     except OverflowError:
         return "overflow"
 
 
-def _plainly(x: Any) -> Any:
-    return [_plainly(each) for each in x] if isinstance(x, list) else exactly(mpq(x))
+def _matmul(plain: Numbers, a: Any, b: Any, sums: Any = None, **order: Any) -> Any:
+    plain = Numbers(plain.r, sums=rounds(sums) if sums is not None else None, **order)
+    return [plain.times(a, b)] if isinstance(a[0], list) else [plain.dot(a, b)]
 
 
-def _matmul(
-    plain: Rounded, a: Any, b: Any, order: str = "left", fused: bool = False, block: int = 32, sums: Any = None
-) -> Any:
-    inner = Rounded(sums) if sums is not None else plain
-    if not isinstance(a[0], list):
-        return [plain.fl(summed(inner.fl, a, b, order, fused, block))]
-    columns = list(zip(*b, strict=True))
-    return [[[plain.fl(summed(inner.fl, row, each, order, fused, block)) for each in columns] for row in a]]
-
-
-def _lu(plain: Rounded, a: Any, pivot: bool) -> Any:
+def _lu(plain: Numbers, a: Any, pivot: bool) -> Any:
     lower, upper, _, order = plain.eliminate(a, [[] for _ in a], pivot)
     return [lower, upper, order]
 
 
-def _det(plain: Rounded, a: Any) -> Any:
+def _det(plain: Numbers, a: Any) -> Any:
     try:
         _, upper, _, order = plain.eliminate(a, [[] for _ in a], True)
     except ZeroDivisionError:
         return [mpq(0)]
     found = upper[0][0]
     for k in range(1, len(a)):
-        found = plain.fl(found * upper[k][k])
+        found = plain.r(found * upper[k][k])
     swaps = sum(order[j] > order[i] for i in range(len(a)) for j in range(i))
-    return [plain.fl(-found) if swaps % 2 else found]
+    return [plain.r(-found) if swaps % 2 else found]
 
 
-def _cholesky(plain: Rounded, a: Any) -> Any:
-    n, fl = len(a), plain.fl
-    L = [[mpq(0)] * n for _ in a]
-    for k in range(n):
-        column = []
-        for i in range(k, n):
-            s = a[i][k]
-            for j in range(k):
-                s = fl(s - fl(L[i][j] * L[k][j]))
-            column.append(s)
-        if column[0] <= 0:
-            raise ZeroDivisionError
-        L[k][k] = plain.root(column[0])
-        for i in range(k + 1, n):
-            L[i][k] = fl(column[i - k] / L[k][k])
+def _cholesky(plain: Numbers, a: Any) -> Any:
+    L = plain.cholesky(a, ZeroDivisionError)
+    if any(L[k][k] == 0 for k in range(len(L))):
+        raise ZeroDivisionError
     return [L]
 
 

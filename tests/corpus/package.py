@@ -37,8 +37,8 @@ from gpbnb.filters.nonlinear_run import opened
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums
 from gpbnb.filters.words import run_words
 from tests.corpus.draw import Fixed, Float, Format, Model
-from tests.plain_nonlinear import Coasting, Moving, Ranges, Turning
-from tests.plain_nonlinear import drawn as random_step
+from tests.plain_steps import Coasting, Moving, Ranges, Turning
+from tests.plain_steps import drawn as random_step
 from tests.step_functions import SYSTEMS
 
 Steps = Iterator[dict[str, Any]]

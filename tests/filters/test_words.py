@@ -12,7 +12,7 @@ from gpbnb import FixedFormat, LinearSystem
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, integers_of, run_words
-from tests.plain_structures import fixed, limited
+from tests.oracles import fixed, limited
 
 MODES = ["nearest", "even", "chop", "up", "down", "odd", "half up"]
 

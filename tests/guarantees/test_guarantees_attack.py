@@ -16,10 +16,9 @@ def test_no_run_of_a_linear_system_exceeds_its_bound(seed: int) -> None:
     assert not found.runs or found.largest > 0.02
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_no_run_of_a_kalman_filter_exceeds_its_bound(seed: int) -> None:
-    """Each takes seconds: a search for the worst run among hundreds, and the exact filter beside each."""
-    assert attack.kalman(seed).largest <= 1
+def test_no_run_of_a_kalman_filter_exceeds_its_bound() -> None:
+    """A seed whose loops test_guarantees_filters compiles, too; `make attack` takes others each day."""
+    assert 0.3 < attack.kalman(2).largest <= 1
 
 
 def test_a_bound_that_promises_too_much_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ import pytest
 from gpbnb.bounds.linear import error_coefficients
 from gpbnb.report.guarantees import comparison
 from gpbnb.report.guarantees.published import fixif_longitudinal
-from tests.plain_structures import floating
+from tests.oracles import floating
 
 
 def numbered():

@@ -9,7 +9,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from independent_filter import Arithmetic, ExactFilter, Filter, Refused
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
@@ -19,17 +18,19 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.guarantees import filters, scalar
 from gpbnb.report.guarantees.random_filters import DETERMINISTIC, KINDS, RANGES, Drawn, draw
+from tests.oracles import EXACT, rounds
+from tests.plain_filters import Filter, Refused
 
 
 def compared(drawn, steps, rng):
     """Run a filter without the package and with it, compare all numbers by ==, and return how the run ends."""
     fmt = drawn.fmt
     z = rng.standard_normal((steps, drawn.model.m)) * 10.0 ** rng.uniform(-2, 3)
-    mine = Arithmetic.of(fmt)
+    r = rounds(fmt)
     measured = [[Fraction(each) for each in row] for row in z.tolist()]
 
     def stored():
-        return Filter.of(drawn.model, mine, drawn.form), [[mine.store(each) for each in row] for row in measured]
+        return Filter.of(drawn.model, fmt, drawn.form), [[r(each) for each in row] for row in measured]
 
     try:
         run = Run(drawn.model, fmt, drawn.form, range(1, steps + 1))
@@ -52,8 +53,8 @@ def compared(drawn, steps, rng):
                 found.step(row)
             return "stopped"
         assert found.step(row) == run.exactly(run.X[k])[:, 0].tolist()
-        assert mine.values(found.U if drawn.form is Form.UD else found.P) == covariances[k]
-        assert mine.values(found.K) == gains[k]
+        assert covariances[k] == found.P
+        assert gains[k] == found.K
     return "equal"
 
 
@@ -110,15 +111,14 @@ def test_errors_are_those_of_filters_without_the_package(seed):
     compared_steps = 0
     for _, z in filters.inputs(drawn, found, np.random.default_rng(seed)):
         off, _ = filters.errors(drawn, z)
-        rounded = Filter.of(drawn.model, Arithmetic.of(drawn.fmt), drawn.form)
-        true = ExactFilter(rounded.model())
+        rounded = Filter.of(drawn.model, drawn.fmt, drawn.form)
+        true = Filter(rounded.model(), EXACT, "innovation")
         for k, row in enumerate(z[:25].tolist()):
-            measured = [rounded.fmt.value(rounded.fmt.store(Fraction(each))) for each in row]
+            measured = [rounded.numbers.r(Fraction(each)) for each in row]
             errors = [float(a - b) for a, b in zip(rounded.step(measured), true.step(measured), strict=True)]
             if k >= len(off):
-                assert any(
-                    abs(v) > X for v, X in zip(map(float, true.innovation), drawn.within.innovation, strict=True)
-                )
+                sizes = [abs(float(v)) for (v,) in true.innovation_found]
+                assert any(size > X for size, X in zip(sizes, drawn.within.innovation, strict=True))
                 break
             # Double-double has 31 digits, of which at most 10 cancel here.
             assert errors == pytest.approx(off[k].tolist(), rel=1e-12, abs=1e-20 * float(np.abs(found.bound).max()))
@@ -170,8 +170,8 @@ def test_the_worst_error_is_that_of_all_sequences():
     assert z == [Fraction(k, 8) for k in (-8, -7, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6, 7, 8)]
     largest = [0.0] * 3
     for sequence in product(z, repeat=3):
-        rounded = Filter.of(model, Arithmetic.of(fmt), Form.INNOVATION)
-        true = ExactFilter(rounded.model())
+        rounded = Filter.of(model, fmt, Form.INNOVATION)
+        true = Filter(rounded.model(), EXACT, "innovation")
         for k, each in enumerate(sequence):
             largest[k] = max(largest[k], abs(float(rounded.step([each])[0] - true.step([each])[0])))
     found = scalar.worst_error(given)
@@ -183,8 +183,8 @@ def test_the_worst_error_is_that_of_all_sequences():
 def test_the_worst_error_is_reached_and_within_the_bound(seed):
     given = scalar.draw(seed)
     found = scalar.worst_error(given)
-    rounded = Filter.of(given.model, Arithmetic.of(given.fmt), given.form)
-    true = ExactFilter(rounded.model())
+    rounded = Filter.of(given.model, given.fmt, given.form)
+    true = Filter(rounded.model(), EXACT, "innovation")
     for each in found.z.tolist():
         error = rounded.step([Fraction(each)])[0] - true.step([Fraction(each)])[0]
     assert abs(float(error)) == pytest.approx(found.error, rel=1e-12)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
-import oracles
 import pytest
 
 from gpbnb.arithmetic import linalg
@@ -15,6 +14,7 @@ from gpbnb.bounds import inverse as bounds
 from gpbnb.report.inversion import experiment, procedure, theory
 from gpbnb.report.inversion.procedure import Reading
 from gpbnb.sweeps import StoredTable
+from tests import oracles
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FMT = FloatFormat(2, 24)
@@ -28,8 +28,8 @@ class TestTrial:
     @pytest.mark.parametrize("fmt", [FMT, FloatFormat(10, 5), FloatFormat(16, 6, CHOP), FloatFormat(3, 9)], ids=str)
     @pytest.mark.parametrize("pivot", [False, True])
     def test_inverse_and_error(self, fmt, pivot):
-        slow = oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST)
-        exact = oracles.Arithmetic(fmt.base, 400, True)
+        slow = oracles.Numbers.of(fmt)
+        exact = oracles.Numbers(oracles.floating(fmt.base, 400, "nearest"))
         for n in (1, 2, 4):
             one = experiment.trial(fmt.array(draw("random", n)), pivot)
             a = one.matrix.to_fractions()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
-import oracles
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import procedure
 from gpbnb.report.inversion.procedure import FORMS, Reading
+from tests import oracles
 
 FORMATS = [FloatFormat(b, t, r) for b, t in ((2, 8), (3, 5), (10, 4), (16, 3)) for r in Rounding.documented()]
 each_format = pytest.mark.parametrize("fmt", FORMATS, ids=str)
@@ -35,7 +35,7 @@ def samples(fmt, sizes=(1, 2, 3, 5)):
 @each_format
 @each_pivoting
 def test_the_computation_is_that_of_the_slow_loops(fmt, pivot):
-    slow = oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is Rounding.NEAREST)
+    slow = oracles.Numbers.of(fmt)
     for a in samples(fmt):
         n = len(a)
         identity = [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]
@@ -52,7 +52,7 @@ def test_the_computation_is_that_of_the_slow_loops(fmt, pivot):
 
 @each_pivoting
 def test_each_stage_comes_from_the_one_before(pivot):
-    fl = oracles.Arithmetic(10, 4, True).fl
+    fl = oracles.floating(10, 4, "nearest")
     for a in samples(FOUR, (3, 5)):
         stages, rights, _ = procedure.reduce(a, pivot)
         n = len(a)

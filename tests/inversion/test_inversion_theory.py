@@ -6,7 +6,6 @@ from fractions import Fraction
 from functools import cache
 
 import numpy as np
-import oracles
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
@@ -14,6 +13,7 @@ from gpbnb.arithmetic.rational import column_sum_norm, exact, row_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import theory
 from gpbnb.report.inversion.theory import Reduction
+from tests import oracles
 
 BETA = Fraction(1, 2000)
 
@@ -77,9 +77,7 @@ def test_the_total_as_printed_and_corrected():
 def eliminated(base, precision, nearest, a, pivot):
     """Elimination and back substitution with every operation rounded, entry by entry: (45)-(90)."""
 
-    def fl(x):
-        return oracles.rounded(x, base, precision, nearest)
-
+    fl = oracles.floating(base, precision, "nearest" if nearest else "chop")
     n = len(a)
     now = [[fl(x) for x in row] for row in a]
     right = [[Fraction(i == j) for j in range(n)] for i in range(n)]

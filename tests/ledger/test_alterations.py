@@ -15,6 +15,7 @@ from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict
 from gpbnb.report.ledger.formula import Undefined, Words
 from gpbnb.report.ledger.statements import Statement, load_statements
+from gpbnb.report.ledger.stored import load_findings
 from gpbnb.report.rounding import experiment
 
 CHECKED = {key: checks for checks in TOPICS.values() for key in checks}
@@ -92,11 +93,8 @@ def in_order(statement):
     return {name: every[name] for name in (*exceptions, *others)}
 
 
-FINDINGS = {}
-
-
 def judged(statement):
-    """The finding on a statement; a copy of it in another document is not judged again."""
+    """The finding on a statement; that of a printed one is stored, and a copy of another is not judged again."""
     key = sameness(statement)
     if key not in FINDINGS:
         FINDINGS[key] = CHECKED[statement.id].run(statement)
@@ -142,6 +140,7 @@ def needed(statement):
 
 TAKEN = [each for each in STATEMENTS if each.form and CHECKED[each.id][each.id].takes_statement]
 """Statements with a form that their checks judge."""
+FINDINGS = {sameness(each): load_findings()[each.id] for each in TAKEN}
 FIRST = {sameness(each): each.id for each in reversed([*TAKEN, *CORRECTED])}
 for each in (TAKEN, CORRECTED):
     each.sort(key=lambda each: FIRST[sameness(each)])  # copies side by side, so that one process judges both

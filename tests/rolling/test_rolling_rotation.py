@@ -7,13 +7,13 @@ from fractions import Fraction
 
 import mpmath
 import numpy as np
-import oracles
 import pytest
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rolling import experiment, rotations, theory
+from tests import oracles
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = [
@@ -32,9 +32,7 @@ def exact_angle(n, period):
 
 
 def slow(fmt, period, steps):
-    def fl(x):
-        return oracles.rounded(x, fmt.base, fmt.precision, fmt.rounding is NEAREST)
-
+    fl = oracles.rounds(fmt)
     a, b = (fl(x) for x in exact_angle(1, period))
     c, s = Fraction(1), Fraction(0)
     for n in range(1, steps + 1):

@@ -8,7 +8,6 @@ from fractions import Fraction
 from functools import cache
 
 import numpy as np
-import oracles
 import pytest
 from flint import fmpq_mat
 
@@ -16,6 +15,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import experiment
+from tests import oracles
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FOUR = FloatFormat(10, 4)
@@ -100,7 +100,7 @@ def numbers(base, precision, exponents):
 
 def all_sums(base, precision, exponents, n, rounding):
     """Every tuple of n terms and its computed sum."""
-    fl = cache(lambda x: oracles.rounded(x, base, precision, rounding is NEAREST))
+    fl = cache(oracles.floating(base, precision, rounding.value))
     for terms in itertools.product(numbers(base, precision, exponents), repeat=n):
         total = terms[0]
         for term in terms[1:]:
@@ -161,7 +161,7 @@ def test_18_of_1984_is_reached_with_four_terms_and_exceeded_with_five(base, prec
 def test_products_and_quotients_of_all_significands(base, precision, n, rounding):
     """n factors, of which the last is also tried as a divisor."""
     fmt = FloatFormat(base, precision, rounding)
-    fl = cache(lambda x: oracles.rounded(x, base, precision, rounding is NEAREST))
+    fl = cache(oracles.floating(base, precision, rounding.value))
     digits = range(base ** (precision - 1), base**precision)
     strict = (1 + fmt.unit_roundoff) ** (n - 1) - 1
     largest = Fraction(0)
@@ -185,7 +185,7 @@ def test_products_and_quotients_of_all_significands(base, precision, n, rounding
 def test_inner_products_of_all_small_vectors(rounding):
     """(26) with chopping, and nβ|a||b| in both, over all vectors of three in two bits."""
     fmt = FloatFormat(2, 2, rounding)
-    fl = cache(lambda x: oracles.rounded(x, 2, 2, rounding is NEAREST))
+    fl = cache(oracles.floating(2, 2, rounding.value))
     # A product of two numbers of two bits is 4, 6 or 9 times a power of two, or zero.
     products = [Fraction(0), *(s * p * Fraction(2) ** e for p in (4, 6, 9) for e in (-2, -1, 0) for s in (1, -1))]
     largest = Fraction(0)

@@ -6,21 +6,21 @@ import math
 from fractions import Fraction
 
 import numpy as np
-import oracles
 import pytest
 
 from gpbnb.arithmetic.bounds import gamma_probabilistic
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import experiment
+from tests import oracles
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FOUR = FloatFormat(10, 4)
 SORTS = ("sum", "product", "dot", "matrix sum", "chain", "example")
 
 
-def arithmetic(fmt: FloatFormat) -> oracles.Arithmetic:
-    return oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST)
+def arithmetic(fmt: FloatFormat) -> oracles.Numbers:
+    return oracles.Numbers.of(fmt)
 
 
 def survey(sort):
@@ -40,23 +40,23 @@ def recomputed(sort, trial):
         case "product":
             value = Fraction(1)
             for x in inputs[0]:
-                value = fl.fl(value * x)
+                value = fl.r(value * x)
             for y in inputs[1]:
-                value = fl.fl(value / y)
+                value = fl.r(value / y)
             return value, math.prod(inputs[0]) / Fraction(math.prod(inputs[1]))
         case "dot":
             return fl.dot(*inputs), sum(a * b for a, b in zip(*inputs, strict=True))
         case "matrix sum":
             a, b = inputs
             true = [[p + q for p, q in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
-            return [[fl.fl(x) for x in row] for row in true], true
+            return [[fl.r(x) for x in row] for row in true], true
         case _:
             value, true = inputs[0], np.array(inputs[0], dtype=object)
             for matrix in inputs[1 : None if sort == "chain" else 3]:
-                value, true = fl.matmul(value, matrix), true @ np.array(matrix, dtype=object)
+                value, true = fl.times(value, matrix), true @ np.array(matrix, dtype=object)
             if sort == "example":
                 pairs = [zip(*rows, strict=True) for rows in zip(value, inputs[3], strict=True)]
-                value = [[fl.fl(p + q) for p, q in row] for row in pairs]
+                value = [[fl.r(p + q) for p, q in row] for row in pairs]
                 true = true + np.array(inputs[3], dtype=object)
             return value, true.tolist()
 

@@ -1,6 +1,6 @@
 """Bounds over a number of steps, for systems that keep their errors, against emulations that share no code with them.
 
-The emulations are plain loops over fractions, rounded by :mod:`tests.plain_structures`.
+The emulations are plain loops over fractions, rounded by :mod:`tests.oracles`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from gpbnb import FloatFormat, LinearModel, LinearSystem, guarantee, limits, req
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.bounds.system import output_errors
 from gpbnb.wordlength.required import judge
-from tests.plain_structures import floating
+from tests.oracles import floating
 
 TENTH = Fraction(1, 10)
 CLOCK = LinearSystem.sum(running=True, name="clock")

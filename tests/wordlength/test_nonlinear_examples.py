@@ -1,24 +1,23 @@
-"""The nonlinear examples, and the collapse of a variance in single precision, in integers of Python."""
+"""The nonlinear examples, and the collapse of a variance in single precision, in plain loops."""
 
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 
 import numpy as np
-from independent_filter import Arithmetic, transposed
 
 from gpbnb import FloatFormat, NonlinearModel, emulate
 from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.run import Run
 from gpbnb.wordlength import nonlinear_examples as examples
 from gpbnb.wordlength.examples import turns
+from tests.oracles import Numbers, floating, transposed, unit
 from tests.step_functions import tracked_motion, tracked_sight
 
 COLLAPSE = 1791
 """The step that the book names."""
 
-# -- the height channel, in integers ------------------------------------------------------------------------------
+# -- the height channel, in plain loops ------------------------------------------------------------------------------
 
 
 def outer(deviations):
@@ -45,21 +44,21 @@ def channel():
 
 def covariances(fmt, steps):
     """Yield the covariance after each step, and whether its variances and all pivots are positive."""
-    Phi, Q, P, R = (fmt.stored([list(map(Fraction, row)) for row in each.tolist()]) for each in channel())
-    H = fmt.unit(7)[4:6]
+    Phi, Q, P, R = (fmt.store(each.tolist()) for each in channel())
+    H = unit(7)[4:6]
     for k in range(steps):
-        P = fmt.sum(fmt.product(fmt.product(Phi, P), transposed(Phi)), Q)
+        P = fmt.plus(fmt.times(Phi, P, transposed(Phi)), Q)
         sound = True
         if k % 5 == 0:
-            VH = fmt.product(P, transposed(H))
-            S = fmt.sum(fmt.product(H, VH), R)
+            VH = fmt.times(P, transposed(H))
+            S = fmt.plus(fmt.times(H, VH), R)
             sound = fmt.has_positive_pivots(S)
-            K = fmt.product(VH, fmt.inverse(S))
-            P = fmt.product(fmt.difference(fmt.unit(7), fmt.product(K, H)), P)
-        yield P, sound and all(P[i][i][0] > 0 for i in range(7))
+            K = fmt.times(VH, fmt.inverse(S))
+            P = fmt.times(fmt.plus(unit(7), fmt.times(K, H), -1), P)
+        yield P, sound and all(P[i][i] > 0 for i in range(7))
 
 
-def test_the_collapse_is_that_of_plain_integers():
+def test_the_collapse_is_that_of_plain_loops():
     """The loops in Python take seconds: the variance is lost after 1,790 steps, not before."""
     run, double = (
         Run(examples.height_channel(), FloatFormat(2, bits), "innovation", (1, 700, COLLAPSE - 1, COLLAPSE))
@@ -69,10 +68,10 @@ def test_the_collapse_is_that_of_plain_integers():
         each.take(np.zeros((1800, 2)))
     assert (run.indefinite, double.indefinite) == (COLLAPSE, None)
     P = dict(zip((1, 700, COLLAPSE - 1, COLLAPSE), run.checkpoints().P.tolist(), strict=True))
-    lost, fmt = None, Arithmetic(2, 24)
+    lost, fmt = None, Numbers(floating(2, 24, "nearest"))
     for step, (plain, positive) in enumerate(covariances(fmt, COLLAPSE), start=1):
         if step in P:
-            assert P[step] == fmt.values(plain)
+            assert P[step] == plain
         lost = lost or (None if positive else step)
     assert lost == COLLAPSE
 
