@@ -3,6 +3,7 @@
 import csv
 import os
 import random
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from alterations import COMPARISON, altered
 
+from gpbnb.report.ledger import judge
 from gpbnb.report.ledger.checks import TOPICS, rounding
 from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict
@@ -39,12 +41,36 @@ def forget():
             getattr(value, "cache_clear", lambda: None)()
 
 
+def until_violated(stated, domain, mode="exact"):
+    """Judge a statement only up to the first instance that violates it: no check verifies it after that."""
+    violated = []
+
+    def held(parts, names, mode):
+        found = HELD(parts, names, mode)
+        violated.append(found[0] != names.get("holds", True))
+        return found
+
+    def instances():
+        for names in [domain] if isinstance(domain, Mapping) else domain:
+            yield names
+            if any(violated):
+                return
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "_held", held)
+        return JUDGE(stated, instances(), mode)
+
+
+HELD, JUDGE = judge._held, judge.judge
+
+
 @pytest.fixture(scope="module", autouse=True)
-def small_surveys():
+def fewer_trials():
     """Survey a third of the trials: fewer trials make it harder to reject a statement."""
     survey = experiment.survey.__wrapped__
     with pytest.MonkeyPatch.context() as patch:
         forget()
+        patch.setattr(judge, "judge", until_violated)
         patch.setattr(experiment, "survey", cache(lambda trial: survey(trial, repeats=3)))
         yield
     forget()

@@ -81,6 +81,13 @@ def _tree(text: str) -> ast.expr:
 
 
 @lru_cache(maxsize=4096)
+def _sides(relation: Relation) -> tuple[Relation, ...]:
+    text, tree = relation.text.replace("≈", " is "), relation.tree
+    nodes = (tree.left, *tree.comparators) if isinstance(tree, ast.Compare) else (tree,)
+    return tuple(Relation(ast.get_source_segment(text, node) or "") for node in nodes)
+
+
+@lru_cache(maxsize=4096)
 def _latex(relation: Relation) -> str:
     return typeset(relation.tree, 0)
 
@@ -99,9 +106,7 @@ class Relation:
     @property
     def sides(self) -> tuple[Relation, ...]:
         """The sides of the chain, each as a relation without a comparison."""
-        text, tree = self.text.replace("≈", " is "), self.tree
-        nodes = (tree.left, *tree.comparators) if isinstance(tree, ast.Compare) else (tree,)
-        return tuple(Relation(ast.get_source_segment(text, node) or "") for node in nodes)
+        return _sides(self)
 
     @property
     def equates(self) -> bool:
