@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.machine import Memory, Addresses, code_of, first_without_result, functions, is_far
+from gpbnb.arithmetic.machine import Addresses, Memory, code_of, first_without_result, functions, is_far
 
 
 class Loop:

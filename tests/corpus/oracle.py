@@ -14,7 +14,7 @@ from typing import Any
 from gmpy2 import mpq
 
 from tests import oracles, plain_filters, plain_steps, plain_structures
-from tests.corpus.draw import Fixed, Format, Model
+from tests.corpus.draw import Fixed, Float, Format, Model
 from tests.oracles import Numbers, elementary, exactly, floating, of_factors, root
 
 Steps = Iterator[dict[str, Any]]
