@@ -65,7 +65,8 @@ _ENCLOSURES: dict[str, Callable[..., Any]] = {
 _MOST_BITS = 1 << 16
 _LONGEST = 1 << 20  # bits of a rational power that is formed exactly; a longer one that is a tie is refused
 _FARTHEST = 1 << 25  # exponent of the largest and smallest result that is written out
-_DOUBT = 2.0**-48  # relative error that no float64 function of NumPy reaches: 16 units of the last digit or more
+# A relative error that no float64 function of NumPy reaches, 16 units of the last digit or more, in both directions.
+_DOUBTED = np.array([1 - 2.0**-48, 1 + 2.0**-48])
 _MOST_DIGITS = 44  # bits of a format for which such an interval seldom contains a tie
 _FEWEST = 2.0**-900  # sizes from here to its inverse are not rounded to fewer digits in float64
 
@@ -111,6 +112,8 @@ def elementary(name: str, *arrays: Any) -> Any:
 
 
 def _broadcast(arrays: tuple[Any, ...]) -> tuple[Any, ...]:
+    if len({each.shape for each in arrays}) == 1:
+        return arrays
     shape = np.broadcast_shapes(*(each.shape for each in arrays))
     return tuple(each if each.shape == shape else np.broadcast_to(each, shape) for each in arrays)
 
@@ -128,16 +131,19 @@ def _by_float64(name: str, *arrays: Any) -> tuple[Any, Any] | None:
         return None
     if not all(isinstance(x.backend, Floats) for x in arrays):
         return None
+    given = [x.components[0] for x in arrays]
     with np.errstate(all="ignore"):
-        y = np.asarray(getattr(np, name)(*(x.components[0] for x in arrays))) + 0.0  # no zero has a sign
-        doubt = 0.0 if name in _EXACT else _DOUBT
-        usual = (np.abs(y) >= _FEWEST) & (np.abs(y) <= 1 / _FEWEST)
-        y = np.where(usual | (doubt == 0), y, 1.0)
-        low, high = (fmt.backend.from_numbers(y * (1 + side * doubt), exactly=False) for side in (-1, 1))
-    if low is None or high is None:
+        y = np.asarray(getattr(np, name)(*given)) + 0.0  # no zero has a sign
+        ends, unusual = y[np.newaxis], np.zeros(y.shape, np.bool_)
+        if name not in _EXACT:
+            size = np.abs(y)
+            unusual = ~((size >= _FEWEST) & (size <= 1 / _FEWEST))
+            ends = np.multiply.outer(_DOUBTED, np.where(unusual, 1.0, y))
+        found = fmt.backend.from_numbers(ends, exactly=False)
+    if found is None:
         return None
-    result = arrays[0].from_components(fmt.backend, low, fmt)
-    return result, (low[0] != high[0]) | (~usual & (doubt > 0))
+    low, high = found[0][0], found[0][-1]
+    return arrays[0].from_components(fmt.backend, (low,), fmt), (low != high) | unusual
 
 
 def _by_arb(name: str, arrays: Any, indices: Iterable[tuple[int, ...]]) -> Any:

@@ -86,6 +86,7 @@ class InLoops:
         self._values = np.zeros((values, *parts), self._backend.dtype)
         self._truths = np.zeros((truths, *parts[:1]), np.uint8)
         self._truths[1] = 1
+        self._memory = machine.Memory(self._values, self._truths)
         constants = [each.rounded(formats[0]) for each in tape.all_constants]
         self._array = type(constants[0])
         places = (np.array(each.places, np.int64) for each in tape.all_constants)
@@ -124,7 +125,7 @@ class InLoops:
     def run(self, ready: list[Any]) -> bool:
         """Run operations and calls; return whether the machine holds every result."""
         for code, count, call in ready:
-            if count and machine.evaluate(self._kind, self._tables, code, self._values, self._truths) < count:
+            if count and machine.evaluate_in(self._memory, self._kind, self._tables, code) < count:
                 return False
             if call is not None:
                 fmt = self._formats[0]

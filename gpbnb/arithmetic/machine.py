@@ -326,7 +326,7 @@ def is_far(numbers: NDArray[Any]) -> bool:
     from gpbnb.arithmetic.kernels import machine
 
     sizes = np.abs(numbers)
-    return bool(np.any((sizes < machine.LEAST) & (sizes > 0)) or np.any(sizes > 1 / machine.LEAST))
+    return bool((((sizes < machine.LEAST) & (sizes > 0)) | (sizes > 1 / machine.LEAST)).any())
 
 
 def functions(kind: Any, far: bool, alone: bool) -> Iterator[int]:
@@ -348,10 +348,14 @@ def functions(kind: Any, far: bool, alone: bool) -> Iterator[int]:
 
 def evaluate(kind: Any, formats: Any, code: Any, values: NDArray[Any], truths: NDArray[np.uint8]) -> int:
     """Run operations once for each lane; return how many have results, 0 if the machine does not tell."""
+    return evaluate_in(Memory(values, truths), kind, formats, code)
+
+
+def evaluate_in(memory: Memory, kind: Any, formats: Any, code: Any) -> int:
+    """Run operations as :func:`evaluate` does, on numbers that stay where they are."""
     from gpbnb.arithmetic.kernels import machine
 
-    far = isinstance(kind, machine.Quick) and is_far(values)
-    return _once(kind, formats, code, Memory(values, truths), far)
+    return _once(kind, formats, code, memory, isinstance(kind, machine.Quick) and is_far(memory.values))
 
 
 def _once(kind: Any, formats: Any, code: Any, memory: Memory, far: bool) -> int:
