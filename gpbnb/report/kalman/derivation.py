@@ -84,7 +84,6 @@ def second_coefficient(c: sp.Expr = C, d: sp.Expr = D, g: sp.Expr = sp.S.Zero, s
 
 ONCE = (6 * N + 3 * M + 5, 4 * N + 3 * M + 4)
 TWICE = (ONCE[0] + N + 1, ONCE[1] + 1)
-GROWTH = 3 * N + M + 2
 
 
 # -- the contraction bound --------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple, cast, get_type_hints
 
@@ -38,16 +39,6 @@ REPEATS = 34
 
 STEPS = 32
 """Steps of a trial."""
-
-
-class Task(NamedTuple):
-    """One trial: a random model of a kind, and a filter."""
-
-    kind: str
-    fmt: FloatFormat
-    form: Form
-    seed: int
-    steps: int
 
 
 class Summary(NamedTuple):
@@ -125,22 +116,22 @@ def _short(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([float(f"{value:.6g}") for value in values.flat]).reshape(values.shape)
 
 
-def trial(task: Task) -> Summary:
-    """Draw the model and the measurements of a task, run the filter, and compare it with its bounds."""
-    rng = np.random.default_rng([task.seed, KINDS.index(task.kind)])
-    model, size = random_model(rng, task.kind)
-    z = _short(size * rng.standard_normal((task.steps, model.m)))
-    z = np.abs(z) if task.kind == "one sign" else z
-    found = emulate_with_bound(model, z, task.fmt, task.form, range(1, task.steps + 1))
+def trial(kind: str, fmt: FloatFormat, form: Form, seed: int, steps: int = STEPS) -> Summary:
+    """Draw a model of a kind and its measurements, run the filter, and compare it with its bounds."""
+    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    model, size = random_model(rng, kind)
+    z = _short(size * rng.standard_normal((steps, model.m)))
+    z = np.abs(z) if kind == "one sign" else z
+    found = emulate_with_bound(model, z, fmt, form, range(1, steps + 1))
     ratios, history = found.ratios(), found.history
     state, gain, covariance = (float(each) for each in (ratios.max(axis=0, initial=0.0) if len(ratios) else (0, 0, 0)))
-    last = float(ratios[-1, 0]) if len(ratios) == task.steps else 0.0  # 0 if the bound is infinite
-    of_covariance, of_gain, of_state = printed_ratios(found, task)
+    last = float(ratios[-1, 0]) if len(ratios) == steps else 0.0  # 0 if the bound is infinite
+    of_covariance, of_gain, of_state = printed_ratios(found, float(fmt.unit_roundoff))
     return Summary(
-        kind=task.kind,
-        form=task.form.name.lower(),
+        kind=kind,
+        form=form.name.lower(),
         trials=1,
-        steps_bounded=float(np.isfinite(found.state).all(axis=1).sum() / task.steps),
+        steps_bounded=float(np.isfinite(found.state).all(axis=1).sum() / steps),
         contraction_violations=int(not all(ratio <= 1 for ratio in (state, gain, covariance))),
         state=state,
         gain=gain,
@@ -157,9 +148,9 @@ def trial(task: Task) -> Summary:
     )
 
 
-def printed_ratios(found: BoundedHistory, task: Task) -> tuple[float, float, float]:
+def printed_ratios(found: BoundedHistory, beta: float) -> tuple[float, float, float]:
     """Return the largest error / bound for (105) and (108) over all entries and steps, and for (125) over all steps."""
-    history, beta = found.history, float(task.fmt.unit_roundoff)
+    history = found.history
     c = len(history.steps)
     if not c:
         return 0.0, 0.0, 0.0
@@ -168,14 +159,14 @@ def printed_ratios(found: BoundedHistory, task: Task) -> tuple[float, float, flo
     with np.errstate(divide="ignore", invalid="ignore"):
         covariance = np.abs(history.covariance) / (report_bounds.covariance_count(n, m) * beta * np.abs(P))
         gain = np.abs(history.gain) / (report_bounds.gain_count(n, m) * beta * np.abs(K))
-        return _largest(covariance), _largest(gain), _largest(history.state_norm / _printed_state(found, task, x, K))
+        return _largest(covariance), _largest(gain), _largest(history.state_norm / _printed_state(found, beta, x, K))
 
 
 def _printed_state(
-    found: BoundedHistory, task: Task, x: NDArray[np.float64], K: NDArray[np.float64]
+    found: BoundedHistory, beta: float, x: NDArray[np.float64], K: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Evaluate (125) as printed after each step, with the least B of (122)."""
-    model, beta = cast(LinearModel, found.history.model), float(task.fmt.unit_roundoff)
+    model = cast(LinearModel, found.history.model)
     given = model.to_float()
     bounds, F, u = np.empty(len(x)), 0.0, 0.0
     for k in range(len(x)):
@@ -193,20 +184,6 @@ def _printed_state(
 def _largest(ratios: NDArray[np.float64]) -> float:
     """Return the largest of some ratios, where 0/0 is not a violation."""
     return float(np.nan_to_num(ratios, nan=0.0, posinf=np.inf).max(initial=0.0))
-
-
-# -- sweeps -------------------------------------------------------------------------------------------
-
-
-def tasks(repeats: int, steps: int = STEPS, first_seed: int = 0) -> tuple[Task, ...]:
-    """List every kind, format and form, `repeats` times."""
-    return tuple(
-        Task(kind, fmt, form, seed, steps)
-        for seed in range(first_seed, first_seed + repeats)
-        for kind in KINDS
-        for fmt in FORMATS
-        for form in Form
-    )
 
 
 # -- what was found -----------------------------------------------------------------------------------
@@ -255,7 +232,7 @@ COLUMNS = (Column("seed", "integer", 0), *(_column(*each) for each in get_type_h
 
 def trials_of_seed(seed: int, directory: Path | None = None) -> list[tuple[str, ...]]:
     """Return the rows for one seed of the random filters."""
-    return lines(seed, [trial(task) for task in tasks(1, first_seed=seed)])
+    return lines(seed, [trial(kind, fmt, form, seed) for kind, fmt, form in product(KINDS, FORMATS, Form)])
 
 
 SWEEP: Sweep[int] = Sweep(

@@ -12,21 +12,19 @@ from gpbnb.filters.steps import gain, predicted, reduction
 
 
 class ExactStep(NamedTuple):
-    """One exact step; object arrays of Fractions."""
+    r"""One exact step; object arrays of Fractions.
 
-    #: (n,), the estimate (98).
+    x (n,) is the estimate (98), P its covariance (101), `predicted` the covariance (100), `gain` (n, m) is (99),
+    `innovation` is :math:`z - H\Phi x`, (m,), with the covariance :math:`HP_pH^T + R`, and `transition` the closed loop
+    (109).
+    """
+
     x: NDArray[Any]
-    #: (n, n), its covariance (101).
     P: NDArray[Any]
-    #: (n, n), the predicted covariance (100).
     predicted: NDArray[Any]
-    #: (n, m), the gain (99).
     gain: NDArray[Any]
-    #: (m, m), :math:`HP_pH^T + R`.
     innovation_covariance: NDArray[Any]
-    #: (m,), :math:`z - H\Phi x`.
     innovation: NDArray[Any]
-    #: (n, n), the closed loop (109).
     transition: NDArray[Any]
 
 

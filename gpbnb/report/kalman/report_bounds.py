@@ -13,11 +13,8 @@ from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gpbnb.arithmetic.formats import prints_as
-from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
+from gpbnb.arithmetic.rational import column_sum_norm, max_norm
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import smallest_precision
 
@@ -47,26 +44,6 @@ def transition_count(n: int, m: int) -> int:
 def input_count(n: int, m: int) -> int:
     """Count the roundings of the input of a step, including its addition, 4n + 3m + 4; hung1984, ch. II, (116)."""
     return 4 * n + 3 * m + 4
-
-
-def printed_covariance_bound(P: Any, m: int, beta: Fraction) -> NDArray[Any]:
-    r"""Bound entry by entry, :math:`(3n+m+2)\beta\,|P_k|`; hung1984, ch. II, (105).
-
-    Parameters
-    ----------
-    P : (n, n), the exact covariance after the step.
-    m : number of measurements.
-    beta : unit roundoff β.
-    """
-    entries: Any = exact(P)
-    return np.asarray(covariance_count(entries.shape[0], m) * beta * abs(entries))
-
-
-def printed_gain_bound(K: Any, beta: Fraction) -> NDArray[Any]:
-    r"""Bound entry by entry, :math:`(4n+2m+3)\beta\,|K_k|`; hung1984, ch. II, (108). K : (n, m), the exact gain."""
-    entries: Any = exact(K)
-    n, m = entries.shape
-    return np.asarray(gain_count(n, m) * beta * abs(entries))
 
 
 class Coefficients(NamedTuple):
@@ -137,31 +114,10 @@ def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fr
     return u * max(Fraction(1), F ** (len(inputs) - 1))
 
 
-def state_bound(
-    x_norm: Fraction,
-    B: Fraction,
-    beta: Fraction,
-    counts: Coefficients,
-) -> Fraction:
-    r"""Return :math:`\beta\{a\|x_k\| + bB\}`, (a, b) from :func:`coefficients`; as printed, hung1984, ch. II, (125)."""
-    return beta * (counts.first * x_norm + counts.second * B)
-
-
 def precision_for_coefficient(
     coefficient: int | Fraction, tolerance: Fraction | int = 1, base: int = 10, rounding: Rounding = Rounding.NEAREST
 ) -> int:
-    r"""Smallest t with :math:`\text{coefficient}\cdot\beta(t) \le \text{tolerance}`.
-
-    Parameters
-    ----------
-    coefficient : the factor of β.
-    tolerance : the allowed error, in the same units.
-    base, rounding : base and rounding of the format.
-
-    References
-    ----------
-    hung1984, ch. II, (8), (13) and the example of section 12.
-    """
+    r"""Return the smallest t with :math:`\text{coefficient}\cdot\beta(t) \le \text{tolerance}`; (8), (13)."""
     if coefficient <= 0 or tolerance <= 0:
         raise ValueError(f"got coefficient {coefficient} and tolerance {tolerance}; needed both positive")
     found = smallest_precision(lambda fmt: coefficient * fmt.unit_roundoff <= tolerance, base, rounding, monotone=True)
@@ -189,14 +145,8 @@ PRINTED = {
 def example_digits(tolerance: Fraction) -> dict[str, float]:
     """Return the decimal digits that the closing example demands, from its first number to a corrected formula.
 
-    Parameters
-    ----------
-    tolerance : relative error that is allowed in place of one as large as the state.
-
-    Returns
-    -------
-    digits : each change of the formula → digits t with coefficient · 0.5 × 10^(1-t) equal to the allowed error; in the
-        order in which the changes are made, each together with those before it.
+    They are those t at which coefficient · 0.5 × 10^(1-t) equals the allowed error: first one as large as the state,
+    then the relative error `tolerance`. Each change is made together with those before it.
     """
     formula = coefficients(*EXAMPLE)
     demanded: dict[str, Fraction] = {
@@ -211,16 +161,7 @@ def example_digits(tolerance: Fraction) -> dict[str, float]:
 
 
 def written_changes(digits: Mapping[str, float]) -> dict[str, tuple[str, str]]:
-    """Write digits and their changes to two decimals, so that a reader can add the changes up.
-
-    Parameters
-    ----------
-    digits : as :func:`example_digits` returns them.
-
-    Returns
-    -------
-    written : for each name, the digits and their change since the name before, which is empty for the first.
-    """
+    """Write digits, and their changes since the name before, to two decimals, so that a reader can add them up."""
     rounded = {name: round(count, 2) for name, count in digits.items()}
     changes = [f"{after - before:+.2f}".replace("-", "−") for before, after in pairwise(rounded.values())]
     return {
@@ -235,19 +176,10 @@ def one_digit_misprints(k: int, n: int, m: int, printed: str) -> list[tuple[int,
     return [(a, b, c) for a, b, c in changed if prints_as(k * (a * n + b * m + c), printed)]
 
 
-def dependencies(second: bool) -> dict[str, set[str]]:
-    """List which of (98)-(101) each of them needs, with the first or the second form of (99)."""
-    return {
-        "(100)": set(),
-        "(99)": {"(101)"} if second else {"(100)"},
-        "(101)": {"(99)", "(100)"},
-        "(98)": {"(99)"},
-    }
-
-
 def order(second: bool) -> tuple[str, ...] | None:
-    """Return an order in which (98)-(101) can be computed, or None."""
+    """Return an order in which (98)-(101) can be computed with the first or the second form of (99), or None."""
+    needs = {"(100)": [], "(99)": ["(101)" if second else "(100)"], "(101)": ["(99)", "(100)"], "(98)": ["(99)"]}
     try:
-        return tuple(TopologicalSorter(dependencies(second)).static_order())
+        return tuple(TopologicalSorter(needs).static_order())
     except CycleError:
         return None

@@ -7,7 +7,7 @@ oracle.
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,12 +109,12 @@ def ratios(fmt: FloatFormat, case: FilterCase, second: bool = False, steps: int 
         exactly = exactly._replace(x=true.x, P=true.P)
         transitions.append(true.transition)
         inputs.append(true.gain @ case.z)
-    beta, (n, m) = fmt.unit_roundoff, true.gain.shape
-    B = report_bounds.printed_input_bound(transitions, inputs)
-    bound = report_bounds.state_bound(max_norm(true.x), B, beta, report_bounds.coefficients(steps, n, m))
+    (n, m), beta = true.gain.shape, cast(Any, fmt.unit_roundoff)
+    first, second = report_bounds.coefficients(steps, n, m)
+    bound = beta * (first * max_norm(true.x) + second * report_bounds.printed_input_bound(transitions, inputs))
     return Ratios(
-        _worst(P - true.P, report_bounds.printed_covariance_bound(true.P, m, beta)),
-        _worst(K - true.gain, report_bounds.printed_gain_bound(true.gain, beta)),
+        _worst(P - true.P, report_bounds.covariance_count(n, m) * beta * abs(true.P)),
+        _worst(K - true.gain, report_bounds.gain_count(n, m) * beta * abs(true.gain)),
         _worst(exact([max_norm(x - true.x)]), exact([bound])),
     )
 

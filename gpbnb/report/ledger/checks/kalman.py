@@ -367,7 +367,8 @@ def dependence() -> Names:
     def value(
         k: int = 3, n: int = 2, m: int = 1, x: int = 1, B: int = 1, beta: Fraction = FOUR.unit_roundoff
     ) -> Fraction:
-        return report_bounds.state_bound(Fraction(x), Fraction(B), beta, report_bounds.coefficients(k, n, m))
+        first, second = report_bounds.coefficients(k, n, m)
+        return beta * (first * x + second * B)
 
     others = [value(k=4), value(n=3), value(m=2), value(x=2), value(B=2), value(beta=FOUR.unit_roundoff * 2)]
     grows = all(other > value() for other in others)
