@@ -61,6 +61,7 @@ def storable_cycles(numbers, Q, R, P0):
 # -- filters ----------------------------------------------------------------------------------------------------------
 
 BLOCKS = ("state", "gain", "covariance", "innovation")
+ROOTS = ("potter", "carlson")
 
 
 class Updates:
@@ -73,7 +74,11 @@ class Updates:
     def predicted(self, P, F, Q):
         p = self.covariance
         F, Q = p.store(F), p.store(Q)
-        return self.thornton(P, F, Q) if self.form == "ud" else p.plus(p.times(F, P, transposed(F)), Q)
+        if self.form == "ud":
+            return self.thornton(P, F, Q)
+        if self.form in ROOTS:
+            return triangle(p, [a + b for a, b in zip(p.times(F, P), Q, strict=True)])
+        return p.plus(p.times(F, P, transposed(F)), Q)
 
     def updated(self, V, H, R):
         """The gain and the covariance."""
@@ -108,32 +113,68 @@ class Updates:
                 W[i] = [r(a - r(s * b)) for a, b in zip(W[i], W[j], strict=True)]
         return found
 
-    def bierman(self, x, U, H, UR, z):
-        """Bierman 1977: estimate, factors and gain after one measurement after the other."""
-        t, s, p, g = (each.r for each in (self.state, self.innovation, self.covariance, self.gain))
-        n, x, U, columns = len(U), list(x), [list(row) for row in U], []
+    def observed(self, x, P, H, UR, z):
+        """Estimate, factors or root, and gain after one decorrelated measurement after the other."""
+        observe = {"ud": self.bierman, "potter": self.potter, "carlson": self.carlson}[self.form]
         values = decorrelated(self.state, UR, [[each] for each in z])
-        rows, UR = decorrelated(self.innovation, UR, self.innovation.store(H)), self.innovation.store(UR)
+        rows, UR, columns = decorrelated(self.innovation, UR, self.innovation.store(H)), self.innovation.store(UR), []
         for i, (h, (y,)) in enumerate(zip(rows, values, strict=True)):
-            for j in range(n):
-                y = t(y - t(t(h[j]) * x[j]))
-            f = [s(summed(s, [s(U[k][j]) for k in range(j)], h[:j]) + h[j]) for j in range(n)]
-            v = [s(s(U[j][j]) * f[j]) for j in range(n)]
-            a, K = UR[i][i], [ZERO] * n
-            for j in range(n):
-                if v[j]:
-                    before, a = a, s(a + s(f[j] * v[j]))
-                    U[j][j] = p(p(U[j][j] * p(before)) / p(a))
-                    factor = -p(p(f[j]) / p(before))
-                    for k in range(j):
-                        u = U[k][j]
-                        U[k][j] = p(u + p(factor * p(K[k])))
-                        K[k] = g(K[k] + g(g(v[j]) * g(u)))
-                K[j] = g(v[j])
-            K = [g(each / g(a)) for each in K]
-            x = [t(each + t(t(k) * y)) for each, k in zip(x, K, strict=True)]
+            x, P, K = observe(h, y, UR[i][i], x, P)
             columns.append(K)
-        return x, U, transposed(columns)
+        return x, P, transposed(columns)
+
+    def bierman(self, h, y, a, x, U):
+        """Bierman 1977: the update of factors by a measurement with the variance a."""
+        t, s, p, g = (each.r for each in (self.state, self.innovation, self.covariance, self.gain))
+        n, U = len(U), [list(row) for row in U]
+        for j in range(n):
+            y = t(y - t(t(h[j]) * x[j]))
+        f = [s(summed(s, [s(U[k][j]) for k in range(j)], h[:j]) + h[j]) for j in range(n)]
+        v = [s(s(U[j][j]) * f[j]) for j in range(n)]
+        K = [ZERO] * n
+        for j in range(n):
+            if v[j]:
+                before, a = a, s(a + s(f[j] * v[j]))
+                U[j][j] = p(p(U[j][j] * p(before)) / p(a))
+                factor = -p(p(f[j]) / p(before))
+                for k in range(j):
+                    u = U[k][j]
+                    U[k][j] = p(u + p(factor * p(K[k])))
+                    K[k] = g(K[k] + g(g(v[j]) * g(u)))
+            K[j] = g(v[j])
+        K = [g(each / g(a)) for each in K]
+        return [t(each + t(t(k) * y)) for each, k in zip(x, K, strict=True)], U, K
+
+    def potter(self, h, y, variance, x, S):
+        """Potter 1963: the update of a square root."""
+        numbers, r = self.numbers, self.numbers.r
+        f = [numbers.dot(column, h) for column in transposed(S)]
+        a, Sf = r(numbers.dot(f, f) + variance), [numbers.dot(row, f) for row in S]
+        scale = r(a + numbers.root(r(variance * a)))
+        S = [[r(b - r(r(c / scale) * d)) for b, d in zip(row, f, strict=True)] for row, c in zip(S, Sf, strict=True)]
+        K = [r(each / a) for each in Sf]
+        return self.moved(x, K, h, y), S, K
+
+    def carlson(self, h, y, a, x, S):
+        """Carlson 1973: the update of an upper triangular root."""
+        numbers, r, n = self.numbers, self.numbers.r, len(x)
+        f = [numbers.dot(column, h) for column in transposed(S)]
+        k, new = [ZERO] * n, [list(row) for row in S]
+        for j in range(n):
+            if f[j]:
+                before, a = a, r(a + r(f[j] * f[j]))
+                p, q = numbers.root(r(before / a)), r(f[j] / numbers.root(r(before * a)))
+                for i in range(n):
+                    new[i][j] = r(r(p * S[i][j]) - r(q * k[i]))
+                    k[i] = r(k[i] + r(f[j] * S[i][j]))
+        K = [r(each / a) for each in k]
+        return self.moved(x, K, h, y), new, K
+
+    def moved(self, x, K, h, y):
+        """The estimate after a measurement."""
+        r = self.numbers.r
+        y = r(y - self.numbers.dot(h, x))
+        return [r(each + r(k * y)) for each, k in zip(x, K, strict=True)]
 
 
 def decorrelated(numbers, UR, A):
@@ -145,13 +186,33 @@ def decorrelated(numbers, UR, A):
     return C
 
 
+def root_of(numbers, U):
+    """The upper triangular root of U D U'."""
+    return [[numbers.r(a * numbers.root(U[j][j])) for j, a in enumerate(row)] for row in with_units(U)]
+
+
+def triangle(numbers, W):
+    """The upper triangle T of W = T times orthonormal rows, by modified Gram-Schmidt from the last row on."""
+    W, n, r = [list(row) for row in W], len(W), numbers.r
+    T = [[ZERO] * n for _ in range(n)]
+    for j in range(n - 1, -1, -1):
+        T[j][j] = size = numbers.root(numbers.dot(W[j], W[j]))
+        if size:
+            direction = [r(value / size) for value in W[j]]
+            for i in range(j):
+                T[i][j] = s = numbers.dot(W[i], direction)
+                W[i] = [r(a - r(s * b)) for a, b in zip(W[i], direction, strict=True)]
+    return T
+
+
 class Filter(Updates):
     """A filter as a user runs it: the model as given, stored, and every operation rounded.
 
     Parameters
     ----------
-    model : cycles of Phi, H, Q and R, then x0 and P0; exact. It is stored as `numbers`.
-    form : "Hung", "Hung second gain", "innovation", "Joseph", "symmetrized" or "UD".
+    model : cycles of Phi, H, Q and R, then x0, P0, and cycles of B, u, b and d by their letters; exact. It is stored
+        as `numbers`.
+    form : "Hung", "Hung second gain", "innovation", "Joseph", "symmetrized", "UD", "Potter" or "Carlson".
     blocks : other numbers by the name of a block.
     compensated : whether the error of adding to the estimate is carried over.
 
@@ -166,7 +227,11 @@ class Filter(Updates):
         Q, R, P0 = storable_cycles(numbers, Q, R, P0)
         self.Phi, self.H, self.Q, self.R = ([numbers.store(each) for each in cycle] for cycle in (Phi, H, Q, R))
         self.x, self.P = self.state.store(numbers.store([[each] for each in x0])), numbers.store(P0)
-        self.stored, self.steps, self.K = (self.x, self.P), 0, []
+        self.stored, self.steps, self.K = (self.x, self.P, self.Q, self.R), 0, []
+        self.known = {
+            letter: [numbers.store(each if letter == "B" else [[a] for a in each]) for each in cycle]
+            for letter, cycle in (model[6] if len(model) > 6 else {}).items()
+        }
         self.increments, self.carried = [], [[ZERO] for _ in x0] if compensated else None
         if compensated:
             self.increments = [numbers.store(EXACT.plus(each, unit(len(each)), -1)) for each in Phi]
@@ -174,17 +239,18 @@ class Filter(Updates):
             if not all(map(numbers.has_positive_pivots, self.R)):
                 raise Refused
             self.RI = [numbers.inverse(each) for each in self.R]
-        if self.form == "ud":
-            self.noise = self._factored(Q, self.Q), self._factored(R, self.R)
+        self.factored = self.form in ("ud", *ROOTS)
+        if self.factored:
+            self.Q, self.R = self._factored(Q, self.Q), self._factored(R, self.R)
             (self.P,) = self._factored([P0], [self.P])
+        if self.form in ROOTS:
+            self.Q, self.P = [root_of(numbers, each) for each in self.Q], root_of(numbers, self.P)
         self.P = self.covariance.store(self.P)
 
     @classmethod
     def of(cls, given, fmt, form):
         """The filter of a model, in a format and a form of the package."""
-        cycles = ([each.tolist() for each in getattr(given, letter)] for letter in ("Phi", "H", "Q", "R"))
-        model = (*cycles, given.x0.tolist(), given.P0.tolist())
-        return cls(model, Numbers.of(fmt), form.name.lower().replace("_", " "))
+        return cls(model_of(given), Numbers.of(fmt), form.name.lower().replace("_", " "))
 
     def _factored(self, cycle, stored):
         """Factors of all members; if some are indefinite, all variances as given are raised until none are."""
@@ -199,21 +265,24 @@ class Filter(Updates):
 
     def model(self):
         """The model that was stored; variances raised for factors are not in it."""
-        x, P = self.stored
-        return self.Phi, self.H, self.Q, self.R, [row[0] for row in x], P
+        x, P, Q, R = self.stored
+        return self.Phi, self.H, Q, R, [row[0] for row in x], P
 
     def step(self, z):
         """Take a step with measurements, which are stored first, and return the estimate."""
         k, t, g = self.steps, self.state, self.gain
         Phi, H, Q, R = (cycle[k % len(cycle)] for cycle in (self.Phi, self.H, self.Q, self.R))
         z, F, self.steps = t.store([[each] for each in z]), t.store(Phi), k + 1
-        if self.form == "ud":
-            UQ, UR = (cycle[k % len(cycle)] for cycle in self.noise)
-            V, x = self.predicted(self.P, Phi, UQ), [row[0] for row in t.times(F, self.x)]
-            x, self.P, self.K = self.bierman(x, V, H, UR, [row[0] for row in z])
+        if "d" in self.known:
+            z = t.plus(z, self.now("d"), -1)
+        V = self.predicted(self.P, Phi, Q)
+        if self.factored:
+            x, self.P, self.K = self.observed(
+                [a for (a,) in self.with_inputs(t.times(F, self.x))], V, H, R, [a for (a,) in z]
+            )
             self.x = [[each] for each in x]
             return x
-        K, self.P = self.updated(self.predicted(self.P, Phi, Q), H, R)
+        K, self.P = self.updated(V, H, R)
         if self.form == "hung second gain":
             K = g.times(g.store(self.P), transposed(g.store(H)), g.store(self.RI[k % len(self.RI)]))
         self.K, own = K, t.store(K)
@@ -221,16 +290,34 @@ class Filter(Updates):
             loop = t.times(t.store(self.reduction(K, H)), F)
             self.x = t.plus(t.times(loop, self.x), t.times(own, z))
         elif self.carried is None:
-            ahead = t.times(F, self.x)
+            ahead = self.with_inputs(t.times(F, self.x))
             self.innovation_found = t.plus(z, t.times(t.store(H), ahead), -1)
             self.x = t.plus(ahead, t.times(own, self.innovation_found))
         else:
-            before, d = self.x, t.times(self.increments[k % len(self.increments)], self.x)
+            before, d = self.x, self.with_inputs(t.times(self.increments[k % len(self.increments)], self.x))
             innovation = t.plus(z, t.times(H, t.plus(before, d)), -1)
             d = t.plus(t.plus(d, t.times(own, innovation)), self.carried, -1)
             self.x = t.plus(before, d)
             self.carried = t.plus(t.plus(self.x, before, -1), d, -1)
         return [row[0] for row in self.x]
+
+    def now(self, letter):
+        cycle = self.known[letter]
+        return cycle[(self.steps - 1) % len(cycle)]
+
+    def with_inputs(self, x):
+        if "B" in self.known:
+            x = self.state.plus(x, self.state.times(self.now("B"), self.now("u")))
+        return self.state.plus(x, self.now("b")) if "b" in self.known else x
+
+
+def model_of(given):
+    """A model of the package in plain lists, with its known inputs."""
+    cycles = ([each.tolist() for each in getattr(given, letter)] for letter in ("Phi", "H", "Q", "R"))
+    known = {letter: each.tolist() for letter in "Bubd" if (each := getattr(given, letter)) is not None}
+    if "u" in known and given.u.ndim == 1:
+        known["u"] = [known["u"]]
+    return (*cycles, given.x0.tolist(), given.P0.tolist(), known)
 
 
 class Extended(Updates):
@@ -246,8 +333,10 @@ class Extended(Updates):
         super().__init__(numbers, form, blocks)
         self.motion, self.sight, self.iterations, self.angle = motion, sight, iterations, angle
         Q, R, x0, P0 = given
-        stored = numbers.exact_factors if self.form == "ud" else numbers.store
-        self.noise, self.steps = (list(map(stored, Q)), list(map(stored, R))), 0
+        self.factored = self.form in ("ud", *ROOTS)
+        of_noise = numbers.exact_factors if self.factored else numbers.store
+        stored = (lambda A: root_of(numbers, of_noise(A))) if self.form in ROOTS else of_noise
+        self.noise, self.steps = (list(map(stored, Q)), list(map(of_noise, R))), 0
         self.P = self.covariance.store(stored(P0))
         self.x = [self.state.r(a) for (a,) in numbers.store([[each] for each in x0])]
 
@@ -263,8 +352,8 @@ class Extended(Updates):
             if i:
                 moved = t.times(H, [[r(a - b)] for a, b in zip(ahead, x, strict=True)])
                 y = [r(a - b) for a, (b,) in zip(y, moved, strict=True)]
-            if self.form == "ud":
-                change, P, _ = self.bierman([ZERO] * len(x), V, H, R, y)
+            if self.factored:
+                change, P, _ = self.observed([ZERO] * len(x), V, H, R, y)
             else:
                 K, P = self.updated(V, H, R)
                 change = [a for (a,) in t.times(t.store(K), [[a] for a in y])]
@@ -344,58 +433,20 @@ def _by_covariances(model, numbers, z, form):
     return found
 
 
-def _root_of(numbers, M):
-    U, n = numbers.exact_factors(M), len(M)
-    W = with_units(U)
-    return [[numbers.r(W[i][j] * numbers.root(U[j][j])) for j in range(n)] for i in range(n)]
-
-
-def _triangle(numbers, W):
-    """The upper triangle T of W = T times orthonormal rows, by modified Gram-Schmidt from the last row on."""
-    W, n, r = [list(row) for row in W], len(W), numbers.r
-    T = [[ZERO] * n for _ in range(n)]
-    for j in range(n - 1, -1, -1):
-        T[j][j] = size = numbers.root(numbers.dot(W[j], W[j]))
-        if size:
-            direction = [r(value / size) for value in W[j]]
-            for i in range(j):
-                T[i][j] = s = numbers.dot(W[i], direction)
-                W[i] = [r(a - r(s * b)) for a, b in zip(W[i], direction, strict=True)]
-    return T
-
-
-def _carlson(numbers, h, z, variance, x, S):
-    """Carlson 1973: the update of an upper triangular root by one measurement."""
-    r, n = numbers.r, len(x)
-    f = [numbers.dot(column, h) for column in transposed(S)]
-    a, k, new = variance, [ZERO] * n, [list(row) for row in S]
-    for j in range(n):
-        if f[j]:
-            before, a = a, r(a + r(f[j] * f[j]))
-            p, q = numbers.root(r(before / a)), r(f[j] / numbers.root(r(before * a)))
-            for i in range(n):
-                new[i][j] = r(r(p * S[i][j]) - r(q * k[i]))
-                k[i] = r(k[i] + r(f[j] * S[i][j]))
-    y = r(z - numbers.dot(h, x))
-    return [r(value + r(r(gain / a) * y)) for value, gain in zip(x, k, strict=True)], new
-
-
 def _by_roots(model, numbers, z):
-    r, n, forward = numbers.r, len(model[4]), []
-    x, S = [r(mpq(value)) for value in model[4]], _root_of(numbers, model[5])
+    r, n, forward, update = numbers.r, len(model[4]), [], Updates(numbers, "carlson")
+    x, S = [r(mpq(value)) for value in model[4]], root_of(numbers, numbers.exact_factors(model[5]))
     for k, row in enumerate(z):
         Phi, H, Q, R = (cycle[k % len(cycle)] for cycle in model[:4])
-        Phi, SQ, UR = numbers.store(Phi), _root_of(numbers, Q), numbers.exact_factors(R)
+        Phi, SQ, UR = numbers.store(Phi), root_of(numbers, numbers.exact_factors(Q)), numbers.exact_factors(R)
         moved = numbers.times(Phi, S)
-        T = _triangle(numbers, [S[i] + [ZERO] * n for i in range(n)] + [moved[i] + SQ[i] for i in range(n)])
+        T = triangle(numbers, [S[i] + [ZERO] * n for i in range(n)] + [moved[i] + SQ[i] for i in range(n)])
         A, B, C = (
             [line[c:d] for line in T[a:b]] for a, b, c, d in ((0, n, 0, n), (0, n, n, 2 * n), (n, 2 * n, n, 2 * n))
         )
         x = ahead = [numbers.dot(line, x) for line in Phi]
         S = C
-        H, y = decorrelated(numbers, UR, numbers.store(H)), decorrelated(numbers, UR, numbers.store([[a] for a in row]))
-        for i, (h, (value,)) in enumerate(zip(H, y, strict=True)):
-            x, S = _carlson(numbers, h, value, UR[i][i], x, S)
+        x, S, _ = update.observed(x, S, H, UR, [r(mpq(value)) for value in row])
         forward.append((A, B, C, ahead, x))
     found = [([[value] for value in x], S)]
     for k in range(len(z) - 2, -1, -1):
@@ -407,6 +458,6 @@ def _by_roots(model, numbers, z):
             joined[i] = [r(a / C[i][i]) for a in joined[i]]
         x = [r(a + numbers.dot(row, [each[0] for each in joined])) for a, row in zip(forward[k][4], B, strict=True)]
         moved = numbers.times(B, [each[1:] for each in joined])
-        S = _triangle(numbers, [moved[i] + A[i] for i in range(n)])
+        S = triangle(numbers, [moved[i] + A[i] for i in range(n)])
         found.insert(0, ([[value] for value in x], S))
     return found

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
-from gpbnb.report.kalman.exact_step import exact_step
+from tests.oracles import EXACT
+from tests.plain_filters import Filter, model_of
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = (
@@ -24,6 +26,12 @@ FORMATS = (
     FloatFormat(16, 6, CHOP),
 )
 STEPS = 6
+
+
+class Step(NamedTuple):
+    x: NDArray[Any]
+    gain: NDArray[Any]
+    P: NDArray[Any]
 
 
 def model(**changed):
@@ -57,20 +65,9 @@ def run(fmt, form, given=None, z=None):
 
 
 def exact_steps(given, z):
-    """The steps of the filter in Fractions, with inputs and offsets: an oracle that shares no code with the runs."""
-    x, P, found = given.x0, given.P0, []
-    for k, measured in enumerate(exact(z)):
-        Phi, H, Q, R = (each[k % len(each)] for each in (given.Phi, given.H, given.Q, given.R))
-        c, d = np.array([Fraction(0)] * given.n), np.array([Fraction(0)] * given.m)
-        if given.B is not None:
-            c = c + given.B[k % len(given.B)] @ (given.u if given.u.ndim == 1 else given.u[k])
-        if given.b is not None:
-            c = c + given.b[k % len(given.b)]
-        if given.d is not None:
-            d = given.d[k % len(given.d)]
-        # inputs by hand: predict with Phi x + c through a step from Phi x + c with Phi = 1 and Q = 0
-        ahead, unit = Phi @ x + c, exact(np.eye(given.n, dtype=int))
-        step = exact_step(unit, H, Phi @ P @ Phi.T + Q, R, ahead, 0 * P, measured - d)
-        x, P = step.x, step.P
-        found.append(step)
+    """The filter after each step, in fractions, with inputs and offsets, by an oracle without the package."""
+    plain, found = Filter(model_of(given), EXACT, "innovation"), []
+    for row in exact(z):
+        x = plain.step(row.tolist())
+        found.append(Step(*(np.array(each, dtype=object) for each in (x, plain.K, plain.P))))
     return found

@@ -66,8 +66,6 @@ class Fading(plain_filters.Filter):
 
 
 def filtered(model: Model, z: Any, fmt: Format, form: str, **options: Any) -> Steps:
-    if model.inputs or form in ("Potter", "Carlson"):
-        raise NotImplementedError
     numbers, each = Numbers.of(fmt), None
     if "sums" in options:
         order, fused, block, wider = options["sums"]
@@ -86,7 +84,16 @@ def filtered(model: Model, z: Any, fmt: Format, form: str, **options: Any) -> St
             x = found.step(row)
         except (OverflowError, ZeroDivisionError):
             return
-        yield {"x": x, "P": of_factors(found.P)} if form == "UD" else {"x": x, "K": found.K, "P": found.P}
+        yield {"x": x, "P": _covariance(found.P, form)} | ({} if form in FACTORED else {"K": found.K})
+
+
+FACTORED = ("UD", "Potter", "Carlson")
+
+
+def _covariance(P: Any, form: str) -> Any:
+    if form not in FACTORED:
+        return P
+    return of_factors(P) if form == "UD" else oracles.EXACT.times(P, oracles.transposed(P))
 
 
 def recorded(model: Model, records: Any, fmt: Format, form: str) -> Steps:
@@ -108,19 +115,14 @@ class Linear:
         return [row[0] for row in numbers.times(given, [[each] for each in x])], given
 
 
-PLAIN_FORMS = ("innovation", "Joseph", "UD")
-
-
 def as_functions(model: Model, z: Any, fmt: Format, form: str) -> Steps:
-    if form not in PLAIN_FORMS:
-        raise NotImplementedError
     parts, given = (Linear(model.Phi[0]), Linear(model.H[0])), (model.Q, model.R, model.x0, model.P0)
     plain = plain_filters.Extended(*parts, given, form, Numbers.of(fmt), angle=False)
     yield from _followed(plain, z, [[] for _ in z], form)
 
 
 def tracked(motion: str, given: Any, z: Any, u: Any, fmt: Format, form: str, **options: Any) -> Steps:
-    if form not in PLAIN_FORMS or options.get("blocks"):  # with blocks, the model is stored in the widest format first
+    if options.get("blocks"):  # with blocks, the model is stored in the widest format first
         raise NotImplementedError
     parts = getattr(plain_steps, motion.title())(), plain_steps.Ranges([Fraction(3, 10), Fraction(1, 5)])
     kind = plain_filters.Unscented if options.get("method") == "unscented" else plain_filters.Extended
@@ -135,7 +137,7 @@ def _followed(plain: Any, z: Any, u: Any, form: str) -> Steps:
             plain.step(measured, known)
         except (OverflowError, ZeroDivisionError, ValueError):
             return
-        yield {"x": list(plain.x), "P": of_factors(plain.P) if form == "UD" else plain.P}
+        yield {"x": list(plain.x), "P": _covariance(plain.P, form)}
 
 
 def smoothed(model: Model, z: Any, fmt: Format, form: str) -> Steps:

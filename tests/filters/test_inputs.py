@@ -8,15 +8,12 @@ import pytest
 from small_filter import exact_steps
 
 from gpbnb import BINARY64, FloatFormat, LinearModel, Rounding, required_precision
-from gpbnb.arithmetic.array import FloatArray
 from gpbnb.bounds.gains import schedule
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.emulation import compare_runs, emulate
 from gpbnb.filters.forms import ArrayForm, Form
-from gpbnb.filters.recording import block_algebra
 from gpbnb.filters.run import Run, Sums, reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
-from gpbnb.filters.steps import LinearStep
 
 FORMS = (*Form, *ArrayForm)
 STEPS = 40
@@ -69,23 +66,6 @@ def test_the_bound_holds_with_inputs_and_is_not_vacuous(form):
     assert (errors <= bound).all()
     assert errors.max() > 2.0**-24  # it does round
     assert bound.max() < 2000 * errors.max()
-
-
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 20), FloatFormat(10, 6)], ids=str)
-@pytest.mark.parametrize("form", [form for form in FORMS if form not in (Form.HUNG, Form.HUNG_SECOND_GAIN)], ids=str)
-def test_a_run_has_the_digits_of_its_step_on_arrays(form, fmt):
-    model = drawn(3)
-    z = simulated_measurements(model, 12)
-    run = Run(model, fmt, form, range(1, 13))
-    letters = {letter: FloatArray.from_packed(each, fmt) for letter, each in run.letters.items()}
-    x, P = (FloatArray.from_packed(each, fmt) for each in (run.x[:, 0], run.P))
-    carried, expected = x * 0, []
-    for k, measured in enumerate(fmt.array(z)):
-        given = {letter: each[k % len(each)] for letter, each in letters.items()}
-        x, carried, P, *_ = LinearStep(form, block_algebra([fmt] * 4), given).taken(x, P, carried, measured)
-        expected.append(x.to_fractions())
-    run.take(z)
-    assert np.array_equal(run.checkpoints().x, expected)
 
 
 def test_without_inputs_the_simulation_is_that_of_the_model():
