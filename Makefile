@@ -75,7 +75,7 @@ certificates: .venv/made-for ## write a certificate of every guarantee in the bo
 	$(PY) -m gpbnb.report.guarantees.certificates $(WORDS)
 
 attack: .venv/made-for ## attack guarantees of random filters, other ones each day; SLICE=0/20 takes a part, SEED=20261128 those of a day
-	$(PY) -m gpbnb.report.guarantees.attack --first $(SEED)0000 $(if $(SLICE),--slice $(SLICE))
+	$(PY) -m tests.guarantees.attack --first $(SEED)0000 $(if $(SLICE),--slice $(SLICE))
 
 proof: ## check proof/guarantee.v, the theorem behind a certificate; needs Coq (apt-get install coq)
 	@mkdir -p .cache/proof

@@ -14,7 +14,6 @@ COMMANDS = {
     "wordlength": "how many digits your own filter needs, with a report",
     "ledger": "every printed equation, number and claim, with its verdict",
     "bounds.check": "prove the claim of a certificate, without the rest of the package",
-    "report.guarantees.attack": "attack guarantees with emulated runs, and list the largest errors",
     "report.guarantees.certificates": "write and check certificates of the book's guarantees",
     "report.stored": "list the stored sweeps, verify a sample of them, or compute them again",
 }

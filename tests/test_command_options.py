@@ -16,7 +16,6 @@ LISTED = {
     "wordlength": "how many digits your own filter needs",
     "ledger": "every printed equation, number and claim, with its verdict",
     "bounds.check": "prove the claim of a certificate, without the rest of the package",
-    "report.guarantees.attack": "attack guarantees with emulated runs",
     "report.guarantees.certificates": "write and check certificates of the book's guarantees",
     "report.stored": "list the stored sweeps, verify a sample of them, or compute them again",
 }

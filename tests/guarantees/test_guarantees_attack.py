@@ -1,10 +1,10 @@
-"""gpbnb.report.guarantees.attack: no run of a seeded slice exceeds its bound, and the bounds are not far above."""
+"""tests.guarantees.attack: no run of a seeded slice exceeds its bound, and the bounds are not far above."""
 
 from __future__ import annotations
 
 import pytest
 
-from gpbnb.report.guarantees import attack
+from tests.guarantees import attack
 
 
 @pytest.mark.parametrize("seed", range(10))

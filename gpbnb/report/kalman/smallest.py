@@ -110,8 +110,9 @@ def ratios(fmt: FloatFormat, case: FilterCase, second: bool = False, steps: int 
         transitions.append(true.transition)
         inputs.append(true.gain @ case.z)
     (n, m), beta = true.gain.shape, cast(Any, fmt.unit_roundoff)
-    first, second = report_bounds.coefficients(steps, n, m)
-    bound = beta * (first * max_norm(true.x) + second * report_bounds.printed_input_bound(transitions, inputs))
+    counts = report_bounds.coefficients(steps, n, m)
+    B = report_bounds.printed_input_bound(transitions, inputs)
+    bound = beta * (counts.first * max_norm(true.x) + counts.second * B)
     return Ratios(
         _worst(P - true.P, report_bounds.covariance_count(n, m) * beta * abs(true.P)),
         _worst(K - true.gain, report_bounds.gain_count(n, m) * beta * abs(true.gain)),

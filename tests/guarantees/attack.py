@@ -1,4 +1,4 @@
-"""Attack guarantees with emulated runs: ``python -m gpbnb.report.guarantees.attack`` prints a table by form and format.
+"""Attack guarantees with emulated runs: ``python -m tests.guarantees.attack`` prints a table by form and format.
 
 A seed determines a filter, a format, limits and inputs. Kalman filters are those of
 :mod:`gpbnb.report.guarantees.filters`. Linear systems, in every structure, are compared with the system as given, in
@@ -182,7 +182,7 @@ def table(found: Sequence[Attacked]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Attack some filters of each kind, and print the table."""
-    parser = argparse.ArgumentParser(prog="python -m gpbnb.report.guarantees.attack", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.guarantees.attack", description=__doc__)
     parser.add_argument("--filters", type=int, default=1_500, help="number of Kalman filters")
     parser.add_argument("--systems", type=int, default=1_500, help="number of linear systems")
     parser.add_argument("--first", type=int, default=0, help="first seed")
@@ -198,4 +198,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(interruptible("python -m gpbnb.report.guarantees.attack", main))
+    raise SystemExit(interruptible("python -m tests.guarantees.attack", main))
