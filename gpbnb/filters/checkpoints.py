@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.filters.kernels.records import pairs_as_double_doubles
+from gpbnb.filters.pairs import nearest_double_doubles
 
 _LARGEST = 2.0**1000  # sums of a few smaller numbers stay in the range of float64
 _SHARE = 2.0**-105  # relative error of the nearest double-double, at most
@@ -156,12 +156,7 @@ def _in_two(values: Packed) -> tuple[NDArray[np.float64], NDArray[np.float64], N
         return high, low, np.zeros_like(high)
     if numbers.dtype == np.float64:
         return numbers, np.zeros_like(numbers), np.zeros_like(numbers)
-    m, e = (np.ascontiguousarray(numbers[..., i]).ravel() for i in range(2))
-    long = (np.abs(m) >= 2**53) | (np.abs(e) > 22)
-    out = np.empty((m.size, 2))
-    pairs_as_double_doubles(np.where(long, 0, m), np.where(long, 0, e), out)
-    out[long] = np.nan
-    high, low = out[:, 0].reshape(values.shape), out[:, 1].reshape(values.shape)
+    high, low = np.moveaxis(nearest_double_doubles(numbers), -1, 0)
     return high, low, np.abs(high) * _SHARE
 
 

@@ -33,8 +33,8 @@ from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
 from gpbnb.filters.factors import factors_of_each, inverses_of_each, roots_of_each
 from gpbnb.filters.forms import ROOTS, AnyForm, Form
-from gpbnb.filters.kernels.records import pairs_as_double_doubles
 from gpbnb.filters.model import INPUTS, LETTERS, LinearModel, remembered, stored_arrays
+from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.steps import FACTORED
 
 
@@ -174,12 +174,11 @@ def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
     """Convert packed numbers of any format to double-double, exactly in base 2 and 16, to the nearest in base 10."""
     if packed.dtype == np.float64:
         return np.stack([packed, np.zeros_like(packed)], axis=-1)
-    m, e = (np.ascontiguousarray(packed[..., i]).ravel() for i in range(2))
-    out = np.empty((m.size, 2))
-    if pairs_as_double_doubles(m, e, out) < m.size:
-        numbers = [Fraction(int(each)) * Fraction(10) ** int(power) for each, power in zip(m, e, strict=True)]
-        out = double_doubles(np.array(numbers, dtype=object))
-    return out.reshape(packed.shape)
+    found = nearest_double_doubles(packed)
+    for at in map(tuple, np.argwhere(np.isnan(found[..., 0]))):
+        m, e = packed[at].tolist()
+        found[at] = double_doubles(np.array([Fraction(m) * Fraction(10) ** e]))[0]
+    return found
 
 
 @remembered

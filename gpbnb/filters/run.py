@@ -21,7 +21,6 @@ from gpbnb.filters.bounded_steps import DECAYED, Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.forms import AnyForm, ArrayForm, Form
-from gpbnb.filters.kernels.records import pairs_as_floats
 from gpbnb.filters.kernels.widened import widen
 from gpbnb.filters.model import INPUTS, LinearModel, identity_in
 from gpbnb.filters.named import form_named
@@ -31,6 +30,7 @@ from gpbnb.filters.opening import (
     opening,
     widened_array,
 )
+from gpbnb.filters.pairs import nearest_floats
 from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
 from gpbnb.filters.stepping import Block, Stepper, Stop
@@ -437,7 +437,7 @@ class Run:
 
 def _nearest_floats(pairs: NDArray[np.int64], out: NDArray[np.float64]) -> None:
     """Convert decimal numbers to the nearest float64, infinite beyond its range."""
-    pairs_as_floats(pairs, out)
+    out[:] = nearest_floats(pairs)
     for at in map(tuple, np.argwhere(np.isnan(out))):
         m, e = pairs[at].tolist()
         power = 10 ** min(abs(e), 400)  # which is beyond the range for every m

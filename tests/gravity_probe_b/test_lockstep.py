@@ -8,7 +8,6 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kernels.records import update_largest
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.gravity_probe_b import threshold
@@ -59,7 +58,7 @@ def test_a_filter_that_stops_leaves_no_numbers():
     assert np.isnan(after).all()
     assert (many.stopped, many.steps) == (3, 2)
     largest = np.zeros((2, 2))
-    update_largest(after, np.zeros_like(after), largest)
+    threshold.raise_largest(largest, after)
     assert np.isinf(largest).all()
 
 

@@ -23,7 +23,6 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import least_from_which_on
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kernels.records import update_largest
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import BLOCK, Simulation
@@ -201,8 +200,13 @@ class Lockstep:
         true = self.reference.carry(z, ANGLES)
         for run, largest, end in zip(self.runs, self.largest, self.end, strict=True):
             computed = run.carry(z, ANGLES)
-            update_largest(computed, true, largest)
+            raise_largest(largest, computed - true)
             end[:] = computed[-1] - true[-1]
+
+
+def raise_largest(largest: NDArray[np.float64], errors: NDArray[np.float64]) -> None:
+    """Raise the largest errors (states, records) to those of some steps; NaN counts as infinite."""
+    np.maximum(largest, np.nan_to_num(np.abs(errors), nan=np.inf, posinf=np.inf).max(axis=0), out=largest)
 
 
 def compute(cell: YearCell, directory: Path | None = None, steps: int | None = None) -> dict[str, Any]:
