@@ -201,7 +201,6 @@ WIDE = {
     "gpbnb.filters.model.__init__": "public: the matrices of a model, and what may be added to them",
     "gpbnb.filters.nonlinear.__init__": "public: the functions and noises of a model, each a keyword",
     "gpbnb.wordlength.required.required_precision": "public: each is a keyword that a user may name",
-    "gpbnb.wordlength.records.survey_records": "public: each is a keyword that a user may name",
 }
 """Functions of more than ten parameters, and the reason. All are public: scripts and the book name these keywords."""
 

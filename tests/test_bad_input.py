@@ -98,7 +98,7 @@ def test_models_with_inputs(letter, value):
 
 
 @SLOW
-@given(st.sampled_from(["records", "tolerance", "formats", "form", "basis", "steps", "chunk", "model"]), matrices)
+@given(st.sampled_from(["records", "tolerance", "formats", "form", "basis", "steps", "model"]), matrices)
 def test_surveys_of_records(name, value):
     asked = {"model": MODEL, "records": [Z], "tolerance": 0.1, "formats": [FloatFormat(2, 8)]} | {name: value}
     found = []

@@ -1,19 +1,16 @@
-"""Run many measurement records in many formats, on any executor, with progress and resumption."""
+"""Run many measurement records in many formats, on any executor."""
 
 from __future__ import annotations
 
-import hashlib
-import math
-import tempfile
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -24,7 +21,6 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named, whole_number
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.system import LinearSystem
-from gpbnb.sweeps import Column, Sweep
 from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.asked import Asked, Data, Function, checked_basis, tolerances_of
 from gpbnb.wordlength.judges import judge_for
@@ -33,13 +29,6 @@ from gpbnb.wordlength.tasks import MOST_STEPS, TASK_OF_BASIS, admitted, data_of
 
 MOST_RECORDS = 1_000_000
 """Largest number of records to simulate."""
-
-
-class RecordCell(NamedTuple):
-    """One record of a survey; a digest of everything that the result depends on identifies the survey."""
-
-    question: str
-    record: int
 
 
 class RecordSurvey(NamedTuple):
@@ -106,8 +95,6 @@ def survey_records(
     basis: Basis = "emulation",
     steps: int | None = None,
     executor: Executor | None = None,
-    directory: Path | str | None = None,
-    chunk: int = 1,
     progress: bool = False,
 ) -> RecordSurvey:
     """Run a model on many records of measurements or inputs in many formats.
@@ -120,9 +107,6 @@ def survey_records(
         seeds 0, 1, …; at most :data:`MOST_RECORDS`, and 100 million steps in all.
     formats : formats of any base, rounding and range, or their names; for a linear filter, with compiled loops.
     executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
-    directory : folder for finished records of a linear filter. After an interruption, the same call resumes; other
-        arguments start a new survey. By default nothing is saved.
-    chunk : number of records sent to a worker at once.
     progress : show a progress bar that counts records.
 
     Raises
@@ -144,14 +128,9 @@ def survey_records(
     BINARY32                  100%                   7.39e-06
     """
     given = admitted(model, TASK_OF_BASIS[checked_basis(basis)], "" if form is None else "have a form")
-    chosen, chunk = form_named(form or Form.INNOVATION), whole_number("chunk", chunk)
+    chosen = form_named(form or Form.INNOVATION)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a record')
-    if directory is not None and not isinstance(given, LinearModel):
-        raise ValueError(
-            f"got directory= for {getattr(given, 'name', 'a function')}; needed none: only the matrices of a Kalman "
-            "filter tell a later call that nothing has changed"
-        )
     if isinstance(formats, str) or not isinstance(formats, Iterable):
         raise TypeError(f"got formats {formats!r}; needed a list of formats or names")
     chosen_formats = tuple(map(format_named, formats))
@@ -168,27 +147,12 @@ def survey_records(
         if any(fmt.limits is None for fmt in chosen_formats):
             given.check_sizes()
     data = _data(given, records, steps)
-    question = (tolerance, chosen_formats, chosen, basis)
-    cells = tuple(RecordCell(_digest(given, each, *question), number) for number, each in enumerate(data))
-    sweep = Sweep(
-        name="records",
-        file=Path("records.csv"),
-        columns=(Column("record"), Column("ratios")),
-        key=1,
-        cells=lambda: cells,
-        compute=partial(_ratios, given, data, *question),
-        rows=lambda cell, found: [(str(cell.record), " ".join(f"{ratio:.6g}" for ratio, *_ in found))],
-        command="gpbnb.wordlength.records.survey_records(...)",
-        seed=0,
-        version="2",
+    one = partial(_outcomes, given, tolerance, chosen_formats, chosen, basis)
+    found = list(
+        tqdm((executor.map if executor else map)(one, data), "records", len(data), unit="record", disable=not progress)
     )
-    if directory is None:
-        with tempfile.TemporaryDirectory() as folder:
-            found = sweep.run(Path(folder), executor, chunk=chunk, progress=progress)
-    else:
-        found = sweep.run(Path(directory), executor, chunk=chunk, progress=progress)
-    ratios = np.array([[ratio for ratio, *_ in each] for _, each in found], dtype=np.float64)
-    return RecordSurvey(chosen_formats, ratios, tuple(tuple(reason for _, reason, *_ in each) for _, each in found))
+    ratios, reasons = (tuple(tuple(each[i] for each in row) for row in found) for i in (0, 1))
+    return RecordSurvey(chosen_formats, np.array(ratios, dtype=np.float64), reasons)
 
 
 def _data(model: Any, records: Any, steps: int | None) -> tuple[Data, ...]:
@@ -216,30 +180,10 @@ def _data(model: Any, records: Any, steps: int | None) -> tuple[Data, ...]:
     return data
 
 
-def _ratios(
-    model: Any,
-    data: tuple[Data, ...],
-    tolerance: Any,
-    formats: tuple[FloatFormat | FixedFormat, ...],
-    form: AnyForm,
-    basis: Basis,
-    cell: RecordCell,
-    directory: Path | None,
+def _outcomes(
+    model: Any, tolerance: Any, formats: tuple[Any, ...], form: AnyForm, basis: Basis, data: Data
 ) -> list[Outcome]:
     """Return the error / tolerance of one record in each format, and why it is infinite."""
     most = max(fmt.precision for fmt in formats)
-    asked = Asked(model, data[cell.record], tolerance, basis, form=form)
-    judge = judge_for(asked, formats[0].base, most)
+    judge = judge_for(Asked(model, data, tolerance, basis, form=form), formats[0].base, most)
     return [judge.proof(fmt) for fmt in formats]
-
-
-def _digest(model: Any, data: Data, *question: Any) -> str:
-    """Return a name for everything that a result of a linear filter depends on; others are not kept."""
-    if not isinstance(model, LinearModel):
-        return f"{math.nan}"
-    letters = ("Phi", "H", "Q", "R", "x0", "P0", "B", "u", "b", "d")
-    matrices = [None if each is None else each.tolist() for each in (getattr(model, letter) for letter in letters)]
-    z = data.z
-    measured = z.filled(np.nan) if isinstance(z, np.ma.MaskedArray) else z
-    parts = (matrices, None if z is None else np.asarray(measured).tolist(), data[1:], question)
-    return hashlib.sha256(repr(parts).encode()).hexdigest()[:20]

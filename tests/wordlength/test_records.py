@@ -8,8 +8,6 @@ import pytest
 
 from gpbnb import FloatFormat, Rounding
 from gpbnb.wordlength import examples
-from gpbnb.wordlength import records as module
-from gpbnb.wordlength.judges import judge_for
 from gpbnb.wordlength.records import RecordSurvey, survey_records
 from tests.surveying import survey
 
@@ -37,42 +35,8 @@ def test_it_is_the_survey_of_each_record():
 def test_any_executor_gives_the_same(kind):
     z = data()
     with kind(2) as executor:
-        found = survey_records(TRACKER, z, 0.01, FORMATS, form="UD", executor=executor, chunk=2)
+        found = survey_records(TRACKER, z, 0.01, FORMATS, form="UD", executor=executor)
     assert np.array_equal(found.ratios, survey_records(TRACKER, z, 0.01, FORMATS, form="UD").ratios)
-
-
-def test_an_interrupted_survey_goes_on(tmp_path, monkeypatch):
-    calls = []
-
-    def counted(asked, *rest):
-        calls.append(asked.data.steps)
-        if len(calls) == 3:
-            raise KeyboardInterrupt
-        return judge_for(asked, *rest)
-
-    monkeypatch.setattr(module, "judge_for", counted)
-    z, formats = data(4), FORMATS[:1]
-    with pytest.raises(KeyboardInterrupt):
-        survey_records(TRACKER, z, 0.01, formats, directory=tmp_path)
-    assert len(list(tmp_path.iterdir())) == 2
-    found = survey_records(TRACKER, z, 0.01, formats, directory=tmp_path)
-    assert calls == [25, 26, 27, 27, 28]  # the first two records were not computed again
-    monkeypatch.undo()
-    assert np.array_equal(found.ratios, survey_records(TRACKER, z, 0.01, formats).ratios)
-
-
-def test_another_question_does_not_use_saved_records(tmp_path):
-    z, formats = data(1), FORMATS[:1]
-    first = survey_records(TRACKER, z, 0.01, formats, directory=tmp_path).ratios
-    assert survey_records(TRACKER, z, 0.02, formats, directory=tmp_path).ratios == first / 2
-    others = [
-        survey_records(replace(TRACKER, R=TRACKER.R * 2), z, 0.01, formats, directory=tmp_path),
-        survey_records(TRACKER, [z[0] * 2], 0.01, formats, directory=tmp_path),
-        survey_records(TRACKER, z, 0.01, formats, form="UD", directory=tmp_path),
-        survey_records(TRACKER, z, 0.01, formats, basis="bound", directory=tmp_path),
-    ]
-    assert all(each.ratios != first for each in others)
-    assert len(list(tmp_path.iterdir())) == 6
 
 
 def test_simulated_records_differ_and_have_the_model_s_inputs():
