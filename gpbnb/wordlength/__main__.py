@@ -33,9 +33,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     except (ValueError, OSError, ArithmeticError, ImportError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return 2
-    print(report.text, flush=True)
-    if report.shortest:
-        print(report.shortest, flush=True)
+    for text in filter(None, (report.entries["text"], report.entries["shortest"])):
+        print(text, flush=True)
     try:
         option = f"--report {given.report}"
         if given.report:
@@ -45,10 +44,10 @@ def _run(arguments: Sequence[str] | None) -> int:
             replace_file(given.certificate, proof.certificate().encode())
             print(f"certificate: {given.certificate}, for {format_in_words(proof.format)}", flush=True)
         option = f"--csv {given.csv}"
-        if given.csv and report.met:
+        if given.csv and report.answer.met:
             write_run(asked, report, given.csv)
         option = f"--code {given.code}"
-        if given.code and report.met:
+        if given.code and report.answer.met:
             files, fmt = write_code_of(asked, report)
             print("code:", *files)
             if proof is not None and (other := uncovered(proof.format, fmt)):
@@ -61,7 +60,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except OSError as error:
         print(f"{program}: got {option}, which could not be written: {error}", file=sys.stderr)
         return 2
-    return 0 if report.met else 1
+    return 0 if report.answer.met else 1
 
 
 if __name__ == "__main__":

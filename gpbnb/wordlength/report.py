@@ -6,7 +6,8 @@ import html
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,102 +48,6 @@ def usual_steps(model: LinearModel | LinearSystem) -> int:
     """Return the number of steps to simulate if none is given: those that a model describes, or the default."""
     described = model.steps if isinstance(model, LinearModel) else None
     return DEFAULT_STEPS if described is None else described
-
-
-@dataclass(frozen=True)
-class Answer:
-    """One search as plain numbers; `tried` holds precision and error / tolerance, None if there is no number.
-
-    `formats` are those of the answer, which are not in the files.
-    """
-
-    label: str
-    basis: str
-    digits: int | None
-    text: str
-    tried: tuple[tuple[int, float | None], ...]
-    formats: Any = None
-
-
-@dataclass(frozen=True)
-class Report:
-    """The findings of the command, as plain numbers and texts.
-
-    Parameters
-    ----------
-    name, kind : name of the model, and "Kalman filter" or "linear system".
-    digits : the answer, None if there is none.
-    text : the answer in words, with its basis.
-    base, rounding, steps, tolerance : the question.
-    source : origin of the measurements.
-    answers : one answer for each basis and form or structure, the requested one first.
-    errors : error / tolerance of each state at the answer; None if the tolerance is infinite.
-    ranges : name, smallest and largest power of two.
-    command : the command that reproduces the report.
-    versions : versions of the machine and packages.
-    limits : for the bases "guarantee" and "probable", the limits on each state, innovation and measurement of the
-        filter without rounding; None if there is no limit.
-    format : the one format that was judged; empty for a search.
-    met : whether an answer meets the tolerance.
-    names : names of the states, or of the outputs of a linear system.
-    measurement_names : names of the measurements, or of the inputs of a linear system.
-    exponents : the range of the exponents; empty if it is unlimited.
-    fixed : whether digits are fraction bits of fixed point.
-    blocks : name of each block of a Kalman filter, its digits together with the others, and alone; None if there is no
-        answer; empty if they were not asked for.
-    structure : structure that gives the answer for a digital filter or a constant gain; empty for another model.
-    lacking : structures that the filter does not have, each with the reason.
-    stored : what storing the coefficients does to a linear system at the answer; empty for another model.
-    shortest : structure that needs fewer digits than the answer, or that meets the tolerance where there is no answer,
-        and how to ask for it; empty if there is none.
-    formats : the format or formats of the answer; not in the files.
-    """
-
-    name: str
-    kind: str
-    digits: int | None
-    text: str
-    base: int
-    rounding: str
-    steps: int
-    tolerance: tuple[float | None, ...]
-    source: str
-    answers: tuple[Answer, ...]
-    errors: tuple[float | None, ...]
-    ranges: tuple[tuple[str, int, int], ...]
-    command: str
-    versions: dict[str, str]
-    limits: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
-    format: str = ""
-    met: bool = True
-    names: tuple[str, ...] = ()
-    measurement_names: tuple[str, ...] = ()
-    exponents: str = ""
-    fixed: bool = False
-    blocks: tuple[tuple[str, int | None, int | None], ...] = ()
-    structure: str = ""
-    lacking: dict[str, str] = field(default_factory=dict)
-    stored: str = ""
-    shortest: str = ""
-    formats: Any = None
-
-    @property
-    def limiting(self) -> int | None:
-        """The index, from 0, of the state with the largest error / tolerance."""
-        ratios = [(ratio, i) for i, ratio in enumerate(self.errors) if ratio is not None]
-        return max(ratios)[1] if ratios else None
-
-    def to_json(self) -> str:
-        """Return the report as JSON, with the limiting state and without NaN or infinity."""
-        plain = replace(self, formats=None, answers=tuple(replace(each, formats=None) for each in self.answers))
-        entries = {**asdict(plain), "limiting": self.limiting}
-        for each in (entries, *entries["answers"]):
-            del each["formats"]
-        return json.dumps(entries, indent=1, ensure_ascii=False, allow_nan=False)
-
-    def to_html(self) -> str:
-        """Return the report as one HTML page that needs no other file."""
-        return page(self)
 
 
 @dataclass(frozen=True)
@@ -236,6 +141,33 @@ class Part(NamedTuple):
     structure: str = ""
 
 
+class Report(NamedTuple):
+    """What the command found.
+
+    Parameters
+    ----------
+    entries : plain numbers and texts, as in the JSON file. None stands for a number that is missing or infinite.
+        `answers` has one for each basis and form or structure, the requested one first; `errors` are over tolerances,
+        `ranges` have the powers of two between which numbers lie, `blocks` the digits of each block together with the
+        others and alone, and `limiting` is the index of the state with the largest error / tolerance.
+    found : the single questions, each with its answer.
+    part, answer : those that `entries` tells first.
+    """
+
+    entries: dict[str, Any]
+    found: list[tuple[Part, Requirement]]
+    part: Part
+    answer: Requirement
+
+    def to_json(self) -> str:
+        """Return the report as JSON, without NaN or infinity."""
+        return json.dumps(self.entries, indent=1, ensure_ascii=False, allow_nan=False)
+
+    def to_html(self) -> str:
+        """Return the report as one HTML page that needs no other file."""
+        return page(self.entries)
+
+
 def study(
     asked: Question, source: str = "", command: str = "", tell: Callable[[str], Any] = lambda text: None
 ) -> Report:
@@ -274,37 +206,49 @@ def study(
         "given" if asked.z is not None else f"simulated by the model, seed {asked.seed}" if z is not None else "none"
     )
     like = fmt or asked.like
-    return Report(
-        name=model.name,
-        kind="Kalman filter" if is_filter else "linear system",
-        digits=main.digits if met else None,
-        text=f"{first.structure}: {main}" if len(structures) > 1 else str(main),
-        base=like.base,
-        rounding=like.rounding.value,
-        steps=asked.count,
-        tolerance=tuple(
+    errors = _errors(model, z, main.format if met else None, asked.form, tolerances)
+    ratios = [(ratio, i) for i, ratio in enumerate(errors) if ratio is not None]
+    entries = {
+        "name": model.name,
+        "kind": "Kalman filter" if is_filter else "linear system",
+        "digits": main.digits if met else None,
+        "text": f"{first.structure}: {main}" if len(structures) > 1 else str(main),
+        "base": like.base,
+        "rounding": like.rounding.value,
+        "steps": asked.count,
+        "tolerance": [
             _finite(float(exactly(each))) for each in np.broadcast_to(asked.tolerance, len(tolerances)).tolist()
-        ),
-        source=source or origin,
-        answers=tuple(_plain(part.label, answer) for part, answer in found),
-        errors=_errors(model, z, main.format if met else None, asked.form, tolerances),
-        ranges=_ranges(model, z),
-        command=command,
-        versions=machine(),
-        limits={} if within is None else {key: tuple(map(_finite, each)) for key, each in within._asdict().items()},
-        format="" if fmt is None else format_text(fmt),
-        met=met,
-        names=model.state_names if isinstance(model, LinearModel) else model.output_names,
-        measurement_names=model.measurement_names if isinstance(model, LinearModel) else model.input_names,
-        exponents=_exponents(like),
-        fixed=asked.kind in IN_FIXED_POINT,
-        blocks=_digits_of_blocks(main),
-        structure=first.structure,
-        lacking=lacking,
-        stored=stored,
-        shortest=_shorter(found, main, fmt is not None),
-        formats=main.format,
-    )
+        ],
+        "source": source or origin,
+        "answers": [
+            {
+                "label": part.label,
+                "basis": answer.basis,
+                "digits": answer.digits if answer.met else None,
+                "text": str(answer),
+                "tried": [(digits, _finite(ratio)) for digits, ratio in answer.tried],
+            }
+            for part, answer in found
+        ],
+        "errors": errors,
+        "ranges": _ranges(model, z),
+        "command": command,
+        "versions": machine(),
+        "limits": {} if within is None else {key: list(map(_finite, each)) for key, each in within._asdict().items()},
+        "format": "" if fmt is None else format_text(fmt),
+        "met": met,
+        "names": model.state_names if isinstance(model, LinearModel) else model.output_names,
+        "measurement_names": model.measurement_names if isinstance(model, LinearModel) else model.input_names,
+        "exponents": _exponents(like),
+        "fixed": asked.kind in IN_FIXED_POINT,
+        "blocks": _digits_of_blocks(main),
+        "structure": first.structure,
+        "lacking": lacking,
+        "stored": stored,
+        "shortest": _shorter(found, main, fmt is not None),
+        "limiting": max(ratios)[1] if ratios else None,
+    }
+    return Report(entries, found, first, main)
 
 
 def _stored(system: LinearSystem | None, answer: Requirement) -> str:
@@ -395,11 +339,6 @@ def _finite(number: float) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _plain(label: str, answer: Requirement) -> Answer:
-    tried = tuple((digits, _finite(ratio)) for digits, ratio in answer.tried)
-    return Answer(label, answer.basis, answer.digits if answer.met else None, str(answer), tried, answer.format)
-
-
 # -- the page -------------------------------------------------------------------------------------------------
 
 _STYLE = """
@@ -425,14 +364,15 @@ _MEANINGS = {
 }
 
 
-def page(report: Report) -> str:
-    """Return a report as a self-contained HTML page."""
+def page(entries: dict[str, Any]) -> str:
+    """Return the entries of a report as a self-contained HTML page."""
+    report = SimpleNamespace(**entries)
     kind, base = ("fraction", 2) if report.fixed else ("", report.base)
     unit = f"{kind} {digit_unit(base)}".strip()
     answer = digits_text(report.digits, base, kind) if report.digits is not None else "no precision that can be run"
     verdict = f"needs <strong>{html.escape(answer)}</strong> to keep rounding errors within the tolerance"
     if report.format:
-        missed = "is not proved to keep" if report.answers[0].basis in PROOFS else "does not keep"
+        missed = "is not proved to keep" if report.answers[0]["basis"] in PROOFS else "does not keep"
         verdict = f"{'keeps' if report.met else missed} rounding errors within the tolerance in "
         verdict += f"<strong>{html.escape(report.format)}</strong>"
     limiting = ""
@@ -440,14 +380,21 @@ def page(report: Report) -> str:
         i, ratio = report.limiting, report.errors[report.limiting]
         state = f"State {html.escape(report.names[i])}" if report.names else f"State {i + 1} of {len(report.errors)}"
         limiting = f"<p>{state} limits the answer: its error is {ratio:.2g} of its tolerance.</p>"
-    of = {"state": report.names, "innovation": report.measurement_names, "measurement": report.measurement_names}
+    of = {
+        "state": report.names,
+        "innovation": report.measurement_names,
+        "measurement": report.measurement_names,
+    }
     what, given = ("Form", "measurements") if report.kind == "Kalman filter" else ("Structure", "inputs")
-    meant = [_MEANINGS[each].format(given) for each in dict.fromkeys(each.basis for each in report.answers)]
+    meant = [_MEANINGS[each].format(given) for each in dict.fromkeys(each["basis"] for each in report.answers)]
     if report.ranges and not report.exponents:
         meant.append("These runs have unlimited exponents; the ranges below show which formats suffice.")
-    rows = [(each.label, "none" if each.digits is None else str(each.digits), each.text) for each in report.answers]
+    rows = [
+        (each["label"], "none" if each["digits"] is None else str(each["digits"]), each["text"])
+        for each in report.answers
+    ]
     tried = [
-        (each.label, ", ".join(f"{t}: {ratio:.3g}" for t, ratio in each.tried if ratio is not None))
+        (each["label"], ", ".join(f"{t}: {ratio:.3g}" for t, ratio in each["tried"] if ratio is not None))
         for each in report.answers
     ]
     parts = [

@@ -138,12 +138,12 @@ def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: Linear
 
 def certificate(asked: CommandInput, report: Report) -> Guarantee:
     """Return the first guarantee in a report, which has a certificate, or reject a report without one."""
-    part = _part(asked, report, "guarantee")
-    fmt = next(each.formats for each in report.answers if each.label == part.label)
+    part = _part(report, "guarantee")
+    fmt: Any = next(answer.format for each, answer in report.found if each.label == part.label)
     if fmt is None:
         raise ValueError("got no precision with a guarantee; needed one for a certificate; allow a larger tolerance")
     within: Any = asked.question.within or _of_inputs(asked)
-    return guarantee(part.model, fmt, within, form=part.form, horizon=report.steps)
+    return guarantee(part.model, fmt, within, form=part.form, horizon=asked.question.count)
 
 
 def _of_inputs(asked: CommandInput) -> FilterLimits:
@@ -151,9 +151,10 @@ def _of_inputs(asked: CommandInput) -> FilterLimits:
     return limits(measurement=np.abs(asked.question.z).max(axis=0))
 
 
-def _part(asked: CommandInput, report: Report, basis: str) -> Part:
+def _part(report: Report, basis: str) -> Part:
     """Return the single question on a basis, for the form or the structure of the answer."""
-    return next(each for each in asked.question.parts() if each.basis == basis and each.structure == report.structure)
+    structure = report.part.structure
+    return next(each for each, _ in report.found if each.basis == basis and each.structure == structure)
 
 
 def write_code_of(asked: CommandInput, report: Report) -> tuple[tuple[Path, ...], Any]:
@@ -164,14 +165,14 @@ def write_code_of(asked: CommandInput, report: Report) -> tuple[tuple[Path, ...]
     """
     folder, form, own, question, z = asked.options.code, asked.options.form, asked.own, asked.question, asked.question.z
     fixed = question.kind in IN_FIXED_POINT
-    fmt: Any = report.formats if fixed else question.fmt or _type_within_tolerance(asked, report)
+    fmt: Any = report.answer.format if fixed else question.fmt or _type_within_tolerance(asked, report)
     within = question.within
     if within is None and fixed and isinstance(question.model, LinearSystem):
         within = _of_inputs(asked)
     if not isinstance(own, LinearModel):
         design, structures = question.source.design, question.source.structures
-        model: Any = design or structures.get(report.structure) or question.model
-        form = report.structure if design else None
+        model: Any = design or structures.get(report.part.structure) or question.model
+        form = report.part.structure if design else None
         return write_code(model, fmt, folder, form=form, within=within), fmt
     if z is None:
         z = simulated_measurements(own, question.count, question.seed)
@@ -182,7 +183,7 @@ def write_code_of(asked: CommandInput, report: Report) -> tuple[tuple[Path, ...]
 def _type_within_tolerance(asked: CommandInput, report: Report) -> FloatFormat:
     """Return binary32 if it meets the tolerance of a command line, else binary64."""
     question = asked.question
-    part = _part(asked, report, question.bases[0])
+    part = _part(report, question.bases[0])
     for fmt in (BINARY32, BINARY64):
         if replace(question, fmt=fmt).answer(part, question.z).met:
             return fmt
@@ -208,12 +209,12 @@ def write(report: Report, page: Path) -> None:
 
 def write_run(asked: CommandInput, report: Report, file: Path) -> None:
     """Write each step of a run in the format of the answer as CSV: estimates or outputs, and their errors."""
-    question, (_, _, model, form, _) = asked.question, _part(asked, report, asked.question.bases[0])
+    question, (_, _, model, form, _) = asked.question, _part(report, asked.question.bases[0])
     seed = question.seed if question.z is None else 0
-    run = emulate(model, question.data, report.formats, form=form, seed=seed)
+    run = emulate(model, question.data, report.answer.format, form=form, seed=seed)
     numbers = run.x if isinstance(model, LinearModel) else run.y
     kind = "output" if run.form is None else "state"
-    names = report.names or [f"{kind} {i}" for i in range(run.errors.shape[1])]
+    names = report.entries["names"] or [f"{kind} {i}" for i in range(run.errors.shape[1])]
     lines = [WRITTEN, ",".join(["step", *names, *(f"error of {name}" for name in names)])]
     values = np.zeros((0, len(names))) if numbers is None else numbers.to_float()
     lines += [",".join(map(repr, [k, *row])) for k, row in enumerate(np.hstack([values, run.errors]).tolist(), 1)]

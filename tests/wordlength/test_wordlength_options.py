@@ -28,7 +28,12 @@ from gpbnb.wordlength.asked import tolerances_of
 
 SYSTEM = 'A = [[0.875]]\nB = [[0.125]]\ninputs = ["sensor (V)"]\noutputs = ["level (V)"]\n'
 FILTER = "Phi = [[1]]\nH = [[1]]\nQ = [[0.01]]\nR = [[1]]\nx0 = [0]\nP0 = [[1]]\n"
-REPORT = SimpleNamespace(text="12 bits", shortest="", met=True, to_html=lambda: "<p>new</p>", to_json=lambda: "{}")
+REPORT = SimpleNamespace(
+    entries={"text": "12 bits", "shortest": ""},
+    answer=SimpleNamespace(met=True),
+    to_html=lambda: "<p>new</p>",
+    to_json=lambda: "{}",
+)
 
 
 @pytest.fixture
