@@ -6,16 +6,13 @@ The innovation form subtracts most of a large variance when a sensor is precise.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.algebra import inverse_in_order
-from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
@@ -96,53 +93,22 @@ def _agree(some: list[Step], others: list[Step]) -> bool:
 
 def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> list[Step] | str:
     """Return all steps in some bits, or why there are none: an innovation covariance is singular in them."""
-    try:
-        found = [taken[:3] for taken in steps_in(FloatFormat(2, bits), model, Form.INNOVATION, z)]
-    except ZeroDivisionError:
-        return SINGULAR
-    x, K, P = ([each.to_fractions() for each in part] for part in zip(*found, strict=True))
-    return list(zip(x, K, P, strict=True))
-
-
-def steps_in(
-    fmt: FloatFormat | FixedFormat, model: LinearModel, form: Form, z: Any
-) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, bool]]:
-    """Take steps in any format, also in one without compiled loops.
-
-    Parameters
-    ----------
-    model : its entries are stored in the format.
-    form : any form except UD.
-    z : (steps, m), measurements.
-
-    Yields
-    ------
-    x, K, P : estimate (n,), gain (n, m) and covariance (n, n) after a step.
-    definite : whether all variances and pivots are positive.
-
-    Raises
-    ------
-    OverflowError, ZeroDivisionError : a step has no result.
-    """
+    fmt = FloatFormat(2, bits)
     given = {letter: each[np.newaxis] if each.ndim == 1 else each for letter, each in model.arrays(fmt).items()}
     x, P = given.pop("x0")[0], given.pop("P0")
-    if form is Form.HUNG_SECOND_GAIN:
-        given["RI"] = inverses_in(fmt, given["R"])
 
     def take(formats: Sequence[Any], states: tuple[Any, ...], matrices: Sequence[Any]) -> StepTaken:
         (x, P, carried), (measured, *rest) = states, matrices
-        step = LinearStep(form, block_algebra([*formats] * 4), dict(zip(given, rest, strict=True)))
+        step = LinearStep(Form.INNOVATION, block_algebra([*formats] * 4), dict(zip(given, rest, strict=True)))
         found = step.taken(x, P, carried, measured)
         return StepTaken((found.x, found.P, found.carried), found.K, found.definite)
 
-    step = RepeatedStep(take, [fmt], (x, P, x * 0))
+    step, done = RepeatedStep(take, [fmt], (x, P, x * 0)), list[Step]()
     members = [list(each) for each in given.values()]
-    for k, measured in enumerate(fmt.array(z)):
-        definite = step.take([measured, *(each[k % len(each)] for each in members)])
-        yield step.states[0], step.gain, step.states[1], definite
-
-
-def inverses_in(fmt: FloatFormat | FixedFormat, matrices: FloatArray) -> FloatArray:
-    """Return the inverses of matrices (p, m, m), as the form with the second gain takes them."""
-    found: Any = np.stack([inverse_in_order(each, fmt.eye(len(each))).matrix for each in matrices])
-    return found
+    try:
+        for k, measured in enumerate(fmt.array(z)):
+            step.take([measured, *(each[k % len(each)] for each in members)])
+            done.append(tuple(each.to_fractions() for each in (step.states[0], step.gain, step.states[1])))
+    except ZeroDivisionError:
+        return SINGULAR
+    return done

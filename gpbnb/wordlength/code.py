@@ -22,7 +22,6 @@ from gpbnb.arithmetic.array import NegativeRootError
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.named import BINARY32, BINARY64, format_named, format_text, rounding_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
@@ -34,20 +33,19 @@ from gpbnb.files import replace_file
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, AnyForm, Form, plain_name
 from gpbnb.filters.listing import kalman_program
-from gpbnb.filters.model import LinearModel, identity_in
+from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named, form_with_program
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun, simulated
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.program import without_exact
-from gpbnb.filters.reference import inverses_in, steps_in
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.steps import HUNG_FORMS
 from gpbnb.filters.system import LinearSystem, system_inputs
-from gpbnb.filters.words import WordFormats, integer_program, integers_of
+from gpbnb.filters.words import WordFormats, integer_program
 from gpbnb.wordlength.c_files import Sections, Vectors, refuse_others, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeSource, CodeStep, checked_identifier, word_arithmetic
 from gpbnb.wordlength.emulation import longest
@@ -117,8 +115,8 @@ def write_code(
         of a format, such as "float32" or "Q15".
     folder : folder for the files, which is created if necessary. Files that gpbnb has written are replaced, others not.
     form : for a Kalman filter, "innovation", "Joseph", "UD", or one of Hung's, or "constant gain"; for a
-        :class:`gpbnb.filters.design.FilterDesign`, its structure. The UD form accepts no words of more than 52 bits and
-        no words that wrap around.
+        :class:`gpbnb.filters.design.FilterDesign`, its structure. A Kalman filter takes words of at
+        most 52 bits that do not wrap around, as its emulation does.
     name : name of the files, and prefix of every name that the header declares.
     inputs : (steps, m), inputs or measurements of the test vectors, or a number of steps of noise, or of simulated
         measurements; by default 100.
@@ -415,15 +413,16 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
             f"got formats of words for the {chosen} form; needed BINARY32, BINARY64 or a FixedFormat, or the form "
             f"{CONSTANT_GAIN!r}"
         )
-    in_loops = isinstance(fmt, FloatFormat) or isinstance(fmt.backend, Compiled)
     if model.b is not None or model.d is not None:
         raise ValueError(f"got offsets of {model.name}; needed none in C: make each a known input that is always 1")
     p = 0 if model.u is None else model.u.shape[-1]
     if p and chosen in HUNG_FORMS:
         raise ValueError(f"got known inputs in the {chosen} form, which is not defined with them; needed another form")
-    given, start = _in_loops(model, fmt, chosen) if in_loops else _in_long_words(model, fmt, chosen)
+    run = Run(model, fmt, chosen, ())  # type: ignore[arg-type]
+    given = {letter: run.exactly(each) for letter, each in run.letters.items()}
     stored = _coefficients([each for letter, each in given.items() if letter != "u"])
     program = kalman_program(chosen, {letter: each.shape[1:] for letter, each in given.items()})
+    start = _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), chosen)[0]
     step = CodeStep(without_exact(program, stored), stored, start)
 
     def bound(within: FilterLimits) -> str:
@@ -444,9 +443,7 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
         _arithmetic(step, fmt),
         model.name,
         f"{chosen} form" + (_WITH_INPUTS if p else ""),
-        lambda z, fmt: (
-            _model_vectors(model, z, fmt, chosen) if in_loops else _long_vectors(model, z, fmt, step, chosen)
-        ),
+        lambda z, fmt: _model_vectors(model, z, fmt, chosen),
         lambda steps: simulated_measurements(model, min(steps, model.steps or steps)),
         bound,
     )
@@ -460,54 +457,11 @@ def _coefficients(members: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return np.concatenate([np.array(rows, dtype=object), constants, constants + 1], axis=1)
 
 
-Letters = dict[str, NDArray[Any]]
-"""The matrices of a model and its known inputs, exact, each with a cycle of its own."""
-
-
-def _in_loops(model: LinearModel, fmt: Any, form: Form) -> tuple[Letters, NDArray[Any]]:
-    """Return the matrices and first states, as a run in compiled loops stores them."""
-    run = Run(model, fmt, form, ())
-    given = {letter: run.exactly(each) for letter, each in run.letters.items()}
-    return given, _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), form)[0]
-
-
-def _in_long_words(model: LinearModel, fmt: Any, form: Form) -> tuple[Letters, NDArray[Any]]:
-    """Return the same in words that are too long for compiled loops, or that wrap around."""
-    if form is Form.UD:
-        raise ValueError(
-            f"got the UD form in {_word(fmt)}; needed another form, or words of at most 52 bits that do not "
-            "wrap around: compiled loops compute the factors of its covariances"
-        )
-    if model.has_inputs:
-        raise ValueError(
-            f"got known inputs in {_word(fmt)}; needed words of at most 52 bits that do not wrap around: the emulation "
-            "has no other loops with inputs"
-        )
-    identity_in(fmt, 1)
-    arrays = model.definite_in(fmt).arrays(fmt)
-    given = {letter: arrays[letter].to_fractions() for letter in ("Phi", "H", "Q", "R")}
-    if form is Form.HUNG_SECOND_GAIN:
-        given["RI"] = inverses_in(fmt, arrays["R"]).to_fractions()
-    return given, np.concatenate([arrays["x0"].to_fractions(), arrays["P0"].to_fractions().ravel()])
-
-
 def _flat(x: NDArray[Any], P: NDArray[Any], form: Form) -> NDArray[Any]:
     """Return estimates and covariances, or factors, as :func:`gpbnb.filters.listing.kalman_program` has its states."""
     n = x.shape[1]
     kept = [(i, j) for i in range(n) for j in range(n) if form is not Form.UD or i <= j]
     return np.concatenate([x[..., 0], np.stack([P[:, i, j] for i, j in kept], axis=-1)], axis=-1)
-
-
-def _long_vectors(model: LinearModel, z: Any, fmt: Any, step: CodeStep, form: Form) -> Vectors:
-    model.check_measurements(z, 0)
-    start = integers_of(step.start[None], fmt)[0].astype(np.int64)
-    states, indefinite = list[NDArray[Any]](), None
-    with suppress(*STOPS):
-        for x, _, P, definite in steps_in(fmt, model.definite_in(fmt), form, z):
-            states.append(np.concatenate([x.to_fractions(), P.to_fractions().ravel()]))
-            indefinite = len(states) if indefinite is None and not definite else indefinite
-    whole = (np.array(states, dtype=object).reshape(-1, len(start)) / fmt.unit).astype(np.int64)
-    return _ended(integers_of(z, fmt).astype(np.int64), start, whole, _statuses(len(states), indefinite))
 
 
 def _statuses(steps: int, indefinite: int | None) -> NDArray[np.int64]:

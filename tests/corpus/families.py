@@ -391,7 +391,7 @@ def code(draw: Draw, i: int) -> Case:
         model, n, m = _sized(draw, 4)
         if form == "constant gain":
             model = model._replace(Phi=model.Phi[:1], H=draw.model(n, m).H[:1], Q=model.Q[:1], R=model.R[:1])
-        if isinstance(fmt, Fixed) and form == "UD":
+        elif isinstance(fmt, Fixed) and (form == "UD" or fmt.fraction > 40 or fmt.overflow == "wrap"):
             fmt = Fixed(8, 23, "even", "saturate")
         return _coded(draw, f"{form}, {fmt}, n {n}, m {m}", ("model", model), fmt, form, m)
     index = i // 3 % 4

@@ -70,8 +70,6 @@ def test_offsets_and_inputs_of_hungs_forms_are_refused(tmp_path):
         write_code(replace(driven(), d=["0.5"]), BINARY32, tmp_path)
     with pytest.raises(ValueError, match="not defined with them; needed another form"):
         write_code(driven(), BINARY32, tmp_path, form="hung")
-    with pytest.raises(ValueError, match="needed words of at most 52 bits that do not wrap around"):
-        write_code(driven(), FixedFormat(3, 28, overflow="wrap"), tmp_path)
 
 
 def built(folder, flags=FLAGS):
@@ -170,11 +168,11 @@ def fits(model, fmt, form):
 
 
 @pytest.mark.parametrize("form", Form, ids=str)
-@pytest.mark.parametrize("fmt", [FixedFormat(17, -1), FixedFormat(0, 15, "even", "saturate"), FixedFormat(0, 60)])
+@pytest.mark.parametrize("fmt", [FixedFormat(17, -1), FixedFormat(0, 15, "even", "saturate")])
 def test_a_format_without_the_number_one_is_refused(fmt, form, tmp_path):
     whole, even = fmt.fraction_bits > 0, np.array([[2]])
     model = LinearModel(*(np.array([["0.5"]]) if whole else even for _ in range(4)), [0], [["0.5"]] if whole else even)
-    with pytest.raises(ValueError, match=r"which does not hold the number 1; needed .* at least 1 integer bit|UD form"):
+    with pytest.raises(ValueError, match=r"which does not hold the number 1; needed .* at least 1 integer bit"):
         write_code(model, fmt, tmp_path, form=form)
 
 
@@ -297,15 +295,19 @@ def test_a_name_cannot_end_a_comment(tmp_path):
         ),
         (models()["one state"], BINARY32, "Potter", "got the Potter form"),
         (models()["one state"], FixedFormat(4, 11, "stochastic"), "UD", "stochastic rounding"),
-        (models()["one state"], FixedFormat(8, 55), "UD", "the UD form in 64 bits with 55 after the point"),
-        (models()["one state"], FixedFormat(8, 23, "even", "wrap"), "UD", "that do not wrap around"),
+        (models()["one state"], FixedFormat(8, 55), "UD", "got 63 bits in fixed point; needed at most 51 for compiled"),
+        (
+            models()["one state"],
+            FixedFormat(8, 23, "even", "wrap"),
+            "UD",
+            "got overflow that wraps around; needed",
+        ),
         (
             NonlinearSystem(lambda fmt, x, u: (x[0] / u[0], x[0]), [2], 1),
             FixedFormat(64, -1, "up", "saturate"),
             None,
             "got divisors of 64 bits",
         ),
-        (models()["one state"], FixedFormat(8, 56), "Joseph", "got data of 65 bits; needed at most 64"),
     ],
 )
 def test_what_has_no_code_is_refused(given, fmt, form, message, tmp_path):
