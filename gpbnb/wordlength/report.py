@@ -397,6 +397,21 @@ def page(entries: dict[str, Any]) -> str:
         (each["label"], ", ".join(f"{t}: {ratio:.3g}" for t, ratio in each["tried"] if ratio is not None))
         for each in report.answers
     ]
+    question = [
+        ("steps", f"{report.steps}"),
+        (given, report.source),
+        ("tolerance", _numbers(report.tolerance, report.names)),
+        *((f"limit on the {name}", _numbers(each, of.get(name, ()))) for name, each in report.limits.items()),
+        ("rounding", report.rounding),
+        *([("exponents", report.exponents)] if report.exponents else []),
+    ]
+    cells = [(name, *("none" if each is None else str(each) for each in digits)) for name, *digits in report.blocks]
+    states = report.names or [str(i + 1) for i in range(len(report.errors))]
+    shares = ["not limited" if each is None else f"{each:.3g}" for each in report.errors]
+    of_states = list(zip(states, shares, strict=True)) if shares else []
+    ranges = [(name, _power(low), _power(high)) for name, low, high in report.ranges]
+    about = "\n".join(f"{key}: {value}" for key, value in report.versions.items())
+    each_form = f"{what.lower()} and basis"
     parts = [
         f"<h1>Wordlength for {html.escape(report.name)}</h1>",
         f'<p class="answer">This {report.kind} {verdict}.</p>',
@@ -404,49 +419,39 @@ def page(entries: dict[str, Any]) -> str:
         f"<p>{html.escape(report.shortest[:1].upper() + report.shortest[1:])}.</p>" if report.shortest else "",
         f"<p>At this answer, {html.escape(report.stored)}.</p>" if report.stored else "",
         limiting,
-        "<h2>Basis of the answer</h2>",
-        _table(
-            ("question", "value"),
-            [
-                ("steps", f"{report.steps}"),
-                (given, report.source),
-                ("tolerance", _numbers(report.tolerance, report.names)),
-                *((f"limit on the {name}", _numbers(each, of.get(name, ()))) for name, each in report.limits.items()),
-                ("rounding", report.rounding),
-                *([("exponents", report.exponents)] if report.exponents else []),
-            ],
-        ),
+        _section("Basis of the answer", ("question", "value"), question),
         f"<p>{' '.join(meant)}</p>",
-        f"<h2>{what}s and bases compared</h2>",
-        _table((f"{what.lower()} and basis", unit, "answer"), rows),
+        _section(f"{what}s and bases compared", (each_form, unit, "answer"), rows),
         *(f"<p>{html.escape(f'Left out: {name}: {why}')}.</p>" for name, why in report.lacking.items()),
-        "<h2>Error / tolerance at each precision</h2>",
-        _table((f"{what.lower()} and basis", f"{unit}: error / tolerance"), tried),
-    ]
-    if report.blocks:
-        columns = ("block of the filter", f"{unit}, with the others", f"{unit}, alone")
-        cells = [(name, *("none" if each is None else str(each) for each in digits)) for name, *digits in report.blocks]
-        parts += ["<h2>Precision of each block</h2>", _table(columns, cells)]
-    if report.errors:
-        states = report.names or [str(i + 1) for i in range(len(report.errors))]
-        body = [
-            (state, "not limited" if e is None else f"{e:.3g}") for state, e in zip(states, report.errors, strict=True)
-        ]
-        parts += ["<h2>Error of each state at the answer</h2>", _table(("state", "error / tolerance"), body)]
-    if report.ranges:
-        ranges = [(name, _power(low), _power(high)) for name, low, high in report.ranges]
-        parts += ["<h2>Range of the numbers</h2>", _table(("numbers", "smallest", "largest"), ranges)]
-    about = "\n".join(f"{key}: {value}" for key, value in report.versions.items())
-    parts += [
+        _section("Error / tolerance at each precision", (each_form, f"{unit}: error / tolerance"), tried),
+        _section(
+            "Precision of each block", ("block of the filter", f"{unit}, with the others", f"{unit}, alone"), cells
+        ),
+        _section("Error of each state at the answer", ("state", "error / tolerance"), of_states),
+        _section("Range of the numbers", ("numbers", "smallest", "largest"), ranges),
         "<h2>How to reproduce this report</h2>",
         f"<pre>{html.escape(report.command or 'gpbnb.wordlength.report.study(...)')}\n\n{html.escape(about)}</pre>",
     ]
-    title = html.escape(f"Wordlength for {report.name}")
-    return (
-        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<meta name="viewport" '
-        f'content="width=device-width, initial-scale=1">\n<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n'
-        f"<body>\n<main>\n{chr(10).join(part for part in parts if part)}\n</main>\n</body>\n</html>\n"
+    return _PAGE.format(
+        title=html.escape(f"Wordlength for {report.name}"), style=_STYLE, body="\n".join(filter(None, parts))
     )
+
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<main>
+{body}
+</main>
+</body>
+</html>
+"""
 
 
 def _numbers(limits: Sequence[float | None], names: Sequence[str] = ()) -> str:
@@ -457,14 +462,13 @@ def _numbers(limits: Sequence[float | None], names: Sequence[str] = ()) -> str:
     return ", ".join(texts)
 
 
-def _table(header: Sequence[str], body: Sequence[Sequence[str]]) -> str:
+def _section(heading: str, header: Sequence[str], body: Sequence[Sequence[str]]) -> str:
+    """Return a table below its heading; nothing if it has no rows."""
     head = "".join(f'<th scope="col">{html.escape(cell)}</th>' for cell in header)
-    lines = ("".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in body)
-    return (
-        f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n"
-        + "\n".join(f"<tr>{line}</tr>" for line in lines)
-        + "\n</tbody>\n</table>"
-    )
+    lines = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in body]
+    rows = "\n".join(f"<tr>{line}</tr>" for line in lines)
+    table = f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody>\n</table>"
+    return f"<h2>{heading}</h2>\n{table}" if lines else ""
 
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
