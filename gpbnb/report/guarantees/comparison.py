@@ -145,13 +145,10 @@ def rows() -> tuple[PublishedNumber, ...]:
 
 def table() -> Table:
     """Tabulate published numbers beside ours."""
-    header = ("program, inputs and quantity", "published", "ours", "remark and source")
-    body = tuple(
-        (
-            f"{each.program}: {each.quantity}",
-            *("none" if number is None else short(number, 6) for number in (each.published, each.ours)),
-            f"{each.note}; source: {each.source}",
-        )
-        for each in rows()
-    )
-    return Table("published numbers and ours", header, body)
+    header = ("program, inputs and quantity", "published; ours", "remark and source")
+    body = []
+    for each in rows():
+        numbers = ["none" if number is None else short(number, 6) for number in (each.published, each.ours)]
+        pair = "none" if numbers == ["none", "none"] else "; ".join(numbers)
+        body.append((f"{each.program}: {each.quantity}", pair, f"{each.note}; source: {each.source}"))
+    return Table("published numbers and ours", header, tuple(body))
