@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from itertools import product
@@ -31,23 +30,6 @@ from gpbnb.report.inversion.example import (
 )
 from gpbnb.report.inversion.procedure import NORMS
 
-
-@dataclass(frozen=True)
-class Possible:
-    """Whether some matrix of a wordlength has a printed error, with one such matrix.
-
-    `reference` is the matrix whose inverse defines the error: "given", or "stored" in the wordlength.
-    """
-
-    wordlength: Wordlength
-    reference: str
-    places: int
-    norm: str
-    relative: bool
-    printed: str
-    witness: Matrix | None
-
-
 #: Norms that are sums of sizes or squares over groups of entries, or the largest such sum.
 SEARCHED = ("column sum", "row sum", "largest entry", "Frobenius")
 
@@ -59,8 +41,8 @@ def possible(
     relative: bool = False,
     printed: str | None = None,
     reference: str = "given",
-) -> Possible:
-    """Search all matrices X of a wordlength for one whose error has the printed norm.
+) -> Matrix | None:
+    """Search all matrices X of a wordlength for one whose error has the printed norm; None if there is none.
 
     It does not matter how X was computed. Only the set of numbers of the wordlength matters, not the rounding.
 
@@ -90,34 +72,31 @@ def possible(
                 witness[index] = min(candidates[index])[1]
             for index, value in zip(group, chosen, strict=True):
                 witness[index] = value
-            return Possible(wordlength, reference, places, norm, relative, printed, witness)
-    return Possible(wordlength, reference, places, norm, relative, printed, None)
+            return witness
+    return None
 
 
 @cache
-def all_possible() -> tuple[Possible, ...]:
-    """Search every wordlength, one more with an additional digit, and every norm.
+def all_possible() -> tuple[tuple[int, Matrix | None], ...]:
+    """Search every wordlength and every norm; return the places of each search, and what it found.
 
     Rounding matters only if three digits cannot hold the given matrix.
     """
-    given = [(Wordlength(kind, Rounding.NEAREST), "given") for kind in (*KINDS, "t = places + 2")]
+    given = [(Wordlength(kind, Rounding.NEAREST), "given") for kind in KINDS]
     stored = [(Wordlength(KINDS[0], rounding), "stored") for rounding in Rounding.documented()]
     cases = product((*given, *stored), SEARCHED, (False, True), PLACES)
-    return tuple(possible(w, places, norm, relative, None, r) for (w, r), norm, relative, places in cases)
+    return tuple((places, possible(w, places, norm, relative, None, r)) for (w, r), norm, relative, places in cases)
 
 
 def _groups(norm: str) -> list[list[tuple[int, int]]]:
     """List the groups of entries whose sizes are summed; the norm is the largest of the sums."""
     n = range(len(MATRIX))
-    match norm:
-        case "column sum":
-            return [[(i, j) for i in n] for j in n]
-        case "row sum":
-            return [[(i, j) for j in n] for i in n]
-        case "largest entry":
-            return [[(i, j)] for i in n for j in n]
-        case _:
-            return [[(i, j) for i in n for j in n]]
+    return {
+        "column sum": [[(i, j) for i in n] for j in n],
+        "row sum": [[(i, j) for j in n] for i in n],
+        "largest entry": [[(i, j)] for i in n for j in n],
+        "Frobenius": [[(i, j) for i in n for j in n]],
+    }[norm]
 
 
 def _near(

@@ -78,18 +78,16 @@ def transform(triangular: Triangularization, right: FloatArray) -> tuple[FloatAr
     return tuple(rights)
 
 
-def substitute(upper: FloatArray, right: FloatArray) -> FloatArray:
-    """Box "Back substitution to solve A_T x_j = b_j", (65)-(79)."""
+def reduce(a: FloatArray, pivot: bool = False) -> Reduction:
+    """Run the three boxes of the computation: stages, right-hand sides and the inverse, as FloatArrays.
+
+    The third box is "Back substitution to solve A_T x_j = b_j", (65)-(79).
+    """
     from gpbnb.arithmetic import linalg
 
-    return linalg.solve(upper, right)
-
-
-def reduce(a: FloatArray, pivot: bool = False) -> Reduction:
-    """Run the three boxes of the computation: stages, right-hand sides and the inverse, as FloatArrays."""
     triangular = triangularize(a, pivot)
     rights = transform(triangular, a.format.array(np.eye(len(a), dtype=int)))
-    return Reduction(triangular.stages, rights, substitute(triangular.upper, rights[-1]))
+    return Reduction(triangular.stages, rights, linalg.solve(triangular.upper, rights[-1]))
 
 
 def as_floats(reduction: Reduction) -> Reduction:

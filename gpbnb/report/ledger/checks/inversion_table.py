@@ -56,8 +56,8 @@ def _closest(column: str) -> example.Agreements:
 @cache
 def _possible(places: tuple[int, ...]) -> tuple[int, int]:
     """Count the searches through all matrices of `places` places that find the printed error norm, and all searches."""
-    here = [p for p in existence.all_possible() if p.places in places and p.wordlength.kind != "t = places + 2"]
-    return sum(p.witness is not None for p in here), len(here)
+    here = [witness for searched, witness in existence.all_possible() if searched in places]
+    return sum(witness is not None for witness in here), len(here)
 
 
 def proposed_text(printed: Statement) -> str:
