@@ -63,6 +63,8 @@ class ExactKernel:
         self.nearest = self.rounding.to_nearest
         self.count = 0  # roundings so far, which select the random bits
         self._unlimited = self.limits is None  # what has no limits takes shorter ways
+        #: Whether references use the format: base 2 to nearest without limits, rounded by shifts.
+        self._plain = self.base == 2 and self._unlimited and self.rounding is Rounding.NEAREST
         self._bits = log2(self.base)
         self._smallest = self.base ** (self.precision - 1)
         self.limit = self.base**self.precision
@@ -251,6 +253,10 @@ class ExactKernel:
     def _round_integer(self, n: int, e: int) -> Pair:
         """Round ``n * base**e``, ``n`` not zero."""
         a = abs(n)
+        if self._plain:
+            drop = a.bit_length() - self.precision
+            m = a << -drop if drop <= 0 else ((a >> (drop - 1)) + 1) >> 1
+            return self._within(n, m, e + drop)
         drop = self._dropped(self.digits(a) - self.precision, e)
         if drop <= 0:
             return (n * self.power(-drop), e + drop) if self._unlimited else self._within(n, a, e)
