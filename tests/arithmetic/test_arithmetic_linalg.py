@@ -151,24 +151,15 @@ def test_shapes() -> None:
 
 @pytest.mark.parametrize("fmt", [FloatFormat(10, 2), FloatFormat(2, 4, "even")], ids=str)
 def test_sums_in_halves_and_in_blocks_are_those_of_their_definition(fmt: FloatFormat) -> None:
-    def halved(first: int, end: int) -> Fraction:
-        middle = (first + end) // 2
-        return products[first] if end - first == 1 else fmt.round(halved(first, middle) + halved(middle, end))
-
-    def from_left(terms: list[Fraction]) -> Fraction:
-        total = terms[0]
-        for term in terms[1:]:
-            total = fmt.round(total + term)
-        return total
-
+    r = oracles.rounds(fmt)
     for n in range(1, 70):
         x, y = (fmt.array(np.random.default_rng([n, k]).normal(size=n)) for k in range(2))
-        products = (x * y).to_fractions().tolist()
-        assert linalg.dot(x, y, "pairwise").to_fractions() == halved(0, n)
+        given = x.to_fractions().tolist(), y.to_fractions().tolist()
+        assert linalg.dot(x, y, "pairwise").to_fractions() == oracles.summed(r, *given, "pairwise")
         for block in (1, 3, 32):
-            sums = [from_left(products[k : k + block]) for k in range(0, n, block)]
-            assert linalg.dot(x, y, "blocked", block=block).to_fractions() == from_left(sums)
-        assert np.cumsum(x).to_fractions().tolist()[-1] == from_left(x.to_fractions().tolist())
+            expected = oracles.summed(r, *given, "blocked", block=block)
+            assert linalg.dot(x, y, "blocked", block=block).to_fractions() == expected
+        assert np.cumsum(x).to_fractions().tolist()[-1] == arithmetic(fmt).total(given[0])
 
 
 def test_long_sums_in_loops_are_those_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -145,3 +145,10 @@ def test_two_rows_of_a_statement_are_refused(monkeypatch):
     monkeypatch.setattr("gpbnb.report.ledger.judge.rows_of", lambda name: iter(rows))
     with pytest.raises(ValueError, match=r"two rows of 'hung1984\.II\.eq1' in topic\.csv; needed one"):
         read_rows("some.topic", {})
+
+
+@pytest.mark.parametrize("symbol", ["==", "<=", "<", ">=", ">"])
+def test_what_has_no_known_sign_does_not_hold(symbol):
+    x = sp.Symbol("x", real=True)
+    assert not holds(Link(x, symbol, sp.Integer(1)))
+    assert not holds(Link(x**2 - x, symbol, sp.Integer(0)))
