@@ -3,57 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.report.geometry.theory import Effect, Misalignments
 from gpbnb.report.measurement import YEAR, apply, deroll, into_spacecraft, rotation
 
 Floats = NDArray[np.float64]
 CHUNK = 2**16
-
-
-@dataclass(frozen=True)
-class MisalignedYear:
-    """A simulated year of one case.
-
-    Parameters
-    ----------
-    case : its angles; radians.
-    roll_period : seconds; None if the spacecraft does not roll.
-    step : seconds between samples.
-    block : number of samples in one mean, the smallest number that fills whole rolls.
-    time : (k,), time of the middle of each mean; years.
-    phi : (k, 2), means of the derolled difference, as φ2 and φ3; radians.
-    first : (j, 2), derolled samples of the first rolls before averaging.
-    offset, drift : (2,), of the straight line fitted to the means; radians, and radians per year.
-    sample_drift : (2,), of the straight line fitted to all samples.
-    line : amplitude at the roll frequency, averaged over the year; radians.
-    """
-
-    case: Misalignments
-    roll_period: float | None
-    step: float
-    block: int
-    time: Floats
-    phi: Floats
-    first: Floats
-    offset: Floats
-    drift: Floats
-    sample_drift: Floats
-    line: float
-
-    @property
-    def error(self) -> Effect:
-        """Errors of angle and drift in the fitted line, as in :func:`gpbnb.report.geometry.theory.effect`."""
-        angle, drift = self.offset, self.drift - np.asarray(self.case.drift)
-        return Effect((float(angle[0]), float(angle[1])), (float(drift[0]), float(drift[1])), self.line)
 
 
 def difference(case: Misalignments, years: ArrayLike, phase: ArrayLike) -> Floats:
@@ -80,62 +38,36 @@ def spin_axis(case: Misalignments, years: ArrayLike) -> Floats:
     return np.stack([np.cos(phi2) * np.cos(phi3), -np.sin(phi3), np.sin(phi2) * np.cos(phi3)], axis=-1)
 
 
-def year(
-    case: Misalignments, roll_period: float | None = 600.0, step: float = 60.0, *, progress: bool = False
-) -> MisalignedYear:
-    """Simulate a year of samples and measure the drift.
+def year(case: Misalignments, roll_period: float | None = 600.0, step: float = 60.0) -> Effect:
+    """Simulate a year of samples; return the errors of a straight line fitted to means of whole rolls.
 
     Parameters
     ----------
     case : the angles.
     roll_period : seconds, a multiple of 0.1; None for a spacecraft that stays at phase 0.
     step : seconds between samples, a multiple of 0.1; at least three samples per roll.
-    progress : show a progress bar.
     """
-    return _year(case, roll_period, step, progress)
-
-
-@lru_cache(maxsize=64)  # a chapter shows some years several times
-def _year(case: Misalignments, roll_period: float | None, step: float, progress: bool) -> MisalignedYear:
     block = _block(roll_period, step)
-    count = int(YEAR / step) // block * block
+    count = int(YEAR / step) // block
     rate = 0.0 if roll_period is None else 2 * math.pi / roll_period
-    first = min(count, 6 * block, CHUNK)
-    means, opening = [], np.empty((0, 2))
-    sums: NDArray[Any] = np.zeros((2, 2))
-    standing: Floats = np.zeros(2)
-    centre = (count - 1) / 2
     # Each block begins at phase zero. In a phase that grows for a year, by 3e5 rolls, float64 loses seven digits.
     phase = rate * step * np.arange(block)
-    for start, stop in tqdm(_chunks(count, block), desc="a year", disable=not progress, ncols=80):
-        index = np.arange(start, stop)
-        blocks = difference(case, index.reshape(-1, block) * (step / YEAR), phase)
-        mean, samples = blocks.mean(axis=1, keepdims=True), blocks.reshape(-1, 2)
-        means.append(mean[:, 0])
-        sums += np.stack([samples.sum(axis=0), ((index - centre)[:, None] * samples).sum(axis=0)])
-        line = blocks - mean
+    means, standing = np.empty((count, 2)), np.zeros(2)
+    size = max(CHUNK // block, 1)
+    for start in range(0, count, size):
+        index = np.arange(start * block, min(start + size, count) * block).reshape(-1, block)
+        found = difference(case, index * (step / YEAR), phase)
+        mean = found.mean(axis=1, keepdims=True)
+        means[start : start + size] = mean[:, 0]
+        line = found - mean
         yz = np.stack([-line[..., 1], line[..., 0]], axis=-1)
-        standing += deroll(yz, -phase).reshape(-1, 2).sum(axis=0)
-        if not start:
-            opening = samples[:first]
-    phi: NDArray[Any] = np.concatenate(means)
-    time: NDArray[Any] = (np.arange(len(phi)) * block + (block - 1) / 2) * (step / YEAR)
-    slope = _slope(time, phi)
-    offset: Floats = phi.mean(axis=0) - slope * time.mean()
-    spread = count * (count**2 - 1) / 12
-    return MisalignedYear(
-        case,
-        roll_period,
-        step,
-        block,
-        time,
-        phi,
-        opening,
-        offset,
-        slope,
-        sums[1] / spread / (step / YEAR),
-        float(np.hypot(*standing)) / count if roll_period is not None else 0.0,
-    )
+        standing += deroll(yz, -phase).sum(axis=(0, 1))
+    time = (np.arange(count) * block + (block - 1) / 2) * (step / YEAR)
+    centred = time - time.mean()
+    slope = centred @ means / (centred @ centred)
+    angle, drift = means.mean(axis=0) - slope * time.mean(), slope - case.drift
+    amplitude = float(np.hypot(*standing)) / (count * block) if roll_period is not None else 0.0
+    return Effect((float(angle[0]), float(angle[1])), (float(drift[0]), float(drift[1])), amplitude)
 
 
 def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float]) -> Floats:
@@ -158,11 +90,6 @@ def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float]) 
     return np.array(errors)
 
 
-def _slope(time: Floats, values: Floats) -> Floats:
-    centred = time - time.mean()
-    return np.asarray(centred @ values / (centred @ centred))
-
-
 def _block(roll_period: float | None, step: float) -> int:
     if not step > 0 or (roll_period is not None and not roll_period > 0):
         raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; needed both above 0")
@@ -180,9 +107,3 @@ def _block(roll_period: float | None, step: float) -> int:
             "that is not a multiple of half the roll period"
         )
     return block
-
-
-def _chunks(count: int, block: int) -> Iterator[tuple[int, int]]:
-    size = max(CHUNK // block, 1) * block
-    for start in range(0, count, size):
-        yield start, min(start + size, count)
