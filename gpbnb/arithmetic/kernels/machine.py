@@ -18,13 +18,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import decimal, doubledouble, shortdecimal, wide
 from gpbnb.arithmetic.kernels.bits import at, bits, call, entries, fma, from_bits, select, words
 from gpbnb.arithmetic.kernels.careful import carefully, masked
-from gpbnb.arithmetic.kernels.compiling import Compiler, address_of, addressed, borrowing, compiled, inner
-from gpbnb.arithmetic.kernels.processor import fused_sum
+from gpbnb.arithmetic.kernels.compiling import address_of, addressed, borrowing, compiled, inner
+from gpbnb.arithmetic.kernels.doubledouble import two_sum
 from gpbnb.arithmetic.kernels.tags import (
     ABSOLUTE,
     ADD,
@@ -75,7 +74,7 @@ after their operands are gathered; or together, since their operands and results
 # arrays, and integers; see gpbnb.arithmetic.machine and gpbnb.arithmetic.loop, which make them.
 WHOLE, NUMBER, RANDOM = range(3)
 """The columns of formats, int64 and float64, whose meaning depends on the kind; seed and count of random numbers."""
-A, B, C, OUT, BEGINS, OPERATIONS, FORMAT, TOGETHER, GATHERED, SEGMENTS, ROWS = range(11)
+A, B, C, OUT, BEGINS, OPERATIONS, FORMAT, TOGETHER, ROOM, SEGMENTS, ROWS = range(11)
 """Operands and results of rows, uint32; where segments begin, and their operations, formats and how their rows run,
 int64; room for the operands of a segment, float64; and how many segments and rows there are."""
 VALUES, TRUTHS = range(2)
@@ -98,120 +97,91 @@ BITS, PRECISION, MODE, QUICK, HOW, UNIT, BELOW_ZERO, ABOVE_ZERO, STICKY_BELOW, S
 )
 _SIGN, _MAGNITUDE = np.int64(-(2**63)), np.int64(2**63 - 1)
 _EXPONENT, _HALF_ULP = np.int64(0x7FF << 52), np.int64(53 << 52)
-_NONE = np.int64(-1)
 _ADD, _MULTIPLY = np.int64(ADD), np.int64(MULTIPLY)
 LONG, SHORT, TIED = range(3)
 """How quick results are rounded: by the sign of a residual, without, or by the size of the residual, which tells ties
 away from zero in 53 bits."""
+_UNIT_OF_EXACT_PRODUCTS = np.int64(1 << 27)  # products of numbers of at most 26 bits are exact
 _SHORT, _LONG = np.int64(SHORT), np.int64(LONG)
 
 
 @inner(forceinline=True)
-def _quick(p: Any, r: Any, rule: Any) -> Any:
-    """Round p + r in a format of base 2 as if its range had no end; also return the size's bits."""
-    unit, below, above, sticky_below, sticky_above, to_even = rule
-    u = bits(p)
-    sign = u & _SIGN
-    size = u & _MAGNITUDE
-    negative = u < 0
-    size -= np.int64(((r < 0.0) & (p > 0.0)) | ((r > 0.0) & (p < 0.0)))
-    sticky = select(negative, sticky_below, sticky_above) & np.int64(r != 0.0)
-    odd = to_even & np.int64((size & unit) != 0)
-    size = (size + select(negative, below, above) + (sticky | odd)) & -unit
-    return from_bits(size | sign), size
-
-
-@inner(forceinline=True)
-def _quick_of_short(p: Any, rule: Any) -> Any:
-    """Round p to nearest in a format of at most 25 bits: rounding twice is correct."""
-    unit, above, to_even = rule[0], rule[2], rule[5]
+def _rounded(how: Any, p: Any, r: Any, rule: Any) -> Any:
+    """Round p + r, where p is p + r to nearest with ties to even; also return whether it is out of range."""
+    unit, below, above, sticky_below, sticky_above, to_even, low, span = rule
     u = bits(p)
     size = u & _MAGNITUDE
-    size = (size + above + (to_even & np.int64((size & unit) != 0))) & -unit
-    return from_bits(size | (u & _SIGN)), size
-
-
-@inner(forceinline=True)
-def _quick_tied(p: Any, r: Any) -> Any:
-    """Round p + r to 53 bits, where p is p + r to nearest with ties to even, with ties away from zero."""
-    u = bits(p)
-    half = from_bits((u & _EXPONENT) - _HALF_ULP)
-    size = (u & _MAGNITUDE) + np.int64(r == (half if p > 0.0 else -half))
-    return from_bits(size | (u & _SIGN)), size
-
-
-@inner(forceinline=True)
-def _quick_sum(how: Any, p: Any, r: Any, rule: Any) -> Any:
-    if how == SHORT:
-        return _quick_of_short(p, rule)
-    return _quick(p, r, rule) if how == LONG else _quick_tied(p, r)
-
-
-@inner(forceinline=True)
-def _outside(size: Any, low: Any, span: Any) -> Any:
+    if how == TIED:
+        half = from_bits((u & _EXPONENT) - _HALF_ULP)
+        size += np.int64(r == (half if p > 0.0 else -half))
+    else:
+        r = 0.0 if how == SHORT else r  # rounding twice is correct
+        negative = u < 0
+        size -= np.int64(((r < 0.0) & (p > 0.0)) | ((r > 0.0) & (p < 0.0)))
+        sticky = select(negative, sticky_below, sticky_above) & np.int64(r != 0.0)
+        odd = to_even & np.int64((size & unit) != 0)
+        size = (size + select(negative, below, above) + (sticky | odd)) & -unit
     # Sizes are so far from the ends of float64 that no product or quotient of other numbers is zero.
-    return (np.uint64(size - low) > span) & (size != 0)
+    gone = (np.uint64(size - low) > np.uint64(span)) & (size != 0)
+    return from_bits(size | (u & _SIGN)) + 0.0, np.int64(gone)
 
 
 @borrowing(error_model="numpy", forceinline=True)
-def _quick_result(operation: Any, how: Any, rule: Any, x: Any, y: Any) -> Any:
-    """The result of a product, quotient or sum as if the range had no end, and the bits of its size."""
+def _basic(operation: Any, how: Any, rule: Any, x: Any, y: Any) -> Any:
+    """A product, quotient or sum, and whether it is out of range."""
     if operation == MULTIPLY:
         p = x * y
-        return _quick_sum(how, p, fma(x, y, -p), rule)
-    if operation == DIVIDE:
+        r = fma(x, y, -p)
+    elif operation == DIVIDE:
         p = x / y
         r = fma(-p, y, x)
         r = 0.0 if how == TIED else -r if y < 0.0 else r  # no quotient is a tie
-        found, size = _quick_sum(how, p, r, rule)
-        return found, select(y == 0.0, _NONE, size)
-    y = -y if operation == SUBTRACT else y
-    p = x + y
-    c = p - x
-    return _quick_sum(how, p, (x - (p - c)) + (y - c), rule)
+    else:
+        y = -y if operation == SUBTRACT else y
+        p = x + y
+        c = p - x
+        r = (x - (p - c)) + (y - c)
+    found, gone = _rounded(how, p, r, rule)
+    return found, gone | np.int64((operation == DIVIDE) & (y == 0.0))
 
 
 @borrowing(forceinline=True)
-def _along(operation: Any, how: Any, sign: Any, limits: Any, a: Any, b: Any, c: Any, count: Any) -> Any:
+def _along(operation: Any, how: Any, sign: Any, rule: Any, a: Any, b: Any, c: Any, count: Any) -> Any:
     """Compute c from a and b, entry by entry; return whether a result left the range."""
-    rule, _, low, span = limits
-    gone = np.int64(0)
+    any_gone = np.int64(0)
     for i in range(count):
-        found, size = _quick_result(operation, how, rule, a[i], sign * b[i])
-        gone |= np.int64(_outside(size, low, span))
-        c[i] = found + 0.0
-    return gone
+        c[i], gone = _basic(operation, how, rule, a[i], sign * b[i])
+        any_gone |= gone
+    return any_gone
 
 
 @borrowing
-def _all_along(operation: Any, limits: Any, a: Any, b: Any, c: Any, count: Any) -> Any:
+def _all_along(operation: Any, how: Any, rule: Any, a: Any, b: Any, c: Any, count: Any) -> Any:
     # A loop for each case, so that none branches and processors compute several entries at once.
-    short, sign = limits[1] == SHORT, (-1.0 if operation == SUBTRACT else 1.0)
+    sign = -1.0 if operation == SUBTRACT else 1.0
     if operation == MULTIPLY:
-        if short:
-            return _along(_MULTIPLY, _SHORT, 1.0, limits, a, b, c, count)
-        return _along(_MULTIPLY, _LONG, 1.0, limits, a, b, c, count)
-    if short:
-        return _along(_ADD, _SHORT, sign, limits, a, b, c, count)
-    return _along(_ADD, _LONG, sign, limits, a, b, c, count)
+        if how == SHORT:
+            return _along(_MULTIPLY, _SHORT, 1.0, rule, a, b, c, count)
+        return _along(_MULTIPLY, _LONG, 1.0, rule, a, b, c, count)
+    if how == SHORT:
+        return _along(_ADD, _SHORT, sign, rule, a, b, c, count)
+    return _along(_ADD, _LONG, sign, rule, a, b, c, count)
 
 
 @borrowing
-def _one_by_one(operation: Any, limits: Any, a: Any, b: Any, out: Any, count: Any, values: Any) -> Any:
-    rule, how, low, span = limits
-    gone = np.int64(0)
+def _one_by_one(operation: Any, how: Any, rule: Any, a: Any, b: Any, out: Any, count: Any, values: Any) -> Any:
+    any_gone = np.int64(0)
     for i in range(count):
-        found, size = _quick_result(operation, how, rule, values[a[i]], values[b[i]])
-        gone |= np.int64(_outside(size, low, span))
-        values[out[i]] = found + 0.0
-    return gone
+        values[out[i]], gone = _basic(operation, how, rule, values[a[i]], values[b[i]])
+        any_gone |= gone
+    return any_gone
 
 
 @borrowing(error_model="numpy")
-def _quick_other(operation: Any, how: Any, rule: Any, x: Any, y: Any, z: Any) -> Any:
-    """The result of any operation on numbers, as :func:`_quick_result`."""
+def _other(operation: Any, how: Any, rule: Any, x: Any, y: Any, z: Any) -> Any:
+    """The result of any operation on numbers, as :func:`_basic`."""
     if operation <= DIVIDE:
-        return _quick_result(operation, how, rule, x, y)
+        return _basic(operation, how, rule, x, y)
     if operation in (NEGATIVE, ABSOLUTE):
         return (0.0 - x if operation == NEGATIVE else abs(x)), np.int64(0)
     p, r = x, 0.0
@@ -219,15 +189,15 @@ def _quick_other(operation: Any, how: Any, rule: Any, x: Any, y: Any, z: Any) ->
         p = math.sqrt(x)
         r = 0.0 if how == TIED else fma(-p, p, x)  # nor is a root
     elif operation == FUSED:
-        if how == TIED:
-            return x, _NONE
-        if rule[0] == 1:  # 53 bits
+        if rule[0] == 1 and how == SHORT:  # 53 bits, ties to even
             p = fma(x, y, z)
-        else:
-            p, r, _ = fused_sum(x, y, z)
+        elif rule[0] >= _UNIT_OF_EXACT_PRODUCTS:
+            p, r = two_sum(x * y, z)
             how = _LONG
-    found, size = _quick_sum(how, p, r, rule)
-    return found, select(p != p, _NONE, size)
+        else:
+            return x, np.int64(1)
+    found, gone = _rounded(how, p, r, rule)
+    return found, gone | np.int64(p != p)
 
 
 @borrowing
@@ -236,19 +206,14 @@ def _without_rounding(operation: Any, values: Any, truths: Any, a: Any, b: Any, 
     if operation == CHOOSE:
         values[out] = values[b] if truths[a] else values[c]
     elif operation == NONZERO:
-        return values[a] == 0.0
+        return np.int64(values[a] == 0.0)
     else:
         k = 2 * np.int64(truths[a]) + np.int64(truths[b])
         if operation == COMPARE:
             x, y = values[a], values[b]
             k = np.int64(x > y) - np.int64(x < y) + 1
         truths[out] = (code >> k) & 1
-    return False
-
-
-@borrowing
-def _column(code: Any, column: Any, begin: Any) -> Any:
-    return at(entries(code, column, np.uint32), begin)
+    return np.int64(0)
 
 
 @borrowing
@@ -259,11 +224,11 @@ def _row(code: Any, lanes: Any, o: Any) -> Any:
 
 
 @borrowing
-def _limits(formats: Any, f: Any) -> Any:
+def _rule(formats: Any, f: Any) -> Any:
     """How results of a format are rounded, and the range of their sizes."""
     whole = at(entries(formats, WHOLE, np.int64), COLUMNS * f)
     rule = whole[UNIT], whole[BELOW_ZERO], whole[ABOVE_ZERO], whole[STICKY_BELOW], whole[STICKY_ABOVE], whole[TO_EVEN]
-    return rule, whole[HOW], whole[LOW], np.uint64(whole[SPAN])
+    return whole[HOW], (*rule, whole[LOW], whole[SPAN])
 
 
 @inner(forceinline=True)
@@ -275,76 +240,68 @@ def _rounds(operation: Any) -> Any:
 @addressed
 def _quick_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8)
-    operations, numbers, together = (
-        entries(code, OPERATIONS, np.int64),
-        entries(code, FORMAT, np.int64),
-        entries(code, TOGETHER, np.int64),
-    )
-    begins, room = entries(code, BEGINS, np.int64), entries(code, GATHERED, np.float64)
-    gone, f, after = np.int64(0), np.int64(0), np.int64(0)
-    limits = _limits(formats, f)
+    operations, numbers = entries(code, OPERATIONS, np.int64), entries(code, FORMAT, np.int64)
+    begins, together = entries(code, BEGINS, np.int64), entries(code, TOGETHER, np.int64)
+    any_gone, f, after = np.int64(0), np.int64(0), np.int64(0)
+    how, rule = _rule(formats, f)
     for s in range(code[SEGMENTS]):
         begin, count, operation = begins[s], begins[s + 1] - begins[s], operations[s]
         if begin < after:
             continue
         if numbers[s] != f:
             f = numbers[s]
-            limits = _limits(formats, f)
-        a, b, out = _column(code, A, begin), _column(code, B, begin), _column(code, OUT, begin)
-        if together[s] != ONE_BY_ONE and limits[1] != TIED:
+            how, rule = _rule(formats, f)
+        a, b = at(entries(code, A, np.uint32), begin), at(entries(code, B, np.uint32), begin)
+        c, out = at(entries(code, C, np.uint32), begin), at(entries(code, OUT, np.uint32), begin)
+        if together[s] != ONE_BY_ONE and how != TIED:
             first, second = at(values, a[0]), at(values, b[0])
             if together[s] == GATHERED:
-                first, second = room, at(room, count)
+                first = entries(code, ROOM, np.float64)
+                second = at(first, count)
                 for i in range(count):
                     first[i] = values[a[i]]
                     second[i] = values[b[i]]
-            gone |= _all_along(operation, limits, first, second, at(values, out[0]), count)
+            any_gone |= _all_along(operation, how, rule, first, second, at(values, out[0]), count)
         elif operation <= DIVIDE:
-            gone |= _one_by_one(operation, limits, a, b, out, count, values)
+            any_gone |= _one_by_one(operation, how, rule, a, b, out, count, values)
         elif operation == SKIP:
             if not truths[a[0]]:
                 after = begin + count + np.int64(b[0])
         else:
-            c = _column(code, C, begin)
             for i in range(count):
                 x, y, z = a[i], b[i], c[i]
                 if _rounds(operation):
                     third = values[z] if operation == FUSED else 0.0
-                    found, size = _quick_other(operation, limits[1], limits[0], values[x], values[y], third)
-                    gone |= np.int64(_outside(size, limits[2], limits[3]))
-                    values[out[i]] = found + 0.0
+                    values[out[i]], gone = _other(operation, how, rule, values[x], values[y], third)
+                    any_gone |= gone
                 else:
-                    gone |= np.int64(_without_rounding(operation, values, truths, x, y, z, np.int64(z), out[i]))
-    return 0 if gone != 0 else code[ROWS]
+                    any_gone |= _without_rounding(operation, values, truths, x, y, z, np.int64(z), out[i])
+    return 0 if any_gone != 0 else code[ROWS]
 
 
 @addressed
 def _quick_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8)
-    operations, numbers, begins = (
-        entries(code, OPERATIONS, np.int64),
-        entries(code, FORMAT, np.int64),
-        entries(code, BEGINS, np.int64),
-    )
-    gone = np.int64(0)
+    operations, numbers = entries(code, OPERATIONS, np.int64), entries(code, FORMAT, np.int64)
+    begins, any_gone = entries(code, BEGINS, np.int64), np.int64(0)
     for s in range(code[SEGMENTS]):
-        limits, operation = _limits(formats, numbers[s]), operations[s]
+        operation = operations[s]
+        how, rule = _rule(formats, numbers[s])
         if operation == SKIP:
             continue
         for o in range(begins[s], begins[s + 1]):
             a, b, c, out, third = _row(code, lanes, o)
-            if operation <= MULTIPLY and limits[1] != TIED:
-                gone |= _all_along(operation, limits, at(values, a), at(values, b), at(values, out), lanes)
+            if operation <= MULTIPLY and how != TIED:
+                any_gone |= _all_along(operation, how, rule, at(values, a), at(values, b), at(values, out), lanes)
                 continue
             for i in range(lanes):
                 if _rounds(operation):
                     z = values[c + i] if operation == FUSED else 0.0
-                    found, size = _quick_other(operation, limits[1], limits[0], values[a + i], values[b + i], z)
-                    gone |= np.int64(_outside(size, limits[2], limits[3]))
-                    values[out + i] = found + 0.0
+                    values[out + i], gone = _other(operation, how, rule, values[a + i], values[b + i], z)
+                    any_gone |= gone
                 else:
-                    gone |= np.int64(_without_rounding(operation, values, truths, a + i, b + i, c + i, third, out + i))
-    return 0 if gone != 0 else code[ROWS]
+                    any_gone |= _without_rounding(operation, values, truths, a + i, b + i, c + i, third, out + i)
+    return 0 if any_gone != 0 else code[ROWS]
 
 
 @borrowing
@@ -388,136 +345,97 @@ quotient of two of them leaves float64."""
 # -- other numbers -----------------------------------------------------------------------------------------------------
 
 
-def _operate(fmt: Any, operation: Any, below: Any, x: Any, y: Any) -> Any:
-    """The result of an operation on numbers of which the first may be below zero."""
-    raise TypeError("got a call of _operate from Python; needed one from a function compiled by numba")
+def _segments(kind: Any, parts: int) -> Any:
+    """Return the function that runs a segment in an arithmetic whose numbers have some parts."""
+    add, multiply, divide, sqrt, round_, compare = (
+        kind.add,
+        kind.multiply,
+        kind.divide,
+        kind.sqrt,
+        kind.round_,
+        kind.compare,
+    )
+    load, put, opposite, negative = kind.load, kind.put, kind.opposite, kind.negative
 
+    @borrowing(forceinline=True)
+    def run(fmt: Any, operation: Any, code: Any, o: Any, end: Any, values: Any, truths: Any, lanes: Any) -> Any:
+        """Run rows from o on for each lane; return the row to go on with, or ~row if one has no result."""
+        while o < end:
+            a, b, c, out, third = _row(code, lanes, o)
+            holds = operation != SKIP
+            for i in range(lanes):
+                if operation == SKIP:
+                    holds |= truths[a + i] != 0
+                elif operation == CHOOSE:
+                    chosen = b if truths[a + i] else c
+                    for j in range(parts):
+                        values[(out + i) * parts + j] = values[(chosen + i) * parts + j]
+                elif operation == COMBINE:
+                    table = 2 * np.int64(truths[a + i]) + np.int64(truths[b + i])
+                    truths[out + i] = (third >> table) & 1
+                elif operation == NONZERO:
+                    if values[(a + i) * parts] == 0:
+                        return ~o
+                elif operation == COMPARE:
+                    order = compare(fmt, load(fmt, values, a + i), load(fmt, values, b + i))
+                    truths[out + i] = (third >> (order + 1)) & 1
+                else:
+                    x, below = load(fmt, values, a + i), values[(a + i) * parts] < 0
+                    if operation <= DIVIDE:
+                        y = load(fmt, values, b + i)
+                        if operation == MULTIPLY:
+                            x = multiply(fmt, x, y)
+                        elif operation <= SUBTRACT:
+                            x = add(fmt, x, opposite(fmt, y) if operation == SUBTRACT else y)
+                        elif values[(b + i) * parts] == 0:
+                            return ~o
+                        else:
+                            x = divide(fmt, x, y)
+                    elif operation == FUSED or (operation == ROOT and below):
+                        return ~o
+                    elif operation == ROOT:
+                        x = sqrt(fmt, x)
+                    elif operation == ROUND:
+                        x = round_(fmt, x)
+                    elif below or operation == NEGATIVE:
+                        x = negative(fmt, x)
+                    put(fmt, values, out + i, x)
+                    first = values[(out + i) * parts]
+                    if first != first:
+                        return ~o
+            o += 1 if holds else 1 + np.int64(entries(code, B, np.uint32)[o])
+        return o
 
-def _load(fmt: Any, values: Any, k: Any) -> Any:
-    """The number k."""
-    raise TypeError("got a call of _load from Python; needed one from a function compiled by numba")
-
-
-def _put(fmt: Any, values: Any, k: Any, x: Any) -> None:
-    """Store the number k."""
-    raise TypeError("got a call of _put from Python; needed one from a function compiled by numba")
-
-
-def _compare(fmt: Any, x: Any, y: Any) -> Any:
-    """-1, 0 or 1 if x is less than, equal to or greater than y."""
-    raise TypeError("got a call of _compare from Python; needed one from a function compiled by numba")
-
-
-_MODULES = {ShortDecimal: shortdecimal, LimitedDecimal: decimal, DoubleDouble: doubledouble, Wide: wide}
-_BORROWING = {"_nrt": False, "pipeline_class": Compiler}
-
-
-@overload(_operate, strict=False, jit_options=_BORROWING)
-def _overloaded_operate(fmt: Any, operation: Any, below: Any, x: Any, y: Any) -> Any:
-    kind: Any = _MODULES[fmt.instance_class]
-    add, multiply, divide, sqrt, round_ = kind.add, kind.multiply, kind.divide, kind.sqrt, kind.round_
-    opposite, negative = kind.opposite, kind.negative
-
-    def operate(fmt: Any, operation: Any, below: Any, x: Any, y: Any) -> Any:
+    @borrowing
+    def alone(fmt: Any, operation: Any, code: Any, o: Any, end: Any, values: Any, truths: Any, lanes: Any) -> Any:
+        """The same; a copy of the loop serves products, so that what depends on the format alone is computed once."""
         if operation == MULTIPLY:
-            return multiply(fmt, x, y)
+            return run(fmt, _MULTIPLY, code, o, end, values, truths, lanes)
         if operation <= SUBTRACT:
-            return add(fmt, x, opposite(fmt, y) if operation == SUBTRACT else y)
-        if operation == DIVIDE:
-            return divide(fmt, x, y)
-        if operation == ROOT:
-            return sqrt(fmt, x)
-        if operation == ROUND:
-            return round_(fmt, x)
-        return negative(fmt, x) if below or operation == NEGATIVE else x
+            return run(fmt, operation & SUBTRACT, code, o, end, values, truths, lanes)
+        return run(fmt, operation, code, o, end, values, truths, lanes)
 
-    return operate
-
-
-@overload(_load, strict=False, jit_options=_BORROWING)
-def _overloaded_load(fmt: Any, values: Any, k: Any) -> Any:
-    load = _MODULES[fmt.instance_class].load
-    return lambda fmt, values, k: load(fmt, values, k)
-
-
-@overload(_put, strict=False, jit_options=_BORROWING)
-def _overloaded_put(fmt: Any, values: Any, k: Any, x: Any) -> Any:
-    put = _MODULES[fmt.instance_class].put
-    return lambda fmt, values, k, x: put(fmt, values, k, x)
-
-
-@overload(_compare, strict=False, jit_options=_BORROWING)
-def _overloaded_compare(fmt: Any, x: Any, y: Any) -> Any:
-    compare = _MODULES[fmt.instance_class].compare
-    return lambda fmt, x, y: compare(fmt, x, y)
-
-
-@borrowing(forceinline=True)
-def _run_rows(fmt: Any, operation: Any, parts: Any, code: Any, o: Any, end: Any, values: Any, lanes: Any) -> Any:
-    """Run rows of sums or products, so that what depends on the format alone is computed once."""
-    while o < end:
-        a, b, _, out, _ = _row(code, lanes, o)
-        for i in range(lanes):
-            found = _operate(fmt, operation, False, _load(fmt, values, a + i), _load(fmt, values, b + i))
-            _put(fmt, values, out + i, found)
-            first = values[(out + i) * parts]
-            if first != first:
-                return ~o
-        o += 1
-    return o
+    return run if kind is doubledouble else alone
 
 
 @borrowing
-def _run_segment(fmt: Any, parts: Any, code: Any, s: Any, o: Any, values: Any, truths: Any, lanes: Any) -> Any:
-    """Run rows of a segment from row o on for each lane; return the row to go on with, or ~row if one has no result."""
-    operation, end = entries(code, OPERATIONS, np.int64)[s], entries(code, BEGINS, np.int64)[s + 1]
-    if operation == MULTIPLY:
-        return _run_rows(fmt, _MULTIPLY, parts, code, o, end, values, lanes)
-    if operation <= SUBTRACT:
-        return _run_rows(fmt, operation, parts, code, o, end, values, lanes)
-    while o < end:
-        a, b, c, out, third = _row(code, lanes, o)
-        holds = operation != SKIP
-        for i in range(lanes):
-            if operation == SKIP:
-                holds |= truths[a + i] != 0
-            elif operation == CHOOSE:
-                chosen = b if truths[a + i] else c
-                for j in range(parts):
-                    values[(out + i) * parts + j] = values[(chosen + i) * parts + j]
-            elif operation == COMBINE:
-                table = 2 * np.int64(truths[a + i]) + np.int64(truths[b + i])
-                truths[out + i] = (third >> table) & 1
-            elif operation == NONZERO:
-                if values[(a + i) * parts] == 0:
-                    return ~o
-            else:
-                x, y = _load(fmt, values, a + i), _load(fmt, values, b + i)
-                below = values[(a + i) * parts] < 0
-                if operation == COMPARE:
-                    truths[out + i] = (third >> (_compare(fmt, x, y) + 1)) & 1
-                    continue
-                if (
-                    operation == FUSED
-                    or (operation == DIVIDE and values[(b + i) * parts] == 0)
-                    or (operation == ROOT and below)
-                ):
-                    return ~o
-                _put(fmt, values, out + i, _operate(fmt, operation, below, x, y))
-                first = values[(out + i) * parts]
-                if first != first:
-                    return ~o
-        o += 1 if holds else 1 + np.int64(entries(code, B, np.uint32)[o])
-    return o
+def _segment(formats: Any, code: Any, s: Any) -> Any:
+    """The columns of the format of a segment, its operation, and the row behind it."""
+    f, operation = entries(code, FORMAT, np.int64)[s], entries(code, OPERATIONS, np.int64)[s]
+    return at(entries(formats, WHOLE, np.int64), COLUMNS * f), operation, entries(code, BEGINS, np.int64)[s + 1]
+
+
+_run_pairs, _run_short = _segments(decimal, 2), _segments(shortdecimal, 2)
+_run_two_words, _run_double_doubles = _segments(wide, 3), _segments(doubledouble, 2)
 
 
 @addressed
 def _pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
-        given = at(entries(formats, WHOLE, np.int64), COLUMNS * entries(code, FORMAT, np.int64)[s])
+        given, operation, end = _segment(formats, code, s)
         fmt = LimitedDecimal(given[1], given[0], given[2], given[3], given[4])
-        o = _run_segment(fmt, 2, code, s, o, values, truths, lanes)
+        o = _run_pairs(fmt, operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
     return o
@@ -527,8 +445,9 @@ def _pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 def _short_pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
-        given = at(entries(formats, WHOLE, np.int64), COLUMNS * entries(code, FORMAT, np.int64)[s])
-        o = _run_segment(ShortDecimal(given[0], given[1] == AWAY), 2, code, s, o, values, truths, lanes)
+        given, operation, end = _segment(formats, code, s)
+        fmt = ShortDecimal(given[0], given[1] == AWAY)
+        o = _run_short(fmt, operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
     return o
@@ -538,12 +457,12 @@ def _short_pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 def _two_words(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
-        given = at(entries(formats, WHOLE, np.int64), COLUMNS * entries(code, FORMAT, np.int64)[s])
+        given, operation, end = _segment(formats, code, s)
         lowest, largest = (given[7], given[8], given[9]), (given[10], given[11], given[12])
         fmt = Wide(
             given[0], given[1], given[2], given[3], given[4], given[5], given[6], lowest, largest, given[13] != 0
         )
-        o = _run_segment(fmt, 3, code, s, o, values, truths, lanes)
+        o = _run_two_words(fmt, operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
     return o
@@ -553,7 +472,8 @@ def _two_words(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 def _double_doubles(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
-        o = _run_segment(DoubleDouble(), 2, code, s, o, values, truths, lanes)
+        _, operation, end = _segment(formats, code, s)
+        o = _run_double_doubles(DoubleDouble(), operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
     return o

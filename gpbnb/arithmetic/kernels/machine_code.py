@@ -20,6 +20,10 @@ _RANDOM, _BITS = random.SystemRandom(), 48
 class _Library(JITCodeLibrary):  # type: ignore[misc]
     """The compiled form of a function, with machine code once its address is asked for."""
 
+    def _optimize_functions(self, module: Any) -> None:
+        """Leave a function as it is, for the same reason."""
+        module.data_layout = self._codegen._data_layout
+
     def _optimize_final_module(self) -> None:
         """Do nothing yet: what is compiled into another function is optimized there, and need not be before."""
 
