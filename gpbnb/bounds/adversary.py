@@ -14,7 +14,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.kernels import doubledouble, tags
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
@@ -86,8 +86,8 @@ def _times(a: Any, x: Any, c: Any) -> None:
     for i in range(a.shape[0]):
         s = (0.0, 0.0)
         for j in range(a.shape[1]):
-            p = doubledouble.multiply(exactly, load(exactly, a, (i, j)), load(exactly, x, j))
-            s = doubledouble.add(exactly, s, p)
+            p = doubledouble.operate(tags.MULTIPLY, load(exactly, a, (i, j)), load(exactly, x, j))
+            s = doubledouble.operate(tags.ADD, s, p)
         put(exactly, c, i, s)
 
 
@@ -96,7 +96,7 @@ def _worth(fmt: Any, row: Any, x: Any, x_exact: Any) -> float:
     """Return the weighted error of an estimate."""
     exactly, total = DoubleDouble(), 0.0
     for i in range(x_exact.shape[0]):
-        e = doubledouble.subtract(exactly, widened(fmt, load(fmt, x, i)), load(exactly, x_exact, i))
+        e = doubledouble.operate(tags.SUBTRACT, widened(fmt, load(fmt, x, i)), load(exactly, x_exact, i))
         total += row[i] * e[0]
     return total
 
@@ -167,7 +167,7 @@ def _measure(fmt: Any, given: Any, plan: Any, values: Any, pull: Any, seen: Any,
         c = number(fmt, value)
         put(fmt, into.z, r, c)
         c_exact = widened(fmt, c)
-        put(exactly, into.nu, r, doubledouble.subtract(exactly, c_exact, load(exactly, seen, r)))
+        put(exactly, into.nu, r, doubledouble.operate(tags.SUBTRACT, c_exact, load(exactly, seen, r)))
         excess = max(excess, _share(abs(into.nu[r, 0]), limits.innovation[r]))
         excess = max(excess, _share(abs(c_exact[0]), limits.measurement[r]))
     return excess
@@ -179,7 +179,7 @@ def _corrected(K: Any, nu: Any, predicted: Any, c: Any) -> None:
     exactly = DoubleDouble()
     _times(K, nu, c)
     for i in range(c.shape[0]):
-        put(exactly, c, i, doubledouble.add(exactly, load(exactly, predicted, i), load(exactly, c, i)))
+        put(exactly, c, i, doubledouble.operate(tags.ADD, load(exactly, predicted, i), load(exactly, c, i)))
 
 
 @inner
@@ -193,7 +193,7 @@ def _error_ahead(fmt: Any, given: Any, plan: Any, k: int, x: Any, x_exact: Any, 
     for r in range(m):
         c = number(fmt, nu[r, 0] if plan.by_range else plan.pool[k + 1, 0, r])
         put(fmt, z, r, c)
-        put(exactly, nu, r, doubledouble.subtract(exactly, widened(fmt, c), load(exactly, nu, r)))
+        put(exactly, nu, r, doubledouble.operate(tags.SUBTRACT, widened(fmt, c), load(exactly, nu, r)))
     _corrected(given.K[then], nu, beyond, moved)
     execute(fmt, given.operations, given.outputs, given.coefficients[then], later, z, values)
     return _worth(fmt, plan.rows[k + 1], later, moved)
@@ -256,7 +256,7 @@ def greedy(fmt: Any, given: Any, plan: Any, x: Any, x_exact: Any, chosen: Any, e
         x_exact[:] = best_exact
         chosen[k] = taken
         for i in range(n):
-            e = doubledouble.subtract(exactly, widened(fmt, load(fmt, x, i)), load(exactly, x_exact, i))
+            e = doubledouble.operate(tags.SUBTRACT, widened(fmt, load(fmt, x, i)), load(exactly, x_exact, i))
             errors[k, i] = e[0]
     return violations
 

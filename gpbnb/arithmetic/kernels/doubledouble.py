@@ -17,6 +17,7 @@ import numpy as np
 
 from gpbnb.arithmetic.kernels.bits import fma, select
 from gpbnb.arithmetic.kernels.compiling import inner
+from gpbnb.arithmetic.kernels.tags import DIVIDE, MULTIPLY, ROOT, ROUND, SUBTRACT
 
 LEAST, LIMIT = 2.0**-850, 2.0**1000
 
@@ -28,73 +29,43 @@ def two_sum(a: Any, b: Any) -> Any:
     return s, (a - (s - c)) + (b - c)
 
 
-@inner(forceinline=True)
-def _fast_two_sum(a: Any, b: Any) -> Any:
-    s = a + b
-    return s, b - (s - a)
-
-
-@inner(forceinline=True)
-def _within_range(high: Any, low: Any, exact_zero: Any) -> Any:
-    size = abs(high)
-    within = ((size >= LEAST) & (size < LIMIT)) | (exact_zero & (size == 0.0))
-    return select(within, high + 0.0, np.nan), select(within, low + 0.0, np.nan)
-
-
-@inner(forceinline=True)
-def add(fmt: Any, a: Any, b: Any) -> Any:
-    s, e = two_sum(a[0], b[0])
-    t, f = two_sum(a[1], b[1])
-    s, e = _fast_two_sum(s, e + t)
-    s, e = _fast_two_sum(s, e + f)
-    return _within_range(s, e, s == 0.0)
-
-
-@inner(forceinline=True)
-def opposite(fmt: Any, a: Any) -> Any:
-    return 0.0 - a[0], 0.0 - a[1]
-
-
-negative = opposite
-
-
-@inner(forceinline=True)
-def subtract(fmt: Any, a: Any, b: Any) -> Any:
-    return add(fmt, a, opposite(fmt, b))
-
-
-@inner(forceinline=True)
-def multiply(fmt: Any, a: Any, b: Any) -> Any:
-    p = a[0] * b[0]
-    e = fma(a[0], b[0], -p)
-    e += fma(a[0], b[1], fma(a[1], b[0], a[1] * b[1]))
-    p, e = _fast_two_sum(p, e)
-    return _within_range(p, e, (a[0] == 0.0) | (b[0] == 0.0))
-
-
 @inner(error_model="numpy", forceinline=True)
-def divide(fmt: Any, a: Any, b: Any) -> Any:
-    q = a[0] / b[0]
-    p = b[0] * q
-    e = fma(b[0], q, -p)
-    p, e = _fast_two_sum(p, fma(b[1], q, e))
-    q, low = _fast_two_sum(q, ((a[0] - p) + (a[1] - e)) / b[0])
-    return _within_range(q, low, a[0] == 0.0)
-
-
-@inner(error_model="numpy", forceinline=True)
-def sqrt(fmt: Any, a: Any) -> Any:
-    if a[0] == 0.0:
-        return 0.0, 0.0
-    s = math.sqrt(a[0])
-    s, low = _fast_two_sum(s, (fma(-s, s, a[0]) + a[1]) / (2.0 * s))
-    return _within_range(s, low, a[0] == 0.0)
-
-
-@inner(forceinline=True)
-def round_(fmt: Any, x: Any) -> Any:
-    high, low = two_sum(x[0], x[1])
-    return _within_range(high, low, x[0] == 0.0 and x[1] == 0.0)
+def operate(operation: Any, a: Any, b: Any) -> Any:
+    """The result of an operation on one or two numbers: a sum, product, quotient, root, rounded sum or the opposite."""
+    x, y = a
+    c, d = b
+    zero = True  # whether a result of zero is exact
+    if operation <= SUBTRACT:
+        c, d = (-c, -d) if operation == SUBTRACT else (c, d)
+        s, e = two_sum(x, c)
+        t, f = two_sum(y, d)
+        e += t
+        high = s + e
+        low = (e - (high - s)) + f
+    elif operation == MULTIPLY:
+        high = x * c
+        low = fma(x, c, -high) + fma(x, d, fma(y, c, y * d))
+        zero = (x == 0.0) | (c == 0.0)
+    elif operation == DIVIDE:
+        high = x / c
+        t = c * high
+        e = fma(d, high, fma(c, high, -t))
+        p = t + e
+        low = ((x - p) + (y - (e - (p - t)))) / c
+        zero = x == 0.0
+    elif operation == ROOT:
+        high = math.sqrt(x)
+        low = 0.0 if x == 0.0 else (fma(-high, high, x) + y) / (2.0 * high)
+    elif operation == ROUND:
+        high, low = two_sum(x, y)
+        zero = (x == 0.0) & (y == 0.0)
+    else:
+        high, low = -x, -y
+    s = high + low
+    low -= s - high
+    size = abs(s)
+    within = ((size >= LEAST) & (size < LIMIT)) | (zero & (size == 0.0))
+    return select(within, s + 0.0, np.nan), select(within, low + 0.0, np.nan)
 
 
 @inner(forceinline=True)

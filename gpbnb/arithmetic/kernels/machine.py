@@ -345,17 +345,34 @@ quotient of two of them leaves float64."""
 # -- other numbers -----------------------------------------------------------------------------------------------------
 
 
-def _segments(kind: Any, parts: int) -> Any:
-    """Return the function that runs a segment in an arithmetic whose numbers have some parts."""
-    add, multiply, divide, sqrt, round_, compare = (
-        kind.add,
-        kind.multiply,
-        kind.divide,
-        kind.sqrt,
-        kind.round_,
-        kind.compare,
-    )
-    load, put, opposite, negative = kind.load, kind.put, kind.opposite, kind.negative
+def _operation(kind: Any) -> Any:
+    """Return the function for all operations of an arithmetic on integers."""
+    add, multiply, divide, sqrt, round_ = kind.add, kind.multiply, kind.divide, kind.sqrt, kind.round_
+    opposite, negative = kind.opposite, kind.negative
+
+    @borrowing(forceinline=True)
+    def operate(fmt: Any, operation: Any, x: Any, y: Any) -> Any:
+        if operation == MULTIPLY:
+            return multiply(fmt, x, y)
+        if operation <= SUBTRACT:
+            return add(fmt, x, opposite(fmt, y) if operation == SUBTRACT else y)
+        if operation == DIVIDE:
+            return divide(fmt, x, y)
+        if operation == ROOT:
+            return sqrt(fmt, x)
+        return round_(fmt, x) if operation == ROUND else negative(fmt, x)
+
+    return operate
+
+
+@inner(forceinline=True)
+def _double_double(fmt: Any, operation: Any, x: Any, y: Any) -> Any:
+    return doubledouble.operate(operation, x, y)
+
+
+def _loop(kind: Any, operate: Any, parts: int) -> Any:
+    """Return the function that runs rows of one operation in an arithmetic whose numbers have some parts."""
+    load, put, compare = kind.load, kind.put, kind.compare
 
     @borrowing(forceinline=True)
     def run(fmt: Any, operation: Any, code: Any, o: Any, end: Any, values: Any, truths: Any, lanes: Any) -> Any:
@@ -381,25 +398,15 @@ def _segments(kind: Any, parts: int) -> Any:
                     truths[out + i] = (third >> (order + 1)) & 1
                 else:
                     x, below = load(fmt, values, a + i), values[(a + i) * parts] < 0
-                    if operation <= DIVIDE:
-                        y = load(fmt, values, b + i)
-                        if operation == MULTIPLY:
-                            x = multiply(fmt, x, y)
-                        elif operation <= SUBTRACT:
-                            x = add(fmt, x, opposite(fmt, y) if operation == SUBTRACT else y)
-                        elif values[(b + i) * parts] == 0:
-                            return ~o
-                        else:
-                            x = divide(fmt, x, y)
-                    elif operation == FUSED or (operation == ROOT and below):
+                    y = load(fmt, values, b + i) if operation <= DIVIDE else x
+                    if (
+                        operation == FUSED
+                        or (operation == DIVIDE and values[(b + i) * parts] == 0)
+                        or (operation == ROOT and below)
+                    ):
                         return ~o
-                    elif operation == ROOT:
-                        x = sqrt(fmt, x)
-                    elif operation == ROUND:
-                        x = round_(fmt, x)
-                    elif below or operation == NEGATIVE:
-                        x = negative(fmt, x)
-                    put(fmt, values, out + i, x)
+                    found = x if operation == ABSOLUTE and not below else operate(fmt, operation, x, y)
+                    put(fmt, values, out + i, found)
                     first = values[(out + i) * parts]
                     if first != first:
                         return ~o
@@ -425,8 +432,8 @@ def _segment(formats: Any, code: Any, s: Any) -> Any:
     return at(entries(formats, WHOLE, np.int64), COLUMNS * f), operation, entries(code, BEGINS, np.int64)[s + 1]
 
 
-_run_pairs, _run_short = _segments(decimal, 2), _segments(shortdecimal, 2)
-_run_two_words, _run_double_doubles = _segments(wide, 3), _segments(doubledouble, 2)
+_run_pairs, _run_short = (_loop(kind, _operation(kind), 2) for kind in (decimal, shortdecimal))
+_run_two_words, _run_double_doubles = _loop(wide, _operation(wide), 3), _loop(doubledouble, _double_double, 2)
 
 
 @addressed

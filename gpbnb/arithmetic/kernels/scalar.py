@@ -10,7 +10,8 @@ for the type of the tag::
             store(fmt, x, k, multiply(fmt, f, load(fmt, x, k - 1)))
 
 Each operation rounds the exact result once and agrees digit for digit with
-:class:`gpbnb.arithmetic.kernels.exact.ExactKernel`; ``DoubleDouble`` has relative errors below 2**-102. A number that
+:class:`gpbnb.arithmetic.kernels.exact.ExactKernel`. ``DoubleDouble`` is only
+loaded and stored. A number that
 leaves the range of its backend never passes unnoticed: an operation on integers, in base 10 or in ``Wide``, raises
 OverflowError; a float64 outside 2**-960 ... 2**1023 becomes NaN, later operations keep it, and ``store``, ``compare``
 and :func:`matmul` raise OverflowError. Callers must pass numbers of the format;
@@ -27,7 +28,7 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
-from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, processor, shortdecimal, wide
+from gpbnb.arithmetic.kernels import binary, decimal, processor, shortdecimal, wide
 from gpbnb.arithmetic.kernels.compiling import Compiler, borrowing, inner
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
@@ -51,7 +52,6 @@ _MODULES = {
     Decimal: decimal,
     ShortDecimal: shortdecimal,
     LimitedDecimal: decimal,
-    DoubleDouble: doubledouble,
     Wide: wide,
 }
 
@@ -310,8 +310,6 @@ def _sqrt(fmt: Any, a: Any) -> Any:
 def _negative(fmt: Any, a: Any) -> Any:
     if _tag(fmt) in PAIRS:
         return lambda fmt, a: (-a[0], a[1])
-    if _tag(fmt) is DoubleDouble:
-        return lambda fmt, a: (0.0 - a[0], 0.0 - a[1])
     if _tag(fmt) is Double:
         return lambda fmt, a: -a
     if _tag(fmt) is Wide:
@@ -331,8 +329,6 @@ def _overloaded_beyond_largest(fmt: Any, a: Any) -> Any:
 def _absolute(fmt: Any, a: Any) -> Any:
     if _tag(fmt) in PAIRS:
         return lambda fmt, a: (abs(a[0]), a[1])
-    if _tag(fmt) is DoubleDouble:
-        return lambda fmt, a: a if a[0] >= 0.0 else (-a[0], -a[1])
     if _tag(fmt) is Double:
         return lambda fmt, a: abs(a)
     if _tag(fmt) is Wide:
@@ -363,8 +359,6 @@ def _less(fmt: Any, a: Any, b: Any) -> Any:
 def _integer(fmt: Any, n: Any) -> Any:
     if _tag(fmt) in PAIRS:
         return lambda fmt, n: round_(fmt, (np.int64(n), np.int64(0)))
-    if _tag(fmt) is DoubleDouble:
-        return lambda fmt, n: (np.float64(n), 0.0)
     if _tag(fmt) is Wide:
         return lambda fmt, n: wide.integer(fmt, np.int64(n))
     return lambda fmt, n: round_(fmt, np.float64(n))

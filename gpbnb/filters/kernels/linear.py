@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.kernels import doubledouble, tags
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import add, less, load, multiply, put, store, subtract
-from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT
 
 
@@ -49,7 +48,7 @@ def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes
     rows : (n + m + o, n + m, 2), to be filled, double-double; relative to `sizes`, errors are below 2**-90.
     sizes : (n + m + o, n + m), to be filled: the result with all signs made positive.
     """
-    exactly, reach = DoubleDouble(), extents(operations, first)
+    reach = extents(operations, first)
     rows[:] = 0.0
     sizes[:] = 0.0
     for i in range(first):
@@ -62,7 +61,7 @@ def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes
             c = (coefficients[a, 0], coefficients[a, 1])
             for j in range(reach[b, 0], reach[b, 1]):
                 right = (rows[b, j, 0], rows[b, j, 1])
-                s = doubledouble.multiply(exactly, c, right) if c[0] != 0.0 and right[0] != 0.0 else (0.0, 0.0)
+                s = doubledouble.operate(tags.MULTIPLY, c, right) if c[0] != 0.0 and right[0] != 0.0 else (0.0, 0.0)
                 rows[v, j, 0], rows[v, j, 1] = s[0], s[1]
                 sizes[v, j] = abs(c[0]) * sizes[b, j]
             continue
@@ -73,7 +72,7 @@ def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes
             right = (rows[b, j, 0], rows[b, j, 1])
             if code == SUBTRACT:
                 right = (-right[0], -right[1])
-            s = doubledouble.add(exactly, (rows[v, j, 0], rows[v, j, 1]), right)
+            s = doubledouble.operate(tags.ADD, (rows[v, j, 0], rows[v, j, 1]), right)
             rows[v, j, 0], rows[v, j, 1] = s[0], s[1]
             sizes[v, j] += sizes[b, j]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numba.extending import overload
 
-from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.kernels import doubledouble, tags
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import load
 from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
@@ -31,10 +31,10 @@ def _overloaded_widened(fmt: Any, a: Any) -> Any:
         high = np.float64(a[0])
         x, e = (high, np.float64(a[0] - np.int64(high))), a[1]
         while e > 0:
-            x = doubledouble.multiply(DoubleDouble(), x, (_POWERS[min(e, 22)], 0.0))
+            x = doubledouble.operate(tags.MULTIPLY, x, (_POWERS[min(e, 22)], 0.0))
             e -= min(e, 22)
         while e < 0:
-            x = doubledouble.divide(DoubleDouble(), x, (_POWERS[min(-e, 22)], 0.0))
+            x = doubledouble.operate(tags.DIVIDE, x, (_POWERS[min(-e, 22)], 0.0))
             e += min(-e, 22)
         return x
 

@@ -27,9 +27,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.kernels import doubledouble, tags
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
-from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.filters.kernels.linear import effects, extents, functionals
 from gpbnb.filters.program import MULTIPLY
 
@@ -212,25 +211,27 @@ def _differences(outputs: Any, given: Any, k: int, limits: Any, values: Any, int
     """Note the closed loop of step k + 1, and its difference and that of the gain from those of the exact filter."""
     n, m = given.dK.shape[1], given.dK.shape[2]
     g_count = into.G.shape[1] - n - m
-    exactly, rows, sizes, X, V = DoubleDouble(), values.rows, values.sizes, limits.state, limits.innovation
+    rows, sizes, X, V = values.rows, values.sizes, limits.state, limits.innovation
     for i in range(n):
         v = outputs[i]
         for j in range(n):
             into.F[i, j] = rows[v, j, 0]
             into.spread[i, j] = (n + 4) * _U * abs(into.F[i, j]) + 2.0**-89 * sizes[v, j]
             size = sizes[v, j] + abs(given.Phi[k, i, j, 0])
-            s = doubledouble.subtract(
-                exactly, (rows[v, j, 0], rows[v, j, 1]), (given.Phi[k, i, j, 0], given.Phi[k, i, j, 1])
+            s = doubledouble.operate(
+                tags.SUBTRACT, (rows[v, j, 0], rows[v, j, 1]), (given.Phi[k, i, j, 0], given.Phi[k, i, j, 1])
             )
             for r in range(m):
                 gain, row = (rows[v, n + r, 0], rows[v, n + r, 1]), (given.HPhi[k, r, j, 0], given.HPhi[k, r, j, 1])
-                s = doubledouble.add(exactly, s, doubledouble.multiply(exactly, gain, row))
+                s = doubledouble.operate(tags.ADD, s, doubledouble.operate(tags.MULTIPLY, gain, row))
                 size += 2 * sizes[v, n + r] * abs(given.HPhi[k, r, j, 0])
             into.G[i, g_count + j] = s[0]
             into.slack[i] += ((n + 4) * _U * abs(s[0]) + 2.0**-86 * size) * X[j]
         for r in range(m):
-            s = doubledouble.subtract(
-                exactly, (rows[v, n + r, 0], rows[v, n + r, 1]), (given.exact[k, i, r, 0], given.exact[k, i, r, 1])
+            s = doubledouble.operate(
+                tags.SUBTRACT,
+                (rows[v, n + r, 0], rows[v, n + r, 1]),
+                (given.exact[k, i, r, 0], given.exact[k, i, r, 1]),
             )
             into.G[i, g_count + n + r] = s[0]
             size = sizes[v, n + r] + abs(given.exact[k, i, r, 0])
