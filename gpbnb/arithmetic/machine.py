@@ -375,11 +375,18 @@ _NO_TRUTHS = np.array([0, 1], np.uint8)
 
 def rounded(kind: Any, formats: Any, numbers: NDArray[Any]) -> NDArray[Any] | None:
     """Round packed numbers, (count, ...), into a format; None if it does not have one of them."""
-    count = len(numbers)
-    values = np.concatenate([numbers, np.zeros_like(numbers)])
-    # However small or large they are, quick computation rounds them, or tells that it cannot.
-    done = _once(kind, formats, _of_rounding(count), Memory(values, _NO_TRUTHS), False)
-    return values[count:] if done == count else None
+    found = []
+    for begin in range(0, len(numbers), _AT_ONCE):
+        part = numbers[begin : begin + _AT_ONCE]
+        count, values = len(part), np.concatenate([part, np.zeros_like(part)])
+        # However small or large they are, quick computation rounds them, or tells that it cannot.
+        if _once(kind, formats, _of_rounding(count), Memory(values, _NO_TRUTHS), False) < count:
+            return None
+        found.append(values[count:])
+    return found[0] if len(found) == 1 else np.concatenate(found)
+
+
+_AT_ONCE = 1 << 12  # numbers that stay in the processor's cache
 
 
 @lru_cache(maxsize=64)

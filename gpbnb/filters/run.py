@@ -40,11 +40,10 @@ LEAST_SHARE = 2.0**-60
 """Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""
 
 BLOCK = 256
+"""Number of steps whose bounds are computed at a time."""
+
+LONG_BLOCK = 1024
 """Number of steps whose results are kept at a time."""
-
-
-RECORDS_BLOCK = 1024
-"""Number of steps whose estimates of all records are kept at a time."""
 
 
 class Sums(NamedTuple):
@@ -267,10 +266,10 @@ class Run:
         if np.ndim(z) != 3 or np.shape(z)[1:] != (self.model.m, self.records):
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m}, {self.records})")
         out = np.full((len(z), states, self.records), np.nan)
-        for begin in range(0, len(z), RECORDS_BLOCK):
+        for begin in range(0, len(z), LONG_BLOCK):
             if self.stopped:
                 break
-            x = self.take_block(as_packed(self.fmt, z[begin : begin + RECORDS_BLOCK]))[0][1:, :states]
+            x = self.take_block(as_packed(self.fmt, z[begin : begin + LONG_BLOCK]))[0][1:, :states]
             some = out[begin : begin + len(x)]
             if x.dtype == np.float64:
                 some[:] = x if x.ndim == 3 else x[..., 0]
@@ -316,9 +315,9 @@ class Run:
         """Continue as :meth:`take` does, and give estimates and covariances, as :meth:`take_block`."""
         self.model.check_measurements(z, self.steps)
         packed = self.pack_measurements(z)
-        for begin in range(0, len(packed), BLOCK):
+        for begin in range(0, len(packed), LONG_BLOCK):
             if not self.stopped:
-                x, _, P = self.take_block(packed[begin : begin + BLOCK])
+                x, _, P = self.take_block(packed[begin : begin + LONG_BLOCK])
                 yield x, P
 
     def pack_measurements(self, z: Any) -> NDArray[Any]:

@@ -23,11 +23,10 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
-from gpbnb.arithmetic.kernels.tags import Double
+from gpbnb.arithmetic.kernels.scalar import BEYOND
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.filters.kernels.linear import execute
 from gpbnb.filters.program import (
     ADD,
     AT_LEAST,
@@ -295,7 +294,27 @@ def _sizes(operations: Any, outputs: Any, coefficients: Any, x: Any, u: Any) -> 
     values = np.empty(n + m + operations.shape[0])
     sizes = np.zeros_like(values)
     for k in range(u.shape[0]):
-        execute(Double(), operations, outputs, coefficients, x, u[k], values)
+        for i in range(n):
+            values[i] = x[i]
+        for i in range(m):
+            values[n + i] = u[k, i]
+        for o in range(operations.shape[0]):
+            code, a, right = operations[o, 0], operations[o, 1], values[operations[o, 2]]
+            if code == MULTIPLY:
+                right *= coefficients[a]
+            elif code == ADD:
+                right += values[a]
+            elif code == SUBTRACT:
+                right = values[a] - right
+            elif code == AT_LEAST:
+                right = coefficients[a] if right < coefficients[a] else right
+            else:
+                right = coefficients[a] if right > coefficients[a] else right
+            values[n + m + o] = right
+        for i in range(n):
+            x[i] = values[outputs[i]]
+            if not abs(x[i]) < np.inf:
+                raise OverflowError(BEYOND)
         for i in range(len(values)):
             sizes[i] = max(sizes[i], abs(values[i]))
     for i in range(n):

@@ -10,7 +10,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import elimination
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.tags import Double
+from gpbnb.arithmetic.kernels.tags import Hardware64
 
 each_pivoting = pytest.mark.parametrize("pivot", [False, True], ids=["in order", "pivoting"])
 
@@ -61,4 +61,4 @@ def test_plain_float64_in_the_same_order() -> None:
         for i in range(k + 1, 7):
             rows[k][7:] = [p - rows[k][i] * q for p, q in zip(rows[k][7:], rows[i][7:], strict=True)]
         rows[k][7:] = [p / rows[k][k] for p in rows[k][7:]]
-    assert inverse(Double(), a, np.eye(7)).tolist() == [row[7:] for row in rows]
+    assert inverse(Hardware64(), a, np.eye(7)).tolist() == [row[7:] for row in rows]

@@ -42,7 +42,7 @@ from gpbnb.interrupts import slices
 Array = NDArray[Any]
 Components = tuple[Array, ...]
 
-_FEW = 1 << 12  # numbers that the machine rounds, which other work needs as well: no loop is compiled for them
+_FEW = 1 << 18  # numbers that the machine rounds, which other work needs as well: no loop is compiled for them
 _MANY = 1000  # multiplications in a product for which a look at the range of its entries pays
 _LEAST_32, _LARGEST_32 = 2.0**-126, float(np.finfo(np.float32).max)
 

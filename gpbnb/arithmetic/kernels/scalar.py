@@ -20,7 +20,6 @@ and :func:`matmul` raise OverflowError. Callers must pass numbers of the format;
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -29,13 +28,12 @@ from numba import types
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import binary, decimal, processor, shortdecimal, wide
-from gpbnb.arithmetic.kernels.compiling import Compiler, borrowing, inner
+from gpbnb.arithmetic.kernels.compiling import Compiler, borrowing
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
     PAIRS,
     Binary,
     Decimal,
-    Double,
     DoubleDouble,
     Free,
     Hardware32,
@@ -55,7 +53,7 @@ _MODULES = {
     Wide: wide,
 }
 
-_BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
+BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
 
 
 def _tag(fmt: Any) -> Any:
@@ -91,11 +89,6 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
     raise _only_compiled("multiply")
 
 
-def divide(fmt: Any, a: Any, b: Any) -> Any:
-    """fl(a / b); raises ZeroDivisionError for b = 0, except in ``Double``."""
-    raise _only_compiled("divide")
-
-
 def quotient(fmt: Any, a: Any, b: Any) -> Any:
     """fl(a / b), where the caller has made sure that b is not zero: without a branch, so that loops are vectorized."""
     raise _only_compiled("quotient")
@@ -104,11 +97,6 @@ def quotient(fmt: Any, a: Any, b: Any) -> Any:
 def root(fmt: Any, a: Any) -> Any:
     """fl(sqrt(a)), where the caller has made sure that a is not negative."""
     raise _only_compiled("root")
-
-
-def sqrt(fmt: Any, a: Any) -> Any:
-    """fl(sqrt(a)); raises ValueError for a < 0, except in ``Double``."""
-    raise _only_compiled("sqrt")
 
 
 def round_(fmt: Any, x: Any) -> Any:
@@ -121,11 +109,6 @@ def negative(fmt: Any, a: Any) -> Any:
     raise _only_compiled("negative")
 
 
-def absolute(fmt: Any, a: Any) -> Any:
-    """The absolute value, exact."""
-    raise _only_compiled("absolute")
-
-
 def compare(fmt: Any, a: Any, b: Any) -> Any:
     """-1, 0 or 1 if a is less than, equal to or greater than b; raises OverflowError if one is out of range."""
     raise _only_compiled("compare")
@@ -136,19 +119,9 @@ def less(fmt: Any, a: Any, b: Any) -> Any:
     raise _only_compiled("less")
 
 
-def integer(fmt: Any, n: Any) -> Any:
-    """The integer n, rounded; abs(n) < 2**53."""
-    raise _only_compiled("integer")
-
-
 def zero(fmt: Any) -> Any:
     """The number 0."""
     raise _only_compiled("zero")
-
-
-def one(fmt: Any) -> Any:
-    """The number 1."""
-    raise _only_compiled("one")
 
 
 def load(fmt: Any, array: Any, index: Any) -> Any:
@@ -189,49 +162,6 @@ def add_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     raise _only_compiled("add_product")
 
 
-# -- plain float64 -----------------------------------------------------------------------------------
-
-
-@inner
-def _double_add(fmt: Any, a: Any, b: Any) -> Any:
-    return a + b
-
-
-@inner
-def _double_subtract(fmt: Any, a: Any, b: Any) -> Any:
-    return a - b
-
-
-@inner
-def _double_multiply(fmt: Any, a: Any, b: Any) -> Any:
-    return a * b
-
-
-@inner(error_model="numpy")
-def _double_divide(fmt: Any, a: Any, b: Any) -> Any:
-    return a / b
-
-
-@inner
-def _double_sqrt(fmt: Any, a: Any) -> Any:
-    return math.sqrt(a)
-
-
-@inner
-def _double_round(fmt: Any, x: Any) -> Any:
-    return x
-
-
-_DOUBLE = {
-    "add": _double_add,
-    "subtract": _double_subtract,
-    "multiply": _double_multiply,
-    "quotient": _double_divide,
-    "root": _double_sqrt,
-    "round_": _double_round,
-}
-
-
 def _implementation(fmt: Any, name: str) -> Any:
     tag, free = _tag(fmt), _tag(fmt) is Free
     if free:
@@ -246,8 +176,6 @@ def _implementation(fmt: Any, name: str) -> Any:
     if tag is Limited:
         digits, mode = (kind.instance_class for kind in fmt.types[:2])
         return processor.operations(digits, mode)[name]
-    if tag is Double:
-        return _DOUBLE.get(name)
     return getattr(_MODULES.get(tag), {"quotient": "divide", "root": "sqrt"}.get(name, name), None)
 
 
@@ -286,32 +214,10 @@ _overload_one(root)
 _overload_one(round_)
 
 
-@overload(divide, strict=False, jit_options=_INLINE)
-def _divide(fmt: Any, a: Any, b: Any) -> Any:
-    def tested(fmt: Any, a: Any, b: Any) -> Any:
-        if b == 0.0:
-            raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
-        return quotient(fmt, a, b)
-
-    return tested if _tag(fmt) in FLOATS and _tag(fmt) is not Double else lambda fmt, a, b: quotient(fmt, a, b)
-
-
-@overload(sqrt, strict=False, jit_options=_INLINE)
-def _sqrt(fmt: Any, a: Any) -> Any:
-    def tested(fmt: Any, a: Any) -> Any:
-        if a < 0.0:
-            raise ValueError("got the square root of a negative number; needed x >= 0")
-        return root(fmt, a)
-
-    return tested if _tag(fmt) in FLOATS and _tag(fmt) is not Double else lambda fmt, a: root(fmt, a)
-
-
 @overload(negative, strict=False, jit_options=_INLINE)
 def _negative(fmt: Any, a: Any) -> Any:
     if _tag(fmt) in PAIRS:
         return lambda fmt, a: (-a[0], a[1])
-    if _tag(fmt) is Double:
-        return lambda fmt, a: -a
     if _tag(fmt) is Wide:
         return lambda fmt, a: wide.negative(fmt, a)
     return lambda fmt, a: _beyond_largest(fmt, zero(fmt) - a)
@@ -325,24 +231,13 @@ def _overloaded_beyond_largest(fmt: Any, a: Any) -> Any:
     return lambda fmt, a: a
 
 
-@overload(absolute, strict=False, jit_options=_INLINE)
-def _absolute(fmt: Any, a: Any) -> Any:
-    if _tag(fmt) in PAIRS:
-        return lambda fmt, a: (abs(a[0]), a[1])
-    if _tag(fmt) is Double:
-        return lambda fmt, a: abs(a)
-    if _tag(fmt) is Wide:
-        return lambda fmt, a: round_(fmt, (False, a[1], a[2]))
-    return lambda fmt, a: _beyond_largest(fmt, abs(a))
-
-
 @overload(compare, strict=False, jit_options=_INLINE)
 def _compare(fmt: Any, a: Any, b: Any) -> Any:
     if _tag(fmt) in FLOATS:
 
         def of_floats(fmt: Any, a: Any, b: Any) -> Any:
             if a != a or b != b:
-                raise OverflowError(_BEYOND)
+                raise OverflowError(BEYOND)
             return (a > b) - (a < b)
 
         return of_floats
@@ -355,15 +250,6 @@ def _less(fmt: Any, a: Any, b: Any) -> Any:
     return lambda fmt, a, b: compare(fmt, a, b) < 0
 
 
-@overload(integer, strict=False, jit_options=_INLINE)
-def _integer(fmt: Any, n: Any) -> Any:
-    if _tag(fmt) in PAIRS:
-        return lambda fmt, n: round_(fmt, (np.int64(n), np.int64(0)))
-    if _tag(fmt) is Wide:
-        return lambda fmt, n: wide.integer(fmt, np.int64(n))
-    return lambda fmt, n: round_(fmt, np.float64(n))
-
-
 @overload(zero, strict=False, jit_options=_INLINE)
 def _zero(fmt: Any) -> Any:
     if _tag(fmt) in PAIRS:
@@ -373,11 +259,6 @@ def _zero(fmt: Any) -> Any:
     if _tag(fmt) is Wide:
         return lambda fmt: wide.zero()
     return (lambda fmt: np.float32(0.0)) if _free_machine(fmt) is Hardware32 else lambda fmt: 0.0
-
-
-@overload(one, strict=False, jit_options=_INLINE)
-def _one(fmt: Any) -> Any:
-    return lambda fmt: integer(fmt, 1)
 
 
 @overload(multiply_add, strict=False, jit_options=_INLINE)
@@ -473,7 +354,7 @@ def _lost(fmt: Any, x: Any) -> Any:
         return lambda fmt, x: False
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, x: x[0] != x[0]
-    if _tag(fmt) is Double or _free_machine(fmt) is not None:
+    if _free_machine(fmt) is not None:
         return lambda fmt, x: not abs(x) < np.inf
     return lambda fmt, x: x != x
 
@@ -482,7 +363,7 @@ def _lost(fmt: Any, x: Any) -> Any:
 def _store(fmt: Any, array: Any, index: Any, x: Any) -> Any:
     def checked(fmt: Any, array: Any, index: Any, x: Any) -> None:
         if lost(fmt, x):
-            raise OverflowError(_BEYOND)
+            raise OverflowError(BEYOND)
         put(fmt, array, index, x)
 
     return checked
@@ -538,4 +419,4 @@ def check(fmt: Any, c: Any) -> None:
         for j in range(c.shape[1]):
             gone |= lost(fmt, load(fmt, c, (i, j)))
     if gone:
-        raise OverflowError(_BEYOND)
+        raise OverflowError(BEYOND)

@@ -62,10 +62,6 @@ class ShortDecimal(NamedTuple):
     nearest: bool
 
 
-class Double(NamedTuple):
-    """Plain float64, as the machine rounds it; an array is float64 (...)."""
-
-
 class DoubleDouble(NamedTuple):
     """The reference: pairs ``(high, low)`` of float64, relative errors below 2**-102; an array is float64 (..., 2)."""
 
@@ -179,7 +175,7 @@ def random_state(tag: Any) -> Any:
     return tag.mode.state if isinstance(tag, Limited) and isinstance(tag.mode, Random) else None
 
 
-FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64, Free)  # numbers are single float64
+FLOATS = (Binary, Hexadecimal, Limited, Hardware32, Hardware64, Free)  # numbers are single float64
 PAIRS = (Decimal, ShortDecimal, LimitedDecimal)
 
 Tag = (
@@ -187,7 +183,6 @@ Tag = (
     | Hexadecimal
     | Decimal
     | ShortDecimal
-    | Double
     | DoubleDouble
     | Limited
     | Hardware32

@@ -4,85 +4,35 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
 from numba import njit
 
-from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.elementwise import product
 from gpbnb.arithmetic.kernels.scalar import (
-    absolute,
-    add,
     compare,
-    divide,
-    integer,
-    less,
     load,
     multiply,
-    negative,
-    one,
-    sqrt,
     store,
-    subtract,
-    zero,
 )
-from gpbnb.arithmetic.kernels.tags import Binary, Decimal, Double, Hexadecimal
-
-
-@compiled
-def recursion(fmt: Any, x: Any, y: Any) -> None:
-    """Some of every operation; x has two numbers, y as many as steps."""
-    a, b = load(fmt, x, 0), load(fmt, x, 1)
-    s = zero(fmt)
-    for k in range(y.shape[0]):
-        n = integer(fmt, k + 2)
-        s = add(fmt, multiply(fmt, s, a), divide(fmt, b, n))
-        s = subtract(fmt, s, sqrt(fmt, absolute(fmt, s)))
-        if less(fmt, s, zero(fmt)):
-            s = add(fmt, negative(fmt, s), one(fmt))
-        store(fmt, y, k, s)
-
-
-def by_hand(x: FloatArray, steps: int) -> list[Fraction]:
-    """The same with FloatArrays of the exact backend."""
-    a, b = x[0].on_exact_backend(), x[1].on_exact_backend()
-    s = x.format.array(0).on_exact_backend()
-    results = []
-    for k in range(steps):
-        s = s * a + b / x.format.array(k + 2).on_exact_backend()
-        s = s - np.sqrt(abs(s))
-        if s < 0:
-            s = -s + 1
-        results.append(s.to_fractions())
-    return results
-
-
-def test_the_recursion_in_float64() -> None:
-    exact = np.array([Fraction(7310586, 10**7), Fraction(2718281828, 10**9)], dtype=object)
-    expected = by_hand(FloatFormat(2, 300).array(exact), 12)
-    z = np.empty(12)
-    recursion(Double(), exact.astype(float), z)
-    assert max(abs(Fraction(v) - e) for v, e in zip(z.tolist(), expected, strict=True)) < Fraction(1, 2**40)
+from gpbnb.arithmetic.kernels.tags import Binary, Decimal, Hexadecimal
 
 
 @njit
 def powers(fmt: Any, x: Any, y: Any) -> None:
     a = load(fmt, x, 0)
-    s = one(fmt)
+    s = a
     for k in range(y.shape[0]):
-        s = multiply(fmt, s, a)
         store(fmt, y, k, s)
+        s = multiply(fmt, s, a)
 
 
 @njit
 def compared_beyond(fmt: Any, x: Any) -> Any:
     a = load(fmt, x, 0)
-    return compare(fmt, multiply(fmt, a, a), one(fmt))
+    return compare(fmt, multiply(fmt, a, a), a)
 
 
 @pytest.mark.parametrize("tag", [Binary(24, True), Binary(53, False), Hexadecimal(6, True)], ids=str)
