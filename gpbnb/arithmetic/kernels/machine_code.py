@@ -22,7 +22,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
 
     def _optimize_functions(self, module: Any) -> None:
         """Leave a function as it is, for the same reason."""
-        module.data_layout = self._codegen._data_layout
+        module.data_layout = str(self._codegen.target_data)
 
     def _optimize_final_module(self) -> None:
         """Do nothing yet: what is compiled into another function is optimized there, and need not be before."""
