@@ -11,6 +11,23 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.machine import Addresses, Memory, code_of, first_without_result, functions, is_far
 
+DECAYED = 2.0**-700
+"""Size below which an entry of a state becomes zero where a step would leave the range of float64."""
+
+
+def drop_decayed(states: NDArray[Any], *carried: NDArray[Any]) -> bool:
+    """Let small entries of states (n,) or (n, lanes, ...) be zero, and what is carried with them; return if any were.
+
+    Nothing decays that far in pairs of integers.
+    """
+    if states.dtype != np.float64:
+        return False
+    sizes = np.abs(states if states.ndim < 3 else states[..., 0])
+    decayed = (sizes > 0) & (sizes < DECAYED)
+    for each in (states, *carried):
+        each[decayed] = 0.0
+    return bool(decayed.any())
+
 
 class Loop:
     """A program whose steps replace its states by their next values.

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.lanes import Lanes, recorded
+from gpbnb.arithmetic.loop import DECAYED
 from gpbnb.filters.contraction import (
     Contraction,
     Repeated,
@@ -27,9 +28,6 @@ from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.steps import FACTORED, StepModel, combined_gain
 
 Array = NDArray[np.float64]
-
-DECAYED = 2.0**-700
-"""Size below which an entry of the estimate becomes zero where a step would leave the range of float64."""
 
 _UNIT = 2.0**-100  # of double-double
 

@@ -6,7 +6,6 @@ runs, correctly rounded to float64, do not need them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cached_property
@@ -42,17 +41,6 @@ class Packed(NamedTuple):
             high, low = (part.astype(object) for part in (self.numbers[..., 0], self.numbers[..., 1]))
             return np.asarray(np.frompyfunc(_exact_sum, 2, 1)(high, low), dtype=object)
         return np.asarray(FloatArray.from_packed(self.numbers, self.fmt).to_fractions(), dtype=object)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The shape without the last axis of pairs."""
-        paired = self.fmt is None or self.numbers.dtype != np.float64
-        return self.numbers.shape[:-1] if paired else self.numbers.shape
-
-    @property
-    def size(self) -> int:
-        """Number of numbers."""
-        return math.prod(self.shape)
 
     def first(self, count: int) -> Packed:
         """Return the numbers of the first checkpoints."""
@@ -101,14 +89,7 @@ class Checkpoints:
                 f"got checkpoint steps {self.steps} for the runs and {true.steps} for the reference; needed equal steps"
             )
         others = [each.first(count) if isinstance(each, Packed) else each[:count] for each in true._kept]
-        packed = [each for each in self._kept if isinstance(each, Packed)]
-        packed_others = [each for each in others if isinstance(each, Packed)]
-        if len(packed) == len(packed_others) == len(others):  # faster together
-            whole = _difference(_joined(packed), _joined(packed_others))
-            parts = np.split(whole, np.cumsum([each.size for each in packed])[:-1])
-            x, K, P = (part.reshape(each.shape) for part, each in zip(parts, packed, strict=True))
-        else:
-            x, K, P = (_difference(a, b) for a, b in zip(self._kept, others, strict=True))
+        x, K, P = (_difference(a, b) for a, b in zip(self._kept, others, strict=True))
         return x, K, P
 
 
@@ -128,12 +109,6 @@ def _nearest(values: NDArray[Any] | Packed) -> NDArray[np.float64]:
             return np.array(values.numbers[..., 0])  # the nearest by definition of a double-double
         return np.asarray(FloatArray.from_packed(values.numbers, values.fmt).to_float(), dtype=np.float64)
     return values.astype(np.float64)
-
-
-def _joined(several: Sequence[Packed]) -> Packed:
-    """Return all numbers of several arrays of one format as one array."""
-    flat = [each.numbers.reshape(each.size, *each.numbers.shape[len(each.shape) :]) for each in several]
-    return Packed(np.concatenate(flat), several[0].fmt)
 
 
 def _difference(values: NDArray[Any] | Packed, true: NDArray[Any] | Packed) -> NDArray[np.float64]:

@@ -7,14 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.loop import Loop
+from gpbnb.arithmetic.loop import Loop, drop_decayed
 from gpbnb.arithmetic.machine import CODES, tables
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT, Program, values_of
 from gpbnb.interrupts import slices
-
-_TINY = 2.0**-700
-"""A decayed state below this becomes zero where its products would leave the range of float64."""
 
 _LESS = 1  # the order in which a comparison holds
 _NAMES = {MULTIPLY: "multiply", ADD: "add", SUBTRACT: "subtract"}
@@ -79,21 +76,13 @@ class LinearSteps:
             found, _, row = loop.take(done, some.reshape(len(some), self._m, *loop.values.shape[1:]), n, loop.after)
             out[done : done + len(found)] = found.reshape(len(found), *out.shape[1:])
             done += len(found)
-            if row >= 0 and not self._decayed():
-                operation = self._operations[loop.first_without_result(self._rows)]
-                return out[:done], int(np.argmax(self._outputs >= operation))
+            if row >= 0:
+                states = loop.states
+                if not drop_decayed(states):
+                    operation = self._operations[loop.first_without_result(self._rows)]
+                    return out[:done], int(np.argmax(self._outputs >= operation))
+                loop.states = states
         return out, -1
-
-    def _decayed(self) -> bool:
-        """Let decayed states be zero; whether there are any. In base 10, nothing decays that far."""
-        states = self._loop.states
-        if states.dtype != np.float64:
-            return False
-        sizes = np.abs(states.reshape(len(states), -1)).max(axis=1)
-        tiny = (sizes > 0) & (sizes < _TINY)
-        states[tiny] = 0.0
-        self._loop.states = states
-        return bool(tiny.any())
 
 
 def _grouped(program: Program) -> NDArray[np.int64]:

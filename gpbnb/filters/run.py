@@ -13,11 +13,12 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
+from gpbnb.arithmetic.loop import drop_decayed
 from gpbnb.arithmetic.machine import OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Limits, Order
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
-from gpbnb.filters.bounded_steps import DECAYED, Bounds, CarriedBound, Taken
+from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.forms import AnyForm, ArrayForm, Form
@@ -357,7 +358,8 @@ class Run:
             rows = self.checkpoint_steps[begin : self.saved] - first - 1
             for array, each in zip((self.X, self.G, self.C), (found.x, found.K, found.P), strict=True):
                 array[begin : self.saved] = each[rows]
-            if found.stop is not None and not (found.stop.fault.overflows and self._drop_decayed()):
+            resumes = found.stop is not None and found.stop.fault.overflows and self._limits is None
+            if found.stop is not None and not (resumes and drop_decayed(self.x, self._compensation)):
                 self.stopped = self.steps + 1
                 self.reason = self._reason(found.stop, self.stopped)
             yield found
@@ -367,16 +369,6 @@ class Run:
         """The limits of the estimate's format."""
         fmt = self.fmt if self.block_formats is None else self.block_formats.state
         return None if fmt is None else fmt.limits
-
-    def _drop_decayed(self) -> bool:
-        """Set small entries of the estimate to zero; return whether there were any."""
-        if self.x.dtype != np.float64 or self._limits is not None:
-            return False
-        sizes = np.abs(self.x if self.x.ndim == 2 else self.x[..., 0])
-        decayed = (sizes > 0) & (sizes < DECAYED)
-        self.x[decayed] = 0.0
-        self._compensation[decayed] = 0.0  # what compensated summation carries is smaller still
-        return bool(decayed.any())
 
     def _fault(self, stop: Stop) -> str:
         """Return in words what ended the run; only a format with a range has an overflow."""
