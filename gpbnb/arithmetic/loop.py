@@ -16,7 +16,7 @@ DECAYED = 2.0**-700
 
 
 def drop_decayed(states: NDArray[Any], *carried: NDArray[Any]) -> bool:
-    """Let small entries of states (n,) or (n, lanes, ...) be zero, and what is carried with them; return if any were.
+    """Let small entries of states (n,) or (n, lanes, ...) be zero, and what is carried with them; tell if any are.
 
     Nothing decays that far in pairs of integers.
     """

@@ -87,7 +87,7 @@ def vars_of(system):
         ({"z": U * math.nan}, "needed a finite number"),
         ({"tolerance": 0}, "needed an error above 0 for each of the 1 outputs"),
         ({"tolerance": "a tenth"}, "got tolerance 'a tenth'"),
-        ({"z": True}, "got True steps"),
+        ({"z": True}, "got steps True"),
         ({"basis": "probable"}, "without limits"),
     ],
 )
