@@ -15,8 +15,7 @@ from gpbnb import (
     NonlinearModel,
     required_precision,
 )
-from gpbnb.filters.forms import ArrayForm
-from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, opened, simulated, true_states
+from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, simulated, true_states
 from gpbnb.wordlength.records import survey_records
 from tests.step_functions import tracked_motion, tracked_sight
 from tests.surveying import survey
@@ -60,26 +59,6 @@ def by_functions(**options):
         return x.format.array(SEEN) @ x
 
     return NonlinearModel(f, None, h, None, **NOISE, **options)
-
-
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 11), FloatFormat(2, 24, "chop"), FloatFormat(10, 6)])
-@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, ArrayForm.SYMMETRIZED])
-def test_linear_functions_have_the_digits_of_the_linear_filter(form, fmt):
-    run, expected = NonlinearRun(by_functions(), fmt, form, [60]), opened(linear(), fmt, form, [60])
-    assert np.array_equal(run.states(RECORD), expected.states(RECORD))
-    assert np.array_equal(run.checkpoints().P, expected.checkpoints().P)
-    assert np.array_equal(run.checkpoints().K, expected.checkpoints().K)
-
-
-def test_factored_forms_subtract_the_predicted_measurement_as_a_sum():
-    """The linear filter subtracts one product after the other, so that only exact arithmetic would agree."""
-    fmt = FloatFormat(2, 24)
-    for form in (Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON):
-        run, expected = NonlinearRun(by_functions(), fmt, form, [60]), opened(linear(), fmt, form, [60])
-        difference = np.abs(run.states(RECORD) - expected.states(RECORD)).max()
-        assert 0 < difference < 1e-5  # a few units in the last place of estimates near one
-        whole = run.checkpoints().K.astype(float)
-        assert np.allclose(whole, expected.checkpoints().K.astype(float), atol=1e-6)  # the same rounding errors
 
 
 def test_the_reference_is_that_of_the_linear_filter():
