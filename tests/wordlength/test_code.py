@@ -379,6 +379,10 @@ def test_the_command_writes_code_in_the_format_that_meets_the_tolerance(options,
     assert str(folder / "filter.c") in capsys.readouterr().out
 
 
+def test_a_number_of_steps_makes_as_many_test_vectors(tmp_path):
+    assert len(write_code(BIQUAD, BINARY32, tmp_path, inputs=9)[3].read_text().splitlines()) == 9
+
+
 def cmsis(system, fmt, folder):
     """The coefficients that a header lists for CMSIS-DSP, as text, and the sentence about them; None without them."""
     header = write_code(system, fmt, folder)[0].read_text()

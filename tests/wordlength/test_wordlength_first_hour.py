@@ -16,8 +16,10 @@ from gpbnb import (
     LinearModel,
     LinearSystem,
     NonlinearModel,
+    NonlinearSystem,
     emulate,
     guarantee,
+    limit_cycles,
     limits,
     read_model,
     required_precision,
@@ -30,6 +32,7 @@ from gpbnb.wordlength.required import judge
 
 WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
 SYSTEM = LinearSystem([["0.9"]], [["0.1"]])
+STEP = NonlinearSystem(lambda fmt, x, u: (x + u / 8, x), [0])
 WITHIN = limits(measurement=0.001)
 TOML = "Phi=[[1,1],[0,1]]\nH=[[1,0]]\nQ=[[1,0],[0,1]]\nR=[[1]]\nx0=[0,0]\nP0=[[1,0],[0,1]]\n"
 
@@ -126,7 +129,24 @@ def test_a_call_is_refused():
         (lambda: required_precision(WALK, 5, [1, 2]), r"^got tolerance \[1, 2\] of shape \(2,\); needed"),
         (lambda: required_precision(lambda: 1, 5, 1), "got a function that does not take .*fmt.*: .*; needed f.fmt."),
         (lambda: required_precision(lambda f, z: 1, 5, 1), "does not take .*; needed f.fmt., or inputs in place of"),
-        # options that would change nothing
+        # options that would change nothing, and counts beyond a limit
+        (lambda: emulate(WALK, np.ones(9), "float32", seed=1), "got seed 1"),
+        (lambda: required_precision(SYSTEM, np.ones(9), 0.1, seed=1), "got seed 1"),
+        (lambda: required_precision(SYSTEM, np.ones(9), 0.1, kind="words", highest=9), "got highest=9"),
+        (lambda: required_precision(WALK, 9, 0.1, kind="blocks", highest=9), "got highest=9"),
+        (lambda: required_precision(WALK, 9, 0.1, kind="blocks", within=WITHIN), "got limits and"),
+        (lambda: guarantee(SYSTEM, "float32", WITHIN, most=5), "got most=5"),
+        (lambda: LinearSystem.sum(9, "tree", 4), "got block 4"),
+        (
+            lambda: NonlinearModel(abs, None, abs, None, [[1]], [[1]], [0], [[1]], points=(1, 2, 1)),
+            "got points",
+        ),
+        (lambda: write_code(STEP, "float32", "code", within=WITHIN), "got limits"),
+        (lambda: guarantee(WALK, "float32", WITHIN, most=10**12), "at most 1,000,000"),
+        (lambda: limit_cycles(SYSTEM, "Q3.4", most=10**12), "at most 268,435,456"),
+        (lambda: limit_cycles(SYSTEM, "Q3.4", [1, 2]), "got an input of shape"),
+        (lambda: np.round(BINARY32.array([3]), 10**9), "at most 100,000"),
+        (lambda: survey_records(WALK, 10**6, 0.1, ["float32"], steps=101), "at most 100"),
         *(
             (
                 partial(answer, np.ones((5, 1)), 1, basis=basis, within=WITHIN),
