@@ -179,9 +179,7 @@ def _one_by_one(operation: Any, how: Any, rule: Any, a: Any, b: Any, out: Any, c
 
 @borrowing(error_model="numpy")
 def _other(operation: Any, how: Any, rule: Any, x: Any, y: Any, z: Any) -> Any:
-    """The result of any operation on numbers, as :func:`_basic`."""
-    if operation <= DIVIDE:
-        return _basic(operation, how, rule, x, y)
+    """The result of another operation on numbers, as :func:`_basic`."""
     if operation in (NEGATIVE, ABSOLUTE):
         return (0.0 - x if operation == NEGATIVE else abs(x)), np.int64(0)
     p, r = x, 0.0
@@ -295,7 +293,10 @@ def _quick_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
                 any_gone |= _all_along(operation, how, rule, at(values, a), at(values, b), at(values, out), lanes)
                 continue
             for i in range(lanes):
-                if _rounds(operation):
+                if operation <= DIVIDE:
+                    values[out + i], gone = _basic(operation, how, rule, values[a + i], values[b + i])
+                    any_gone |= gone
+                elif _rounds(operation):
                     z = values[c + i] if operation == FUSED else 0.0
                     values[out + i], gone = _other(operation, how, rule, values[a + i], values[b + i], z)
                     any_gone |= gone
