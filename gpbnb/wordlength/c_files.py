@@ -122,7 +122,7 @@ def _header(
             f"rounded. The test allows each state at most {tolerances.max():.2g}: four times what it changes if every "
             "operation is rounded up, or every one down."
         )
-    paragraphs = _comment(WRITTEN, f"{what}.", flags, bound, functions)
+    paragraphs = _comment(f"{what}.", WRITTEN, flags, bound, functions)
     values = ",\n".join(f"    {status.name} = {status.value}" for status in statuses)
     meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in statuses)
     takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
