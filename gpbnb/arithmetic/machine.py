@@ -375,22 +375,28 @@ _NO_TRUTHS = np.array([0, 1], np.uint8)
 
 def rounded(kind: Any, formats: Any, numbers: NDArray[Any]) -> NDArray[Any] | None:
     """Round packed numbers, (count, ...), into a format; None if it does not have one of them."""
-    found = []
+    found, sums = [], numbers.ndim == 1  # sums with zero, which run together, round float64 as well
     for begin in range(0, len(numbers), _AT_ONCE):
         part = numbers[begin : begin + _AT_ONCE]
-        count, values = len(part), np.concatenate([part, np.zeros_like(part)])
+        count = len(part)
+        values = np.zeros(((2 + sums) * count, *part.shape[1:]), part.dtype)
+        values[:count] = part
         # However small or large they are, quick computation rounds them, or tells that it cannot.
-        if _once(kind, formats, _of_rounding(count), Memory(values, _NO_TRUTHS), False) < count:
+        if _once(kind, formats, _of_rounding(count, sums), Memory(values, _NO_TRUTHS), False) < count:
             return None
-        found.append(values[count:])
+        found.append(values[-count:])
     return found[0] if len(found) == 1 else np.concatenate(found)
 
 
-_AT_ONCE = 1 << 12  # numbers that stay in the processor's cache
+_AT_ONCE = 1 << 14  # numbers that stay in the processor's cache
 
 
 @lru_cache(maxsize=64)
-def _of_rounding(count: int) -> Code:
+def _of_rounding(count: int, sums: bool) -> Code:
+    from gpbnb.arithmetic.kernels import machine
+
     at, none = np.arange(count, dtype=np.uint32), np.zeros(1, np.int64)
-    begins, codes = np.array([0, count]), np.array([CODES["round"]])
-    return Code(Addresses(at, at, at, at + np.uint32(count), begins, codes, none, none, np.empty(0), 1, count), count)
+    b, out = at + np.uint32(count * sums), at + np.uint32(count * (1 + sums))
+    begins, codes = np.array([0, count]), np.array([CODES["add" if sums else "round"]])
+    together = none + (machine.NEIGHBOURS if sums else machine.ONE_BY_ONE)
+    return Code(Addresses(at, b, at, out, begins, codes, none, together, np.empty(0), 1, count), count)
