@@ -43,9 +43,13 @@ RAISED = (1.0, 1.001, 1.003, 1.01, 1.03, 1.1)
 """Factors of a guess that are tried, until the checker proves one."""
 SLOW = (1.005, 1.03, 1.1, 1.5)
 """The same for filters that settle slowly, where the checker adds effects of old errors that are alike."""
-_NEGLIGIBLE = 2.0**-26
-_LONG, _APART = 700, 64
-"""Steps after which a filter is slow; the age at which errors of two steps of a slow filter may be added, in steps."""
+_LONG, _MANY, _APART = 700, 10_000, 64
+"""Steps after which a filter is slow; steps before those of a period, in all, from which the checker takes phases
+together; the age at which errors of two steps of a slow filter may be added, in steps."""
+_LEFT, _LEFT_SLOW = 2.0**-26, 2.0**-13
+"""Share of an error that is left when the checker stops to follow it."""
+_MORE, _MORE_ALIKE, _MORE_SLOW = 2.0**-22, 2.0**-12, 2.0**-8
+"""Share of a bound that the unsettled exact gain, or phases that are taken together, may add to it, at most."""
 
 
 class Proof(NamedTuple):
@@ -62,8 +66,9 @@ def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
     For fixed coefficients, the checker says how much larger; otherwise some factors are tried.
     """
     why, content, larger = "", json.loads(written(guess)), np.ones(len(guess.bound))
-    slow = "keep" in content and max(content["back"], content["steps"] or 0) > _LONG
-    for factor in SLOW if slow else RAISED:
+    slow = "keep" in content and max(content["keep"], content["back"], content["steps"] or 0) > _LONG
+    together = content.get("phases", 1) < content.get("period", 1)
+    for factor in SLOW if slow else RAISED[together:]:
         claim = guess._replace(bound=guess.bound * larger * factor)
         text = written(claim)
         try:
@@ -142,11 +147,19 @@ def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | N
     model = given.origin
     if not isinstance(model, LinearModel) or given.form is None:
         raise ValueError("got a schedule without a Kalman filter; needed both the model and its form")
-    first, period = given.first, given.steps - given.first
-    bound, state = guess.bound, guess.state
-    innovation = guess.innovation
-    width, more = (None, 0) if steps is not None else _width(given, innovation, bound)
-    back = 0 if steps is not None else _back(F[first:], bound, state)
+    bound, state, innovation = guess.bound, guess.state, guess.innovation
+    back, slow = 0, (steps or 0) > _LONG
+    repeated = {"repeat": 0, "period": 1, "phases": 1, "first": 0, "below": [], "above": []}
+    if steps is None:
+        period = F[given.first :]
+        decay = 1 - min(radius_of(_product(period)) ** (1 / len(period)), 1 - 1e-6)
+        back = _back(period, _LEFT, bound, state)
+        slow = back > _LONG
+        back = _back(period, _LEFT_SLOW, bound, state) if slow else back
+        stay = _stay(given, innovation, (_MORE_SLOW if slow else _MORE) * decay * bound)
+        phases = _alike(given, model.cycle, _MORE_ALIKE * decay) if len(period) * back > _MANY else len(period)
+        repeated = {"repeat": given.repeat, "period": given.period, "phases": phases, "first": stay.first}
+        repeated |= {"below": texts(stay.below), "above": texts(stay.above)}
     content = {
         "filter": {
             "kind": "kalman",
@@ -158,12 +171,8 @@ def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | N
         "format": _format(given.fmt),
         "limits": {name: texts(each) for name, each in asked._asdict().items()},
         "derived": {"state": texts(state), "innovation": texts(innovation)},
-        "repeat": given.repeat or 0,
-        "period": max(period, 1),
-        "first": first + more,
-        "keep": _APART if max(back, steps or 0) > _LONG else steps or back,
-        "width": [] if width is None else texts(width),
-    }
+        "keep": _APART if slow else back or steps,
+    } | repeated
     return _text(_head(model.name, bound, steps, back) | content)
 
 
@@ -195,62 +204,92 @@ def _words(words: WordFormats) -> dict[str, Any]:
     return {name: _format(fmt) for name, fmt in formats.items()}
 
 
-def _back(F: NDArray[np.float64], *sizes: NDArray[np.float64]) -> int:
+def _back(F: NDArray[np.float64], left: float, *sizes: NDArray[np.float64]) -> int:
     """Return the number of steps after which products of closed loops are negligible, for each phase of the period."""
     period, n, most = len(F), F.shape[1], 0
     for phase in range(period):
         C, lag = np.eye(n), 0
-        while lag < most or not all((np.abs(C) @ size <= _NEGLIGIBLE * size).all() for size in sizes):
+        while lag < most or not all((np.abs(C) @ size <= left * size).all() for size in sizes):
             C = C @ F[(phase - lag) % period]
             lag += 1
         most = lag
     return max(most, 1)
 
 
-@np.errstate(over="ignore", invalid="ignore")  # where nothing moves the gain, no share is needed
-def _width(
-    given: Schedule, innovation: NDArray[np.float64], bound: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], int]:
-    """Return the width of an interval of covariances that the exact filter does not leave, and after how many steps.
+def _alike(given: Schedule, cycle: int, share: float) -> int:
+    """Return how many steps of the period differ: a cycle of the model, if others are alike but for a share."""
+    c = given.coefficients[given.first :, :, 0]
+    alike = np.abs(c - c[np.arange(len(c)) % cycle]) <= share * np.abs(c).max(axis=0)
+    return cycle if alike.all() else len(c)
 
-    It has a shape that each period shrinks. The errors of the gain that follow from it are far below those of a step.
+
+class _Stay(NamedTuple):
+    """An interval that the exact covariance does not leave: how far it reaches below and above the one after a step."""
+
+    first: int
+    below: NDArray[np.float64]
+    above: NDArray[np.float64]
+
+
+def _stay(given: Schedule, innovation: NDArray[np.float64], each: NDArray[np.float64]) -> _Stay:
+    """Return the first such interval whose errors of the gain add at most `each` to the error of a step."""
+    assert given.repeat is not None
+    first, last = max(given.repeat, 1) - 1, given.steps
+    while last - first > 1:
+        middle = (first + last) // 2
+        enough = (_interval(given, middle, innovation, each)[1] <= each).all()
+        first, last = (first, middle) if enough else (middle, last)
+    return _interval(given, last, innovation, each)[0]
+
+
+@np.errstate(over="ignore", invalid="ignore")  # where nothing moves the gain, no share is needed
+def _interval(
+    given: Schedule, first: int, innovation: NDArray[np.float64], each: NDArray[np.float64]
+) -> tuple[_Stay, NDArray[np.float64]]:
+    """Return an interval, and what its errors of the gain add to the error of a step.
+
+    The distance from the limit is a sum of what the coming periods add or take away; each moves the others further in.
     """
     assert isinstance(given.origin, LinearModel)
-    stored, K = given.origin.rounded(given.fmt), given.exact[given.first :, ..., 0]
-    phases = np.arange(given.first, given.steps)
+    stored = given.origin.rounded(given.fmt)
+    phases = given.first + (first - given.first + np.arange(stored.cycle)) % stored.cycle
     cycles = (stored.Phi, stored.H, stored.Q, stored.R)
-    Phi, H, Q, R = (np.array([each[k % len(each)] for k in phases]).astype(np.float64) for each in cycles)
+    Phi, H, Q, R = (np.array([c[k % len(c)] for k in phases]).astype(np.float64) for c in cycles)
+    K = given.exact[phases, ..., 0]
     kept = np.eye(stored.n) - K @ H
     A, noise = kept @ Phi, kept @ Q @ kept.swapaxes(1, 2) + K @ R @ K.swapaxes(1, 2)
     added = np.zeros((stored.n, stored.n))
     for a, more in zip(A, noise, strict=True):
         added = a @ added @ a.T + more
     whole = _product(A)
-    P = _limit(whole, added)
-    W = _limit(whole, np.diag(np.maximum(np.diag(P), 1e-30 * max(np.diag(P).max(), 1e-300))))
-    D, share = W, 2.0**-20
-    for k, a in enumerate(A):
-        V, far = Phi[k] @ P @ Phi[k].T + Q[k], H[k] @ Phi[k]
-        inverse = np.sqrt(np.diag(np.linalg.inv(H[k] @ V @ H[k].T + R[k])))
-        by = (np.sqrt(np.diag(far @ D @ far.T)) @ inverse) * (inverse @ innovation)
-        D, P = a @ D @ a.T, a @ P @ a.T + noise[k]
-        off = by * np.sqrt(np.diag(D))
-        # what a step may add to the bound, so that all steps together add a millionth
-        step = 1e-6 * bound * (1 - min(radius_of(whole) ** (1 / len(A)), 1 - 1e-6))
-        share = min(share, float(np.min(step[off > 0] / off[off > 0], initial=math.inf)))
-    share = max(share, 2.0**-70)
-    rate = max(radius_of(whole), 1e-9) ** 2
-    begun = stored.n * float(np.max(np.abs(_difference(given, P)) / np.sqrt(np.outer(np.diag(W), np.diag(W)))))
-    periods = max(math.ceil(math.log(max(begun, 1e-300) / (0.1 * share)) / -math.log(rate)), 1)
-    return np.asarray(W * share), (1 + periods) * len(A)  # from the end of the schedule
+    P, now = _limit(whole, added), given.covariances[first - 1]
+    variances = np.maximum(np.diag(P), 1e-30 * max(np.diag(P).max(), 1e-300))
+    unit = np.sqrt(np.outer(variances, variances))
+    far = now[..., 0] - P + now[..., 1]
+    values, vectors = np.linalg.eigh((far - whole @ far @ whole.T) / unit)
+    below, above = (_limit(whole, (vectors * np.maximum(x, 0) @ vectors.T) * unit) for x in (values, -values))
+    wide = _limit(whole, np.diag(variances))
 
+    def moved(D: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest error of each state due to a gain of a covariance that is off by at most D."""
+        most = np.zeros(stored.n)
+        for a, rows in zip(A, np.linalg.solve(R, H), strict=True):
+            D = a @ D @ a.T
+            seen = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, D, rows), 0))
+            most = np.maximum(most, np.sqrt(np.maximum(np.diag(D), 0)) * (seen @ innovation) / 2)
+        return most
 
-def _difference(given: Schedule, P: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the distance of the exact covariance at the end of the schedule from its limit."""
-    found = given.covariance
-    if found is None:
-        raise ValueError("got a schedule without a covariance; needed that of a Kalman filter")
-    return np.asarray(found[..., 0] - P + found[..., 1])
+    off = moved(wide)
+    last = first == given.steps
+    least = 2.0**-70 if last else 2.0**-46  # float64 does not know the limit better
+    share = np.clip(np.min(0.1 * each[off > 0] / off[off > 0], initial=2.0**-20), least, 2.0**-20)
+    if last:  # nor how far it is, so wait until that is nothing
+        begun = stored.n * float(np.max(np.abs(far) / np.sqrt(np.outer(np.diag(wide), np.diag(wide)))))
+        rate = max(radius_of(whole), 1e-9) ** 2
+        periods = math.ceil(math.log(max(begun, 1e-300) / (0.1 * share)) / -math.log(rate))
+        first, below, above = first + max(periods, 0) * stored.cycle, 0 * below, 0 * above
+    below, above = (x + share / 2 * wide for x in (below, above))
+    return _Stay(first, below, above), moved(below + above)
 
 
 def _limit(F: NDArray[np.float64], added: NDArray[np.float64]) -> NDArray[np.float64]:

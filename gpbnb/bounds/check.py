@@ -19,22 +19,24 @@ the file: filter, format, form, limits. It verifies the answer: the bound b, and
     1. Two old steps are merged in this way, with the smaller of the two in the ellipsoid. The largest size m(r) of
     r e over a set is a seminorm of the row r, so m(r) <= sum |c_j| m(r_j) + |r - sum c_j r_j| b for any rows r_j, if
     |e| <= b. Steps are taken in blocks: after j steps, e is P_j e_0 plus the effects of their own w, for the product
-    P_j of loops; r P_j is near (1 - j/J) r + (j/J) r P_J, so only the end of a block moves the set.
+    P_j of loops; r P_j is near (1 - j/J) r + (j/J) r P_J, so only the end of a block moves the set. Within a block,
+    |e_j| <= |F'_j| |e_{j-1}| + |w_j| bounds these effects; where that is too large, they are added one by one.
 
     (2) For a row C_0, any rows C_1, ..., C_L with 1 <= L <= k, and R_l = C_l F'_{k-l} - C_{l+1}, telescoping gives
     exactly C_0 e_k = sum_{l<L} (C_l w_{k-l} + R_l e_{k-l-1}) + C_L e_{k-L}. If |e_j| <= b for all j < k, then
     |C_0 e_k| <= sum (|C_l w_{k-l}| + |R_l| b) + |C_L| b; or fewer terms meet the set of (1). If that is at most b_i
     for each unit row and phase, then |e_k| <= b for all k, by induction; see proof/guarantee.v. Here C_{l+1} is
-    C_l F', rounded down in its last place, so that R_l is at most one unit of it.
+    C_l F', rounded down in its last place, so that R_l is at most one unit of it. Phases whose steps are nearly alike
+    are taken as one, with the mean F' and G of them all, and with what theirs differ from these in w.
 
     (3) A computed covariance that recurs after a whole number of the model's cycles recurs for ever, with all
     coefficients.
 
     (4) The exact step of a covariance, E(P) = V - V H' (H V H' + R)^-1 H V with V = Phi P Phi' + Q, is the least of
     (I - KH) V (I - KH)' + K R K' over all K. So it keeps the order of symmetric matrices: if A <= P <= B, then
-    E(A) <= E(P) <= E(B), if H V H' + R is definite for A. If some steps lead A and B back between A and B, covariances
-    stay there. The gain is E(P) H' R^-1. With D = E(B) - E(A) and row c_j of R^-1 H, its entry i, j differs from that
-    of A by at most the square root of D_ii times c_j D c_j', by the inequality of Cauchy and Schwarz.
+    E(A) <= E(P) <= E(B), if H V H' + R is definite for A. If a cycle leads A and B back between A and B, covariances
+    stay there. The gain is E(P) H' R^-1. With D = E(B) - E(A) and row c_j of R^-1 H, its entry i, j differs from the
+    mean of those of A and B by at most half the square root of D_ii times c_j D c_j', by Cauchy and Schwarz.
 
     (5) A result within M is rounded by at most h(M): half a unit in the last place of M, or a whole one unless to
     nearest. M holds the exact filter's limits, b, and earlier roundings of the step. For the last operation of
@@ -59,7 +61,6 @@ import json
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
-from copy import copy
 from fractions import Fraction
 from functools import reduce
 from itertools import combinations, combinations_with_replacement, cycle, islice, repeat
@@ -90,9 +91,12 @@ FILE = {
     "steps": {int},
     "back": int,
 }
-COUNTS = {"repeat": int, "period": int, "first": int, "keep": int}
+STAY = {"below": [VECTOR], "above": [VECTOR]}
+COUNTS = {"repeat": int, "period": int, "phases": int, "first": int, "keep": int}
 FILES = {
-    "kalman": FILE | COUNTS | {"limits": LIMITS | {"measurement": KNOWN}, "derived": LIMITS, "width": [VECTOR]},
+    "kalman": FILE
+    | COUNTS
+    | {"limits": LIMITS | {"measurement": KNOWN}, "derived": LIMITS, "below": [VECTOR], "above": [VECTOR]},
     "linear": FILE | {"limits": {"measurement": KNOWN}, "derived": {"state": VECTOR}},
 }
 NUMBER = re.compile(r"-?[0-9]{1,4000}([./][0-9]{1,4000})?", re.ASCII)
@@ -243,6 +247,8 @@ class Arithmetic:
         return self.fit(x + sign * y) if x and y else x + sign * y
 
     def multiply(self, x: Any, y: Any) -> Any:
+        if x == self.unit or y == self.unit:
+            return y if x == self.unit else x
         return self.fit(x * y, self.unit) if x and y else 0
 
     def divide(self, x: Any, y: Any) -> Any:
@@ -630,10 +636,18 @@ class Linear:
         need(max(shares) <= 1 << PEAK, LARGER, [Fraction(x, 1 << PEAK) for x in shares])
 
 
-def whole(a: Any) -> tuple[Any, int]:
-    """A matrix of fractions as one of integers, and their denominator."""
-    den = lcm(*(x.denominator for row in a for x in row))
-    return each(lambda x: int(x * den), a), den
+def inverse(given: Any) -> tuple[Any, int]:
+    """The inverse of a definite matrix of integers, as one of integers and their denominator, by Bareiss."""
+    a, m, last = list(map(add, given, diagonal(len(given)))), len(given), 1
+    for k in range(m):
+        pivot = a[k][k]
+        need(pivot > 0, "a covariance of measurements or innovations is not definite")
+        for i in range(m):
+            if i != k:
+                factor = a[i][k]
+                a[i] = [(pivot * x - factor * y) // last for x, y in zip(a[i], a[k], strict=True)]
+        last = pivot
+    return [row[m:] for row in a], last
 
 
 class ExactCovariance:
@@ -645,9 +659,9 @@ class ExactCovariance:
         self.bits = 160 + 2 * max(0, *((self.unit // x).bit_length() for x in variances))
         self.members = list[Any]()
         for Phi, H, Q, R in map(model.members, range(model.cycle)):
-            factors = across(ExactArithmetic().inverse(R)[0], turned(H))
+            RI, den = inverse(R)
             scaled = [each(lambda x: x * self.unit << self.bits, c) for c in (Q, R)]
-            self.members.append((Phi, H, *scaled, *whole(factors)))
+            self.members.append((Phi, H, *scaled, across(RI, turned(H)), den))
         self.wide = diagonal(self.n, -self.n), diagonal(self.n, self.n)  # for entries that are rounded down
         self.ends = [each(lambda x, y: (x << self.bits) // self.unit + y, P0, wide) for wide in self.wide]
 
@@ -656,33 +670,30 @@ class ExactCovariance:
         Phi, H, Q, R, *_ = self.members[k % len(self.members)]
         V = each(lambda x, q, y: (x + q) // self.unit**2 + y, around(Phi, P), Q, wide)
         W = across(V, H)
-        inverse, positive = ExactArithmetic().inverse(each(add, across(H, turned(W)), R))
-        need(positive, "an innovation covariance is not definite")
-        T, den = whole(inverse)
+        T, den = inverse(each(add, across(H, turned(W)), R))
         return each(lambda x, y, z: (x * den - y) // den + z, V, around(W, T), wide)
 
     def step(self, k: int) -> tuple[Any, Any]:
-        """Take step k + 1; return the gain of A, rounded down, and a bound of its distance from the exact one."""
+        """Take step k + 1; return the mean gain of A and B, rounded down, and how far the exact one may be from it."""
         A, B = self.ends = [self.moved(k, *each) for each in zip(self.ends, self.wide, strict=True)]
         *_, rows, den = self.members[k % len(self.members)]
         D = each(sub, B, A)
         seen = [around([row], D)[0][0] for row in rows]
-        far = [[up(isqrt(D[i][i] * x) + 1, den) + 1 for x in seen] for i in range(self.n)]
-        return each(lambda x: x // den, across(A, rows)), far
+        far = [[up(isqrt(D[i][i] * x) + 1, 2 * den) + 1 for x in seen] for i in range(self.n)]
+        return each(lambda x: x // (2 * den), across(each(add, A, B), rows)), far
 
-    def gains(self, first: int, period: int, width: Any) -> Iterator[Any]:
-        """Gains of the first steps, and of all later ones, which repeat, with bounds of their distances."""
+    def gains(self, first: int, below: Any, above: Any) -> Iterator[Any]:
+        """Gains of the first steps, and of all later ones, where covariances are so far from the last; without end."""
         yield from map(self.step, range(first))
-        need([*map(len, width)] == [self.n] * self.n, "no interval of the exact covariance")
-        width = each(lambda x: int(x * 2**self.bits // 1), width)
-        low, gains = each(lambda x, w: x - w // 2, self.ends[0], width), list[Any]()
-        high = each(add, low, width)
-        for phases in (period, 0):
+        need([*map(len, below + above)] == [self.n] * 2 * self.n, "no interval of the exact covariance")
+        below, above = (each(lambda x: int(x * 2**self.bits // 1), far) for far in (below, above))
+        low, high, gains = each(sub, self.ends[0], below), each(add, self.ends[0], above), list[Any]()
+        for phases in (len(self.members), 0):
             inside = definite(each(sub, self.ends[0], low)) and definite(each(sub, high, self.ends[1]))
             need(inside, "the exact covariance was not shown to settle")
             self.ends = [low, high]
             gains += map(self.step, range(first, first + phases))
-        yield from gains
+        yield from cycle(gains)
 
 
 def near(row: Any, known: Any, whole: int, box: Any) -> int:
@@ -717,39 +728,50 @@ class ErrorSet:
     def through(self, rows: Any, F: Any) -> Any:
         return each(lambda x: x >> self.loops, across(rows, turned(F)))
 
+    def effects(self, rows: Any, steps: Any) -> tuple[list[int], Any]:
+        """Bound what some steps add to rows times the vector; return also the rows before the steps, rounded down."""
+        sums, lost = [0] * len(rows), sum(self.sizes)
+        for F, columns, slack, _ in reversed(steps):
+            added = [sum([abs(sum(map(mul, row, g))) for g in columns]) + size(row, slack) + lost for row in rows]
+            sums, rows = list(map(add, sums, added)), self.through(rows, F)
+        return sums, rows
+
+    def advance(self, steps: Any, keep: int) -> None:
+        """Take some steps; some rows must be within limits before each, and the entries after it."""
+        self.absorb(keep)
+        one, whole, loops, lost = self.one, len(steps), self.loops, sum(self.sizes)
+        P, columns, box, groups = one, list[Any](), [0] * self.n, list[Any]()
+        for F, own, slack, _ in reversed(steps):
+            columns = [[sum(map(mul, row, g)) >> loops for row in P] for g in own] + columns
+            box = [x + up(size(row, slack) + lost, 1 << loops) + len(own) for x, row in zip(box, P, strict=True)]
+            P, groups = self.through(P, F), [(len(own), 1), *groups]
+        before, after = [*map(self.most, one)], [*map(self.most, P)]
+        sizes, rows, added = [up(x, 1 << loops) for x in before], one, [0] * self.n
+        known = [(0, row, x) for row, x in zip(one, before, strict=True)]
+        for j, (F, own, slack, seen) in enumerate(steps, 1):
+            for row, limit in zip(seen, self.limits[self.n :], strict=False):
+                (effect,), (far,) = self.effects([row], steps[: j - 1])
+                need(self.most(far) + effect <= limit, f"{self.message} before step {self.steps + j}")
+            rows, new = self.through(F, rows), [sum(map(abs, x)) + y for *x, y in zip(*own, slack, strict=True)]
+            added = [up(size(row, added), 1 << loops) + x for row, x in zip(F, new, strict=True)]
+            for i, row in enumerate(rows):
+                k, *last = known[i]
+                ends = [(whole - j, *last), (j - k, P[i], after[i])]
+                if near(row, ends, whole - k, sizes) + (added[i] << loops) > self.limits[i]:
+                    (effect,), (far,) = self.effects([one[i]], steps[:j])
+                    known[i] = j, far, self.most(far)
+                    need(known[i][2] + effect <= self.limits[i], f"{self.message} after step {self.steps + j}")
+        self.move(P)
+        self.steps, self.groups = self.steps + whole, self.groups + groups
+        self.box = list(map(add, self.box, box))
+        self.x = [x + [g[i] for g in columns] for i, x in enumerate(self.x)]
+
     def move(self, F: Any) -> None:
         """Take the image of the set, and round its numbers."""
         moved, loops = [self.image(row, 1 << self.loops - 1) for row in F], self.loops
         self.x = [[s >> loops for s in x] for x in moved]
         self.box = [up(size(row, self.box), 1 << loops) + len(moved[0]) for row in F]
         self.M = each(lambda x, y: (x >> 2 * loops) + y, around(F, self.M), diagonal(self.n, self.n))
-
-    def add(self, columns: Any, slack: Any, groups: Any) -> None:
-        """Add a box, and the columns of some groups of steps; a group is a number of columns, and one of steps."""
-        self.groups, self.box = self.groups + groups, list(map(add, self.box, slack))
-        self.x = [x + [g[i] for g in columns] for i, x in enumerate(self.x)]
-
-    def advance(self, steps: Any, keep: int) -> None:
-        """Take some steps; some rows must be within limits before each, and the entries after it."""
-        rows, one, whole, old, before = self.one, self.one, len(steps), copy(self), [*map(self.most, self.one)]
-        P = reduce(lambda rows, step: self.through(step[0], rows), steps, one)
-        self.absorb(keep)
-        self.move(P)
-        after, box = [*map(self.most, one)], [up(x, 1 << self.loops) for x in before]
-        new, known = ErrorSet(self.sizes, [], self.loops, ""), [(0, row, x) for row, x in zip(one, before, strict=True)]
-        for j, (F, columns, slack, seen) in enumerate(steps, 1):
-            for row, far, limit in zip(seen, self.through(seen, rows), self.limits[self.n :], strict=False):
-                need(old.most(far) + new.most(row) <= limit, f"{self.message} before step {self.steps + j}")
-            new.move(F)
-            new.add(columns, slack, [(len(columns), 1)])
-            rows = self.through(F, rows)
-            for i, row in enumerate(rows):
-                room, (k, *last) = self.limits[i] - new.most(one[i]), known[i]
-                if near(row, [(whole - j, *last), (j - k, P[i], after[i])], whole - k, box) > room:
-                    known[i] = j, row, old.most(row)
-                    need(known[i][2] <= room, f"{self.message} after step {self.steps + j}")
-        self.steps += whole
-        self.add(turned(new.x), new.box, new.groups)
 
     def pairs(self, keep: int) -> Any:
         """Add columns of steps that are alike, as they are old; return segments that contain what this leaves out."""
@@ -786,16 +808,27 @@ class ErrorSet:
         added = across([list(map(mul, row, shares)) for row in x], x)
         self.M = each(lambda x, y, z: (x * up(total, own) + y >> 40) + z, self.M, added, diagonal(self.n, self.n))
 
+    def hull(self, steps: Any) -> Any:
+        """A step in the middle of some, whose slack contains what they differ from it."""
+        most, middle = max(len(columns) for _, columns, *_ in steps), lambda *x: (max(x) + min(x)) >> 1
+        alike = [(F, columns + [[0] * self.n] * (most - len(columns)), slack) for F, columns, slack, _ in steps]
+        F, columns, slack = each(middle, *(F for F, *_ in alike)), each(middle, *(g for _, g, _ in alike)), [0] * self.n
+        for G, others, wider in alike:
+            off = [sum(map(abs, x)) for x in turned(each(sub, others, columns))] or [0] * self.n
+            off = [x + (size(row, self.sizes) >> self.loops) + 1 for x, row in zip(off, each(sub, G, F), strict=True)]
+            slack = list(map(max, slack, map(add, off, wider)))
+        return F, columns, slack, steps[0][3]
+
     def later(self, steps: Any, phase: int, back: int) -> None:
         """Prove that the vector, and rows before them, are within limits after all steps of a phase."""
-        loops, rows, sums, known, period = self.loops, self.one, [0] * self.n, list[Any](), len(steps)
-        box = [up(self.most(row), 1 << loops) for row in self.one]
+        rows, sums, known, period = self.one, [0] * self.n, list[Any](), len(steps)
+        box = [up(self.most(row), 1 << self.loops) for row in self.one]
         for lag in range(back):
-            F, columns, slack, seen = steps[(phase - lag) % period]
-            effects = [sum([abs(sum(map(mul, row, g))) for g in columns]) + size(row, slack) for row in rows]
-            sums, rows = [x + y + sum(self.sizes) for x, y in zip(sums, effects, strict=True)], self.through(rows, F)
+            step = steps[(phase - lag) % period]
+            effects, rows = self.effects(rows, [step])
+            sums = list(map(add, sums, effects))
             if not lag:
-                rows, sums = rows + seen, sums + [0] * len(seen)
+                rows, sums = rows + step[3], sums + [0] * len(step[3])
             if lag % period == phase:
                 known = known or [(row, self.most(row)) for row in rows]
                 for i, (row, x, limit) in enumerate(zip(rows, sums, self.limits, strict=False)):
@@ -880,7 +913,7 @@ class Filter:
     def moves(self) -> Any:
         """Yield, for each step, loop, columns, slack and rows before it, of the error and of the exact filter."""
         exact = self.exact
-        gains = exact.gains(self.first, self.period, self.given["width"])
+        gains = exact.gains(self.first, self.given["below"], self.given["above"])
         for (F, K, errors, inputs, both, seen), (gain, far) in zip(self.coefficients(), gains, strict=False):
             both = both + times(turned(each(sub, K, gain)), self.V, 1 << exact.bits)
             off = [size(row, self.V) + sum(self.V) for row in far]
@@ -897,16 +930,18 @@ class Filter:
         moves, back = self.moves(), self.given["back"]
         k, keep = 0, self.given["keep"]
         while k < self.first:  # longer blocks where sets have more segments
-            block = min(max(BLOCK, isqrt(min(k, 1000))), self.first - k)
+            block = min(max(BLOCK, isqrt(min(k, 2000))), self.first - k)
             for reach, steps in zip(sets, turned(islice(moves, block)), strict=False):
                 reach.advance(steps, keep)
             k += block
         if self.steps is None:
             need(back > 0, "no step back")
-            errors, states = turned(islice(moves, self.period))
-            for reach, steps in zip(sets, (errors, states), strict=False):
-                for phase in range(self.period):
-                    reach.later(steps, phase, back)
+            phases, repeated = self.given["phases"], turned(islice(moves, self.period))
+            need(phases and self.period % phases == phases % self.model.cycle == 0, "phases that are none")
+            for reach, steps in zip(sets, repeated, strict=False):
+                alike = [reach.hull(steps[phase::phases]) for phase in range(phases)]
+                for phase in range(phases):
+                    reach.later(alike, phase, back)
 
 
 def prove(given: Any) -> str:

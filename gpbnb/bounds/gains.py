@@ -8,7 +8,7 @@ covariance to occur again; the emulation shows whether one does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -53,7 +53,7 @@ class Schedule:
     settled : whether the rows from there on repeat for ever.
     repeat, period : first step whose computed covariance occurs again, `period` steps later.
     why : why the gain has not settled, if it has not.
-    covariance : (n, n, 2), that of the exact filter after the last step; None for fixed coefficients.
+    covariances : (steps, n, n, 2), those of the exact filter after each step; none for fixed coefficients.
     origin, form : the filter as given, and the form of a Kalman filter.
     """
 
@@ -70,7 +70,7 @@ class Schedule:
     repeat: int | None
     period: int | None
     why: str = ""
-    covariance: NDArray[np.float64] | None = None
+    covariances: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 0, 2)))
     origin: LinearModel | LinearFilter | None = None
     form: Form | None = None
 
@@ -173,7 +173,7 @@ def schedule(
     exact = true.run.G[:steps].reshape(steps, model.n, model.m, 2)
     return Schedule(
         program, fmt, widened_array(packed), packed, Phi, HPhi, exact, x0, true.first, true.settled, repeat, period,
-        why, true.run.C[steps - 1], model, form,
+        why, true.run.C[:steps], model, form,
     )  # fmt: skip
 
 

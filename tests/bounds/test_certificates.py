@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from independent_filter import exact_inverse, plus, times, turned
 from test_openings import NINE, WITHIN, raised_while_factored
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, WordFormats
-from gpbnb.bounds import check, guess
+from gpbnb.bounds import certificate, check, guess
 from gpbnb.bounds.certificate import first_proved, of_operations
 from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.gains import filter_schedule
@@ -111,20 +112,28 @@ def test_models_of_cycles_and_of_some_steps_are_proved() -> None:
 
 
 def test_a_long_cycle_is_proved() -> None:
-    """An ellipsoid for errors of all but five steps once lost too much, after 700 steps, whose proof takes seconds."""
-    found = guarantee(cyclic(2, 1, cycle=250, decay=0.8), FORMAT, limits(state=100, innovation=10), form=Form.UD)
-    content = json.loads(found.certificate())
-    assert content["first"] > 700
+    """Its phases are proved one by one."""
+    content = written(cyclic(2, 1, cycle=250, decay=0.8), FORMAT, limits(state=100, innovation=10), Form.UD)
+    assert content["phases"] == content["period"] == 250
     prove(content)
+
+
+def test_phases_that_are_alike_are_taken_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They add to the bound what they differ by, which is little."""
+    monkeypatch.setattr(certificate, "_MANY", 0)
+    content = written(small(), FloatFormat(2, 23), limits(state=100, innovation=10))
+    assert (content["phases"], content["period"]) == (1, 2)
+    scale_bound("0.99")(content)
+    assert "may exceed its bound" in refused(content)
 
 
 def test_a_filter_that_settles_slowly_is_proved() -> None:
-    """In a far wider interval of covariances, gains are too far apart. The proof takes seconds, for over 1000 steps."""
+    """In a far wider interval of covariances, gains are too far apart. The proof takes each of the first steps."""
     model = small(Phi=[["0.9", "0.1"], [0, 1]], H=[[1, 0]], Q=[["0.01", 0], [0, "1e-4"]], R=[["0.01"]], x0=[0, 0])
     content = written(model, FORMAT, limits(state=[10, 1], innovation=1))
-    assert content["first"] > 1_000
+    assert content["first"] >= content["repeat"] > 500
     prove(content)
-    wide = content | {"width": [[factor(each, "1e9") for each in row] for row in content["width"]]}
+    wide = content | {"above": [[factor(each, "1e9") for each in row] for row in content["above"]]}
     assert "may exceed its bound later" in refused(wide)
     scale_bound("0.99")(content)
     refused(content)
@@ -219,12 +228,41 @@ def test_a_set_contains_all_sums_of_effects(case: str, keep: int) -> None:
 
 def test_an_ellipsoid_contains_parallel_segments_and_hardly_more() -> None:
     found = check.ErrorSet([10**12] * 2, [], 64, "an error is larger")
-    found.add([[3 * 10**9, -(10**9)], [9 * 10**9, -3 * 10**9], [-6 * 10**8, 2 * 10**8]], [0, 0], [(3, 1)])
+    found.x, found.groups = [[3 * 10**9, 9 * 10**9, -6 * 10**8], [-(10**9), -3 * 10**9, 2 * 10**8]], [(3, 1)]
     found.absorb(0)
     assert found.groups == []
     for row in ([1, 0], [0, 1], [2, -5], [7, 1]):
         size = abs(row[0] * 3 - row[1]) * 42 * 10**8
         assert size <= found.most(row) <= size * 1.0001
+
+
+def test_a_gain_is_near_the_mean_of_two_where_its_covariance_lies_between_theirs() -> None:
+    rng = np.random.default_rng(43)
+    fmt = {"base": 2, "precision": 24, "rounding": "nearest", "emin": None, "emax": None, "subnormal": True}
+    numbers = lambda rows: [[Fraction(x) for x in row] for row in rows]  # noqa: E731
+    Q, R, least = numbers([[1, 0], [0, 2]]), numbers([[3, 1], [1, 2]]), numbers([[2, 1], [1, 2]])
+    used = 0
+    for _ in range(50):
+        Phi, H, c = rng.integers(-9, 10, (2, 2)).tolist(), rng.integers(-9, 10, (2, 2)).tolist(), rng.integers(1, 9)
+        given = {"Phi": [numbers(Phi)], "H": [numbers(H)], "Q": [Q], "R": [R], "x0": [Fraction(0)] * 2, "P0": least}
+        exact = check.ExactCovariance(
+            check.Kalman(check.Arithmetic(fmt | {"largest": None}, 120), "innovation", False, **given)
+        )
+        more = numbers([[int(c), int(c) - 1], [int(c) - 1, int(c) + 2]])
+        between = [
+            plus(least, [[share * x for x in row] for row in more]) for share in map(Fraction, (0, 1, "1/7", "1/2"))
+        ]
+        exact.ends = tuple([[int(x * 2**exact.bits) for x in row] for row in end] for end in between[:2])
+        gain, far = exact.step(0)
+        for P in between:
+            V = plus(times(times(given["Phi"][0], P), turned(given["Phi"][0])), Q)
+            VH = times(V, turned(given["H"][0]))
+            K = times(VH, exact_inverse(plus(times(given["H"][0], VH), R)))
+            for i, j in np.ndindex(2, 2):
+                off = abs(K[i][j] * 2**exact.bits - gain[i][j])
+                assert off <= far[i][j]
+                used += off > far[i][j] * Fraction("0.9")
+    assert used > 10
 
 
 def test_a_running_sum_is_proved_for_its_steps() -> None:
@@ -339,7 +377,12 @@ def set_to(*keys: Any) -> Callable[[Content], None]:
 
 
 def narrower(by: str) -> Callable[[Content], None]:
-    return set_to("width", lambda width: [[factor(each, by) for each in row] for row in width])
+    change = lambda far: [[factor(each, by) for each in row] for row in far]  # noqa: E731
+
+    def alter(content: Content) -> None:
+        content["below"], content["above"] = change(content["below"]), change(content["above"])
+
+    return alter
 
 
 ALTERED: dict[str, tuple[tuple[str, ...], Callable[[Content], None]]] = {
@@ -352,7 +395,7 @@ ALTERED: dict[str, tuple[tuple[str, ...], Callable[[Content], None]]] = {
     "one step back": (STEADY, set_to("back", 1)),
     "no steps back": (EVERY, set_to("back", 0)),
     "steps back in floats": (EVERY, set_to("back", float)),
-    "no limits of the exact covariance": (KALMAN, set_to("width", [])),
+    "no limits of the exact covariance": (KALMAN, set_to("below", [])),
     "limits of the exact covariance without width": (KALMAN, narrower("0")),
     "limits of the exact covariance that are negative": (KALMAN, narrower("-1")),
     "limits of the exact covariance that are too narrow": (("tracker",), narrower("1/1000")),
@@ -360,6 +403,9 @@ ALTERED: dict[str, tuple[tuple[str, ...], Callable[[Content], None]]] = {
     "another period": (("cycle",), set_to("period", lambda p: p + 1)),
     "half of the period": (("cycle",), set_to("period", lambda p: p // 2)),
     "no period": (KALMAN, set_to("period", 0)),
+    "no phases": (KALMAN, set_to("phases", 0)),
+    "fewer phases than the model's": (("cycle",), set_to("phases", 1)),
+    "phases that do not divide the period": (("cycle",), set_to("phases", lambda p: p + p)),
     "repeats too soon": (KALMAN, set_to("repeat", lambda k: k - 1)),
     "repeats from the beginning": (KALMAN, set_to("repeat", 0)),
     "settles before it repeats": (KALMAN, set_to("first", 0)),
@@ -425,7 +471,7 @@ def test_originals_are_proved_and_altered_certificates_are_rejected(name: str) -
 
 
 def test_incomplete_certificates_are_rejected() -> None:
-    for key in ("filter", "format", "limits", "bound", "back", "steps", "keep", "derived", "width"):
+    for key in ("filter", "format", "limits", "bound", "back", "steps", "keep", "derived", "below", "phases"):
         content = json.loads(original("joseph"))
         del content[key]
         assert "no certificate" in refused(content)
@@ -527,7 +573,7 @@ def test_units_do_not_change_the_verdict(power: int) -> None:
     scaled = lambda x, by: [scaled(each, by) for each in x] if isinstance(x, list) else x and factor(x, by)  # noqa: E731
     for key in ("Q", "R", "P0"):
         given["filter"][key] = scaled(given["filter"][key], f"1e{2 * power}")
-    given["width"] = scaled(given["width"], f"1e{2 * power}")
+    given |= {side: scaled(given[side], f"1e{2 * power}") for side in ("below", "above")}
     given["filter"]["x0"], given["bound"] = (scaled(x, f"1e{power}") for x in (given["filter"]["x0"], given["bound"]))
     for key in ("limits", "derived"):
         given[key] = {name: scaled(sizes, f"1e{power}") for name, sizes in given[key].items()}
@@ -601,7 +647,7 @@ def test_signs_of_a_first_estimate_count() -> None:
         "limits": {"state": [None, None], "innovation": [None], "measurement": ["1"]},
         "derived": {"state": ["1100", "1100"], "innovation": ["1200"]},
         "bound": ["640", "640"],
-        "steps": 61, "repeat": 0, "period": 0, "first": 0, "keep": 99, "back": 0, "width": [],
+        "steps": 61, "repeat": 0, "period": 0, "phases": 0, "first": 0, "keep": 99, "back": 0, "below": [], "above": [],
     }  # fmt: skip
     assert "may exceed its limit" in refused(content)
     content |= {"derived": {"state": ["40000", "1100"], "innovation": ["50000"]}, "bound": ["40000", "40000"]}
