@@ -48,8 +48,9 @@ _LONG, _MANY, _APART = 700, 10_000, 64
 together; the age at which errors of two steps of a slow filter may be added, in steps."""
 _LEFT, _LEFT_SLOW = 2.0**-26, 2.0**-13
 """Share of an error that is left when the checker stops to follow it."""
-_MORE, _MORE_ALIKE, _MORE_SLOW = 2.0**-22, 2.0**-12, 2.0**-8
-"""Share of a bound that the unsettled exact gain, or phases that are taken together, may add to it, at most."""
+_MORE, _MORE_ALIKE, _MORE_SLOW = 2.0**-22, 0.5, 2.0**-8
+"""Share of a bound that the unsettled exact gain, or phases that are taken together, may add to it, by estimates that
+are far too large."""
 
 
 class Proof(NamedTuple):
@@ -63,16 +64,18 @@ class Proof(NamedTuple):
 def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
     """Ask the checker for a guess, and for somewhat larger ones if it rejects that.
 
-    For fixed coefficients, the checker says how much larger; otherwise some factors are tried.
+    For fixed coefficients, the checker says how much larger; otherwise some factors are tried. Phases that differ too
+    much to be taken together are then kept apart.
     """
     why, content, larger = "", json.loads(written(guess)), np.ones(len(guess.bound))
     slow = "keep" in content and max(content["keep"], content["back"], content["steps"] or 0) > _LONG
     together = content.get("phases", 1) < content.get("period", 1)
     for factor in SLOW if slow else RAISED[together:]:
-        claim = guess._replace(bound=guess.bound * larger * factor)
-        text = written(claim)
+        content = json.loads(written(guess._replace(bound=guess.bound * larger * factor)))
+        if together and factor > RAISED[2]:
+            content["phases"] = content["period"]
         try:
-            prove(json.loads(text))
+            prove(content)
         except NotProvedError as error:
             why, needed = f"not proved: {error}", np.array([above(each) for each in error.shares]) * EXCESS
             if len(needed) and str(error) == BEYOND:
@@ -85,7 +88,7 @@ def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
         except NotImplementedError as error:
             return Proof(guess.bound, "", f"not covered: {error}")
         else:
-            return Proof(np.array([above(Fraction(each)) for each in json.loads(text)["bound"]]), text)
+            return Proof(np.array([above(Fraction(each)) for each in content["bound"]]), _text(content))
     return Proof(guess.bound, "", why)
 
 
@@ -157,7 +160,11 @@ def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | N
         slow = back > _LONG
         back = _back(period, _LEFT_SLOW, bound, state) if slow else back
         stay = _stay(given, innovation, (_MORE_SLOW if slow else _MORE) * decay * bound)
-        phases = _alike(given, model.cycle, _MORE_ALIKE * decay) if len(period) * back > _MANY else len(period)
+        phases = (
+            _alike(period, model.cycle, state, _MORE_ALIKE * decay * bound)
+            if len(period) * back > _MANY
+            else len(period)
+        )
         repeated = {"repeat": given.repeat, "period": given.period, "phases": phases, "first": stay.first}
         repeated |= {"below": texts(stay.below), "above": texts(stay.above)}
     content = {
@@ -216,11 +223,10 @@ def _back(F: NDArray[np.float64], left: float, *sizes: NDArray[np.float64]) -> i
     return max(most, 1)
 
 
-def _alike(given: Schedule, cycle: int, share: float) -> int:
-    """Return how many steps of the period differ: a cycle of the model, if others are alike but for a share."""
-    c = given.coefficients[given.first :, :, 0]
-    alike = np.abs(c - c[np.arange(len(c)) % cycle]) <= share * np.abs(c).max(axis=0)
-    return cycle if alike.all() else len(c)
+def _alike(F: NDArray[np.float64], cycle: int, state: NDArray[np.float64], each: NDArray[np.float64]) -> int:
+    """Return how many steps of a period differ: a cycle of the model, if others move the error by at most `each`."""
+    off = np.abs(F - F[np.arange(len(F)) % cycle]) @ state
+    return cycle if (off <= each).all() else len(F)
 
 
 class _Stay(NamedTuple):
