@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from independent_filter import exact_inverse, plus, times, turned
 from test_openings import NINE, WITHIN, raised_while_factored
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, WordFormats
@@ -237,29 +236,25 @@ def test_an_ellipsoid_contains_parallel_segments_and_hardly_more() -> None:
 
 
 def test_a_gain_is_near_the_mean_of_two_where_its_covariance_lies_between_theirs() -> None:
-    rng = np.random.default_rng(43)
+    rng, used = np.random.default_rng(43), 0
     fmt = {"base": 2, "precision": 24, "rounding": "nearest", "emin": None, "emax": None, "subnormal": True}
-    numbers = lambda rows: [[Fraction(x) for x in row] for row in rows]  # noqa: E731
-    Q, R, least = numbers([[1, 0], [0, 2]]), numbers([[3, 1], [1, 2]]), numbers([[2, 1], [1, 2]])
-    used = 0
+    Q, R, least = (np.array(c) + Fraction(0) for c in ([[1, 0], [0, 2]], [[3, 1], [1, 2]], [[2, 1], [1, 2]]))
     for _ in range(50):
-        Phi, H, c = rng.integers(-9, 10, (2, 2)).tolist(), rng.integers(-9, 10, (2, 2)).tolist(), rng.integers(1, 9)
-        given = {"Phi": [numbers(Phi)], "H": [numbers(H)], "Q": [Q], "R": [R], "x0": [Fraction(0)] * 2, "P0": least}
-        exact = check.ExactCovariance(
-            check.Kalman(check.Arithmetic(fmt | {"largest": None}, 120), "innovation", False, **given)
-        )
-        more = numbers([[int(c), int(c) - 1], [int(c) - 1, int(c) + 2]])
-        between = [
-            plus(least, [[share * x for x in row] for row in more]) for share in map(Fraction, (0, 1, "1/7", "1/2"))
-        ]
+        Phi, H, c = *(rng.integers(-9, 10, (2, 2, 2)) + Fraction(0)), int(rng.integers(1, 9))
+        more, shares = np.array([[c, c - 1], [c - 1, c + 2]]), map(Fraction, (0, 1, "1/7", "1/2"))
+        between = [least + share * more for share in shares]
+        parts = {name: [c.tolist()] for name, c in zip(("Phi", "H", "Q", "R"), (Phi, H, Q, R), strict=True)}
+        given = parts | {"x0": [Fraction(0)] * 2, "P0": least.tolist()}
+        arithmetic = check.Arithmetic(fmt | {"largest": None}, 120)
+        exact = check.ExactCovariance(check.Kalman(arithmetic, "innovation", False, **given))
         exact.ends = tuple([[int(x * 2**exact.bits) for x in row] for row in end] for end in between[:2])
         gain, far = exact.step(0)
         for P in between:
-            V = plus(times(times(given["Phi"][0], P), turned(given["Phi"][0])), Q)
-            VH = times(V, turned(given["H"][0]))
-            K = times(VH, exact_inverse(plus(times(given["H"][0], VH), R)))
+            V = Phi @ P @ Phi.T + Q
+            (p, q), (r, s) = H @ V @ H.T + R
+            K = V @ H.T @ np.array([[s, -q], [-r, p]]) / (p * s - q * r)
             for i, j in np.ndindex(2, 2):
-                off = abs(K[i][j] * 2**exact.bits - gain[i][j])
+                off = abs(K[i, j] * 2**exact.bits - gain[i][j])
                 assert off <= far[i][j]
                 used += off > far[i][j] * Fraction("0.9")
     assert used > 10
