@@ -244,7 +244,7 @@ class Numbers:
     def eliminate(self, A, B, pivot=False, negative=True):
         """L, U, the reduced right sides and the order of the rows; ZeroDivisionError on a zero pivot.
 
-        A product with the negative of a factor is added; else a product is subtracted, as in filters.
+        The negative of a factor may saturate, and is multiplied and added; or a product is subtracted, as in filters.
         """
         r, n = self.r, len(A)
         A, B, order = [list(map(mpq, row)) for row in A], [list(map(mpq, row)) for row in B], list(range(n))
@@ -262,7 +262,7 @@ class Numbers:
                 A[i][k] = ZERO
                 for row, above, first in ((A[i], A[k], k + 1), (B[i], B[k], 0)):
                     for j in range(first, len(row)):
-                        row[j] = r(row[j] + (r(-f * above[j]) if negative else -r(f * above[j])))
+                        row[j] = r(row[j] + (r(r(-f) * above[j]) if negative else -r(f * above[j])))
         return lower, A, B, order
 
     def solve(self, A, B, pivot=False, negative=True):
