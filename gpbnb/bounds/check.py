@@ -94,9 +94,7 @@ FILE = {
 STAY = {"below": [VECTOR], "above": [VECTOR]}
 COUNTS = {"repeat": int, "period": int, "phases": int, "first": int, "keep": int}
 FILES = {
-    "kalman": FILE
-    | COUNTS
-    | {"limits": LIMITS | {"measurement": KNOWN}, "derived": LIMITS, "below": [VECTOR], "above": [VECTOR]},
+    "kalman": FILE | COUNTS | STAY | {"limits": LIMITS | {"measurement": KNOWN}, "derived": LIMITS},
     "linear": FILE | {"limits": {"measurement": KNOWN}, "derived": {"state": VECTOR}},
 }
 NUMBER = re.compile(r"-?[0-9]{1,4000}([./][0-9]{1,4000})?", re.ASCII)
