@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters import program
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from tests.oracles import EXACT
 from tests.plain_filters import Filter, model_of
+from tests.plain_program import OPERATIONS
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = (
@@ -71,3 +73,9 @@ def exact_steps(given, z):
         x = plain.step(row.tolist())
         found.append(Step(*(np.array(each, dtype=object) for each in (x, plain.K, plain.P))))
     return found
+
+
+def named_operations(given):
+    """The operations of a linear program as an oracle takes them, with the names of their codes."""
+    names = {getattr(program, name): name for name in OPERATIONS}
+    return [(names[code], a, b) for code, a, b in given.operations.tolist()]

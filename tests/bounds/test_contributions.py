@@ -14,6 +14,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.report.guarantees import published
 from gpbnb.wordlength.examples import cyclic, tracker
 from tests.plain_program import steps_in_python
+from tests.small_filter import named_operations
 
 TRACKER = tracker(), limits(state=[1000, 30], innovation=8)
 
@@ -58,7 +59,8 @@ def followed(found, operation, steps):
         row = given.coefficients[given.first + (period - 1 + step) % period]
         exact = [Fraction(float(high)) + Fraction(float(low)) for high, low in row]
         exact = exact if step < 3 else list(map(float, exact))
-        x = steps_in_python(program, disturbed, exact, x if step < 3 else list(map(float, x)), [0] * program.m)
+        x = [*(x if step < 3 else map(float, x)), *[0] * program.m]
+        x = steps_in_python(named_operations(program), program.outputs, disturbed, exact, x)
         yield [float(each) for each in x]
 
 

@@ -6,6 +6,7 @@ import itertools
 import math
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from gpbnb.filters.system import biquad, state_space
 from gpbnb.report.guarantees.published import fixif_longitudinal, nile_local_level
 from gpbnb.report.kalman.exact_step import exact_step
 from tests.plain_program import steps_in_python
+from tests.small_filter import named_operations
 
 FORMATS = [
     FloatFormat(2, 24),
@@ -103,7 +105,7 @@ def test_the_error_is_what_its_terms_add_up_to(form: Form) -> None:
 
         stored_coefficients = [Fraction(c) for c in given.coefficients[k, :, 0]]
         before = np.array(x) - np.array(true)
-        x = steps_in_python(program, noted, stored_coefficients, x, z)
+        x = steps_in_python(named_operations(program), program.outputs, noted, stored_coefficients, [*x, *z])
         parts = (each[k % len(each)] for each in (stored.Phi, stored.H, stored.Q, stored.R))
         step = exact_step(*parts, true, P, z)
         total = exact(found.F[k]) @ before + exact(found.loop[k]) @ np.array(true)
@@ -118,7 +120,7 @@ def test_the_error_is_what_its_terms_add_up_to(form: Form) -> None:
         assert np.abs((error - total).astype(float)).max() <= 1e-11 * np.abs(error.astype(float)).max() + 1e-13
 
 
-def _effect(program: object, coefficients: list[Fraction], o: int, n: int) -> np.ndarray:
+def _effect(program: Any, coefficients: list[Fraction], o: int, n: int) -> np.ndarray:
     """What an error of 1 in operation o does to the result, by running the program with it, without rounding."""
     at = -1
 
@@ -127,8 +129,8 @@ def _effect(program: object, coefficients: list[Fraction], o: int, n: int) -> np
         at += 1
         return exactly + (1 if at == o else 0)
 
-    nothing = [Fraction(0)]
-    return np.array(steps_in_python(program, disturbed, coefficients, nothing * n, nothing * program.m))
+    nothing = [Fraction(0)] * (n + program.m)
+    return np.array(steps_in_python(named_operations(program), program.outputs, disturbed, coefficients, nothing))
 
 
 # -- units and sums ---------------------------------------------------------------------------------------------------
