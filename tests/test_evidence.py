@@ -21,11 +21,9 @@ def test_compared_operations_are_counted(tmp_path):
 
 def test_a_run_beyond_its_bound_is_wrong(monkeypatch):
     row = evidence.survey.load()[0]
-    monkeypatch.setattr(
-        evidence.filters, "load", lambda: (evidence.filters.SWEEP.load().tuples(evidence.filters.FilterRow)[0],)
-    )
-    monkeypatch.setattr(evidence.survey, "load", lambda: (row, row._replace(constant="1.001")))
     kalman = evidence.filters.load()[0]
+    monkeypatch.setattr(evidence.filters, "load", lambda: (kalman,))
+    monkeypatch.setattr(evidence.survey, "load", lambda: (row, row._replace(constant="1.001")))
     assert evidence.attacks() == Checked(kalman.runs + 2 * row.runs, 1)
     monkeypatch.setattr(evidence.filters, "load", lambda: (kalman._replace(chosen="1.001"),))
     assert evidence.attacks().wrong == 2

@@ -10,7 +10,7 @@ import hashlib
 import io
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -75,14 +75,6 @@ class StoredTable:
         names = [column.name for column in self.columns]
         found = (dict(zip(names, row, strict=True)) for row in self.rows)
         return [each for each in found if all(each[name] == value for name, value in where.items())]
-
-    def tuples(self, kind: Callable[..., T]) -> tuple[T, ...]:
-        """Return the rows as named tuples whose fields are the columns: integers as int, other values as text."""
-        whole = [column.kind == "integer" for column in self.columns]
-        return tuple(
-            kind(*(plain_integer(text) if is_whole else text for text, is_whole in zip(row, whole, strict=True)))
-            for row in self.rows
-        )
 
 
 def write(file: Path, columns: Sequence[Column], rows: Iterable[Record], provenance: Mapping[str, str]) -> None:

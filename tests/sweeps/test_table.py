@@ -34,7 +34,6 @@ def test_what_is_written_is_read(file):
     }
     assert table.records(seed="3") == [{"kind": "a", "seed": "3", "error": "0.428571", "note": "", "limit": "inf"}]
     assert len(table.records(kind="a")) == 22
-    assert table.tuples(lambda *values: values)[3] == ("a", 3, "0.428571", "", "inf")
 
 
 def test_every_lost_end_is_found(file):

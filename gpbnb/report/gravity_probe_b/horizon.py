@@ -32,9 +32,9 @@ from gpbnb.report.gravity_probe_b.error_sets import GAIN, LOOP, ROUNDING, Distur
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS
 from gpbnb.report.gravity_probe_b.year import model as year_model
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_rows import sweep
+from gpbnb.sweeps import Column
 
-FILE = Path(__file__).with_name("horizon.csv")
 COLUMNS = (
     Column("precision", "integer", 2, 53),
     Column("steps", "integer", 1),
@@ -227,21 +227,11 @@ def first_cycle(precision: int, rng: np.random.Generator) -> list[tuple[str, ...
     return [tuple(row) for row in year_of_bounds(precision, steps=year_model(MODELS[0], 2).cycle)]
 
 
-SWEEP: Sweep[int] = Sweep(
-    name="gravity_probe_b/horizon",
-    file=FILE,
-    columns=COLUMNS,
-    key=3,
-    cells=lambda: (53,),
-    compute=year_of_bounds,
-    command="python -m gpbnb.report.stored recompute gravity_probe_b/horizon",
-    seed=0,
-    sample=first_cycle,
-)
+SWEEP = sweep("gravity_probe_b/horizon", COLUMNS, 3, lambda: (53,), year_of_bounds, sample=first_cycle)
 
 
-def load(file: Path = FILE) -> tuple[HorizonRow, ...]:
+def load() -> tuple[HorizonRow, ...]:
     """Return the stored rows."""
     return tuple(
-        HorizonRow(int(line[0]), int(line[1]), line[2], tuple(map(float, line[3:13]))) for line in SWEEP.load(file).rows
+        HorizonRow(int(line[0]), int(line[1]), line[2], tuple(map(float, line[3:13]))) for line in SWEEP.load().rows
     )

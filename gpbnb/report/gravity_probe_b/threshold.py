@@ -29,6 +29,7 @@ from gpbnb.filters.simulation import BLOCK, Simulation
 from gpbnb.report.gravity_probe_b.mission import SETTINGS, Mission
 from gpbnb.report.gravity_probe_b.model import TRUTH, YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS, model
+from gpbnb.report.stored_rows import sweep
 from gpbnb.sweeps import Column, StoredTable, Sweep
 
 #: States of the filter, either drift angles and rates or their deviations from the predicted drift.
@@ -43,7 +44,6 @@ DEVIATION = (4.3, 2.0)
 ANGLES, DECIMALS = 4, 4
 """Number of first states that are compared, two angles and two rates; decimals of measurement matrices in base 10."""
 SEED, MISSION_SEED = 1984, 2004
-_HERE = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -249,18 +249,8 @@ MISSION_COLUMNS = (Column("setting", "text", choices=tuple(SETTINGS)), *COLUMNS)
 
 
 def _sweep(name: str, columns: tuple[Column, ...], cells: tuple[YearCell, ...], seed: int) -> Sweep[YearCell]:
-    return Sweep(
-        name=f"gravity_probe_b/{name}",
-        file=_HERE / f"{name}.csv",
-        columns=columns,
-        key=len(columns) - 4,
-        cells=lambda: cells,
-        compute=compute,
-        rows=rows,
-        command=f"python -m gpbnb.report.stored recompute gravity_probe_b/{name}",
-        seed=seed,
-        sample=sample,
-    )
+    name, key = f"gravity_probe_b/{name}", len(columns) - 4
+    return sweep(name, columns, key, lambda: cells, compute, seed, rows=rows, sample=sample)
 
 
 SWEEP = _sweep("threshold", COLUMNS, SIMPLE_CELLS, SEED)

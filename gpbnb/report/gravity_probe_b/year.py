@@ -27,6 +27,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.filters.simulation import Simulation
 from gpbnb.report.gravity_probe_b.model import SEED, YEAR, gravity_probe_b, gravity_probe_b_year
+from gpbnb.report.stored_rows import sweep
 from gpbnb.sweeps import Column, Sweep
 
 #: Format in which the model is stored, by base; every format of this base in :data:`CASES` contains it.
@@ -183,8 +184,6 @@ COLUMNS = (
 """Columns of ``year.csv``, the errors in the same units. Those of drift have a sign. The last is the least eigenvalue
 of the covariance, scaled to ones on the true diagonal; it is below zero for an indefinite one."""
 
-_HERE, _COMMAND = Path(__file__).parent, "python -m gpbnb.report.stored recompute gravity_probe_b/"
-
 
 class Year(NamedTuple):
     """Errors of a year in one format and form, or bounds of them, after each of the steps.
@@ -221,26 +220,22 @@ def bounds() -> dict[YearCase, Year]:
     return {each.case: each for each in _years(BOUND_SWEEP, None)}
 
 
-SWEEP: Sweep[YearCase] = Sweep(
-    name="gravity_probe_b/year",
-    file=_HERE / "year.csv",
-    columns=COLUMNS,
-    key=6,
-    cells=lambda: CASES,
-    compute=rows,
-    command=_COMMAND + "year",
-    seed=SEED,
+SWEEP = sweep(
+    "gravity_probe_b/year",
+    COLUMNS,
+    6,
+    lambda: CASES,
+    rows,
+    SEED,
     sample=lambda case, rng: rows(case, steps=SAMPLE_STEPS),
     same=_same,
 )
-BOUND_SWEEP: Sweep[YearCase] = Sweep(
-    name="gravity_probe_b/bounds",
-    file=_HERE / "bounds.csv",
-    columns=BOUND_COLUMNS,
-    key=6,
-    cells=lambda: BOUNDED_CASES,
-    compute=bound_rows,
-    command=_COMMAND + "bounds",
-    seed=SEED,
+BOUND_SWEEP = sweep(
+    "gravity_probe_b/bounds",
+    BOUND_COLUMNS,
+    6,
+    lambda: BOUNDED_CASES,
+    bound_rows,
+    SEED,
     sample=lambda case, rng: bound_rows(case, steps=SAMPLE_OF_BOUND),
 )

@@ -10,6 +10,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,21 +21,14 @@ from gpbnb.filters.forms import Form
 from gpbnb.interrupts import interruptible
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.table import CASES, FORMAT, case_guarantee
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_rows import Number, sweep_of_rows
+from gpbnb.report.stored_rows import load as load_rows
 from gpbnb.wordlength.examples import cyclic, tracker
 from gpbnb.wordlength.required import required_precision
 
 COMMAND = "python -m gpbnb.report.guarantees.certificates"
 SLOW = ("altimeter", "tilt filter", "ten states")
 """Guarantees whose check takes more than some seconds."""
-FILE = Path(__file__).with_name("certificates.csv")
-COLUMNS = (
-    Column("name", "text"),
-    Column("size", "integer", 1),
-    Column("seconds", "number", 0),
-    Column("verdict", "text"),
-)
-"""Columns of the stored table."""
 WITHOUT = {
     "random Kalman and linear filters": "proved when the surveys compute them, and not stored",
     "filters of one state in three to six bits": "their worst errors are known exactly",
@@ -51,7 +45,7 @@ class CheckedCertificate(NamedTuple):
 
     name: str
     size: int
-    seconds: str
+    seconds: Number
     verdict: str
 
 
@@ -102,8 +96,9 @@ def verdict(name: str, text: str) -> CheckedCertificate:
 # -- the stored table -------------------------------------------------------------------------------------------------
 
 
-def _computed(name: str, directory: Path | None = None) -> list[list[str]]:
-    return [[str(each) for each in verdict(name, guarantees()[name]().certificate())]]
+def checked(name: str) -> CheckedCertificate:
+    """Compute a guarantee of the book, write its certificate and check it."""
+    return verdict(name, guarantees()[name]().certificate())
 
 
 def _same(stored: Sequence[str], computed: Sequence[str]) -> bool:
@@ -111,22 +106,8 @@ def _same(stored: Sequence[str], computed: Sequence[str]) -> bool:
     return (*stored[:2], *stored[3:]) == (*computed[:2], *computed[3:])
 
 
-SWEEP: Sweep[str] = Sweep(
-    name="guarantees/certificates",
-    file=FILE,
-    columns=COLUMNS,
-    key=1,
-    cells=lambda: tuple(guarantees()),
-    compute=_computed,
-    command="python -m gpbnb.report.stored recompute guarantees/certificates",
-    seed=0,
-    same=_same,
-)
-
-
-def load(file: Path = FILE) -> tuple[CheckedCertificate, ...]:
-    """Return the stored rows."""
-    return SWEEP.load(file).tuples(CheckedCertificate)
+SWEEP = sweep_of_rows("guarantees/certificates", CheckedCertificate, lambda: tuple(guarantees()), checked, same=_same)
+load = partial(load_rows, SWEEP, CheckedCertificate)
 
 
 def table(rows: Sequence[CheckedCertificate]) -> Table:

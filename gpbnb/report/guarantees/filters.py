@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +33,9 @@ from gpbnb.report.guarantees.random_filters import (
     draw,
     innovations,
 )
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_rows import Number, sweep_of_rows
+from gpbnb.report.stored_rows import load as load_rows
 
-FILE = Path(__file__).with_name("filters.csv")
 FILTERS = 3_000
 MOST, CANDIDATES = 1_000, 8
 """Steps until a gain must have settled; measurements that the adversary tries at each step."""
@@ -78,9 +79,9 @@ class FilterRow(NamedTuple):
     steps: int = 0
     stopped: int = 0
     gains: int = 0
-    random: str = "0"
-    constant: str = "0"
-    chosen: str = "0"
+    random: Number = "0"
+    constant: Number = "0"
+    chosen: Number = "0"
 
     @property
     def largest(self) -> float:
@@ -91,28 +92,6 @@ class FilterRow(NamedTuple):
     def wrong(self) -> bool:
         """Whether a run exceeds its bound or has other gains, or the answer fails without a reason."""
         return self.largest > 1 or self.gains > 0 or self.result == "failed"
-
-
-COLUMNS = (
-    Column("seed", "integer", 0),
-    Column("kind", "text", choices=KINDS),
-    Column("n", "integer", 1, 4),
-    Column("m", "integer", 1, 2),
-    Column("base", "integer", 2, 16),
-    Column("precision", "integer", 3, 30),
-    Column("rounding", "text", choices=tuple(each.value for each in DETERMINISTIC)),
-    Column("range", "text", choices=RANGES),
-    Column("form", "text", choices=tuple(each.name.lower() for each in Form)),
-    Column("limited", "text", choices=LIMITED),
-    Column("result", "text", choices=RESULTS),
-    Column("reason", "text", choices=REASONS),
-    Column("runs", "integer", 0),
-    Column("steps", "integer", 0),
-    Column("stopped", "integer", 0),
-    Column("gains", "integer", 0),
-    *(Column(kind, "number", 0) for kind in INPUTS),
-)
-"""Columns of the stored table."""
 
 
 def errors(drawn: Drawn, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
@@ -280,85 +259,48 @@ def reason_of(text: str) -> str:
 # -- the stored survey ------------------------------------------------------------------------------------------------
 
 
-def texts(row: FilterRow) -> tuple[str, ...]:
-    """Return a row as it is stored."""
-    return tuple(map(str, row))
-
-
-def _computed(seed: int, directory: Path | None = None) -> list[list[str]]:
-    return [list(texts(examine(seed)))]
-
-
 def _wrong(file: Path) -> list[str]:
-    return [" ".join(texts(row)) for row in load(file) if row.wrong]
+    return [" ".join(map(str, row)) for row in load(file) if row.wrong]
 
 
-SWEEP: Sweep[int] = Sweep(
-    name="guarantees/filters",
-    file=FILE,
-    columns=COLUMNS,
-    key=1,
-    cells=lambda: range(FILTERS),
-    compute=_computed,
-    command="python -m gpbnb.report.stored recompute guarantees/filters",
-    seed=0,
-    faults=_wrong,
-)
+SWEEP = sweep_of_rows("guarantees/filters", FilterRow, lambda: range(FILTERS), examine, faults=_wrong)
+load = partial(load_rows, SWEEP, FilterRow)
 
 
-def load(file: Path = FILE) -> tuple[FilterRow, ...]:
-    """Return the stored rows."""
-    return SWEEP.load(file).tuples(FilterRow)
+_VALUES: dict[str, Sequence[Any]] = {
+    "form": [form.name.lower() for form in Form],
+    "rounding": [rounding.value for rounding in DETERMINISTIC],
+    "kind": KINDS,
+    "range": RANGES,
+    "limited": LIMITED,
+}
 
 
-class Count(NamedTuple):
-    """Filters that share a property, how many of them have which result, their runs, and the largest error / bound."""
-
-    value: str
-    filters: int
-    for_ever: int
-    some_steps: int
-    without: int
-    runs: int
-    random: float
-    constant: float
-    chosen: float
-
-    @property
-    def largest(self) -> float:
-        """Largest error / bound of all runs."""
-        return max(self.random, self.constant, self.chosen)
-
-
-def counts(rows: Sequence[FilterRow], name: str) -> tuple[Count, ...]:
-    """Count filters by one of the columns, in the order in which its values are listed there, or of their size."""
-    values = {column.name: column.choices for column in COLUMNS}[name] or sorted({getattr(row, name) for row in rows})
-    found = []
-    for value in values:
-        chosen = [row for row in rows if getattr(row, name) == value]
-        results = [row.result for row in chosen]
-        known = results.count("for ever"), results.count("some steps")
-        worst = (max((float(getattr(row, kind)) for row in chosen), default=0.0) for kind in INPUTS)
-        runs = sum(row.runs for row in chosen)
-        found.append(Count(str(value), len(chosen), *known, len(chosen) - sum(known), runs, *worst))
-    return tuple(each for each in found if each.filters)
+def groups(rows: Sequence[FilterRow], name: str) -> dict[Any, list[FilterRow]]:
+    """Return the filters with each value of a column, in the order in which they are drawn, or of their size."""
+    values = _VALUES.get(name) or sorted({getattr(row, name) for row in rows})
+    found = {value: [row for row in rows if getattr(row, name) == value] for value in values}
+    return {value: chosen for value, chosen in found.items() if chosen}
 
 
 def table(rows: Sequence[FilterRow]) -> Table:
-    """Tabulate the counts by form, base, rounding, kind of model, range and limits."""
+    """Count results and runs by form, base, rounding, kind of model, range and limits, with the largest ratios."""
     header = ("group", "filters", "for ever", "some steps", "no answer", "runs", *(f"{kind} inputs" for kind in INPUTS))
     body = []
     for name in ("form", "base", "rounding", "kind", "range", "limited"):
-        for each in counts(rows, name):
-            label = each.value.replace("_", " ")
+        for value, chosen in groups(rows, name).items():
+            label = value
             if name == "form":
-                label = str(Form[each.value.upper()])
+                label = str(Form[value.upper()])
             elif name == "rounding":
-                label = rounding_text(rounding_named(each.value))
-            numbers = (each.filters, each.for_ever, each.some_steps, each.without, each.runs)
-            worst = (each.random, each.constant, each.chosen)
-            cells = *map(str, numbers), *(f"{ratio:.3f}" if each.runs else "–" for ratio in worst)
-            body.append((f"base {label}" if name == "base" else label, *cells))
+                label = rounding_text(rounding_named(value))
+            elif name == "base":
+                label = f"base {value}"
+            results, runs = Counter(row.result for row in chosen), sum(row.runs for row in chosen)
+            known = results["for ever"], results["some steps"]
+            worst = (max(float(getattr(row, kind)) for row in chosen) for kind in INPUTS)
+            cells = (*map(str, (len(chosen), *known, len(chosen) - sum(known), runs)),)
+            body.append((label, *cells, *(f"{ratio:.3f}" if runs else "–" for ratio in worst)))
     return Table("random filters against their guarantees", header, tuple(body))
 
 

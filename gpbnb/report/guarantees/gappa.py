@@ -14,6 +14,7 @@ import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,17 +25,11 @@ from gpbnb.bounds.guess import FilterLimits, columns, linear_steps, rounding_err
 from gpbnb.filters.program import ADD, MULTIPLY
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.guarantees.table import FORMAT, case_guarantee, case_named
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_rows import Number, sweep
+from gpbnb.report.stored_rows import columns as columns_of
+from gpbnb.report.stored_rows import load as load_rows
 
-FILE = Path(__file__).with_name("gappa.csv")
 FILTERS = ("tracker, 0 m from its origin", "PX4, landing target", "dynamax, tracking")
-COLUMNS = (
-    Column("name", "text"),
-    Column("state", "integer", 0),
-    Column("ours", "number", 0),
-    Column("gappa", "number", 0),
-)
-"""Columns of the stored table."""
 _RESULT = re.compile(r"v\d+ - e\d+ in \[(-?\d+)(?:b(-?\d+))?(?: \{[^}]*\})?, (-?\d+)(?:b(-?\d+))?")
 
 
@@ -43,8 +38,8 @@ class GappaRow(NamedTuple):
 
     name: str
     state: int
-    ours: str
-    gappa: str
+    ours: Number
+    gappa: Number
 
 
 def single_step(found: FilterGuarantee) -> FilterGuarantee:
@@ -117,22 +112,8 @@ def _sample(name: str, rng: np.random.Generator) -> list[tuple[str, ...]]:
     return _rows(name, lambda found: [row.gappa for row in load() if row.name == name])
 
 
-SWEEP: Sweep[str] = Sweep(
-    name="guarantees/gappa",
-    file=FILE,
-    columns=COLUMNS,
-    key=2,
-    cells=lambda: FILTERS,
-    compute=_computed,
-    command="python -m gpbnb.report.stored recompute guarantees/gappa",
-    seed=0,
-    sample=_sample,
-)
-
-
-def load(file: Path = FILE) -> tuple[GappaRow, ...]:
-    """Return the stored rows."""
-    return SWEEP.load(file).tuples(GappaRow)
+SWEEP = sweep("guarantees/gappa", columns_of(GappaRow), 2, lambda: FILTERS, _computed, sample=_sample)
+load = partial(load_rows, SWEEP, GappaRow)
 
 
 def table(rows: Sequence[GappaRow]) -> Table:

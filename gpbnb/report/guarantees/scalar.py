@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,9 +29,9 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.random_filters import DETERMINISTIC
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_rows import Number, sweep_of_rows
+from gpbnb.report.stored_rows import load as load_rows
 
-FILE = Path(__file__).with_name("scalar.csv")
 FILTERS = 500
 LONGEST = 400
 """Steps within which gains must settle and errors converge."""
@@ -222,22 +223,9 @@ class ScalarRow(NamedTuple):
     form: str
     result: str
     steps: int
-    bound: str
-    worst: str
-    ratio: str
-
-
-COLUMNS = (
-    Column("seed", "integer", 0),
-    Column("precision", "integer", 3, 6),
-    Column("rounding", "text", choices=tuple(each.value for each in DETERMINISTIC)),
-    Column("subnormal", "integer", 0, 1),
-    Column("form", "text", choices=tuple(each.name.lower() for each in Form)),
-    Column("result", "text", choices=("compared", "no bound for ever", "not settled", "leaves the range")),
-    Column("steps", "integer", 0, LONGEST),
-    *(Column(name, "number", 0) for name in ("bound", "worst", "ratio")),
-)
-"""Columns of the stored table."""
+    bound: Number
+    worst: Number
+    ratio: Number
 
 
 def examine(seed: int) -> ScalarRow:
@@ -263,30 +251,12 @@ def examine(seed: int) -> ScalarRow:
     return ScalarRow(*about, "compared", worst.step, f"{bound:.6g}", f"{worst.error:.6g}", f"{ratio:.4g}")
 
 
-def _computed(seed: int, directory: Path | None = None) -> list[list[str]]:
-    return [[str(each) for each in examine(seed)]]
-
-
 def _above(file: Path) -> list[str]:
     return [" ".join(map(str, row)) for row in load(file) if float(row.ratio) > 1]
 
 
-SWEEP: Sweep[int] = Sweep(
-    name="guarantees/scalar",
-    file=FILE,
-    columns=COLUMNS,
-    key=1,
-    cells=lambda: range(FILTERS),
-    compute=_computed,
-    command="python -m gpbnb.report.stored recompute guarantees/scalar",
-    seed=0,
-    faults=_above,
-)
-
-
-def load(file: Path = FILE) -> tuple[ScalarRow, ...]:
-    """Return the stored rows."""
-    return SWEEP.load(file).tuples(ScalarRow)
+SWEEP = sweep_of_rows("guarantees/scalar", ScalarRow, lambda: range(FILTERS), examine, faults=_above)
+load = partial(load_rows, SWEEP, ScalarRow)
 
 
 def table(rows: Sequence[ScalarRow]) -> Table:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,25 +13,13 @@ from gpbnb.bounds.adversary import responses, run_against
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import closed_loops, from_schedule, limits
 from gpbnb.filters.system import state_space
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_rows import Number, sweep_of_rows
+from gpbnb.report.stored_rows import load as load_rows
 
-FILE = Path(__file__).with_name("survey.csv")
 ROWS = 2_000
 RANDOM, CONSTANT, CHOSEN = 40, 6, 5
 """Runs of each kind for a filter."""
 STEPS = 300
-COLUMNS = (
-    Column("seed", "integer", 0),
-    Column("n", "integer", 1, 4),
-    Column("m", "integer", 1, 2),
-    Column("base", "integer", 2, 10),
-    Column("precision", "integer", 3, 30),
-    Column("rounding", "text", choices=tuple(each.value for each in Rounding)),
-    Column("radius", "number", 0),
-    Column("runs", "integer", 0, RANDOM + CONSTANT + CHOSEN),
-    *(Column(kind, "number", 0) for kind in ("random", "constant", "chosen")),
-)
-"""Columns of the stored table."""
 
 
 class SurveyRow(NamedTuple):
@@ -43,11 +31,11 @@ class SurveyRow(NamedTuple):
     base: int
     precision: int
     rounding: str
-    radius: str
+    radius: Number
     runs: int
-    random: str
-    constant: str
-    chosen: str
+    random: Number
+    constant: Number
+    chosen: Number
 
 
 def compute(seed: int) -> SurveyRow:
@@ -81,22 +69,5 @@ def compute(seed: int) -> SurveyRow:
     return SurveyRow(seed, n, m, base, precision, fmt.rounding.value, f"{found.radius:.4f}", len(kinds), *ratios)
 
 
-def _computed(seed: int, directory: Path | None = None) -> list[list[str]]:
-    return [[str(each) for each in compute(seed)]]
-
-
-SWEEP: Sweep[int] = Sweep(
-    name="guarantees/survey",
-    file=FILE,
-    columns=COLUMNS,
-    key=1,
-    cells=lambda: range(ROWS),
-    compute=_computed,
-    command="python -m gpbnb.report.stored recompute guarantees/survey",
-    seed=19,
-)
-
-
-def load(file: Path = FILE) -> tuple[SurveyRow, ...]:
-    """Return the stored rows."""
-    return SWEEP.load(file).tuples(SurveyRow)
+SWEEP = sweep_of_rows("guarantees/survey", SurveyRow, lambda: range(ROWS), compute, seed=19)
+load = partial(load_rows, SWEEP, SurveyRow)

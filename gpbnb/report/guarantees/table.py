@@ -6,8 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -35,12 +34,12 @@ from gpbnb.report.guarantees.published import (
     nile_local_level,
     px4_landing_target,
 )
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_rows import Number, Whole, sweep_of_rows
+from gpbnb.report.stored_rows import load as load_rows
 from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.examples import TILT_STATES, altimeter, tilt, tracker
 from gpbnb.wordlength.required import required_precision
 
-FILE = Path(__file__).with_name("guarantees.csv")
 FORMAT = FloatFormat(2, 24)
 SHARE = 1e-4
 """Tolerance of each state, as a share of its limit."""
@@ -153,31 +152,21 @@ class GuaranteeRow(NamedTuple):
     """One row of the table, as text."""
 
     name: str
-    n: str
-    m: str
-    repeat: str
-    period: str
-    worst: str
-    bound: str
-    ratio: str
-    ceiling: str
-    probable: str
-    scatter: str
-    guarantee: str
-    contraction: str
-    three_sigma: str
-    emulation: str
-    seconds: str
-
-
-_WHOLE = {"n", "m", "repeat", "period", "worst", "guarantee", "contraction", "three_sigma", "emulation"}
-COLUMNS = tuple(
-    Column(name, "text")
-    if name == "name"
-    else Column(name, "integer" if name in _WHOLE else "number", 0, optional=True)
-    for name in GuaranteeRow._fields
-)
-"""Columns of the stored table."""
+    n: Whole
+    m: Whole
+    repeat: Whole
+    period: Whole
+    worst: Whole
+    bound: Number
+    ratio: Number
+    ceiling: Number
+    probable: Number
+    scatter: Number
+    guarantee: Whole
+    contraction: Whole
+    three_sigma: Whole
+    emulation: Whole
+    seconds: Number
 
 
 def compute(case: GuaranteeCase) -> GuaranteeRow:
@@ -285,9 +274,10 @@ def case_named(name: str) -> GuaranteeCase:
     return next(case for case in CASES if case.make().name == name)
 
 
-def _computed(name: str, directory: Path | None = None) -> list[list[str]]:
+def compute_named(name: str) -> GuaranteeRow:
+    """Compute the row of the filter of a name."""
     _compile()
-    return [list(compute(case_named(name)))]
+    return compute(case_named(name))
 
 
 @cache
@@ -302,22 +292,15 @@ def _same(stored: Sequence[str], computed: Sequence[str]) -> bool:
     return stored[:-1] == computed[:-1]
 
 
-SWEEP: Sweep[str] = Sweep(
-    name="guarantees/guarantees",
-    file=FILE,
-    columns=COLUMNS,
-    key=1,
-    cells=lambda: tuple(case.make().name for case in CASES),
-    compute=_computed,
-    command="python -m gpbnb.report.stored recompute guarantees/guarantees",
-    seed=0,
+SWEEP = sweep_of_rows(
+    "guarantees/guarantees",
+    GuaranteeRow,
+    lambda: tuple(case.make().name for case in CASES),
+    compute_named,
+    optional=True,
     same=_same,
 )
-
-
-def load(file: Path = FILE) -> tuple[GuaranteeRow, ...]:
-    """Return the stored rows."""
-    return tuple(GuaranteeRow(**line) for line in SWEEP.load(file).records())
+load = partial(load_rows, SWEEP, GuaranteeRow)
 
 
 def table() -> Table:

@@ -24,6 +24,7 @@ from gpbnb.arithmetic.rational import column_sum_norm, rationals, true_inverse
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import inverse as bounds
 from gpbnb.report.inversion import procedure, theory
+from gpbnb.report.stored_rows import sweep
 from gpbnb.sweeps import Column, Sweep
 
 # -- one inverse beside its bounds ----------------------------------------------------------------
@@ -324,16 +325,14 @@ def format_name(fmt: FloatFormat) -> str:
 def stored_sweep(name: str) -> Sweep[InverseCell]:
     """Return one of the sweeps of :data:`SWEEPS`."""
     cells, names = SWEEPS[name]
-    return Sweep(
-        name=f"inversion/{name}",
-        file=Path(__file__).with_name(f"{name}.csv"),
-        columns=COLUMNS,
-        key=5,
-        cells=cells,
-        compute=partial(computed, names=names),
+    return sweep(
+        f"inversion/{name}",
+        COLUMNS,
+        5,
+        cells,
+        partial(computed, names=names),
+        SEED,
         rows=partial(rows, names=names),
-        command=f"python -m gpbnb.report.stored recompute inversion/{name}",
-        seed=SEED,
         summary=partial(sums, names=names),
         packages=("numpy", "numba", "python-flint"),
     )

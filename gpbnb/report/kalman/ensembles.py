@@ -22,7 +22,8 @@ from gpbnb.bounds.bounded_run import BoundedHistory, emulate_with_bound
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.kalman import report_bounds
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_rows import columns, sweep
+from gpbnb.sweeps import Column
 
 #: The kinds of random models; see :func:`random_model`.
 KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
@@ -220,14 +221,8 @@ def lines(seed: int, trials: Sequence[Summary]) -> list[tuple[str, ...]]:
     ]
 
 
-def _column(name: str, kind: type) -> Column:
-    if kind is str:
-        return Column(name, "text")
-    return Column(name, "integer" if kind is int else "number", low=0)
-
-
 #: Columns of ``ensembles.csv``.
-COLUMNS = (Column("seed", "integer", 0), *(_column(*each) for each in get_type_hints(Summary).items()))
+COLUMNS = (Column("seed", "integer", 0), *columns(Summary))
 
 
 def trials_of_seed(seed: int, directory: Path | None = None) -> list[tuple[str, ...]]:
@@ -235,16 +230,7 @@ def trials_of_seed(seed: int, directory: Path | None = None) -> list[tuple[str, 
     return lines(seed, [trial(kind, fmt, form, seed) for kind, fmt, form in product(KINDS, FORMATS, Form)])
 
 
-SWEEP: Sweep[int] = Sweep(
-    name="kalman/ensembles",
-    file=Path(__file__).with_name("ensembles.csv"),
-    columns=COLUMNS,
-    key=3,
-    cells=lambda: range(REPEATS),
-    compute=trials_of_seed,
-    command="python -m gpbnb.report.stored recompute kalman/ensembles",
-    seed=0,
-)
+SWEEP = sweep("kalman/ensembles", COLUMNS, 3, lambda: range(REPEATS), trials_of_seed)
 
 
 @cache

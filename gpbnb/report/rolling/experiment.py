@@ -18,7 +18,8 @@ from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
 from gpbnb.report.rolling.flicker import record
 from gpbnb.report.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_rows import sweep
+from gpbnb.sweeps import Column
 
 YEAR_SAMPLES = round(YEAR / INTERVAL)
 
@@ -237,9 +238,6 @@ def drift_rates(
     return DriftStudy(tuple(periods), level, n, interval, errors)
 
 
-SURVEY = Path(__file__).with_name("drift_rates.csv")
-"""Errors of the drift rates of `SURVEY_GYROS` gyros, a year each."""
-
 SURVEY_PERIODS = (None, 6000.0, 600.0, 200.0, 77.5)
 SURVEY_GYROS = 128
 
@@ -274,14 +272,12 @@ def survey_of(gyros: int, directory: Path | None = None) -> list[tuple[str, ...]
     return survey_rows(drift_rates(SURVEY_PERIODS, gyros, rng, progress=directory is not None))
 
 
-SWEEP: Sweep[int] = Sweep(
-    name="rolling/drift_rates",
-    file=SURVEY,
-    columns=SURVEY_COLUMNS,
-    key=1,
-    cells=lambda: (SURVEY_GYROS,),
-    compute=survey_of,
-    command="python -m gpbnb.report.stored recompute rolling/drift_rates",
+SWEEP = sweep(
+    "rolling/drift_rates",
+    SURVEY_COLUMNS,
+    1,
+    lambda: (SURVEY_GYROS,),
+    survey_of,
     seed=1984,
     sample=lambda gyros, rng: survey_of(int(rng.integers(1, 4))),
 )
