@@ -547,7 +547,7 @@ class Linear:
                 row = dict(rows[p])
                 for i, x in rows[q].items():
                     row[i] = row.get(i, 0) + (x if kind == ADD else -x)
-                rows.append({i: x for i, x in row.items() if x})
+                rows.append(row)  # what cancels leaves roundings, so it is not zero
         return rows
 
     def effects(self) -> list[tuple[Fraction, ...]]:
