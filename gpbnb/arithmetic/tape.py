@@ -37,6 +37,17 @@ class UntraceableError(Exception):
     """A function has done what no tape can repeat."""
 
 
+def _combined(a: Places, b: Places, table: int) -> Places:
+    """Return the places of truth values that are known, or those of a or b, and -1 for others."""
+    found = np.full(a.shape, -1)
+    for known, other, columns in ((a, b, False), (b, a, True)):
+        for truth in (0, 1):
+            row = (table >> truth & 1) + 2 * (table >> truth + 2 & 1) if columns else table >> 2 * truth & 3
+            result = {0: np.zeros_like(a), 2: other, 3: np.ones_like(a)}.get(row, found)
+            found = np.where(known == truth, result, found)
+    return found
+
+
 class Tape:
     """Operations in the order in which they ran. Place 0 is the number zero; truth values 0 and 1 are false and true.
 
@@ -113,6 +124,13 @@ class Tape:
             if left.any():
                 found[left] = self._append(name, (a[left],), fmt)
             return found
+        if name in ("compare", "combine"):
+            a, b, table = operands
+            found = np.where(a == b, table >> 1 & 1, -1) if name == "compare" else _combined(a, b, table)
+            left = found < 0
+            if left.any():
+                found[left] = self._append(name, (a[left], b[left], table), fmt)
+            return found
         if name not in _SHORTENED:
             return self._append(name, operands, fmt)
         a, b = operands
@@ -162,7 +180,10 @@ class Tape:
         before, self._guarded = self._guarded, True
         found = changed()
         self._guarded = before
-        self._instructions[at + 2] = (len(self._instructions) - at) // 5 - 1
+        if rows := (len(self._instructions) - at) // 5 - 1:
+            self._instructions[at + 2] = rows
+        else:
+            del self._instructions[at:]
         return found
 
     def about(self, quantity: str) -> None:

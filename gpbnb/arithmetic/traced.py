@@ -332,16 +332,6 @@ class TracedArray(FloatArray):
     def __bool__(self) -> bool:
         self.tape.refuse("it branches on a number")
 
-    def if_nonzero(self, changed: Callable[[], Any], unchanged: Any) -> Any:
-        """Record what changes if this number is not zero, and the choice; see ``filters.steps.if_nonzero``."""
-        if not self.components[0].any():
-            return unchanged
-        nonzero = self != 0
-        found = self.tape.only_if(nonzero.components[0], changed)
-        if isinstance(found, list):
-            return [np.where(nonzero, a, b) for a, b in zip(found, unchanged, strict=True)]
-        return np.where(nonzero, found, unchanged)
-
     def check_nonzero(self) -> None:
         """Record that this number must not be zero."""
         self.tape.check(int(self.components[0]))
@@ -428,6 +418,16 @@ class TracedTruth(ComponentArray):
     def any(self, axis: int | None = None, keepdims: bool = False) -> TracedTruth:
         """Whether one holds."""
         return self._reduced(operator.or_, False, axis, keepdims)
+
+    def if_holds(self, changed: Callable[[], Any], unchanged: Any) -> Any:
+        """Record what changes if this holds, and the choice; see ``filters.steps.if_holds``."""
+        place = int(self.components[0])
+        if place < 2:  # known
+            return changed() if place else unchanged
+        found = self.format.tape.only_if(self.components[0], changed)
+        if isinstance(found, list):
+            return [self.choose(a, b) for a, b in zip(found, unchanged, strict=True)]
+        return self.choose(found, unchanged)
 
     def choose(self, a: Any, b: Any) -> TracedArray:
         """Return entries of the first array where the truth values hold, and of the second elsewhere."""

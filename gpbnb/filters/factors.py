@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.algebra import Matrix, inverse_in_order
 from gpbnb.arithmetic.definiteness import factor
 from gpbnb.arithmetic.lanes import recorded
-from gpbnb.filters.steps import if_nonzero, root_of_factors
+from gpbnb.filters.steps import if_holds, root_of_factors
 
 
 def upper_factors(covariance: NDArray[Any]) -> NDArray[Any]:
@@ -38,7 +38,7 @@ def factors(a: Matrix) -> tuple[Matrix, Any]:
         definite = definite & (d >= 0)
         for each in above:
             definite = definite & ((d != 0) | (each == 0))
-        column = if_nonzero(d, _divided(above, d), [each * 0 for each in above])
+        column = if_holds(d != 0, _divided(above, d), [each * 0 for each in above])
         for i in range(j):
             found[i][j] = column[i]
             for k in range(i + 1):

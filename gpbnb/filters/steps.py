@@ -188,47 +188,39 @@ def predict_ud(Phi: Matrix, U: Matrix, UQ: Matrix, times: Times = operator.matmu
     n = len(U)
     W = np.concatenate([times(Phi, _unit(U)), _unit(UQ)], axis=1)
     D = np.concatenate([np.diagonal(U), np.diagonal(UQ)])
-    found: list[list[Matrix]] = _entries(U * 0)
-    definite: Any = True
+    columns: list[Matrix] = []
     for j in range(n - 1, -1, -1):
         c = D * W[j]
         d = (W[j] * c).sum()
-        found[j][j] = d
-        definite = definite & np.logical_not(d < 0)
-        if j:
-            s = if_nonzero(d, _share(W[:j], c, d), U[:j, j] * 0)
-            W = np.concatenate([W[:j] - s[:, None] * W[j], W[j:]])
-            for i in range(j):
-                found[i][j] = s[i]
-    for i in range(n):
-        definite = definite & (_one_of_variance(found, i) > 0)
-    return _matrix(found), definite
+        s = if_holds(d != 0, _share(W[:j], c, d), U[:j, j] * 0) if j else U[:0, j]
+        W = W[:j] - s[:, None] * W[j]
+        columns.append(np.concatenate([s, _stacked([d]), U[j + 1 :, j] * 0]))
+    found = _stacked(columns[::-1]).T
+    D = np.diagonal(found)
+    return found, np.all(np.logical_not(D < 0)) & np.all(_of_variances(found, D) > 0)
 
 
-def _one_of_variance(factors: list[list[Matrix]], i: int) -> Any:
-    """Return an entry of D that adds to the variance of state i, or zero if none does."""
-    found = factors[i][i]
-    for u, d in ((factors[i][j], factors[j][j]) for j in range(i + 1, len(factors))):
-        found = _chosen(found, found, _chosen(u, d, found))
+def _of_variances(U: Matrix, D: Matrix) -> Matrix:
+    """Return for each state an entry of D that adds to its variance, or zero if none does."""
+    found = D
+    for j in range(1, len(D)):
+        first = found[:j]
+        found = np.concatenate([np.where((first == 0) & (U[:j, j] != 0), D[j], first), found[j:]])
     return found
-
-
-def _chosen(x: Any, a: Any, b: Any) -> Any:
-    return if_nonzero(x, lambda: [a], [b])[0]
 
 
 def _share(W: Matrix, c: Matrix, d: Matrix) -> Callable[[], Matrix]:
     return lambda: (W * c).sum(1) / d
 
 
-def if_nonzero(x: Any, changed: Callable[[], Any], unchanged: Any) -> Any:
-    """Return changed numbers if x is not zero, else the unchanged ones.
+def if_holds(truth: Any, changed: Callable[[], Any], unchanged: Any) -> Any:
+    """Return changed numbers if a truth value holds, else the unchanged ones.
 
-    A number that records its operations, see :mod:`gpbnb.arithmetic.traced`, records both.
+    A truth value that is recorded, see :mod:`gpbnb.arithmetic.traced`, records both.
     """
-    if hasattr(type(x), "if_nonzero"):  # arrays would look for names that are spelled alike
-        return x.if_nonzero(changed, unchanged)
-    return changed() if x != 0 else unchanged
+    if hasattr(type(truth), "if_holds"):  # arrays would look for names that are spelled alike
+        return truth.if_holds(changed, unchanged)
+    return changed() if truth else unchanged
 
 
 def check_nonzero(a: Any) -> None:
@@ -241,7 +233,7 @@ def check_nonzero(a: Any) -> None:
 
 def observe_ud(
     h: Matrix, z: Matrix, r: Matrix, x: Matrix, U: Matrix, stored: BlockStorage = ONE_FORMAT
-) -> tuple[Matrix, Matrix, Matrix, bool]:
+) -> tuple[Matrix, Matrix, Matrix, Any]:
     """Update UD factors by Bierman's method, for one measurement z of h'x with variance r.
 
     Parameters
@@ -254,47 +246,37 @@ def observe_ud(
     x, U, gain : values after the update.
     definite : whether variances stay positive.
     """
-    n = len(x)
-    y, c = z, stored.state(h)
-    for j in range(n):
-        y = y - c[j] * x[j]
+    y = z
+    for each in stored.state(h) * x:
+        y = y - each
     seen = stored.innovation(U)
     f = _unit(seen).T @ h
     g = np.diagonal(seen) * f
-    taken, moved = stored.gain(g), stored.covariance(f)
-    factors, gain = _entries(U), [stored.gain(h[0] * 0) for _ in range(n)]
-    a, observed, definite = r, h[0] * 0, True
-    for j in range(n):
-        before, a = a, a + f[j] * g[j]
-        check_nonzero(a)
-        definite = definite & (a > 0)
-        column = [factors[k][j] for k in range(j + 1)]
-        known = [stored.covariance(each) for each in gain[:j]]
-        change = _updated(column, known, moved[j], stored.covariance(before), stored.covariance(a), observed)
-        updated, observed = if_nonzero(g[j], change, column), _chosen(g[j], g[j], observed)
-        for k in range(j):
-            gain[k] = gain[k] + taken[j] * stored.gain(column[k])
-        for k in range(j + 1):
-            factors[k][j] = updated[k]
-        definite = definite & np.logical_not(factors[j][j] < 0)
-        gain[j] = taken[j]
-    K = _stacked(gain) / stored.gain(a)
-    return x + stored.state(K) * y, _matrix(factors), K, definite
+    taken, moved, added, nonzero = stored.gain(g), stored.covariance(f), f * g, g != 0
+    gain, columns, variances, earlier = taken[:0], list[Matrix](), [r], nonzero[0]
+    for j in range(len(x)):
+        variances.append(variances[-1] + added[j])
+        check_nonzero(variances[-1])
+        column, known = U[: j + 1, j], [stored.covariance(each) for each in (gain, moved[j], *variances[-2:])]
+        change = partial(_updated, column, earlier, *known)
+        columns.append(np.concatenate([if_holds(nonzero[j], change, column), U[j + 1 :, j]]))
+        share = gain + taken[j] * stored.gain(column[:j])
+        gain, earlier = np.concatenate([share, taken[j : j + 1]]), earlier | nonzero[j]
+    after = _stacked(columns).T
+    definite = np.all(_stacked(variances[1:]) > 0) & np.all(np.logical_not(np.diagonal(after) < 0))
+    K = gain / stored.gain(variances[-1])
+    return x + stored.state(K) * y, after, K, definite
 
 
-def _updated(
-    column: list[Matrix], gain: list[Matrix], f: Matrix, before: Matrix, a: Matrix, observed: Any
-) -> Callable[[], Any]:
-    """Return a function that updates a column of U, whose last entry is a variance.
+def _updated(column: Matrix, earlier: Any, gain: Matrix, f: Matrix, before: Matrix, a: Matrix) -> Matrix:
+    """Return an updated column of U, whose last entry is a variance.
 
-    Entries above it change only if `observed`, an entry of an earlier column, is not zero; otherwise the gain is zero.
+    Entries above it change only if an entry of an earlier column is not zero; otherwise the gain is zero.
     """
-
-    def moved() -> list[Matrix]:
-        factor = -(f / before)
-        return [u + factor * c for u, c in zip(column, gain, strict=False)]
-
-    return lambda: [*if_nonzero(observed, moved, column[:-1]), column[-1] * before / a]
+    above = column[:-1]
+    if len(above):
+        above = if_holds(earlier, lambda: above + -(f / before) * gain, above)
+    return np.concatenate([above, column[-1:] * before / a])
 
 
 def predict_root(Phi: Matrix, S: Matrix, SQ: Matrix, times: Times = operator.matmul) -> tuple[Matrix, Any]:
@@ -306,7 +288,7 @@ def predict_root(Phi: Matrix, S: Matrix, SQ: Matrix, times: Times = operator.mat
         size = (W[j] * W[j]).sum().sqrt()
         found[j][j] = size
         if j:
-            s, above = if_nonzero(size, partial(_projected, W, j, size), [W[:j, 0] * 0, W[:j]])
+            s, above = if_holds(size != 0, partial(_projected, W, j, size), [W[:j, 0] * 0, W[:j]])
             W = np.concatenate([above, W[j:]])
             for i in range(j):
                 found[i][j] = s[i]
@@ -346,7 +328,7 @@ def observe_carlson(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tu
     a, k = r, x * 0
     columns: list[Matrix] = []
     for j in range(n):
-        a, column, k = if_nonzero(f[j], partial(_carlson, a, f[j], S[:, j], k), [a, S[:, j], k])
+        a, column, k = if_holds(f[j] != 0, partial(_carlson, a, f[j], S[:, j], k), [a, S[:, j], k])
         columns.append(column)
     K = k / a
     return x + K * (z - h @ x), _stacked(columns).T, K, a > 0
@@ -666,7 +648,7 @@ def lower_root(P: Matrix) -> Any:
         for column in columns:
             rest = rest - column * column[j]
         pivot = rest[j].sqrt()
-        columns.append(if_nonzero(pivot, partial(_column, rest, pivot, j), rest * 0))
+        columns.append(if_holds(pivot != 0, partial(_column, rest, pivot, j), rest * 0))
     return np.stack(columns).T
 
 
