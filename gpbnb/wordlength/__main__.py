@@ -9,6 +9,9 @@ from collections.abc import Sequence
 from gpbnb.files import replace_file
 from gpbnb.interrupts import interruptible
 from gpbnb.wordlength.options import printable, read
+from gpbnb.wordlength.own_code import where_raised
+
+_MISUSE = (ValueError, TypeError, OSError, ArithmeticError, ImportError)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,8 +33,11 @@ def _run(arguments: Sequence[str] | None) -> int:
         tell = (lambda text: None) if given.quiet else (lambda text: print(text, file=sys.stderr, flush=True))
         report = study(asked.question, asked.origin, command, tell)
         proof = certificate(asked, report) if given.certificate else None
-    except (ValueError, OSError, ArithmeticError, ImportError) as error:
-        print(f"{program}: {error}", file=sys.stderr)
+    except Exception as error:
+        own = where_raised(error)
+        if not own and not isinstance(error, _MISUSE):
+            raise
+        print(f"{program}: {own or error}", file=sys.stderr)
         return 2
     for text in filter(None, (report.entries["text"], report.entries["shortest"])):
         print(text, flush=True)

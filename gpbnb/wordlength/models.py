@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple, Protocol, TypeAlias, TypeVar, overload
 
 import numpy as np
@@ -26,6 +26,7 @@ from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.structures import structure_named
 from gpbnb.filters.system import LinearSystem
 from gpbnb.sweeps import plain_number
+from gpbnb.wordlength.own_code import function_at
 
 KALMAN = ("Phi", "H", "Q", "R", "x0", "P0")
 """Keys of a Kalman filter in a TOML file."""
@@ -39,14 +40,34 @@ SYSTEM = ("A", "B")
 DESIGN = ("b", "a", "sos", "pairing", "order", "scale", "structure")
 """Keys of a digital filter in a TOML file, with ``b`` or ``sos``; see :class:`gpbnb.filters.design.FilterDesign`."""
 
-NAMES = {f"{kind}s": f"{kind}_names" for kind in ("state", "measurement", "input", "output")}
+LISTS = ("states", "measurements", "inputs", "outputs")
+NAMES = {key: f"{key[:-1]}_names" for key in LISTS}
 """Keys that list names in a TOML file, each perhaps with a unit, and the arguments of the models for them."""
 
 PID = ("Kp", "Ki", "Kd", "leak", "limits", "integral_limits", "back_calculation")
 """Keys of a controller in a TOML file; only ``Kp`` and ``Ki`` are needed. See :meth:`gpbnb.LinearSystem.pid`."""
 
+OWN = ("step", "f", "h", "F", "residual", "normalize", "function")
+"""Keys of functions, such as ``step = "model.py:step"``; H, too, is a function beside f."""
+
+
+def _nonlinear_model(F: Any = None, H: Any = None, **rest: Any) -> NonlinearModel:
+    return NonlinearModel(F=F, H=H, **rest)
+
+
+def _function(function: Any, name: str) -> Any:
+    return function
+
+
 _KINDS: dict[str, tuple[Any, Sequence[str], Sequence[str]]] = {
-    "a Kalman filter": (LinearModel, KALMAN, (*INPUTS, "repair", "states", "measurements", "inputs")),
+    "a system with a step of its own": (NonlinearSystem, ("step", "x0"), ("m",)),
+    "a function": (_function, ("function",), ()),
+    "a nonlinear filter": (
+        _nonlinear_model,
+        ("f", "h", *KALMAN[2:]),
+        (*"FHu", "angles", "residual", "normalize", "iterations", "method", "steps", "repair", *LISTS[:2]),
+    ),
+    "a Kalman filter": (LinearModel, KALMAN, (*INPUTS, "repair", *LISTS[:3])),
     "a linear system": (LinearSystem, SYSTEM, ("C", "D", "x0", "states", "inputs", "outputs")),
     "a digital filter": (FilterDesign, (), (*DESIGN, "inputs", "outputs")),
     "a controller": (LinearSystem.pid, PID[:2], PID[2:]),
@@ -88,7 +109,7 @@ Own = TypeVar("Own", NonlinearModel, NonlinearSystem, FixedIntervalSmoother)
 @overload
 def read_model(
     source: ModelSource, u: Numbers | None = ..., structure: str | None = ...
-) -> LinearModel | LinearSystem: ...
+) -> LinearModel | LinearSystem | Any: ...
 
 
 @overload
@@ -106,7 +127,10 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
     ----------
     source : the path of a TOML, JSON, NPZ or MAT file, or a mapping with the same keys: Phi, H, Q, R, x0 and P0 for a
         Kalman filter; A, B and optionally C, D and x0 for a linear system; b and a, or sos, for a digital filter; Kp
-        and Ki for a controller. Lists of names are optional: states, measurements, inputs, outputs. Or (b, a), or
+        and Ki for a controller. Lists of names are optional: states, measurements, inputs, outputs. Functions are
+        named by the path from the file: step = "model.py:step" and x0 for a :class:`gpbnb.NonlinearSystem`; f, h, Q, R,
+        x0 and P0 for a :class:`gpbnb.NonlinearModel`; function for a function of a format and data. Reading such a
+        model runs the Python file: read none that you do not trust. Or (b, a), or
         sections (sections, 6). Or a discrete StateSpace or TransferFunction of ``scipy.signal`` or python-control, or a
         ZerosPolesGain of ``scipy.signal``; it is read as a linear system that starts at rest. Or a KalmanFilter,
         SquareRootKalmanFilter or FadingKalmanFilter of FilterPy, or a KalmanFilter of OpenCV; its current estimate
@@ -121,7 +145,8 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
     ------
     ValueError : a key is missing or unknown; a system is continuous, or has no time step; a filter of FilterPy has a
         fading memory ``alpha``, correlated noise ``M``, another inverse ``inv``, inputs ``B`` without `u`, or other
-        changed settings; or the class of the model rejects a matrix.
+        changed settings; the class of the model rejects a matrix; or a Python file lacks the function, or raises an
+        error.
     TypeError : the class of the object is not supported.
     OSError : the file cannot be read.
 
@@ -134,18 +159,7 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
     if isinstance(source, tuple | list | np.ndarray):
         source = _coefficients(source)
     if isinstance(source, (str, Path, Mapping)):
-        given, where = _read(source)
-        made, named = _made(given, where, u)
-        if not isinstance(made, FilterDesign):
-            if structure is not None:
-                raise ValueError(
-                    f"{where}: got structure={structure!r}; needed none: only a digital filter has structures"
-                )
-            return made
-        try:
-            return made.system(structure or (None if named == "all" else named))
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"{where}: {error}") from None
+        return _of_file(source, u, structure)[0]
     library, kind = type(source).__module__.partition(".")[0], type(source).__name__
     own = isinstance(source, LinearModel | LinearSystem | NonlinearModel | NonlinearSystem | FixedIntervalSmoother)
     of_filter = own or (library == "filterpy" and kind in FILTERS)
@@ -250,7 +264,7 @@ class FilterSource(NamedTuple):
 
     Parameters
     ----------
-    model : a digital filter in the structure that the source names, or else in its usual one.
+    model : the model; a digital filter in the structure that the source names, or else in its usual one.
     structures : a digital filter in several structures by name, beginning with the one that the source names; the
         others are those in :data:`gpbnb.filters.design.SIDE_BY_SIDE` or, with ``structure = "all"``, all that the
         filter has. Empty for another model.
@@ -259,7 +273,7 @@ class FilterSource(NamedTuple):
     design : a digital filter before it has a structure; None for another model.
     """
 
-    model: LinearModel | LinearSystem
+    model: Any
     structures: Mapping[str, LinearSystem] = MappingProxyType({})
     lacking: Mapping[str, str] = MappingProxyType({})
     compares_all: bool = False
@@ -275,27 +289,38 @@ def read_filter(source: str | Path | Mapping[str, Any], u: Numbers | None = None
     ------
     ValueError, OSError : as for :func:`read_model`.
     """
-    given, where = _read(source)
-    design, named = _made(given, where, u)
-    if not isinstance(design, FilterDesign):
-        return FilterSource(design)
-    try:
-        if named == "all":
-            return FilterSource(design.system(), *design.compared("all"), True, design)
-        first = structure_named(design.usual if named is None else named)
-        model, (others, lacking) = design.system(first), design.compared()
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{where}: {error}") from None
+    model, design, named = _of_file(source, u)
+    if design is None:
+        return FilterSource(model)
+    if named == "all":
+        return FilterSource(model, *design.compared("all"), True, design)
+    first, (others, lacking) = structure_named(design.usual if named is None else named), design.compared()
     structures = {first: model} | {name: each for name, each in others.items() if name != first}
     return FilterSource(model, structures, lacking, design=design)
 
 
-def _read(source: str | Path | Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
-    """Return the entries of a source, and where they stand."""
+def _of_file(source: Any, u: Any, structure: str | None = None) -> tuple[Any, FilterDesign | None, Any]:
+    """Return a model and, of a digital filter, its design and the structure that the file names, perhaps "all"."""
     if isinstance(source, Mapping):
-        return source, "the mapping"
-    path = Path(source)
-    return _READERS.get(path.suffix.lower(), _toml)(path), path.name
+        given, where, folder = source, "the mapping", Path()
+    else:
+        path = Path(source)
+        given, where, folder = _READERS.get(path.suffix.lower(), _toml)(path), path.name, path.parent
+    kind, arguments = _arguments(given, where, u)
+    named = arguments.pop("structure", None)
+    try:
+        loaded = dict[Path, ModuleType]()
+        of_functions = (*OWN, "H") if kind == "a nonlinear filter" else OWN
+        for key in arguments.keys() & {*of_functions}:
+            arguments[key] = function_at(arguments[key], key, folder, loaded)
+        made = _KINDS[kind][0](**arguments)
+        if isinstance(made, FilterDesign):
+            return made.system(structure or (None if named == "all" else named)), made, named
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{where}: {error}") from None
+    if structure is not None:
+        raise ValueError(f"{where}: got structure={structure!r}; needed none: only a digital filter has structures")
+    return made, None, named
 
 
 def _npz(path: Path) -> dict[str, Any]:
@@ -359,7 +384,10 @@ def _in_structure(given: Any, kind: str, library: str, structure: str) -> Linear
     )
 
 
-_KEYS = f"{', '.join(KALMAN)}, or {', '.join(SYSTEM)}, or b and a, or sos, or Kp and Ki"
+_KEYS = (
+    f"{', '.join(KALMAN)}, or {', '.join(SYSTEM)}, or b and a, or sos, or Kp and Ki, or step and x0, or f, h, "
+    f"{', '.join(KALMAN[2:])}, or function"
+)
 _READERS = {".npz": _npz, ".mat": _mat, ".json": _json}
 """How files of other tools are read; all others are TOML."""
 
@@ -398,36 +426,35 @@ def _toml(path: Path) -> dict[str, Any]:
         raise ValueError(f"{path.name} is not TOML: its lists are nested too deeply") from None
 
 
-def _made(given: Mapping[str, Any], where: str, u: Any) -> tuple[LinearModel | LinearSystem | FilterDesign, Any]:
-    """Return a model or a design, and the structure that a file names, perhaps "all"; `u` are its known inputs."""
-    if any(key in given for key in ("Phi", "H", "Q", "R", "P0")):
+def _arguments(given: Mapping[str, Any], where: str, u: Any) -> tuple[str, dict[str, Any]]:
+    """Return what kind of model the keys describe, and the arguments that make it; `u` are its known inputs."""
+    own = (kind for kind, (_, needed, _) in _KINDS.items() if needed and needed[0] in OWN and needed[0] in given)
+    if kind := next(own, ""):
+        pass
+    elif any(key in given for key in ("Phi", "H", "Q", "R", "P0")):
         kind = "a Kalman filter"
     elif "sos" in given or ("b" in given and not any(key in given for key in (*KALMAN, *SYSTEM))):
         kind = "a digital filter"
     else:
         kind = "a controller" if "Kp" in given else "a linear system"
-    make, needed, optional = _KINDS[kind]
+    _, needed, optional = _KINDS[kind]
     if u is not None:
-        if make is not LinearModel:
+        if "u" not in optional:
             raise ValueError(f"{where}: got known inputs for {kind}; needed none: its measurements are its inputs")
         given = {**given, "u": u}
     missing = [key for key in needed if key not in given]
     unknown = sorted(map(str, set(given) - {*needed, *optional, "name"}))
     if missing or unknown:
         problems = [f"{', '.join(keys)} {what}" for keys, what in ((missing, "missing"), (unknown, "unknown")) if keys]
-        more = f"; or, for another model, {_KEYS}" if make is LinearSystem else ""
-        own = ", ".join(needed) or "b and a, or sos,"
+        more = f"; or, for another model, {_KEYS}" if kind == "a linear system" else ""
+        must = ", ".join(needed) or "b and a, or sos,"
         perhaps = ", ".join(each for each in (*optional, "name") if each not in ("b", "a", "sos"))
-        raise ValueError(f"{where}: {'; '.join(problems)}; needed {own} and perhaps {perhaps} for {kind}{more}")
-    arguments = ({"repair": True} if make is LinearModel else {}) | {"name": where.removesuffix(".toml")}
+        raise ValueError(f"{where}: {'; '.join(problems)}; needed {must} and perhaps {perhaps} for {kind}{more}")
+    arguments = ({"repair": True} if "repair" in optional else {}) | {"name": where.removesuffix(".toml")}
     arguments |= {NAMES.get(key, key): value for key, value in given.items()}
-    structure = arguments.pop("structure", None)
     if not isinstance(arguments["name"], str):
         raise ValueError(f"{where}: got name {arguments['name']!r}; needed text")
-    try:
-        return make(**arguments), structure
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{where}: {error}") from None
+    return kind, arguments
 
 
 def read_measurements(path: str | Path) -> NDArray[np.float64]:

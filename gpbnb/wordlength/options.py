@@ -45,6 +45,9 @@ structures are compared side by side, and with "all", the one that needs the few
 shortest word) gives the answer and the code. Beside sos, there may be pairing, order, and scale = true, which scales
 the sections of a cascade by powers of two. A controller has Kp and Ki, and perhaps Kd, leak, limits, integral_limits,
 back_calculation. Numbers are read as decimals. NPZ, MAT and JSON files with the same names are read, too.
+Functions of your own stand in a Python file, named from the folder of the model file: step = "model.py:step" and x0 for
+a system, f, h, Q, R, x0 and P0 for a nonlinear filter, or function = "model.py:run" for a function of a format and the
+measurements. The command runs that file: read no model that you do not trust.
 With --form "constant gain", a Kalman filter is the linear system with the gain that it approaches; its inputs are the
 measurements.
 The file may name states, measurements, inputs and outputs, each with its unit: states = ["tilt (°)", "rate (°/s)"].

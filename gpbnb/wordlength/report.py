@@ -21,8 +21,8 @@ from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named, whole_number
+from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.poles import stored_response
-from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.sweeps import machine
@@ -33,6 +33,7 @@ from gpbnb.wordlength.models import FilterSource
 from gpbnb.wordlength.options import IN_FIXED_POINT
 from gpbnb.wordlength.ranges import binary_ranges
 from gpbnb.wordlength.required import judge, required_precision
+from gpbnb.wordlength.tasks import is_filter, kind_of
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms that a report compares; the requested form comes first."""
@@ -44,10 +45,10 @@ DEFAULT_STEPS = 1000
 """Steps that are simulated if no number is given."""
 
 
-def usual_steps(model: LinearModel | LinearSystem) -> int:
+def usual_steps(model: Any) -> int:
     """Return the number of steps to simulate if none is given: those that a model describes, or the default."""
-    described = model.steps if isinstance(model, LinearModel) else None
-    return DEFAULT_STEPS if described is None else described
+    described = model.steps if is_filter(model) else None
+    return DEFAULT_STEPS if described is None else int(described)
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ class Question:
     seed: int = 0
 
     @property
-    def model(self) -> LinearModel | LinearSystem:
+    def model(self) -> Any:
         """The filter in its first structure."""
         return self.source.model
 
@@ -100,7 +101,7 @@ class Question:
     def parts(self) -> list[Part]:
         """Return the single questions, one for each basis and form or structure."""
         model, form = self.model, form_named(self.form)
-        if isinstance(model, LinearSystem):
+        if not is_filter(model):
             systems = self.source.structures or {"": model}
             return [
                 Part(f"{name}, {basis}" if name else basis, basis, each, None, name)
@@ -108,14 +109,15 @@ class Question:
                 for basis in self.bases
             ]
         model.check_sizes()
-        forms = [form, *(each for each in SIDE_BY_SIDE if each is not form and self.kind != "blocks")]
+        has_forms = self.kind != "blocks" and getattr(model, "method", "extended") == "extended"
+        forms = [form, *(each for each in SIDE_BY_SIDE if each is not form and has_forms)]
         return [Part(f"{each}, {basis}", basis, model, each) for each in forms for basis in self.bases]
 
     def measured(self) -> Any:
         """Return the measurements or inputs; those of a Kalman filter are simulated if there are none."""
-        if isinstance(self.model, LinearSystem) or self.z is not None:
+        if not is_filter(self.model) or self.z is not None:
             return self.z
-        return simulated_measurements(self.model, whole_number("steps", self.count), self.seed)
+        return simulated(self.model, whole_number("steps", self.count), self.seed)
 
     def answer(self, part: Part, z: Any) -> Requirement:
         """Answer one of the single questions, by a search or by judging the one format."""
@@ -136,7 +138,7 @@ class Part(NamedTuple):
 
     label: str
     basis: Basis
-    model: LinearModel | LinearSystem
+    model: Any
     form: AnyForm | None
     structure: str = ""
 
@@ -200,8 +202,8 @@ def study(
     stored = _stored(structures.get(first.structure), main) if met else ""
     if stored:
         tell(f"{first.structure}: {stored}")
-    is_filter = isinstance(model, LinearModel)
-    tolerances = tolerances_of(asked.tolerance, model.n if is_filter else model.p, "outputs")
+    count = model.n if is_filter(model) else getattr(model, "p", np.size(asked.tolerance))
+    tolerances = tolerances_of(asked.tolerance, count, "outputs")
     origin = (
         "given" if asked.z is not None else f"simulated by the model, seed {asked.seed}" if z is not None else "none"
     )
@@ -209,8 +211,8 @@ def study(
     errors = _errors(model, z, main.format if met else None, asked.form, tolerances)
     ratios = [(ratio, i) for i, ratio in enumerate(errors) if ratio is not None]
     entries = {
-        "name": model.name,
-        "kind": "Kalman filter" if is_filter else "linear system",
+        "name": getattr(model, "name", getattr(model, "__name__", "a function")),
+        "kind": "Kalman filter" if isinstance(model, LinearModel) else kind_of(model).removeprefix("a "),
         "digits": main.digits if met else None,
         "text": f"{first.structure}: {main}" if len(structures) > 1 else str(main),
         "base": like.base,
@@ -237,8 +239,8 @@ def study(
         "limits": {} if within is None else {key: list(map(_finite, each)) for key, each in within._asdict().items()},
         "format": "" if fmt is None else format_text(fmt),
         "met": met,
-        "names": model.state_names if isinstance(model, LinearModel) else model.output_names,
-        "measurement_names": model.measurement_names if isinstance(model, LinearModel) else model.input_names,
+        "names": getattr(model, "state_names" if is_filter(model) else "output_names", ()),
+        "measurement_names": getattr(model, "measurement_names" if is_filter(model) else "input_names", ()),
         "exponents": _exponents(like),
         "fixed": asked.kind in IN_FIXED_POINT,
         "blocks": _digits_of_blocks(main),
@@ -310,19 +312,17 @@ def _digits_of_blocks(found: Requirement) -> tuple[tuple[str, int | None, int | 
     )
 
 
-def _ranges(model: LinearModel | LinearSystem, z: Any) -> tuple[tuple[str, int, int], ...]:
-    """Return name, smallest and largest power of two of the quantities of a Kalman filter."""
-    if isinstance(model, LinearSystem):
+def _ranges(model: Any, z: Any) -> tuple[tuple[str, int, int], ...]:
+    """Return name, smallest and largest power of two of the quantities of a linear Kalman filter."""
+    if not isinstance(model, LinearModel):
         return ()
     sound, filled = model.without_missing(z)
     return tuple((each.name, each.least, each.largest) for each in binary_ranges(sound, filled))
 
 
-def _errors(
-    model: LinearModel | LinearSystem, z: Any, fmt: Any, form: str, tolerances: np.ndarray
-) -> tuple[float | None, ...]:
+def _errors(model: Any, z: Any, fmt: Any, form: str, tolerances: np.ndarray) -> tuple[float | None, ...]:
     """Return the largest error / tolerance of each state of a Kalman filter at the answer."""
-    if fmt is None or isinstance(model, LinearSystem):
+    if fmt is None or not is_filter(model):
         return ()
     largest = emulate(model, z, fmt, form=form).largest
     return tuple(_finite(float(e / t)) if math.isfinite(t) else None for e, t in zip(largest, tolerances, strict=True))
@@ -385,7 +385,8 @@ def page(entries: dict[str, Any]) -> str:
         "innovation": report.measurement_names,
         "measurement": report.measurement_names,
     }
-    what, given = ("Form", "measurements") if report.kind == "Kalman filter" else ("Structure", "inputs")
+    of_filter = report.kind.endswith("filter")
+    what, given = ("Form", "measurements") if of_filter else ("Structure", "inputs")
     meant = [_MEANINGS[each].format(given) for each in dict.fromkeys(each["basis"] for each in report.answers)]
     if report.ranges and not report.exponents:
         meant.append("These runs have unlimited exponents; the ranges below show which formats suffice.")

@@ -21,6 +21,7 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.files import replace_file
 from gpbnb.filters.forms import CONSTANT_GAIN
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_inputs, simulated_measurements
 from gpbnb.filters.system import LinearSystem
@@ -32,6 +33,7 @@ from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
 from gpbnb.wordlength.options import IN_FIXED_POINT, QUANTITIES, WRITTEN
 from gpbnb.wordlength.report import DEFAULT_STEPS, Part, Question, Report, usual_steps
+from gpbnb.wordlength.tasks import CANNOT, FUNCTION, is_filter, kind_of
 
 
 class CommandInput(NamedTuple):
@@ -46,7 +48,7 @@ class CommandInput(NamedTuple):
     """
 
     options: argparse.Namespace
-    own: LinearModel | LinearSystem
+    own: Any
     question: Question
     origin: str
 
@@ -57,22 +59,22 @@ def read_files(options: argparse.Namespace) -> CommandInput:
         refuse_others(options.code, "filter")
     source = read_filter(options.model, read_measurements(options.inputs) if options.inputs else None)
     own, settles = source.model, options.form == CONSTANT_GAIN
-    if isinstance(own, LinearSystem):
-        if options.form:
-            raise ValueError(
-                f"got --form {options.form} for a linear system; needed none: only a Kalman filter has forms"
-            )
-    elif settles:
+    if options.form and not is_filter(own):
+        raise ValueError(f"got --form {options.form} for {kind_of(own)}; needed none: only a Kalman filter has forms")
+    if settles:
+        if not isinstance(own, LinearModel):
+            raise ValueError(f"got --form {options.form!r} for {kind_of(own)}, whose gain depends on estimates")
         settled = settled_filter(own)
         source = FilterSource(settled, {CONSTANT_GAIN: settled})
-    of_system = isinstance(source.model, LinearSystem)
+    of_system, kind = isinstance(source.model, LinearSystem), kind_of(source.model)
     usual = {"float": "bound", "blocks": ""}.get(options.kind, "guarantee" if of_system else "bound")
+    usual = "" if kind in CANNOT["be bounded along a run"] else usual
     bases: Sequence[Basis] = options.basis or tuple(filter(None, ("emulation", usual)))
     z, origin = _data(options, source.model, own)
-    if z is None and of_system and {"emulation", "bound"} & {*bases}:
-        raise ValueError(
-            "got a linear system without inputs; needed --measurements, a CSV file with its inputs, or --simulate"
-        )
+    alone = is_filter(source.model) or (kind == FUNCTION and options.steps)
+    if z is None and not alone and {"emulation", "bound"} & {*bases}:
+        other = "--steps, if it takes none" if kind == FUNCTION else "--simulate"
+        raise ValueError(f"got {kind} without inputs; needed --measurements, a CSV file with its inputs, or {other}")
     rounding = Rounding(options.rounding or "nearest")
     question = Question(
         source,
@@ -91,7 +93,7 @@ def read_files(options: argparse.Namespace) -> CommandInput:
     return CommandInput(options, own, question, origin)
 
 
-def _data(given: argparse.Namespace, model: LinearModel | LinearSystem, own: LinearModel | LinearSystem) -> Any:
+def _data(given: argparse.Namespace, model: Any, own: Any) -> Any:
     """Return the measurements or inputs of a command line, None if a model simulates them, and their origin.
 
     `own` is the model in its file, which simulates the measurements of its filter with a constant gain.
@@ -99,19 +101,16 @@ def _data(given: argparse.Namespace, model: LinearModel | LinearSystem, own: Lin
     if given.measurements:
         z = read_measurements(given.measurements)
         _check_rows(given, z, model)
+        if kind_of(model) == FUNCTION and z.shape[1] == 1:
+            z = z.ravel()
         return z, str(given.measurements).encode(errors="surrogateescape").decode(errors="backslashreplace")
     seed = given.seed or 0
-    if not isinstance(own, LinearSystem):
-        if given.simulate:
-            raise ValueError(
-                f"got --simulate {given.simulate} for a Kalman filter; needed none: its model simulates its "
-                "measurements"
-            )
-        if own is model:
-            return None, ""
-        return simulated_measurements(
-            own, given.steps or usual_steps(own), seed
-        ), f"simulated by the model, seed {seed}"
+    if given.simulate and (is_filter(own) or kind_of(own) == FUNCTION):
+        why = "its model simulates its measurements" if is_filter(own) else "give --measurements, whose rows it takes"
+        raise ValueError(f"got --simulate {given.simulate} for {kind_of(own)}; needed none: {why}")
+    if own is not model:
+        z = simulated_measurements(own, given.steps or usual_steps(own), seed)
+        return z, f"simulated by the model, seed {seed}"
     if not given.simulate:
         return None, ""
     level = 1.0 if given.level is None else np.asarray(exact(given.level), dtype=np.float64)
@@ -120,11 +119,11 @@ def _data(given: argparse.Namespace, model: LinearModel | LinearSystem, own: Lin
     return z, f"simulated, {given.simulate} of level {shown}"
 
 
-def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: LinearModel | LinearSystem) -> None:
+def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: Any) -> None:
     """Reject a file with other columns than the model has measurements or inputs, or with other rows than steps."""
-    kind = "input" if isinstance(model, LinearSystem) and given.form != CONSTANT_GAIN else "measurement"
+    kind = "measurement" if is_filter(model) or given.form == CONSTANT_GAIN else "input"
     rows, columns = z.shape
-    if columns != model.m:
+    if kind_of(model) != FUNCTION and columns != model.m:
         raise ValueError(
             f"{given.measurements.name}: got {columns} columns; needed {model.m}, one for each {kind}; remove others, "
             "such as the time, and write decimal points, not commas"
@@ -169,13 +168,13 @@ def write_code_of(asked: CommandInput, report: Report) -> tuple[tuple[Path, ...]
     within = question.within
     if within is None and fixed and isinstance(question.model, LinearSystem):
         within = _of_inputs(asked)
-    if not isinstance(own, LinearModel):
+    if not is_filter(own):
         design, structures = question.source.design, question.source.structures
         model: Any = design or structures.get(report.part.structure) or question.model
         form = report.part.structure if design else None
         return write_code(model, fmt, folder, form=form, within=within), fmt
     if z is None:
-        z = simulated_measurements(own, question.count, question.seed)
+        z = simulated(own, question.count, question.seed)
     vectors = None if np.isnan(z[:VECTORS]).any() else z[:VECTORS]
     return write_code(own, fmt, folder, form=form, inputs=vectors, within=within), fmt
 
@@ -212,7 +211,7 @@ def write_run(asked: CommandInput, report: Report, file: Path) -> None:
     question, (_, _, model, form, _) = asked.question, _part(report, asked.question.bases[0])
     seed = question.seed if question.z is None else 0
     run = emulate(model, question.data, report.answer.format, form=form, seed=seed)
-    numbers = run.x if isinstance(model, LinearModel) else run.y
+    numbers = run.x if is_filter(model) else run.y
     kind = "output" if run.form is None else "state"
     names = report.entries["names"] or [f"{kind} {i}" for i in range(run.errors.shape[1])]
     lines = [WRITTEN, ",".join(["step", *names, *(f"error of {name}" for name in names)])]

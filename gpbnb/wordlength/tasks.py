@@ -95,6 +95,11 @@ def kind_of(model: Any) -> str:
     return kinds.get(type(model), FUNCTION)
 
 
+def is_filter(model: Any) -> bool:
+    """Whether a model is a Kalman filter, linear or nonlinear."""
+    return isinstance(model, LinearModel | NonlinearModel)
+
+
 def admitted(model: Any, *tasks: str) -> Any:
     """Read a model of any kind, and refuse what it cannot do.
 
