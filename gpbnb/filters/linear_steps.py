@@ -48,7 +48,7 @@ class LinearSteps:
             numbers += [o] * (len(rows) - len(numbers))
         #: The rows in the order of the program, and the operation of each.
         self._rows, self._operations, self._m = np.array(rows, np.int64).reshape(-1, 5), np.array(numbers), program.m
-        self._outputs = program.outputs - first
+        self._outputs, self._places = program.outputs - first, place
         moved = np.argsort(place[first + self._operations], kind="stable") if rows else np.zeros(0, np.int64)
         parts = x.shape[1:]
         self._loop = Loop(
@@ -83,6 +83,23 @@ class LinearSteps:
                     return out[:done], int(np.argmax(self._outputs >= operation))
                 loop.states = states
         return out, -1
+
+    def largest(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest size of each value over steps with the numbers z, (steps, m), in a format on float64.
+
+        Raises
+        ------
+        OverflowError : a step has no result.
+        """
+        loop, sizes = self._loop, np.zeros(len(self._places))
+        for part in slices(len(z), len(self._rows)):
+            kept, _, row = loop.take(part.start, z[part], len(self._outputs), self._places)
+            if row >= 0:
+                raise OverflowError(f"got no result of step {part.start + len(kept) + 1}")
+            np.maximum(sizes, np.abs(kept).max(axis=0), out=sizes)
+        states = sizes[: len(self._outputs)]
+        np.maximum(states, np.abs(loop.states), out=states)
+        return sizes
 
 
 def _grouped(program: Program) -> NDArray[np.int64]:

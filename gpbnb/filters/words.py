@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,17 +24,10 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
-from gpbnb.arithmetic.kernels.scalar import BEYOND
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.filters.program import (
-    ADD,
-    AT_LEAST,
-    MULTIPLY,
-    SUBTRACT,
-    Program,
-)
+from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT, Program
 from gpbnb.filters.system import LinearFilter, LinearSystem, system_inputs
 from gpbnb.interrupts import slices
 
@@ -270,82 +264,33 @@ def _rounded_up(low: NDArray[np.float64], rest: NDArray[np.float64], rounding: R
     return np.asarray(up, dtype=np.int64)
 
 
-def largest_values(made: LinearFilter, u: NDArray[np.float64], start: Any = None) -> NDArray[np.float64]:
-    """Return the largest size of each value in a run in float64, (n + m + o,).
-
-    Parameters
-    ----------
-    u : (steps, m).
-    start : (n,), the first state; by default zeros.
-    """
-    program = made.program
-    x = np.zeros(program.n) if start is None else np.array(start, dtype=np.float64)
-    coefficients = made.coefficients.astype(np.float64)
-    sizes = np.zeros(program.n + u.shape[1] + len(program.operations))
-    for part in slices(len(u), len(program.operations)):
-        given = np.ascontiguousarray(u[part])
-        np.maximum(sizes, _sizes(program.operations, program.outputs, coefficients, x, given), out=sizes)
-    return sizes
-
-
-@compiled
-def _sizes(operations: Any, outputs: Any, coefficients: Any, x: Any, u: Any) -> Any:
-    n, m = x.shape[0], u.shape[1]
-    values = np.empty(n + m + operations.shape[0])
-    sizes = np.zeros_like(values)
-    for k in range(u.shape[0]):
-        for i in range(n):
-            values[i] = x[i]
-        for i in range(m):
-            values[n + i] = u[k, i]
-        for o in range(operations.shape[0]):
-            code, a, right = operations[o, 0], operations[o, 1], values[operations[o, 2]]
-            if code == MULTIPLY:
-                right *= coefficients[a]
-            elif code == ADD:
-                right += values[a]
-            elif code == SUBTRACT:
-                right = values[a] - right
-            elif code == AT_LEAST:
-                right = coefficients[a] if right < coefficients[a] else right
-            else:
-                right = coefficients[a] if right > coefficients[a] else right
-            values[n + m + o] = right
-        for i in range(n):
-            x[i] = values[outputs[i]]
-            if not abs(x[i]) < np.inf:
-                raise OverflowError(BEYOND)
-        for i in range(len(values)):
-            sizes[i] = max(sizes[i], abs(values[i]))
-    for i in range(n):
-        sizes[i] = max(sizes[i], abs(x[i]))
-    return sizes
-
-
 # -- the loops --------------------------------------------------------------------------------------------------------
 
 
 class _Store(NamedTuple):
-    """How a format stores an integer; `spare` is 64 less the bits of its word."""
+    """How a format stores an integer; `mask` has the bits of its word."""
 
     mode: int
     policy: int
     low: int
     high: int
-    spare: int
+    mask: int
 
 
-def _store(fmt: FixedFormat) -> _Store:
+def _store(fmt: FixedFormat, dtype: Any) -> _Store:
     low, high = int(fmt.lowest / fmt.unit), int(fmt.largest / fmt.unit)
-    return _Store(_MODES[fmt.rounding], _POLICIES.index(fmt.overflow), low, high, 63 - fmt.precision)
+    mask = (2 << fmt.precision) - 1
+    if dtype is not object and mask >> 63:
+        mask = -1  # all 64 bits
+    return _Store(_MODES[fmt.rounding], _POLICIES.index(fmt.overflow), low, high, mask)
 
 
 class _Code(NamedTuple):
-    """A program on 64-bit integers, as the compiled loops take it."""
+    """A program on integers, of 64 bits in compiled loops."""
 
     operations: NDArray[np.int64]
-    factors: NDArray[np.int64]
-    shifts: NDArray[np.int64]
+    factors: NDArray[Any]
+    shifts: NDArray[Any]
     wide: NDArray[np.bool_]
     outputs: NDArray[np.int64]
     data: _Store
@@ -354,16 +299,16 @@ class _Code(NamedTuple):
     accumulates: bool
 
 
-def _code(made: IntegerProgram) -> _Code:
+def _code(made: IntegerProgram, dtype: Any = np.int64) -> _Code:
     program, words = made.program, made.words
     return _Code(
         program.operations,
-        np.array(made.factors, np.int64),
-        np.array(made.shifts, np.int64),
+        np.array(made.factors, dtype),
+        np.array(made.shifts, dtype),
         program.wide,
         program.outputs,
-        _store(words.data),
-        _store(words.accumulator),
+        _store(words.data, dtype),
+        _store(words.accumulator, dtype),
         words.gap,
         words.sums is not None,
     )
@@ -376,21 +321,17 @@ def run_integers(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -> NDAr
     ----------
     u, x : (steps, m) and (n,), inputs and first state in units of the data.
     """
-    if made.is_short and u.dtype != object and x.dtype != object:
-        states, code, state = np.zeros((len(u), made.program.n), np.int64), _code(made), x.astype(np.int64)
-        for part in slices(len(u), len(code.operations)):
-            step, operation = _advance(code, state, u[part], states[part])
-            if step >= 0:
-                step += part.start
-                break
-    else:
-        states, step, operation = _advance_in_python(made, u, x)
-    if step >= 0:
-        code = made.program.operations[operation, 0]
-        kind = "a product" if code == MULTIPLY else "a sum"
-        raise OverflowError(
-            f"overflow in {kind}, operation {operation + 1} of {len(made.program.operations)}, at step {step + 1}"
-        )
+    short = made.is_short and u.dtype != object and x.dtype != object
+    advance, dtype = (_advance, np.int64) if short else (_advance_in_python, object)
+    states, code, state = np.zeros((len(u), made.program.n), dtype), _code(made, dtype), x.astype(dtype)
+    for part in slices(len(u), len(code.operations)):
+        step, operation = advance(code, state, u[part].astype(dtype, copy=False), states[part])
+        if step >= 0:
+            kind = "a product" if code.operations[operation, 0] == MULTIPLY else "a sum"
+            raise OverflowError(
+                f"overflow in {kind}, operation {operation + 1} of {len(code.operations)}, at step "
+                f"{part.start + step + 1}"
+            )
     return states
 
 
@@ -466,7 +407,7 @@ def _kept(n: int, over: int, store: Any) -> Any:
     if store.policy == _SATURATE:
         return (store.high if over > 0 or (over == 0 and n > 0) else store.low), False
     if store.policy == _WRAP:
-        return (n << store.spare) >> store.spare, False
+        return ((n - store.low) & store.mask) + store.low, False
     return n, True
 
 
@@ -475,7 +416,7 @@ def _advance(code: Any, x: Any, u: Any, states: Any) -> Any:
     """Take a step with each row of u; return the step and the operation of an overflow, or -1 for each."""
     operations, factors, shifts, wide, outputs, data, sums, gap, accumulates = code
     n, m, count = x.shape[0], u.shape[1], operations.shape[0]
-    values = np.zeros(n + m + count, np.int64)
+    values = np.zeros(n + m + count, x.dtype)
     bad = False
     for k in range(u.shape[0]):
         for i in range(n):
@@ -513,42 +454,6 @@ def _advance(code: Any, x: Any, u: Any, states: Any) -> Any:
     return -1, -1
 
 
-def _kept_in_python(n: int, store: _Store) -> tuple[int, bool]:
-    if store.low <= n <= store.high:
-        return n, False
-    if store.policy == _SATURATE:
-        return (store.high if n > 0 else store.low), False
-    if store.policy == _WRAP:
-        return (n - store.low) % (store.high - store.low + 1) + store.low, False
-    return n, True
-
-
-def _advance_in_python(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -> tuple[NDArray[Any], int, int]:
-    """Run on Python's integers, of any length; see :func:`_advance`."""
-    data, sums = _store(made.words.data), _store(made.words.accumulator)
-    program, gap, first = made.program, made.words.gap, made.program.n + made.program.m
-    shifted, kept = _shifted.py_func, _kept_in_python
-    states = np.zeros((len(u), program.n), object)
-    state = [int(each) for each in x]
-    lift = [gap] * first + [0 if each else gap for each in program.wide.tolist()]
-    for k, row in enumerate(u.tolist()):
-        values = [*state, *map(int, row)]
-        for o, (code, a, b) in enumerate(program.operations.tolist()):
-            factor = made.factors[o]
-            if code >= AT_LEAST:
-                values.append(max(factor, values[b]) if code == AT_LEAST else min(factor, values[b]))
-                continue
-            if code == MULTIPLY:
-                value = shifted(factor * values[b], made.shifts[o], sums.mode)
-            else:
-                left, right = values[a] << lift[a], values[b] << lift[b]
-                value = left + right if code == ADD else left - right
-            value, bad = kept(value, sums)
-            if made.words.sums is not None and not bad and not program.wide[o]:
-                value, bad = kept(shifted(value, gap, data.mode), data)
-            if bad:
-                return states, k, o
-            values.append(value)
-        state = [values[i] for i in program.outputs.tolist()]
-        states[k] = state
-    return states, -1, -1
+_IN_PYTHON = {**globals(), "_shifted": _shifted.py_func, "_kept": _kept.py_func}
+_advance_in_python: Any = FunctionType(_advance.py_func.__code__, _IN_PYTHON)
+"""The same on Python's integers, of any length, none of which is lost."""

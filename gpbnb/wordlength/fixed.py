@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.named import arithmetic, format_named
+from gpbnb.arithmetic.named import BINARY64, arithmetic, format_named
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.arithmetic.search import Outcome, Search
+from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.sections import scaled
 from gpbnb.filters.system import LinearFilter, LinearSystem
-from gpbnb.filters.words import WordFormats, largest_values
+from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.answer import Requirement, joined, share_text
 from gpbnb.wordlength.asked import Asked
 from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, measured, slowest_response
@@ -277,8 +278,10 @@ def _integer_bits(asked: Asked) -> int:
 def _sizes(system: LinearSystem, z: Any) -> NDArray[np.float64]:
     """Return the largest size of each value of a linear system without rounding."""
     start = np.concatenate([system.x0.astype(np.float64), np.zeros(system.p)])
+    made = system.as_filter()
+    steps = LinearSteps(made.program, BINARY64, BINARY64.run_tag(), made.coefficients.astype(np.float64), start)
     try:
-        return largest_values(system.as_filter(), np.ascontiguousarray(np.asarray(z, dtype=np.float64)), start)
+        return steps.largest(np.ascontiguousarray(np.asarray(z, dtype=np.float64)))
     except OverflowError:
         raise OverflowError(f"the run without rounding: {system.beyond()}") from None
 

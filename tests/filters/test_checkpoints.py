@@ -1,75 +1,39 @@
-"""Differences of checkpoints without Fractions: those that Fractions give, correctly rounded."""
+"""Checkpoints of a run, and their differences from those of a reference."""
 
 from __future__ import annotations
+
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.filters import checkpoints as module
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 
-COUNT = 3000
+TENTH = Fraction(1, 10)
 
 
-def double_double(rng):
-    """Random numbers, some with low parts that are zero or far below the high parts."""
-    high = rng.standard_normal(COUNT) * 2.0 ** rng.integers(-60, 60, COUNT)
-    low = high * 2.0**-53 * rng.uniform(-0.5, 0.5, COUNT) * rng.choice([0, 1, 1, 2.0**-300], COUNT)
-    total = high + low
-    return np.stack([total, low - (total - high)], axis=-1)
+def saved(steps, numbers, fmt):
+    """Checkpoints with one number, the same for state, gain and covariance."""
+    each = [Packed(numbers.reshape(1, *(1,) * k, *numbers.shape[1:]), fmt) for k in (1, 2, 2)]
+    return Checkpoints(steps, *each)
 
 
-def difference(numbers, fmt, true):
-    """State minus reference, as a run with one checkpoint has it; and the same by Fractions."""
-    each = [Packed(part.reshape(1, COUNT, *part.shape[1:]), of) for part, of in ((numbers, fmt), (true, None))]
-    run, reference = (Checkpoints((1,), x, Packed(x.numbers[:0], x.fmt), Packed(x.numbers[:0], x.fmt)) for x in each)
-    found = run.minus(reference)[0]
-    assert np.array_equal(reference.to_float("x"), reference.x.astype(float))
-    assert not np.signbit(found[found == 0]).any()
-    return found, (run.x - reference.x).astype(float)
+def test_a_difference_below_what_double_double_resolves_is_correctly_rounded():
+    fmt = FloatFormat(10, 3)
+    near = double_doubles(np.array([TENTH]))
+    run = saved((2,), fmt.backend.pack(fmt.array(["0.1"]).components), fmt)
+    true = Checkpoints(
+        (2, 5), *(Packed(np.concatenate([near, near]).reshape(2, *(1,) * k, 2), None) for k in (1, 2, 2))
+    )
+    off = float(TENTH - Fraction(near[0, 0]) - Fraction(near[0, 1]))
+    assert 0 < abs(off) < 2.0**-107
+    assert [each.ravel().tolist() for each in run.minus(true)] == [[off]] * 3
+    assert true.to_float("K").ravel().tolist() == [0.1, 0.1]
 
 
-def of_floats(rng):
-    """Numbers of 53 bits and what is subtracted: near, equal, neighbours, far, subnormal, halfway, and huge."""
-    true = double_double(rng)
-    yield rng.standard_normal(COUNT), true
-    yield true[:, 0].astype(np.float32).astype(float), true
-    yield true[:, 0], true
-    yield np.nextafter(true[:, 0], np.inf), true
-    yield true[:, 0] * 2.0 ** rng.integers(-54, 54, COUNT), true
-    tiny = rng.integers(-5, 5, COUNT) * 2.0**-1070
-    yield rng.integers(-5, 5, COUNT) * 2.0 ** rng.integers(-1074, -1000, COUNT), np.stack([tiny, 0 * tiny], axis=-1)
-    whole = rng.integers(1, 2**20, COUNT).astype(float)
-    half = -(2.0 ** (np.floor(np.log2(whole)) - 53))
-    yield whole, np.stack([half, rng.choice([-1, 0, 1], COUNT) * 2.0**-700], axis=-1)
-    yield rng.choice([0.0, 1.0, -(2.0**1010)], COUNT), np.stack([rng.choice([0.0, -(2.0**999)], COUNT), 0 * whole], -1)
-
-
-def test_differences_of_float64_are_those_of_fractions():
-    rng = np.random.default_rng(1)
-    for numbers, true in of_floats(rng):
-        found, expected = difference(numbers, FloatFormat(2, 53), true)
-        assert np.array_equal(found, expected)
-        other = np.where(rng.random((COUNT, 1)) < 0.5, true, np.stack([true[:, 0], true[:, 1] / 2], axis=-1))
-        found, expected = difference(other, None, true)
-        assert np.array_equal(found, expected)
-
-
-@pytest.mark.parametrize("precision", [3, 8, 17])
-def test_differences_of_decimals_are_those_of_fractions(precision, monkeypatch):
-    """Also where the reference is the nearest double-double, whose distance is below what double-double resolves."""
-    rng, fmt = np.random.default_rng(precision), FloatFormat(10, precision)
-    given = rng.standard_normal(COUNT) * 10.0 ** rng.integers(-25, 25, COUNT)
-    given[:100], given[100:200] = 0, rng.integers(-9, 9, 100)
-    x = fmt.array(given)
-    true = double_doubles(x.to_fractions())
-    true[::2] = double_double(rng)[::2]
-    true[1::4] = np.stack([np.nextafter(true[1::4, 0], 1), 0 * true[1::4, 1]], axis=-1)
-    packed = fmt.backend.pack(x.components)
-    found, expected = difference(packed, fmt, true)
-    assert np.array_equal(found, expected)
-    if precision == 8:  # a difference that is not certain is asked of Fractions
-        monkeypatch.setattr(module, "_SHARE", 0.0)
-        assert not np.array_equal(difference(packed, fmt, true)[0], expected)
+def test_runs_are_compared_at_equal_steps():
+    x = np.ones((1, 2))
+    with pytest.raises(ValueError, match=r"\(3,\) for the runs and \(2,\) for the reference; needed equal steps"):
+        saved((3,), x, None).minus(saved((2,), x, None))
