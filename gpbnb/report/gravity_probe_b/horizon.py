@@ -19,7 +19,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.bounds.gains import packed_coefficients
+from gpbnb.bounds.gains import Schedule, packed_coefficients
 from gpbnb.bounds.guarantee import limits, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.forms import Form
@@ -27,8 +27,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import widened_array
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
-from gpbnb.report.gravity_probe_b import error_sets
-from gpbnb.report.gravity_probe_b.error_sets import GAIN, LOOP, ROUNDING, Disturbances, FilterSteps, Reach
+from gpbnb.report.gravity_probe_b.error_sets import GAIN, Disturbances, Reach, disturbances, functions
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS
 from gpbnb.report.gravity_probe_b.year import model as year_model
@@ -52,29 +51,18 @@ class HorizonBounds:
     within: FilterLimits
     assumed: NDArray[np.float64]
     worst: NDArray[np.float64]
-    last: NDArray[np.float64]
-    #: (n, 3), of the step where the bound was largest.
+    #: (n, 2), of the step where the bound was largest.
     parts: NDArray[np.float64]
-    #: unit of each state, and the columns that are not zero; known from the first disturbances on, like the reach.
-    size: NDArray[np.float64]
-    used: NDArray[np.bool_]
+    #: known from the first disturbances on.
     reach: Reach | None = None
 
-    def follow(self, found: Disturbances, part: NDArray[np.int64], done: int, window: int) -> None:
-        """Take in the disturbances of the next steps; `part` is the part of the bound of each column."""
-        sizes = error_sets.columns(found)
-        if self.reach is None:
-            self.used = sizes.max(axis=(0, 1)) > 0
-            self.size = error_sets.units_of_trace((sizes.sum(axis=2) + found.slack).max(axis=0))
-            self.reach = error_sets.nothing(window, part[self.used], len(self.last))
-        slack = found.slack + sizes[:, :, ~self.used].sum(axis=2) * (1 + 2.0**-40)
-        G, limited = (np.ascontiguousarray(each[..., self.used]) for each in (found.G, found.limits))
-        given = found.F, found.spread, G, limited, slack, self.reach
-        bounds, parts = error_sets.forward(*given, done, len(slack), self.last, self.size)
-        bounds = np.where(np.isnan(bounds), np.inf, bounds)
-        most, of_most = bounds.max(axis=0), parts[bounds.argmax(axis=0), np.arange(len(self.last))]
-        self.parts = np.where((most > self.worst)[:, np.newaxis], of_most, self.parts)
-        self.worst, self.last = np.maximum(self.worst, most), bounds[-1]
+    def follow(self, found: Disturbances, window: int) -> None:
+        """Take in the disturbances of the next steps."""
+        self.reach = self.reach or Reach.nothing(found, window)
+        for F, spread, G, slack in zip(*found[:4], strict=True):
+            parts = self.reach.advance(F, spread, G, slack)
+            more = ~(self.reach.last <= self.worst)
+            self.parts[more], self.worst[more] = parts[more], self.reach.last[more]
 
 
 def bounds_in_blocks(
@@ -109,7 +97,7 @@ def bounds_in_blocks(
     silence = ((run, fmt.array(np.zeros((block, stored.m)))), (true, np.zeros((block, stored.m))))
     products = [stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(stored.cycle)]
     Phi, HPhi = double_doubles(stored.Phi), double_doubles(np.array(products))
-    done, each = 0, [_begun(stored, *given) for given in zip(within, assumed, strict=True)]
+    x0, done, each = stored.x0, 0, [_begun(stored, *given) for given in zip(within, assumed, strict=True)]
     while done < steps:
         count = min(block, steps - done)
         for filter_run, z in silence:
@@ -122,30 +110,22 @@ def bounds_in_blocks(
                 )
         program, packed = packed_coefficients(run, np.arange(count), done)
         at = done + np.arange(count)
-        numbers = FilterSteps(
-            widened_array(packed),
-            np.ascontiguousarray(Phi[at % len(Phi)]),
-            np.ascontiguousarray(HPhi[at % len(HPhi)]),
-            np.ascontiguousarray(true.G[:count].reshape(count, program.n, program.m, 2)),
-            true.bounds.gain[:count],
-        )
-        part = np.array([ROUNDING] * len(program.roots) + [LOOP] * stored.n + [GAIN] * stored.m)
+        exact = true.G[:count].reshape(count, program.n, program.m, 2)
+        of_model = Phi[at % len(Phi)], HPhi[at % len(HPhi)]
+        given = Schedule(program, fmt, widened_array(packed), packed, *of_model, exact, x0, 0, False, None, None)
+        known = functions(given)
         for one in each:
-            found = error_sets.disturbances(program.compiled, numbers, precision, one.within, one.assumed)
-            one.follow(Disturbances(*found), part, done, window)
+            one.follow(disturbances(given, known, true.bounds.gain[:count], one.within, one.assumed), window)
             if not (one.worst <= one.assumed).all():
                 raise ArithmeticError(f"the bound {one.worst} exceeds the assumed {one.assumed} by step {done + count}")
         done += count
-        yield done, [replace(one) for one in each]
+        yield done, [replace(one, worst=one.worst.copy(), parts=one.parts.copy()) for one in each]
 
 
 def _begun(stored: LinearModel, within: FilterLimits, assumed: Any) -> HorizonBounds:
     """Return the state before the first step."""
     limit, n = sized_limits(within, stored.n, stored.m, stored.x0), stored.n
-    size, used = np.ones(n), np.zeros(0, dtype=bool)
-    return HorizonBounds(
-        limit, np.asarray(assumed, dtype=float), np.zeros(n), np.zeros(n), np.zeros((n, 3)), size, used
-    )
+    return HorizonBounds(limit, np.asarray(assumed, dtype=float), np.zeros(n), np.zeros((n, 2)))
 
 
 # -- Gravity Probe B --------------------------------------------------------------------------------------------------
