@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import json
 import math
 import shutil
@@ -235,6 +236,74 @@ def test_an_ellipsoid_contains_parallel_segments_and_hardly_more() -> None:
     for row in ([1, 0], [0, 1], [2, -5], [7, 1]):
         size = abs(row[0] * 3 - row[1]) * 42 * 10**8
         assert size <= found.most(row) <= size * 1.0001
+
+
+def drawn_steps(rng: Any, F: Any, count: int, spread: int) -> list[Any]:
+    """Steps of two states that differ by some hundredths and by their numbers of columns, with no rows before them."""
+    G, steps = rng.integers(-999, 1000, (3, 2)), list[Any]()
+    for _ in range(count):
+        loop, columns = (x + rng.integers(-spread, spread + 1, x.shape) * x // 99 for x in (F, G))
+        slack = rng.integers(0, 4 * spread + 9, 2)
+        steps.append((loop.tolist(), columns[: rng.integers(1, 4) if spread else 3].tolist(), slack.tolist(), []))
+    return steps
+
+
+def test_a_hull_of_phases_contains_the_step_of_each() -> None:
+    """No row is larger after one of the steps, from any corner of the limits, and sometimes it is as large."""
+    rng, bits, used = np.random.default_rng(47), 20, 0
+    for _ in range(100):
+        sizes, F = rng.integers(1, 9999, 2), rng.integers(-(2**bits), 2**bits, (2, 2))
+        steps = drawn_steps(rng, F, rng.integers(2, 5), int(rng.integers(0, 40)))
+        hull = check.ErrorSet(sizes.tolist(), [], bits, "an error is larger").hull(steps)
+        rows = [[1, 0], [0, 1], [-1, 0], [0, -1], *rng.integers(-9, 10, (6, 2)).tolist()]
+        for row, corner in itertools.product(rows, itertools.product((-1, 1), repeat=2)):
+            most = [
+                row @ np.array(F) @ (sizes * corner) + 2**bits * (np.abs(np.array(G) @ row).sum() + np.abs(row) @ slack)
+                for F, G, slack, _ in (*steps, hull)
+            ]
+            assert max(most[:-1]) <= most[-1]
+            used += max(most[:-1]) >= most[-1] - 2 * 2**bits
+    assert used > 100
+
+
+@pytest.mark.parametrize("spread", [0, 2])
+def test_errors_of_phases_that_are_taken_as_one_are_bounded_for_ever(spread: int) -> None:
+    """The least limit that is proved is above the error of every later step, and near the largest if none differs."""
+    rng, bits, ratios = np.random.default_rng(53), 24, list[Fraction]()
+    for phases, more in itertools.product((1, 2, 3), (1, 1, 9, 9)):
+        first, repeats = (int(x) for x in rng.integers(1, 4, 2))
+        F = (2**bits * np.array([[0.6, rng.uniform(-3, 3)], [0, 0.7]])).astype(np.int64)
+        alike = [drawn_steps(rng, F, repeats, spread) for _ in range(phases)]
+        period = [steps[k] for k in range(repeats) for steps in alike]
+        begun = [(F, [[more * x for x in g] for g in G]) for F, G, *_ in drawn_steps(rng, F, first, 40)]
+        steps = begun + [each[:2] for each in period] * (30 // len(period))
+        loops = [[[Fraction(x, 2**bits) for x in row] for row in F] for F, _ in steps]
+        true = max(
+            largest(loops[:k], [G for _, G in steps[:k]], row)
+            for k in (*range(1, first + 9), *range(len(steps) - len(period), len(steps) + 1))
+            for row in ([1, 0], [0, 1])
+        )
+        parts = [(F, [[x << 20 for x in g] for g in G], [1 << 10] * 2, list[Any]()) for F, G in steps]
+        begun, later = parts[:first], parts[first : first + len(period)]
+
+        def prove_later(limit: int, begun: Any = begun, later: Any = later, phases: int = phases) -> None:
+            found = check.ErrorSet([limit] * 2, [], bits, "an error is larger")
+            found.advance(begun, 64)
+            hulls = [found.hull(later[phase::phases]) for phase in range(phases)]
+            for phase in range(phases):
+                found.later(hulls, phase, 60)
+
+        least, most = 0, 100 * int(true) << 20
+        while most - least > most // 5000:
+            middle = (least + most) // 2
+            try:
+                prove_later(middle)
+                most = middle
+            except NotProvedError:
+                least = middle
+        ratios.append(true * 2**20 / most)
+    assert max(ratios) <= 1
+    assert min(ratios) > 0.999 or spread
 
 
 def test_a_gain_is_near_the_mean_of_two_where_its_covariance_lies_between_theirs() -> None:
