@@ -1,13 +1,16 @@
-"""Every command of the package: --help only helps, and nothing is written into the package by default."""
+"""Every command of the package: it is listed, --help only helps, and nothing is written into the package by default."""
 
 from __future__ import annotations
 
+import runpy
+import sys
 from pathlib import Path
 
 import pytest
 from forks import answering
 
 import gpbnb
+from gpbnb import __main__ as top
 from gpbnb.report.stored import SWEEPS, main
 from gpbnb.sweeps import Sweep
 
@@ -47,12 +50,10 @@ def helped():
         yield ask
 
 
-def test_the_commands_are_found():
-    assert {
-        "gpbnb.wordlength",
-        "gpbnb.ledger",
-        "gpbnb.report.stored",
-    } <= set(COMMANDS)
+STATUSES = {
+    "gpbnb.wordlength": "0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong, 130 ",
+    "gpbnb.ledger": "0 if the findings are written, 2 if an option or the output file is wrong, 130 if it",
+}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -62,6 +63,7 @@ def test_help_only_helps(command, helped):
     status, printed, errors = helped(command)
     assert status == 0, errors
     assert printed.startswith(f"usage: python -m {command}")
+    assert STATUSES.get(command, "") in " ".join(printed.split())
     assert stored() == before
 
 
@@ -74,3 +76,26 @@ def test_tables_are_written_below_the_working_directory_by_default(monkeypatch, 
     assert written == [Path(".cache/sweeps")] * len(SWEEPS)
     assert stored() == before
     assert len(capsys.readouterr().out.splitlines()) == len(SWEEPS)
+
+
+def test_every_command_is_listed_with_what_it_does(capsys):
+    assert {"gpbnb", *(f"gpbnb.{name}" for name in top.COMMANDS)} == set(COMMANDS)
+    assert top.main([]) == 0
+    lines = capsys.readouterr().out.partition("commands:\n")[2].splitlines()
+    assert dict(line.split(maxsplit=1) for line in lines[: len(top.COMMANDS)]) == top.COMMANDS
+
+
+def test_a_command_gets_its_own_arguments(monkeypatch):
+    ran = []
+    monkeypatch.setattr(sys, "argv", ["before"])
+    monkeypatch.setattr(runpy, "run_module", lambda name, run_name, **_: ran.append((name, run_name, sys.argv)))
+    assert top.main(["report.stored", "verify", "--sample", "2"]) == 0
+    assert ran == [("gpbnb.report.stored", "__main__", ["report.stored", "verify", "--sample", "2"])]
+
+
+def test_an_unknown_command_is_told_the_known_ones(capsys):
+    with pytest.raises(SystemExit):
+        top.main(["bake"])
+    shown = capsys.readouterr().err
+    assert shown.startswith("usage: python -m gpbnb ")
+    assert f"got 'bake'; needed one of {', '.join(top.COMMANDS)}" in shown

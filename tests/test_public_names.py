@@ -1,4 +1,4 @@
-"""The names of the package itself lead to the modules that define them."""
+"""The names of the package itself lead to the modules that define them, also in the stub for type checkers."""
 
 import ast
 from importlib import import_module
@@ -7,57 +7,35 @@ from pathlib import Path
 import pytest
 
 import gpbnb
+from gpbnb.names import HOMES, NAMED_FORMATS
 
-HOMES = {
-    "arithmetic.formats": "FloatFormat",
-    "arithmetic.rounding": "Rounding",
-    "arithmetic.fixed": "FixedFormat",
-    "arithmetic.array": "FloatArray",
-    "arithmetic.exits": "peek",
-    "arithmetic.second_format": "convert",
-    "arithmetic.traced": "TracedFunction",
-    "arithmetic.named": "BINARY16 BINARY32 BINARY64 BINARY128 BFLOAT16 TF32 FP8_E4M3 FP8_E5M2 FP6_E3M2 FP6_E2M3 "
-    "FP4_E2M1 DECIMAL32 DECIMAL64 DECIMAL128 IBM_HEX32 IBM_HEX64 IBM_704",
-    "filters.model": "LinearModel",
-    "filters.blocks": "BlockFormats",
-    "filters.forms": "Form",
-    "filters.nonlinear": "NonlinearModel",
-    "filters.nonlinear_system": "NonlinearSystem",
-    "filters.smoothing": "FixedIntervalSmoother SmoothedRecord",
-    "filters.words": "WordFormats",
-    "bounds.guarantee": "FilterGuarantee Guarantee limits",
-    "bounds.limit_cycles": "LimitCycles",
-    "wordlength.answer": "Requirement",
-    "wordlength.bounding": "guarantee limit_cycles",
-    "wordlength.emulation": "EmulatedRun emulate",
-    "filters.system": "LinearSystem",
-    "wordlength.required": "required_precision",
-    "wordlength.models": "read_model",
-    "wordlength.records": "RecordSurvey survey_records",
-    "wordlength.code": "write_code",
-}
+PACKAGE = Path(gpbnb.__file__).parent
 
 
-@pytest.mark.parametrize(("home", "names"), HOMES.items())
-def test_a_public_name_is_what_its_module_defines(home, names):
-    module = import_module(f"gpbnb.{home}")
-    for name in names.split():
-        assert getattr(gpbnb, name) is getattr(module, name)
-
-
-def test_the_public_names_are_these():
-    names = {name for some in HOMES.values() for name in some.split()} | {"linalg", "NAMED_FORMATS"}
-    assert dir(gpbnb) == sorted(gpbnb.__all__) == sorted(names)
-    assert gpbnb.linalg is import_module("gpbnb.arithmetic.linalg")
-    assert list(gpbnb.NAMED_FORMATS) == HOMES["arithmetic.named"].split()
-    assert {name: getattr(gpbnb, name) for name in gpbnb.NAMED_FORMATS} == import_module("gpbnb.arithmetic.named").NAMED
+def test_a_public_name_is_what_its_module_defines():
+    for name, home in HOMES.items():
+        module = import_module(home)
+        found = getattr(gpbnb, name)
+        assert found is (module if name == "linalg" else getattr(module, name)), name
+        assert name in NAMED_FORMATS or getattr(found, "__module__", home) == home, name
     with pytest.raises(AttributeError, match="no attribute 'BINARY8'; the public names are BFLOAT16, "):
         _ = gpbnb.BINARY8
 
 
+def test_the_package_and_its_stub_have_the_same_names_from_the_same_modules():
+    assert dir(gpbnb) == sorted(gpbnb.__all__) == sorted([*HOMES, "NAMED_FORMATS"])
+    assert list(gpbnb.NAMED_FORMATS) == list(NAMED_FORMATS)
+    assert {name: getattr(gpbnb, name) for name in NAMED_FORMATS} == import_module("gpbnb.arithmetic.named").NAMED
+    stub = {}
+    for node in ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            stub |= {alias.asname: node.module for alias in node.names}
+    assert stub == HOMES | {"NAMED_FORMATS": stub["NAMED_FORMATS"], "linalg": "gpbnb.arithmetic"}
+
+
 def test_only_long_computations_of_commands_show_progress_unasked():
     shown = set()
-    for path in Path(gpbnb.__file__).parent.rglob("*.py"):
+    for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef):
                 given = node.args
