@@ -10,6 +10,9 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.filters.checkpoints import Checkpoints, Packed
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
 
 TENTH = Fraction(1, 10)
 
@@ -37,3 +40,10 @@ def test_runs_are_compared_at_equal_steps():
     x = np.ones((1, 2))
     with pytest.raises(ValueError, match=r"\(3,\) for the runs and \(2,\) for the reference; needed equal steps"):
         saved((3,), x, None).minus(saved((2,), x, None))
+
+
+def test_the_parts_of_a_double_double_are_added_exactly():
+    given = LinearModel([[1]], [[1]], [[1]], [[1]], [0], [[1]])
+    parts = np.array([[1.5, 2.0**-70], [2.0**-60, -(2.0**-130)], [3.0, 0.0]])
+    found = Run(given, None, Form.INNOVATION, ()).exactly(parts)
+    assert found.tolist() == [Fraction(3, 2) + Fraction(1, 2**70), Fraction(2**70 - 1, 2**130), 3]

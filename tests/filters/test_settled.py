@@ -65,13 +65,3 @@ def test_a_covariance_that_comes_back_changes_no_digit(fmt, form, compensated, r
         # the covariance does come back within the run
         cycle = given.cycle
         assert any(np.array_equal(run.C[-1], earlier) for earlier in run.C[-1 - cycle : 0 : -cycle][:300])
-
-
-def test_a_run_may_be_cut_anywhere():
-    given, z = model(2, 1), BINARY32.array(measurements(900))
-    whole, cut = (Run(given, BINARY32, Form.INNOVATION, (450, 777)) for _ in range(2))
-    whole.take(z)
-    for begin, end in ((0, 1), (1, 700), (700, 702), (702, 900)):
-        cut.take(z[begin:end])
-    for one, other in ((whole.x, cut.x), (whole.P, cut.P), (whole.C, cut.C), (whole.G, cut.G), (whole.X, cut.X)):
-        assert np.array_equal(one, other)

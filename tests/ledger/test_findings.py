@@ -42,3 +42,11 @@ def test_a_part_of_the_ledger_has_the_rows_of_that_part():
     assert part == tuple(row for row in rows() if row in part) != ()
     assert {(row.statement.document, row.statement.chapter) for row in part} == {("hung1984", "II")}
     assert {row.statement.section.split(".")[0] for row in part} == {"2", "9"}
+
+
+def test_twins_of_the_two_reports_with_one_form_have_the_same_verdict():
+    verdicts = {row.statement.id: (row.statement.form, row.finding.verdict) for row in rows() if row.statement.form}
+    twins = [(verdicts[key], verdicts.get(key.replace("hung1984.II.", "hung1982.III."))) for key in verdicts]
+    same = [(one[1], other[1]) for one, other in twins if other is not None and other is not one and other[0] == one[0]]
+    assert len(same) > 80
+    assert all(one is other for one, other in same)

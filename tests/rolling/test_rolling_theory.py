@@ -13,7 +13,7 @@ from scipy import integrate, signal
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.rolling import theory
+from gpbnb.report.rolling import derivation, theory
 from gpbnb.report.rolling.theory import DRIFTS, LEVEL, YEAR
 
 CHOP = Rounding.CHOP
@@ -46,6 +46,12 @@ def test_fitted_drifts_of_constant_and_linear_phases():
 
         expected = [integrate.quad(integrand, 0, 1, args=(part,), epsabs=1e-12)[0] for part in (math.cos, math.sin)]
         assert theory.fitted_drift((1.0, 0.0), lambda t, r=rate: r * t) == pytest.approx(expected, abs=1e-10)
+
+
+def test_the_derivation_derolls_by_the_inverse_of_the_roll():
+    phi = sp.Symbol("phi", real=True)
+    roll = sp.Matrix([[sp.cos(phi), sp.sin(phi)], [-sp.sin(phi), sp.cos(phi)]])
+    assert sp.simplify(derivation.deroll(phi) * roll) == sp.eye(2)
 
 
 # -- registers -----------------------------------------------------------------------------------------
