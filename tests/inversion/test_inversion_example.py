@@ -35,9 +35,9 @@ def exact_inverse():
 
 
 class TestInverses:
-    @pytest.mark.parametrize("method", ["eliminate", "gauss_jordan", "round_once"])
+    @pytest.mark.parametrize("method", example.METHODS)
     def test_without_rounding_they_are_exact(self, method):
-        found = getattr(example, method)(example.matrix(), lambda x: x)
+        found = example.METHODS[method](example.matrix(), lambda x: x)
         assert (found == exact_inverse()).all()
 
     @pytest.mark.parametrize("wordlength", example.WORDLENGTHS[:4], ids=str)
@@ -45,14 +45,14 @@ class TestInverses:
         for places in PLACES:
             fmt = wordlength.format(places)
             a = fmt.array(example.MATRIX)
-            found = example.eliminate(a.to_fractions(), wordlength.rounder(places))
+            found = example.METHODS["elimination"](a.to_fractions(), wordlength.rounder(places))
             assert (found == linalg.inv(a).to_fractions()).all()
             assert (found == linalg.inv(a, pivot=True).to_fractions()).all()
 
     def test_nothing_of_the_wordlength_is_nearer_than_rounded_once(self):
         true = exact_inverse()
         for wordlength, places in itertools.product((MORE, FIXED), PLACES):
-            best = example.round_once(example.matrix(), wordlength.rounder(places))
+            best = example.METHODS["rounded once"](example.matrix(), wordlength.rounder(places))
             for method in example.METHODS.values():
                 found = method(example.matrix(), wordlength.rounder(places))
                 assert (abs(best - true) <= abs(found - true)).all()
@@ -166,13 +166,13 @@ class TestPossible:
         # Three digits: the error of the best inverse of the stored matrix is found possible.
         wordlength = Wordlength("t = places", rounding)
         fl = wordlength.rounder(3)
-        stored = example.each_rounded(example.matrix(), fl)
+        stored = fl(example.matrix())
         true = inverse_of(stored)
         assert (true @ stored == np.eye(3, dtype=int)).all()
         for norm in existence.SEARCHED:
-            error = norm_of(example.round_once(stored, fl) - true, norm)
+            error = norm_of(example.METHODS["rounded once"](stored, fl) - true, norm)
             printed = f"{float(error):.3e}"
             found = existence.possible(wordlength, 3, norm, printed=printed, reference="stored")
             assert example.agree(norm_of(found - true, norm), printed)
         for norm in existence.SEARCHED:  # and the largest error of the best inverse is above the print
-            assert norm_of(example.round_once(stored, fl) - true, norm) > Fraction(PRINTED["error"][0])
+            assert norm_of(example.METHODS["rounded once"](stored, fl) - true, norm) > Fraction(PRINTED["error"][0])

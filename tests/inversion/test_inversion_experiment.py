@@ -50,20 +50,16 @@ class TestTrial:
         for found in procedure.evaluate_all(reduction, beta, experiment.PRINTED):
             assert one.bounds[str(found.reading)] == pytest.approx(float(found.bound), rel=1e-11)
         assert one.bounds["corrected"] == pytest.approx(float(theory.bound(reduction, beta)), rel=1e-12)
-        assert one.bounds["strict"] == pytest.approx(float(theory.strict_bound(reduction, beta)), rel=1e-12)
         factors, x = linalg.lu(a, True), linalg.inv(a, True)
         assert one.bounds["Wilkinson"] == bounds.wilkinson(factors, x)
         assert one.bounds["Higham"] == bounds.higham(factors, x)
-        assert one.bounds["probabilistic"] == bounds.higham_probabilistic(factors, x)
-        assert one.bounds["rule of thumb"] == bounds.rule_of_thumb(factors, x)
         assert one.bounds["ball"] == bounds.ball(a, x)
-        assert one.bounds["preconditioned ball"] == bounds.ball(a, x, True)
         assert one.bounds["a posteriori"] == bounds.a_posteriori(a, x)
 
     def test_what_proves_nothing_is_absent(self):
         few = FloatFormat(10, 2, CHOP)
         one = experiment.trial(few.array([[1, "0.9"], ["0.9", 1]]))
-        assert {"probabilistic", "Higham"}.isdisjoint(one.bounds)
+        assert "Higham" not in one.bounds
         assert set(one.bounds) >= {*map(str, experiment.PRINTED), "corrected"}
 
     def test_violations_and_ratios(self):

@@ -35,8 +35,8 @@ MATRIX = (("3.235", "-1.234", "3.256"), ("1.023", "-5.235", "0.921"), ("1.336", 
 PLACES = (3, 5, 8)
 PRINTED = {"bound": ("3.706e-2", "3.706e-4", "3.706e-7"), "error": ("7.782e-5", "4.530e-7", "4.672e-10")}
 
-Rounder = Callable[[Fraction], Fraction]
 Matrix = NDArray[Any]
+Rounder = Callable[[Matrix], Matrix]
 
 # -- what a wordlength may be ---------------------------------------------------------------------
 
@@ -61,19 +61,15 @@ class Wordlength:
         return FloatFormat(10, places + more, self.rounding)
 
     def rounder(self, places: int) -> Rounder:
-        """Function that rounds one number."""
-        return self.fixed(places) if self.kind == "fixed point" else self.format(places).round
+        """Function that rounds each number of an array; in fixed point, half away from zero or towards zero."""
+        if self.kind != "fixed point":
+            return np.vectorize(self.format(places).round, otypes=[object])
+        half, units = Fraction(1, 2) if self.rounding is Rounding.NEAREST else 0, 10**places
 
-    def fixed(self, places: int) -> Rounder:
-        """Round to a multiple of the last place, half away from zero or towards zero."""
-        unit = Fraction(1, 10**places)
-        half = Fraction(1, 2) if self.rounding is Rounding.NEAREST else 0
+        def fixed(x: Fraction) -> Fraction:
+            return Fraction(math.floor(abs(x) * units + half), units) * (1 if x > 0 else -1)
 
-        def fix(x: Fraction) -> Fraction:
-            steps = math.floor(abs(x) / unit + half)
-            return unit * (steps if x > 0 else -steps)
-
-        return fix
+        return np.vectorize(fixed, otypes=[object])
 
     def __str__(self) -> str:
         return f"{self.kind}, {rounding_text(self.rounding)}"
@@ -85,45 +81,24 @@ WORDLENGTHS = tuple(Wordlength(kind, rounding) for kind, rounding in product(KIN
 # -- ways to invert, with a rounding after each operation -----------------------------------------
 
 
-def eliminate(a: Matrix, fl: Rounder) -> Matrix:
-    """Invert by elimination and back substitution in the order of section 11; pivoting would change nothing here."""
-    identity = exact(np.eye(len(a), dtype=int))
-    return np.asarray(inverse_in_order(a, identity, np.vectorize(fl, otypes=[object])).matrix)
-
-
 def gauss_jordan(a: Matrix, fl: Rounder) -> Matrix:
     """Invert by Gauss-Jordan: divide each row by its pivot and subtract multiples of it from all others."""
     n = len(a)
-    rows = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(a.tolist())]
+    rows = np.hstack([a, exact(np.eye(n, dtype=int))])
     for k in range(n):
-        pivot = rows[k][k]
-        rows[k] = [fl(p / pivot) for p in rows[k]]
-        for i in range(n):
-            if i != k:
-                m = rows[i][k]
-                rows[i] = [fl(p - fl(m * q)) for p, q in zip(rows[i], rows[k], strict=True)]
-    return np.array([row[n:] for row in rows], dtype=object)
+        rows[k] = fl(rows[k] / rows[k, k])
+        others = np.arange(n) != k
+        rows[others] = fl(rows[others] - fl(rows[others, k, np.newaxis] * rows[k]))
+    return rows[:, n:]
 
 
-def round_once(a: Matrix, fl: Rounder) -> Matrix:
-    """Round each entry of the true inverse: the most accurate inverse in a format."""
-    return each_rounded(inverse_of(a), fl)
-
-
+#: Elimination and back substitution are in the order of section 11; pivoting would change nothing here. The last one
+#: gives the most accurate inverse of a wordlength.
 METHODS: dict[str, Callable[[Matrix, Rounder], Matrix]] = {
-    "elimination": eliminate,
+    "elimination": lambda a, fl: np.asarray(inverse_in_order(a, exact(np.eye(len(a), dtype=int)), fl).matrix),
     "Gauss-Jordan": gauss_jordan,
-    "rounded once": round_once,
+    "rounded once": lambda a, fl: fl(inverse_of(a)),
 }
-
-
-def each_rounded(a: Matrix, fl: Rounder) -> Matrix:
-    """Round each entry of a matrix."""
-    out = np.empty_like(a)
-    for index in np.ndindex(a.shape):
-        entry: Any = a[index]
-        out[index] = fl(entry)
-    return out
 
 
 # -- readings -------------------------------------------------------------------------------------
@@ -219,7 +194,7 @@ def error_readings() -> tuple[PrintedColumn, ...]:
     result = []
     for wordlength, (method, invert) in product(WORDLENGTHS, METHODS.items()):
         rounders = [wordlength.rounder(places) for places in PLACES]
-        stored = [each_rounded(given, fl) for fl in rounders]
+        stored = [fl(given) for fl in rounders]
         computed = [invert(a, fl) for a, fl in zip(stored, rounders, strict=True)]
         references = {"given": [given] * 3} | ({"stored": stored} if (stored[0] != given).any() else {})
         for reference, matrices in references.items():

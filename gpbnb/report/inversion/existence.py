@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 from itertools import product
@@ -24,7 +24,6 @@ from gpbnb.report.inversion.example import (
     PRINTED,
     Matrix,
     Wordlength,
-    each_rounded,
     interval,
     matrix,
 )
@@ -52,7 +51,7 @@ def possible(
     reference : whose inverse defines the error, the matrix as "given" or as "stored" in the wordlength.
     """
     printed = printed or PRINTED["error"][PLACES.index(places)]
-    true = inverse_of(matrix() if reference == "given" else each_rounded(matrix(), wordlength.rounder(places)))
+    true = inverse_of(matrix() if reference == "given" else wordlength.rounder(places)(matrix()))
     scale = Fraction(float(NORMS[norm](true))) if relative else Fraction(1)
     low, high = (end * scale for end in interval(printed))
     square = norm == "Frobenius"
@@ -66,13 +65,11 @@ def possible(
         others = [least[h] for h in range(len(groups)) if h != g]
         if any(value >= high for value in others):
             continue
+        group = sorted(group, key=lambda i: len(candidates[i]))
         if (chosen := _fit([candidates[i] for i in group], low, high)) is not None:
-            witness = np.empty_like(true)
-            for index in np.ndindex(true.shape):
-                witness[index] = min(candidates[index])[1]
-            for index, value in zip(group, chosen, strict=True):
-                witness[index] = value
-            return witness
+            nearest = {index: near[0][1] for index, near in candidates.items()}
+            values = nearest | dict(zip(group, chosen, strict=True))
+            return np.array([*values.values()], dtype=object).reshape(true.shape)
     return None
 
 
@@ -108,38 +105,22 @@ def _near(
     if wordlength.kind != "fixed point":  # the spacing of the smallest numbers within reach
         fmt = wordlength.format(places)
         unit = Fraction(10) ** (fmt.split(abs(x) - reach)[2] - fmt.precision)
-    multiples = (k * unit for k in range(math.floor((x - reach) / unit), math.ceil((x + reach) / unit) + 1))
-    sizes = ((abs(y - x), y) for y in multiples if wordlength.rounder(places)(y) == y)
-    found = ((size**2 if square else size, y) for size, y in sizes)
-    return sorted((size, y) for size, y in found if size < most)
+    multiples = np.arange(math.floor((x - reach) / unit), math.ceil((x + reach) / unit) + 1).astype(object) * unit
+    near = multiples[wordlength.rounder(places)(multiples) == multiples]
+    return sorted((size, y) for size, y in zip(abs(near - x) ** (2 if square else 1), near, strict=True) if size < most)
 
 
 def _fit(
     candidates: Sequence[Sequence[tuple[Fraction, Fraction]]], low: Fraction, high: Fraction
 ) -> list[Fraction] | None:
     """Choose one candidate of each list so that the sizes sum to at least `low` and less than `high`, or None."""
-    order = sorted(range(len(candidates)), key=lambda i: len(candidates[i]))
-    if not all(candidates):
-        return None
-    last = candidates[order[-1]]
-    sizes = [size for size, _ in last]
-
-    def choose(depth: int, total: Fraction) -> Iterator[list[Fraction]]:
-        if depth == len(order) - 1:
-            i = bisect_left(sizes, low - total)
-            if i < len(sizes) and total + sizes[i] < high:
-                yield [last[i][1]]
-            return
-        for size, value in candidates[order[depth]]:
-            if total + size >= high:
-                break
-            for rest in choose(depth + 1, total + size):
-                yield [value, *rest]
-
-    chosen = next(choose(0, Fraction(0)), None)
-    if chosen is None:
-        return None
-    values: list[Any] = [None] * len(candidates)
-    for i, value in zip(order, chosen, strict=True):
-        values[i] = value
-    return values
+    first, *rest = candidates
+    if not rest:
+        i = bisect_left(first, low, key=lambda candidate: candidate[0])
+        return [first[i][1]] if i < len(first) and first[i][0] < high else None
+    for size, value in first:
+        if size >= high:
+            break
+        if (others := _fit(rest, low - size, high - size)) is not None:
+            return [value, *others]
+    return None

@@ -25,69 +25,28 @@ from gpbnb.report.inversion.theory import Norm, Reduction
 # -- the computation, in the arithmetic of the format ---------------------------------------------
 
 
-class Triangularization(NamedTuple):
-    """Every stage of the elimination of a matrix, with multipliers and row order.
+def reduce(a: FloatArray, pivot: bool = False, right: FloatArray | None = None) -> Reduction:
+    """Run the boxes of the computation: stages, right-hand sides and solution, as FloatArrays.
+
+    They are "Triangularization of A into A_T", (45)-(58), "Use the same triangularization transformation to change u_j
+    to b_j", and "Back substitution to solve A_T x_j = b_j", (65)-(79). The digits are those of
+    :func:`gpbnb.arithmetic.linalg.inv`. Section 10 mentions partial pivoting, which section 11 omits.
 
     Parameters
     ----------
-    stages : n FloatArrays (n, n), from the given matrix with its rows in final order to the upper triangular matrix.
-    multipliers : n - 1 FloatArrays; the k-th, of length n - k, holds the factors of row k before it was added.
-    order : (n,), the rows of the given matrix in the order in which they were eliminated.
-    """
-
-    stages: tuple[FloatArray, ...]
-    multipliers: tuple[FloatArray, ...]
-    order: NDArray[np.intp]
-
-    @property
-    def upper(self) -> FloatArray:
-        """The upper triangular matrix A_T, (63)."""
-        return self.stages[-1]
-
-
-def triangularize(a: FloatArray, pivot: bool = False) -> Triangularization:
-    """Box "Triangularization of A into A_T", (45)-(58); the digits are those of :func:`gpbnb.arithmetic.linalg.lu`.
-
-    Section 10 mentions partial pivoting, which section 11 omits.
+    right : (n, p), by default the identity, whose solution is the inverse.
     """
     from gpbnb.arithmetic import linalg
 
-    found = linalg.lu(a, pivot)
-    n, order = len(a), found.permutation
-    work = a[order]
-    stages, multipliers = [work], []
+    found, n = linalg.lu(a, pivot), len(a)
+    right = a.format.array(np.eye(n, dtype=int)) if right is None else right
+    stages, rights = [a[found.permutation]], [right[found.permutation]]
     for k in range(n - 1):
-        m = -found.lower[k + 1 :, k]
-        changed = work[k + 1 :, k + 1 :] + m[:, np.newaxis] * work[k, k + 1 :]
-        work = work.at[k + 1 :, k].set(0).at[k + 1 :, k + 1 :].set(changed)
-        stages.append(work)
-        multipliers.append(m)
-    return Triangularization(tuple(stages), tuple(multipliers), order)
-
-
-def transform(triangular: Triangularization, right: FloatArray) -> tuple[FloatArray, ...]:
-    """Box "Use the same triangularization transformation to change u_j to b_j": every stage of the right-hand sides.
-
-    Each has the shape of `right`, with rows in the order of elimination; the last is b_T of (64).
-    """
-    work = right[triangular.order]
-    rights = [work]
-    for k, m in enumerate(triangular.multipliers):
-        work = work.at[k + 1 :].set(work[k + 1 :] + m[:, np.newaxis] * work[k])
-        rights.append(work)
-    return tuple(rights)
-
-
-def reduce(a: FloatArray, pivot: bool = False) -> Reduction:
-    """Run the three boxes of the computation: stages, right-hand sides and the inverse, as FloatArrays.
-
-    The third box is "Back substitution to solve A_T x_j = b_j", (65)-(79).
-    """
-    from gpbnb.arithmetic import linalg
-
-    triangular = triangularize(a, pivot)
-    rights = transform(triangular, a.format.array(np.eye(len(a), dtype=int)))
-    return Reduction(triangular.stages, rights, linalg.solve(triangular.upper, rights[-1]))
+        A, b, m = stages[-1], rights[-1], -found.lower[k + 1 :, k, np.newaxis]
+        changed = A[k + 1 :, k + 1 :] + m * A[k, k + 1 :]
+        stages.append(A.at[k + 1 :, k].set(0).at[k + 1 :, k + 1 :].set(changed))
+        rights.append(b.at[k + 1 :].set(b[k + 1 :] + m * b[k]))
+    return Reduction(tuple(stages), tuple(rights), linalg.solve(stages[-1], rights[-1]))
 
 
 def as_floats(reduction: Reduction) -> Reduction:

@@ -16,13 +16,12 @@ Arrays hold Fractions or float64 numbers, and ``beta``, the unit roundoff β, is
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import column_sum, gamma
+from gpbnb.arithmetic.bounds import column_sum
 from gpbnb.arithmetic.rational import exact
 
 Norm = Callable[[NDArray[Any]], Any]
@@ -57,14 +56,9 @@ def residual(a: Any, x: Any) -> NDArray[Any]:
     return np.asarray(exact(a) @ exact(x) - np.eye(len(x), dtype=int))
 
 
-def printed_first_bound(inverse: Any, residual: Any, change: Any = 0, norm: Norm = column_sum) -> Any:
-    r"""Bound of ‖E‖ as :math:`\|A^{-1}\|\|R\| + \|A^{-1}\|^2\|\Delta A\|`; hung1984, ch. II, (39) and (43).
-
-    `inverse` is the true inverse of A. `residual` belongs to the matrix that was inverted, A + ΔA, and `change` is ΔA.
-    The bound holds only to first order in ΔA.
-    """
-    size = norm(inverse)
-    return size * (norm(residual) + size * norm(inverse * 0 + change))
+def printed_first_bound(inverse: Any, residual: Any) -> Any:
+    r"""Bound of ‖E‖ as :math:`\|A^{-1}\|\|R\|` with the true inverse; hung1984, ch. II, (39)."""
+    return column_sum(inverse) * column_sum(residual)
 
 
 # -- triangularization, (45)-(64) -----------------------------------------------------------------
@@ -108,21 +102,6 @@ def printed_triangularization_norm(
     return sum(
         beta * (3 * norm(trailing(new, k, columns)) + 2 * norm(trailing(old, k, columns))) for new, old, k in pairs
     )
-
-
-def strict_triangularization_bounds(
-    stages: Sequence[Any], parts: Sequence[Any], beta: Any, columns: bool = True
-) -> NDArray[Any]:
-    r"""Sizes of Ã or b̃, at most :math:`\sum_k[\gamma_1|\hat a_{ij}(k)| + \gamma_2|l_{ik}\hat a_{kj}(k-1)|]`, always.
-
-    `parts` are the stages themselves, or the right sides without `columns`.
-    """
-    one, two = _gammas(np.array([1, 2]), beta)
-    lower, total = abs(lower_factor(stages)), 0 * parts[0]
-    for k in range(1, len(stages)):
-        products = np.multiply.outer(lower[:, k - 1], abs(parts[k - 1][k - 1]))
-        total = total + one * abs(trailing(parts[k], k, columns)) + two * trailing(products, k, columns)
-    return np.asarray(total)
 
 
 # -- back substitution, (65)-(90) -----------------------------------------------------------------
@@ -172,18 +151,6 @@ def perturbation(reduction: Reduction, beta: Any, signed: bool = True, transfer:
     )
 
 
-def strict_perturbation(reduction: Reduction, beta: Any) -> Perturbation:
-    """Bounds of the sizes to every order in β, with L and the sharper Ã and b̃."""
-    stages, rights, _ = reduction
-    lower, n = abs(lower_factor(stages)), len(stages)
-    return Perturbation(
-        strict_triangularization_bounds(stages, stages, beta)
-        + lower @ (abs(stages[-1]) * _gammas(back_substitution_weights(n), beta)),
-        strict_triangularization_bounds(stages, rights, beta, columns=False)
-        + lower @ (abs(rights[-1]) * _gammas(right_side_weights(n), beta)),
-    )
-
-
 def bracket(reduction: Reduction, change: Perturbation, signed: bool = True) -> NDArray[Any]:
     r"""E of (95), columns :math:`\delta b_j - \delta A\,\hat x_j`, or :math:`|\delta b_j| + |\delta A||\hat x_j|`."""
     if signed:
@@ -191,23 +158,7 @@ def bracket(reduction: Reduction, change: Perturbation, signed: bool = True) -> 
     return np.asarray(abs(change.right) + abs(change.matrix) @ abs(reduction.solution))
 
 
-def bound(reduction: Reduction, beta: Any, norm: Norm = column_sum) -> Any:
-    r"""Corrected (96), :math:`\|\hat A^{-1}\|\,\bigl\||\delta b| + |\delta A||\hat A^{-1}|\bigr\|`; to first order.
-
-    `norm` must not grow when entries shrink in size; column and row sums have this property.
-    """
+def bound(reduction: Reduction, beta: Any) -> Any:
+    r"""Corrected (96), :math:`\|\hat A^{-1}\|\,\bigl\||\delta b| + |\delta A||\hat A^{-1}|\bigr\|`; to first order."""
     change = perturbation(reduction, beta, signed=False, transfer=True)
-    return norm(reduction.solution) * norm(bracket(reduction, change, signed=False))
-
-
-def strict_bound(reduction: Reduction, beta: Any, norm: Norm = column_sum) -> Any:
-    r"""Bound of :func:`bound` to every order: with strict entries, divided by :math:`1 - \|E\|`."""
-    size = norm(bracket(reduction, strict_perturbation(reduction, beta), signed=False))
-    if not size < 1:
-        raise ValueError(f"got ‖E‖ = {float(size):.3g}; needed less than 1; this takes more digits")
-    return norm(reduction.solution) * size / (1 - size)
-
-
-def _gammas(weights: NDArray[Any], beta: Any) -> NDArray[Any]:
-    found = np.vectorize(lambda weight: gamma(int(weight), Fraction(beta)), otypes=[object])(weights)
-    return np.asarray(found.astype(float) if isinstance(beta, float) else found)
+    return column_sum(reduction.solution) * column_sum(bracket(reduction, change, signed=False))

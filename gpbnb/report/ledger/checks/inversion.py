@@ -609,11 +609,9 @@ def left_alone() -> Names:
     triangular = full = 0
     few = samples()[::3]
     for sample in few:
-        upper = procedure.triangularize(sample.matrix, sample.pivot).upper
-        triangular += all(bool((stage == upper).all()) for stage in procedure.triangularize(upper).stages)
-        full += all(
-            bool((stage == sample.matrix).all()) for stage in procedure.triangularize(sample.matrix, True).stages
-        )
+        upper = procedure.reduce(sample.matrix, sample.pivot).stages[-1]
+        triangular += all(bool((stage == upper).all()) for stage in procedure.reduce(upper).stages)
+        full += all(bool((stage == sample.matrix).all()) for stage in procedure.reduce(sample.matrix, True).stages)
     return {"form": "upper triangular" if triangular == len(few) > full else "full", "triangular": triangular,
             "full": full, "count": len(few)}  # fmt: skip
 
