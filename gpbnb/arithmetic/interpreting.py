@@ -67,7 +67,57 @@ class Segment(NamedTuple):
     call: Call | None
 
 
-class InLoops:
+class Numbers:
+    """Numbers and truth values of a program on the machine.
+
+    Parameters
+    ----------
+    formats : those that the program names, all with one kind of numbers; None is double-double.
+    sizes : numbers of places, and of truth values.
+    lanes : number of lanes, which lie behind the places; None for one, which only numbers with parts have an axis for.
+    tag : the arithmetic of a run, from which random numbers are drawn.
+    """
+
+    def __init__(
+        self, formats: Sequence[Any], sizes: tuple[int, int], lanes: int | None = None, tag: Any = None
+    ) -> None:
+        self.formats, backend = formats, None if formats[0] is None else formats[0].backend
+        count, dtype = (2, np.float64) if backend is None else (backend.count, backend.dtype)
+        parts = () if count == 1 else (count,)
+        shape = (1,) * bool(parts) if lanes is None else (lanes,)
+        #: Their kind, and their columns.
+        self.kind, self.tables = machine.tables(formats, tag)
+        #: (places, [lanes], [parts]) and (truths, [lanes]).
+        self.values, self.truths = np.zeros((sizes[0], *shape, *parts), dtype), np.zeros((sizes[1], *shape), np.uint8)
+        self.truths[1] = 1
+        self.memory = machine.Memory(self.values, self.truths)
+
+    def hold(self, places: Any, numbers: NDArray[Any]) -> None:
+        """Set packed numbers that are the same in all lanes, (count, ...)."""
+        lanes = self.values.ndim - numbers.ndim
+        self.values[places] = numbers[(slice(None), *(np.newaxis,) * lanes)]
+
+    def hold_constants(self, constants: Iterable[Constants]) -> None:
+        """Set the constants of a tape."""
+        for each in constants:
+            if each.places:
+                self.hold(each.places, machine.packed_constants(self.formats[0], each))
+
+    def first_without_result(self, rows: NDArray[Any], formats: NDArray[np.int64]) -> int:
+        """Return the first of some operations that has no result, by halving: one of them has none."""
+        good, bad = 0, len(rows)
+        while bad - good > 1:
+            middle = (good + bad) // 2
+            done = self.evaluate(machine.code_of(rows[:middle], formats[:middle]))
+            good, bad = (middle, bad) if done == middle else (good, middle)
+        return good
+
+    def evaluate(self, code: Any) -> int:
+        """Run operations once in each lane; return how many have results, 0 if the machine does not tell."""
+        return machine.evaluate_in(self.memory, self.kind, self.tables, code)
+
+
+class InLoops(Numbers):
     """Numbers of a tape on the machine.
 
     Parameters
@@ -77,16 +127,8 @@ class InLoops:
     """
 
     def __init__(self, tape: Any, formats: Sequence[Any]) -> None:
-        self._formats = formats
-        self._kind, self._tables = machine.tables(formats)
-        self._backend = formats[0].backend
-        values, truths = tape.sizes
-        parts = () if self._backend.count == 1 else (1, self._backend.count)
-        self._alone = bool(parts)
-        self._values = np.zeros((values, *parts), self._backend.dtype)
-        self._truths = np.zeros((truths, *parts[:1]), np.uint8)
-        self._truths[1] = 1
-        self._memory = machine.Memory(self._values, self._truths)
+        super().__init__(formats, tape.sizes)
+        self._alone = self.truths.ndim > 1
         constants = [each.rounded(formats[0]) for each in tape.all_constants]
         self._array = type(constants[0])
         places = (np.array(each.places, np.int64) for each in tape.all_constants)
@@ -99,23 +141,23 @@ class InLoops:
         if backend is not numbers.format.backend:
             return False
         if self._alone:
-            self._values[places, 0] = backend.pack(numbers.components)  # type: ignore[attr-defined]
+            self.values[places, 0] = backend.pack(numbers.components)  # type: ignore[attr-defined]
         else:
-            self._values[places] = numbers.components[0]
+            self.values[places] = numbers.components[0]
         return True
 
     def move(self, places: NDArray[np.int64], to: NDArray[np.int64]) -> None:
         """Copy numbers to other places."""
-        self._values[to] = self._values[places]
+        self.values[to] = self.values[places]
 
     def array(self, places: NDArray[np.int64], fmt: Any) -> FloatArray:
         """Return the numbers at some places."""
-        found = self._values[places, 0] if self._alone else self._values[places]
+        found = self.values[places, 0] if self._alone else self.values[places]
         return self._array.from_packed(found, fmt)
 
     def truth(self, place: int) -> bool:
         """Return a truth value."""
-        return bool(self._truths[place].all())
+        return bool(self.truths[place].all())
 
     @staticmethod
     def ready(segments: Iterable[Segment]) -> list[Any]:
@@ -125,10 +167,10 @@ class InLoops:
     def run(self, ready: list[Any]) -> bool:
         """Run operations and calls; return whether the machine holds every result."""
         for code, count, call in ready:
-            if count and machine.evaluate_in(self._memory, self._kind, self._tables, code) < count:
+            if count and self.evaluate(code) < count:
                 return False
             if call is not None:
-                fmt = self._formats[0]
+                fmt = self.formats[0]
                 if not self.put(call.results, call.function(*(self.array(each, fmt) for each in call.operands))):
                     return False
         return True

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.interpreting import Constants
-from gpbnb.arithmetic.machine import code_of, evaluate, fault_of, packed_constants, tables
+from gpbnb.arithmetic.interpreting import Constants, Numbers
+from gpbnb.arithmetic.machine import code_of, fault_of
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
 
@@ -38,7 +38,7 @@ class Lanes:
         found: Sequence[NDArray[np.int64] | TracedTruth],
     ) -> None:
         self._rows, self._code = rows, code_of(rows, np.zeros(len(rows), np.int64))
-        self._sizes, self._constants = sizes, [each for each in constants if each.places]
+        self._sizes, self._constants = sizes, constants
         self._given, self._found = given, found
 
     def run(self, fmt: Any, *given: NDArray[Any], tag: Any = None) -> list[NDArray[Any]]:
@@ -76,15 +76,13 @@ class Lanes:
 
     def _together(self, fmt: Any, tag: Any, given: Sequence[NDArray[Any]]) -> list[NDArray[Any]]:
         lanes, parts = len(given[0]), given[0].shape[1 + self._given[0].ndim :]
-        values = np.zeros((self._sizes[0], lanes, *parts), given[0].dtype)
-        truths = np.zeros((self._sizes[1], lanes), np.uint8)
-        truths[1] = 1
-        for constants in self._constants:
-            values[constants.places] = packed_constants(fmt, constants)[:, np.newaxis]
+        numbers = Numbers([fmt], self._sizes, lanes, tag)
+        numbers.hold_constants(self._constants)
+        values, truths = numbers.values, numbers.truths
         for places, each in zip(self._given, given, strict=True):
             values[places.ravel()] = np.moveaxis(each.reshape(lanes, places.size, *parts), 0, 1)
         if lanes and len(self._rows):
-            done = evaluate(*tables([fmt], tag), self._code, values, truths)
+            done = numbers.evaluate(self._code)
             if done < len(self._rows):
                 fault = fault_of(self._rows, values, done)
                 raise (OverflowError if fault.overflows else ZeroDivisionError)(f"got {fault.reason}")

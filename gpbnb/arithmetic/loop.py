@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.machine import Addresses, Memory, code_of, first_without_result, functions, is_far
+from gpbnb.arithmetic.interpreting import Numbers
+from gpbnb.arithmetic.machine import Addresses, code_of, functions, is_far
 
 DECAYED = 2.0**-700
 """Size below which an entry of a state becomes zero where a step would leave the range of float64."""
@@ -29,49 +30,42 @@ def drop_decayed(states: NDArray[Any], *carried: NDArray[Any]) -> bool:
     return bool(decayed.any())
 
 
-class Loop:
+class Loop(Numbers):
     """A program whose steps replace its states by their next values.
 
     Parameters
     ----------
-    loaded : kind and columns of the formats, from :func:`gpbnb.arithmetic.machine.tables`.
-    rows, formats : operations, (o, 5), and the number of the format of each, (o,).
-    sizes : numbers of places, and of truth values.
-    dtype : type of the machine's numbers.
-    lanes : lengths of the axes behind the places.
+    formats, sizes, lanes, tag : as for :class:`~gpbnb.arithmetic.interpreting.Numbers`.
+    rows, numbers : operations, (o, 5), and the number of the format of each, (o,).
     states, after : places of the states, and of their next values.
     truth : the truth value that is kept of each step.
     """
 
     def __init__(
         self,
-        loaded: tuple[Any, Any],
+        formats: Sequence[Any],
         rows: NDArray[np.int64],
-        formats: NDArray[np.int64],
+        numbers: NDArray[np.int64],
         sizes: tuple[int, int],
-        dtype: Any,
-        lanes: tuple[int, ...],
         states: NDArray[np.int64],
         after: NDArray[np.int64],
         truth: int = 1,
+        lanes: int | None = None,
+        tag: Any = None,
     ) -> None:
         from gpbnb.arithmetic.kernels import machine
 
-        self._machine, (self._kind, self._formats) = machine, loaded
-        self.rows, self.formats, self._code = rows, formats, code_of(rows, formats)
-        self.values = np.zeros((sizes[0], *lanes), dtype)
-        self._truths = np.zeros((sizes[1], *lanes[:1]), np.uint8)
-        self._truths[1] = 1
-        self._memory, self._distant = Memory(self.values, self._truths), {"held": False, "fed": False}
+        super().__init__(formats, sizes, lanes, tag)
+        self.rows, self._numbers, self._code = rows, numbers, code_of(rows, numbers)
+        self._machine, self._distant = machine, {"held": False, "fed": False}
         self._states, self.after, self._truth = states, after, truth
-        self._before = np.full(len(states) * self._memory.width, -1, self.values.dtype)
+        self._before = np.full(len(states) * self.memory.width, -1, self.values.dtype)
         self._notes = np.zeros(5, np.int64)
         self._table, self._feeds = np.zeros((0, 1), self.values.dtype), np.zeros((0, 4), np.int64)
 
     def hold(self, places: Any, numbers: NDArray[Any]) -> None:
         """Set numbers that stay as they are, the same in all lanes, (count, ...)."""
-        lanes = self.values.ndim - numbers.ndim
-        self.values[places] = numbers[(slice(None), *(np.newaxis,) * lanes)]
+        super().hold(places, numbers)
         self._distant["held"] |= self._far(numbers)
 
     def feed(self, groups: Sequence[tuple[NDArray[np.int64], NDArray[Any]]]) -> None:
@@ -89,7 +83,7 @@ class Loop:
 
     def _far(self, numbers: NDArray[Any]) -> bool:
         """Whether numbers may be too small or too large for quick computation."""
-        return isinstance(self._kind, self._machine.Quick) and is_far(numbers)
+        return isinstance(self.kind, self._machine.Quick) and is_far(numbers)
 
     def compare_from(self, states: NDArray[Any], cycle: int) -> None:
         """Begin to look for states that repeat."""
@@ -128,7 +122,7 @@ class Loop:
         kept, held : the results of each step, and whether the truth value holds in all lanes, (steps,).
         row : the row without a result that ended the steps, or -1.
         """
-        steps, lanes, machine, memory = len(own), self.values.shape[1:], self._machine, self._memory
+        steps, lanes, machine, memory = len(own), self.values.shape[1:], self._machine, self.memory
         kept = np.empty((steps, len(kept_at), *lanes), self.values.dtype)
         held, row = np.ones(steps * memory.lanes, np.uint8), 0
         states_at, after_at, places = map(memory.places, (self._states, self.after, kept_at))
@@ -142,9 +136,9 @@ class Loop:
         # fmt: on
         far = any(self._distant.values()) or self._far(own) or self._far(self.states)
         self._notes[machine.DONE] = 0
-        tables = self._formats.address, self._code.table.address, memory.table.address
+        tables = self.tables.address, self._code.table.address, memory.table.address
         with contextlib.suppress(OverflowError, ZeroDivisionError):
-            for execute in functions(self._kind, far, memory.lanes == 1):
+            for execute in functions(self.kind, far, memory.lanes == 1):
                 machine.advance(execute, *tables, run.address, self._notes.ctypes.data)
                 row = int(self._notes[machine.ROW])
                 if row < 0:
@@ -153,9 +147,5 @@ class Loop:
         if done == steps or self.period:
             row = -1
         elif row == 0:  # operations on integers do not tell which one it was
-            row = self.first_without_result(self.rows)
+            row = self.first_without_result(self.rows, self._numbers)
         return kept[:done], np.asarray(np.all(held.reshape(steps, memory.lanes)[:done] != 0, axis=1)), row
-
-    def first_without_result(self, rows: NDArray[np.int64]) -> int:
-        """Return the first of some operations that has no result in the step that ended the last ones."""
-        return first_without_result(self._kind, self._formats, rows, self.formats, self.values, self._truths)

@@ -185,28 +185,6 @@ def fault_of(rows: NDArray[np.int64], values: NDArray[Any], row: int) -> Fault:
     return Fault(row, reason)
 
 
-def first_without_result(
-    kind: Any,
-    formats: Any,
-    rows: NDArray[np.int64],
-    numbers: NDArray[np.int64],
-    values: NDArray[Any],
-    truths: NDArray[np.uint8],
-) -> int:
-    """Return the first row that has no result, by halving: some row has none.
-
-    Parameters
-    ----------
-    numbers : (rows,), the number of the format of each.
-    """
-    good, bad = 0, len(rows)
-    while bad - good > 1:
-        middle = (good + bad) // 2
-        done = evaluate(kind, formats, code_of(rows[:middle], numbers[:middle]), values, truths)
-        good, bad = (middle, bad) if done == middle else (good, middle)
-    return good
-
-
 def packed_one(fmt: Any) -> Any:
     """Return the number one as the machine takes it, None being double-double; None if a format does not have it."""
     if fmt is None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.loop import Loop, drop_decayed
-from gpbnb.arithmetic.machine import CODES, tables
+from gpbnb.arithmetic.machine import CODES
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT, Program, values_of
 from gpbnb.interrupts import slices
@@ -50,10 +50,10 @@ class LinearSteps:
         self._rows, self._operations, self._m = np.array(rows, np.int64).reshape(-1, 5), np.array(numbers), program.m
         self._outputs, self._places = program.outputs - first, place
         moved = np.argsort(place[first + self._operations], kind="stable") if rows else np.zeros(0, np.int64)
-        parts = x.shape[1:]
+        self._formats = np.zeros(len(rows), np.int64)
         self._loop = Loop(
-            tables([fmt], tag), self._rows[moved], np.zeros(len(rows), np.int64), (at + len(coefficients), truths),
-            x.dtype, (1, *parts) if parts else (), np.arange(n), place[program.outputs],
+            [fmt], self._rows[moved], self._formats, (at + len(coefficients), truths), np.arange(n),
+            place[program.outputs], tag=tag,
         )  # fmt: skip
         self._loop.hold(slice(at, None), coefficients)
         self._loop.states = x
@@ -79,7 +79,7 @@ class LinearSteps:
             if row >= 0:
                 states = loop.states
                 if not drop_decayed(states):
-                    operation = self._operations[loop.first_without_result(self._rows)]
+                    operation = self._operations[loop.first_without_result(self._rows, self._formats)]
                     return out[:done], int(np.argmax(self._outputs >= operation))
                 loop.states = states
         return out, -1

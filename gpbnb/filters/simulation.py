@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.definiteness import factor
 from gpbnb.arithmetic.loop import Loop
-from gpbnb.arithmetic.machine import CODES, tables
 from gpbnb.arithmetic.named import BINARY64
+from gpbnb.arithmetic.tape import Tape
+from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.model import LinearModel
 
 #: Steps for which one seeded generator draws the noise, so that a run can resume at any block.
@@ -112,45 +113,39 @@ def measured(
     x, z : (n,) and (steps, m), to be overwritten.
     """
     n, (steps, m), groups = len(x), z.shape, []
-    # Column by column, so that sums of different rows, which do not wait for each other, lie beside each other.
-    terms = tuple(tuple((i, j) for j, i in np.argwhere((each != 0).any(axis=0).T).tolist()) for each in matrices)
-    rows, size, after, found = _recorded(n, m, terms)
-    own_at, at, states = 1 + n, 1 + 2 * n + m, np.arange(1, 1 + n)
-    for each, some in zip(matrices, terms, strict=True):
-        if some:
-            groups.append((np.arange(at, at + len(some)), each[:, *np.array(some).T]))
-        at += len(some)
-    alone = np.zeros(len(rows), np.int64)
-    loop = Loop(tables([BINARY64]), rows, alone, (size, 2), np.float64, (), states, after)
+    places, rows, size, after, found = _recorded(n, m, tuple((each != 0).any(axis=0).tobytes() for each in matrices))
+    for each, at in zip(matrices, places, strict=True):
+        groups.append((at, each.reshape(len(each), -1)))
+    loop = Loop([BINARY64], rows, np.zeros(len(rows), np.int64), (size, 2), np.arange(1, 1 + n), after)
     loop.feed(groups)
     loop.states = x
-    kept, _, _ = loop.take(first, np.concatenate([w[:steps], v[:steps]], axis=1), own_at, found)
+    kept, _, _ = loop.take(first, np.concatenate([w[:steps], v[:steps]], axis=1), 1 + n, found)
     z[: len(kept)], z[len(kept) :], x[:] = kept, math.inf, loop.states if len(kept) == steps else math.inf
 
 
 @lru_cache(maxsize=16)
-def _recorded(
-    n: int, m: int, terms: tuple[tuple[tuple[int, int], ...], ...]
-) -> tuple[NDArray[np.int64], int, NDArray[np.int64], NDArray[np.int64]]:
-    """Return the rows of a step of :func:`measured`, its number of places, and those of the next state and of z.
+def _recorded(n: int, m: int, nonzero: tuple[bytes, ...]) -> tuple[Any, ...]:
+    """Record a step of :func:`measured`.
 
-    Zero comes first, then the state, w and v, and the given entries of the matrices.
+    Parameters
+    ----------
+    nonzero : which entries of the matrices are not zero in every step, by the bytes 0 and 1.
+
+    Returns
+    -------
+    Places of the matrices, the operations and the number of places, and the places of the next state and of z.
     """
-    rows, at, entry = list[tuple[int, ...]](), 1 + 2 * n + m, 1 + 2 * n + m
-    size = at + sum(map(len, terms))
-
-    def operate(name: str, a: int, b: int) -> int:
-        rows.append((CODES[name], a, b, 0, size + len(rows)))
-        return size + len(rows) - 1
-
-    sums = np.zeros((2, max(n, m)), np.int64)
-    for k, factors in enumerate((range(1, 1 + n), range(1 + n, 1 + 2 * n), sums[0], range(1 + 2 * n, at))):
-        products = [operate("multiply", entry + t, int(factors[j])) for t, (_, j) in enumerate(terms[k])]
-        for product, (i, _) in zip(products, terms[k], strict=True):
-            place = sums[k // 2, i]
-            sums[k // 2, i] = operate("add", int(place), product) if place else product
-        entry += len(terms[k])
-    return np.array(rows, np.int64).reshape(-1, 5), size + len(rows), sums[0, :n].copy(), sums[1, :m].copy()
+    shapes = [(n,), (n,), (m,), (n, n), (n, n), (m, n), (m, m)]
+    ends = 1 + np.cumsum([math.prod(shape) for shape in shapes])
+    places = [np.arange(end - math.prod(shape), end).reshape(shape) for end, shape in zip(ends, shapes, strict=True)]
+    tape = Tape(int(ends[-1]) - 1)
+    masks = (np.frombuffer(each, np.bool_) for each in nonzero)
+    known = [np.where(mask.reshape(at.shape), at, 0) for mask, at in zip(masks, places[3:], strict=True)]
+    x, w, v, Phi, of_Q, H, of_R = map(TracedFormat(tape).made, [*places[:3], *known])
+    after: Any = np.concatenate([Phi, of_Q], axis=1) @ np.concatenate([x, w])
+    found: Any = np.concatenate([H, of_R], axis=1) @ np.concatenate([after, v])
+    rows = tape.instructions.astype(np.int64)
+    return [at.ravel() for at in places[3:]], rows, tape.sizes[0], after.components[0], found.components[0]
 
 
 def fine_resolution(model: LinearModel) -> tuple[float, ...]:

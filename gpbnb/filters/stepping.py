@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.loop import Loop
-from gpbnb.arithmetic.machine import Fault, fault_of, packed_constants, tables, takes_numbers
+from gpbnb.arithmetic.machine import Fault, fault_of, takes_numbers
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.recording import ProgramPart, RecordedStep
 from gpbnb.interrupts import slices
@@ -44,32 +44,6 @@ class Block(NamedTuple):
     stop: Stop | None
 
 
-def _loop(
-    step: RecordedStep,
-    part: ProgramPart,
-    formats: Sequence[Any],
-    lanes: tuple[int, ...],
-    changes: Sequence[str],
-    loaded: tuple[Any, Any],
-) -> Loop:
-    """Return a part of a step that is repeated on its own values.
-
-    Parameters
-    ----------
-    lanes : lengths of the axes behind the places.
-    changes : what it changes.
-    loaded : kind and columns of the formats.
-    """
-    sizes = step.sizes[0] + len(step.shared), step.sizes[1]
-    dtype = formats[0].backend.dtype if formats[0] is not None else np.float64
-    states, after = (np.concatenate([at[each].ravel() for each in changes]) for at in (step.places, step.after))
-    found = Loop(loaded, part.rows, part.formats, sizes, dtype, lanes, states, after, step.definite)
-    for constants in step.constants:
-        if constants.places:
-            found.hold(constants.places, packed_constants(formats[0], constants))
-    return found
-
-
 class Stepper:
     """A filter that takes steps with packed numbers.
 
@@ -93,9 +67,6 @@ class Stepper:
         tag: Any = None,
     ) -> None:
         self._step = step
-        parts = model["Phi"].shape[3:]
-        alone = () if not parts else (1, *parts)
-        lanes = (records, *parts) if parts or records > 1 else ()
         self._shared_at = step.sizes[0] + np.arange(len(step.shared))
         moved = np.arange(step.sizes[0] + len(step.shared))
         moved[step.shared] = self._shared_at
@@ -103,9 +74,18 @@ class Stepper:
         given, taken = rows[:, 1:4], takes_numbers(rows[:, 0])
         given[taken] = moved[given[taken]]
         late = step._replace(after={**step.after, **{each: moved[step.after[each]] for each in _ESTIMATE}})
-        loaded = tables(formats, tag)
-        self._gain = _loop(step, step.gain, formats, alone, _GAIN, loaded)
-        self._estimate = _loop(late, step.estimate._replace(rows=rows), formats, lanes, _ESTIMATE, loaded)
+        lanes = records if records > 1 else None
+
+        def loop(step: RecordedStep, part: ProgramPart, changes: Sequence[str], lanes: int | None = None) -> Loop:
+            """Return a part of a step that is repeated on its own values."""
+            sizes = step.sizes[0] + len(step.shared), step.sizes[1]
+            states, after = (np.concatenate([at[each].ravel() for each in changes]) for at in (step.places, step.after))
+            found = Loop(formats, part.rows, part.formats, sizes, states, after, step.definite, lanes, tag)
+            found.hold_constants(step.constants)
+            return found
+
+        self._gain = loop(step, step.gain, _GAIN)
+        self._estimate = loop(late, step.estimate._replace(rows=rows), _ESTIMATE, lanes)
         self._kept_at = np.concatenate([step.shared, step.K.ravel(), step.after["P"].ravel()])
         repeats = all(fmt is None or fmt.rounding is not Rounding.STOCHASTIC for fmt in formats)
         self._cycle = cycle if repeats else 0
