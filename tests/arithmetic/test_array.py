@@ -328,12 +328,6 @@ class TestLeavingTheFormat:
         assert np.load(stream).tolist() == [0.5, -2.0, 0.0]
         assert pickle.loads(pickle.dumps(self.LONG)).tolist() == self.LONG.tolist()
 
-    def test_the_nearest_and_the_exact_are_asked_for(self) -> None:
-        assert self.TENTH.to_float().tolist() == [0.1, 0.5]
-        assert self.TENTH.astype(float).tolist() == [0.1, 0.5]
-        assert f"{self.TENTH[0]:.3f}" == "0.100"
-        assert self.TENTH.to_fractions().tolist() == [Fraction(1, 10), Fraction(1, 2)]
-
     def test_unknown_names_have_a_hint(self) -> None:
         for wrong, near in [
             (lambda x: x.summ(), "the nearest is x.sum"),

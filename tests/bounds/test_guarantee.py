@@ -19,7 +19,6 @@ from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.guess import GAIN, LOOP, gains, linear_steps, rounding_errors, value_sizes
 from gpbnb.bounds.linear import error_coefficients, peak_gain
 from gpbnb.bounds.probable import probable_error, separate_roundings
-from gpbnb.bounds.units import units
 from gpbnb.filters.forms import Form
 from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import LinearModel
@@ -134,16 +133,6 @@ def _effect(program: Any, coefficients: list[Fraction], o: int, n: int) -> np.nd
 
 
 # -- units and sums ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("fmt", FORMATS, ids=str)
-def test_no_rounding_exceeds_the_unit_of_its_magnitude(fmt: FloatFormat) -> None:
-    table, rng = units(fmt), np.random.default_rng(4)
-    for size in (*rng.uniform(0, 300, 50), 1.0, 2.0, 16.0, 100.0):
-        most = table.errors[np.searchsorted(table.powers, size)]
-        errors = [abs(fmt.round(v) - Fraction(v)) for v in (size * s for s in (*rng.uniform(-1, 1, 200), 1.0))]
-        assert max(errors) <= Fraction(float(most))
-        assert most <= float(fmt.unit_roundoff) * size * (1 + 1e-12)
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import ctx
 from scipy import signal
 
 from gpbnb import FloatFormat, LinearSystem, limits, required_precision
-from gpbnb.bounds import linear
 from gpbnb.bounds.check import prove
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule
@@ -53,26 +51,6 @@ def test_a_peak_gain_counts_the_growth_before_a_power_contracts() -> None:
     assert F(7, 8) <= F(found.high[0, 0]) < F(7, 8) * (1 + F(1, 2**48))
     assert F(found.low[1, 0]) <= exactly <= F(found.high[1, 0]) < exactly * (1 + F(1, 2**39))
     assert found.low[1, 0] >= float(exactly) * (1 - 2.0**-48)
-
-
-def test_the_rest_of_a_geometric_sum_is_exact() -> None:
-    """After L terms of the sum of r**l, the bound of later terms is r**L / (1 - r), which is their sum."""
-    r = F(999, 1000)
-    before, ctx.prec = ctx.prec, 256
-    try:
-        sums = linear._Sums([[r]], [[F(3)]], [[F(2)]], [[F(-5)]])
-        sums.add(sums.length)
-        left = 3 * r**sums.length / (1 - r)
-        rest = sums.rest()
-        assert rest is not None
-        for (found,), exactly in zip(rest, (left, 2 * left), strict=True):
-            assert float(found.mid()) == pytest.approx(float(exactly), rel=1e-15, abs=0)
-        sums.add(sums.length)  # the next block begins where the first has ended
-        assert sums.count == 2 * sums.length
-        expected = [3 * (1 - r**sums.count) / (1 - r), 5 + 6 * (1 - r**sums.count) / (1 - r)]
-        assert [float(each[0]) for each in sums._sums] == pytest.approx(list(map(float, expected)), rel=1e-15, abs=0)
-    finally:
-        ctx.prec = before
 
 
 @pytest.mark.parametrize("terms", [1, 2, 255, 256, 257, 700, 1281])

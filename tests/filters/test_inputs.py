@@ -100,16 +100,6 @@ def test_answers_with_inputs(basis):
     assert answer.ratio <= 1 < dict(answer.tried)[answer.digits - 1]
 
 
-def test_an_offset_of_the_states_is_an_input_of_one():
-    by_offset = LinearModel(**CART, b=["0.1", "-0.2"])
-    by_input = LinearModel(**CART, B=[["0.1"], ["-0.2"]], u=[1])
-    z = simulated_measurements(by_offset, 50)
-    assert np.array_equal(z, simulated_measurements(by_input, 50))
-    for fmt in (FloatFormat(2, 12), FloatFormat(10, 5)):
-        a, b = (emulate(each, z, fmt).state for each in (by_offset, by_input))
-        assert np.array_equal(a, b)
-
-
 def test_functions_of_the_step_are_cycles():
     def transition(k):
         return [[1, Fraction(k, 100)], [0, Fraction(9, 10)]]
@@ -121,21 +111,6 @@ def test_functions_of_the_step_are_cycles():
     for basis in ("emulation", "bound"):
         a, b = (required_precision(each, z, 1e-2, basis=basis).tried for each in (varying, cycle))
         assert a == b
-
-
-def test_square_roots_survive_where_the_innovation_form_loses_its_variance():
-    """A sensor far more precise than the prior: the classic case for square roots."""
-    precise = LinearModel(
-        Phi=[[1, "0.1"], [0, 1]],
-        H=[[1, "0.5"]],
-        Q=[["1/30000", "1/2000"], ["1/2000", "1/100"]],
-        R=[["1e-12"]],
-        x0=[0, 0],
-        P0=[["1e4", 0], [0, "1e4"]],
-    )
-    z = simulated_measurements(precise, 30)
-    needed = {form: required_precision(precise, z, 0.1, form=form) for form in ("innovation", "Carlson")}
-    assert needed["Carlson"].digits < needed["innovation"].digits
 
 
 def test_inputs_are_refused_where_they_would_be_ignored():

@@ -7,18 +7,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from scipy import signal
 
 from gpbnb import required_precision
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, limits
-from gpbnb.bounds.linear import peak_gain
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.system import LinearSystem, is_stable
 
-BUTTERWORTH = LinearSystem(*signal.tf2ss(*signal.butter(4, 0.05)), name="Butterworth")
 SMALL = LinearSystem([["0.9", "0.2"], [0, "-0.5"]], [["0.1"], [1]], [[1, "0.3"]], [["0.25"]])
 U = np.random.default_rng(3).uniform(-1, 1, (80, 1))
 
@@ -65,18 +62,6 @@ def test_probable_errors_are_three_standard_deviations():
     )
     ratios = dict(required_precision(system, 1, 1e-3, basis="probable", within=limits(measurement=1)).tried)
     assert ratios[12] == pytest.approx((3 * probable_error(found)[1] + 2 * 2**-13) / 1e-3, rel=1e-3)
-
-
-def test_a_peak_gain_of_a_filter_in_companion_form_is_found():
-    """Its entries are near 6: balls grow beyond all bounds at 256 bits, and their ends once compared as if narrow."""
-    gain = peak_gain(BUTTERWORTH.A, BUTTERWORTH.B, BUTTERWORTH.C, BUTTERWORTH.D)
-    response = signal.dimpulse((*(each.astype(float) for each in vars_of(BUTTERWORTH)), 1), n=2000)[1][0][:, 0]
-    assert gain.low[0, 0] <= np.abs(response).sum() * (1 + 1e-9)
-    assert gain.high[0, 0] == pytest.approx(np.abs(response).sum(), rel=1e-6)
-
-
-def vars_of(system):
-    return system.A, system.B, system.C, system.D
 
 
 @pytest.mark.parametrize(

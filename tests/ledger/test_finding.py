@@ -35,19 +35,6 @@ def test_verdict_must_fit_agreement():
                     Finding("$1$", agrees, verdict, "see (20)")
 
 
-@pytest.mark.parametrize("otherwise", [Verdict.MISPRINT, Verdict.WRONG, Verdict.INCONSISTENT, Verdict.OCR])
-def test_compare(otherwise):
-    assert compare(True, "4", otherwise, "n") == Finding("4", True, Verdict.VERIFIED, "n")
-    assert compare(False, "4", otherwise, "n") == Finding("4", False, otherwise, "n")
-    assert compare(True, "4", otherwise, "n", "no").note == "n"
-    assert compare(False, "4", otherwise, "n", "no").note == "no"
-    assert compare(False, "4", otherwise, "n", "").note == ""
-
-
-def test_compare_calls_a_disagreement_wrong_unless_told():
-    assert compare(False, "4").verdict is Verdict.WRONG
-
-
 def test_only_a_disagreement_has_a_root_error():
     assert compare(False, "4", root="product").root == "product"
     assert compare(True, "4", root="product").root == ""

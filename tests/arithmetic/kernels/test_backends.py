@@ -1,4 +1,4 @@
-"""FloatArrays beyond their compiled backend, and between the two: the digits are those of the exact kernel."""
+"""Which backend holds a format; beyond a backend and between two, the digits are those of the exact kernel."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gpbnb import BFLOAT16
+from gpbnb.arithmetic import named
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, TwoWords, backend
+from gpbnb.arithmetic.kernels.tags import Free, Hardware32, Hardware64, Limited
 from gpbnb.arithmetic.rounding import Rounding, Rules
 
 OPERATIONS = [operator.add, operator.sub, operator.mul, operator.truediv]
@@ -111,3 +115,117 @@ def test_numbers_of_usual_size_stay_on_the_compiled_backend(base: int, precision
         assert found[0].shape == (3,)
     for name in ("add", "multiply"):
         assert fmt.backend.fold(name, x.components) is not None
+
+
+FORMATS = {
+    "binary128": named.BINARY128,
+    "54 bits": FloatFormat(2, 54),
+    "64 bits, up": FloatFormat(2, 64, "up"),
+    "53 bits, saturating": FloatFormat(2, 53, emin=-200, emax=200, overflow="saturate"),
+    "24 bits, far": FloatFormat(2, 24, "even", emin=-16382, emax=16383),
+    "IBM, 14 digits": named.IBM_HEX64,
+    "decimal128": named.DECIMAL128,
+    "19 digits, odd": FloatFormat(10, 19, "odd"),
+    "Q16.40": FixedFormat(16, 40),
+    "Q0.63": FixedFormat(0, 63, "even", overflow="saturate"),
+}
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_the_format_is_stored_in_two_words(name: str) -> None:
+    assert isinstance(FORMATS[name].backend, TwoWords)
+
+
+def values(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    far = rng.standard_normal(40) * 10.0 ** rng.integers(-40, 40, 40)
+    few = rng.integers(-99, 99, 40) / 2.0 ** rng.integers(0, 40, 40)
+    return np.concatenate([far, few, rng.uniform(-1, 1, 100), [0.0, 5e-324, 0.1, -(2.0**-60), 2.0**53 + 2, 1e22, 1e23]])
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_float64_is_rounded_like_its_fraction(name: str) -> None:
+    fmt: Any = FORMATS[name]
+    x = values(3)
+    if isinstance(fmt, FixedFormat):
+        x = x[np.abs(x) < 0.99]
+    if fmt.limits is not None:
+        x = x[(x == 0) | (np.abs(x) > 1e-70) & (np.abs(x) < 1e70)]
+    expected = fmt.array([Fraction(value) for value in x.tolist()])
+    assert np.all(fmt.array(x) == expected)
+    whole = np.array([0, 1, -1, 2**62 + 1, -(2**63) + 1]) if not isinstance(fmt, FixedFormat) else np.array([0])
+    assert np.all(fmt.array(whole) == fmt.array(whole.tolist()))
+
+
+NARROW = {
+    "binary32": named.BINARY32,
+    "binary64": named.BINARY64,
+    "24 bits": FloatFormat(2, 24),
+    "6 hexadecimal": FloatFormat(16, 6, "chop"),
+    "Q7.8": FixedFormat(7, 8, "down"),
+    "8 digits": FloatFormat(10, 8),
+    "17 digits": FloatFormat(10, 17, "chop"),
+    "decimal64": named.DECIMAL64,
+}
+ALL = FORMATS | NARROW
+
+
+@pytest.mark.parametrize("source", ALL)
+def test_conversion_between_formats_rounds_once(source: str) -> None:
+    tiny = [Fraction(1, 10**9), Fraction(3, 10**25)] if not isinstance(ALL[source], FixedFormat) else []
+    halves = [Fraction(2 * n + 1, 2**k) for k in (9, 25, 54) for n in (0, 6)]
+    x = ALL[source].array([*(Fraction(n, 97) for n in range(-96, 97, 5)), *tiny, *halves])
+    for target in ALL.keys() - {source}:
+        found, expected = ALL[target].array(x), ALL[target].array(x.to_fractions())
+        assert np.all(found == expected), target
+        assert found.backend is expected.backend, target
+        if type(x.backend) is not type(found.backend) or ALL[source].base != ALL[target].base:
+            assert ALL[target].backend.from_backend(x.backend, x.components) is not None, target
+
+
+@pytest.mark.parametrize("name", ["binary128", "decimal128", "Q16.40", "binary32", "17 digits", "6 hexadecimal"])
+def test_sorting_orders_like_fractions_and_keeps_the_order_of_equal_entries(name: str) -> None:
+    fmt = ALL[name]
+    rng = np.random.default_rng(8)
+    step = fmt.unit_roundoff / 2 if isinstance(fmt, FloatFormat) else Fraction(1, 2**40)
+    near = [Fraction(1, 2) + k * step for k in range(5)]
+    numbers = [*near, Fraction(0), *(Fraction(int(n), 8) for n in rng.integers(-40, 40, 31)), *(-x for x in near)]
+    x = fmt.array([numbers[i] for i in rng.permutation(len(numbers))]).reshape(6, 7)
+    fractions = x.to_fractions()
+    for axis in (0, 1, -1, None):
+        assert np.array_equal(np.argsort(x, axis=axis), np.argsort(fractions, axis=axis, kind="stable"))
+
+
+PRODUCTS = {
+    "bfloat16": BFLOAT16,
+    "24 bits, even": FloatFormat(2, 24, "even"),
+    "24 bits, even, flushed": FloatFormat(2, 24, "even", emin=-100, emax=100, subnormal=False),
+    "24 bits, even, small": FloatFormat(2, 24, "even", emin=-40, emax=40),
+    "53 bits, even": FloatFormat(2, 53, "even"),
+    "53 bits, even, small": FloatFormat(2, 53, "even", emin=-100, emax=100),
+}
+
+
+def chosen(name: str, scale: float) -> Any:
+    """The tag with which a product of two matrices is computed."""
+    a = PRODUCTS[name].array(scale * np.random.default_rng(1).uniform(0.5, 1, (30, 30)))
+    assert isinstance(a.backend, Compiled)
+    return a.backend._product_tag(a.components[0], a.components[0])
+
+
+def test_products_without_range_checks_are_those_that_cannot_leave_the_range() -> None:
+    assert isinstance(chosen("bfloat16", 1.0), Free)
+    assert isinstance(chosen("bfloat16", 2.0**61.5), Limited)
+    assert chosen("24 bits, even", 1.0) == Free(Hardware32())
+    assert isinstance(chosen("24 bits, even", 2.0**-60).tag, Limited)
+    assert isinstance(chosen("24 bits, even", 2.0**-475), Limited)
+    assert isinstance(chosen("24 bits, even, flushed", 2.0**-48), Limited)
+    assert isinstance(chosen("24 bits, even, small", 2.0**-10).tag, Limited)
+    assert chosen("53 bits, even", 1.0) == Free(Hardware64())
+    assert isinstance(chosen("53 bits, even, small", 2.0**-30), Limited)
+
+
+def test_a_product_without_range_checks_has_the_digits_of_the_exact_backend() -> None:
+    a = PRODUCTS["24 bits, even"].array(np.random.default_rng(1).uniform(0.5, 1, (30, 30)))
+    exact = a.on_exact_backend()
+    assert all(map(np.array_equal, (a @ a).to_pairs(), (exact @ exact).to_pairs()))
