@@ -6,8 +6,13 @@ of this package does not cover, is listed with the reason.
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
@@ -53,93 +58,37 @@ def lead_lag() -> LinearSystem:
     return LinearSystem.from_filter(LinearFilter(program, exact(["0.499", "-0.05", 1, "0.010", 1, 0]), "lead-lag"))
 
 
-_FPBENCH = "FPBench, benchmarks"
+def _fixif() -> float:
+    """Return the largest of the error coefficients for which FixIF prints numbers."""
+    given = fixif_longitudinal()
+    ours = error_coefficients(given["A"], given["B"], given["C"], given["D"], given["input_bound"])
+    return float(ours[int(np.argmax(given["published_E"]))])
 
-NOT_COMPARABLE = (
-    PublishedNumber(
-        "PID and odometry loops",
-        "rounding error",
-        "no error is printed; the PID loop starts from a given state, where our bounds start from rest, and the "
-        "odometry loop multiplies states",
-        f"{_FPBENCH}: salsa.fpcore, PID and Odometry",
-    ),
-    PublishedNumber(
-        "filter x ← 3x/4 - y/8",
-        "rounding error",
-        "no error is printed; the loop has no input and starts from a given state",
-        f"{_FPBENCH}: apron.fpcore, Filter",
-    ),
-    PublishedNumber(
-        "filters of Roux",
-        "rounding error",
-        "we found his proofs in Coq, but no filter with its printed number",
-        "Roux, Application: Impact of floating-point rounding errors on a Lyapunov stability proof",
-    ),
-    PublishedNumber(
-        "filters of FixIF 2015",
-        "worst-case peak gain",
-        "the examples use random filters or binary files, and the repository contains no printed results",
-        "fixif/examples, TC2018",
-    ),
-    PublishedNumber(
-        "Kalman filters of VerFilter",
-        "probability that a variance is not positive",
-        "the repository has the program, but neither a model nor a number",
-        "VerFilter, by A. Evangelidis",
-    ),
-)
-"""Programs of which no printed error can be compared with a bound of ours."""
+
+def _largest_output(system: LinearSystem) -> float:
+    return float(peak_gain(system.A, system.B, system.C, system.D).high[0, 0])
+
+
+OURS: dict[str, Callable[[], float]] = {
+    "tree": lambda: float(output_errors(LinearSystem.sum(1024, "tree"), DOUBLE, 1.0)[0]),
+    "second-order output": lambda: _largest_output(second_order_filter()),
+    "second-order rounding": lambda: float(output_errors(second_order_filter(), DOUBLE, 1.0)[0]),
+    "FixIF": _fixif,
+    "lead-lag": lambda: float(output_errors(lead_lag(), SINGLE, 1.0)[0]),
+}
+"""Our numbers, by their names in ``published.csv``."""
 
 
 @cache
 def rows() -> tuple[PublishedNumber, ...]:
     """Return the rows of the table."""
-    given, second = fixif_longitudinal(), second_order_filter()
-    coefficients = given["published_E"]
-    most = coefficients.index(max(coefficients))
-    ours = error_coefficients(given["A"], given["B"], given["C"], given["D"], given["input_bound"])
-    return (
+    with Path(__file__).with_name("published.csv").open(encoding="utf-8", newline="") as file:
+        lines = list(csv.reader(file))[1:]
+    return tuple(
         PublishedNumber(
-            "sum of 1024 numbers within 1, as a tree",
-            "rounding error, binary64",
-            "SATIRE charges a unit roundoff for storing a number; storing a number within 1 costs at most half of that",
-            "Satire, README.md, Reduction_1024",
-            1.2505552149377763e-12,
-            float(output_errors(LinearSystem.sum(1024, "tree"), DOUBLE, 1.0)[0]),
-        ),
-        PublishedNumber(
-            "second-order filter of Fluctuat, inputs within 1, from rest",
-            "largest output, exact",
-            "Pilat finds an invariant ellipse; a peak gain is exact",
-            "Frama-C, plug-in Pilat, a test with the option -pilat-degree 2",
-            8.70578,
-            float(peak_gain(second.A, second.B, second.C, second.D).high[0, 0]),
-        ),
-        PublishedNumber(
-            "second-order filter of Fluctuat, inputs within 1, from rest",
-            "rounding for ever, binary64",
-            "the example prints no number",
-            "Fluctuat, example of a second-order filter with DBETWEEN(-1.0, 1.0)",
-            None,
-            float(output_errors(second, DOUBLE, 1.0)[0]),
-        ),
-        PublishedNumber(
-            "aircraft's longitudinal controller",
-            f"FixIF's coefficient of state {most + 1}",
-            "all eleven coefficients agree in each printed digit",
-            "fixif/examples, ARITH26 (2019)",
-            coefficients[most],
-            float(ours[most]),
-        ),
-        PublishedNumber(
-            "lead-lag controller, deviation clamped to 1",
-            "rounding for ever, binary32",
-            "FPBench has the program and its inputs, but no error",
-            f"{_FPBENCH}: salsa.fpcore, Lead-lag System",
-            None,
-            float(output_errors(lead_lag(), SINGLE, 1.0)[0]),
-        ),
-        *NOT_COMPARABLE,
+            program, quantity, note, source, float(published) if published else None, OURS[ours]() if ours else None
+        )
+        for program, quantity, note, source, published, ours in lines
     )
 
 

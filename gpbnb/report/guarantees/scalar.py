@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,14 +57,12 @@ class Worst:
     ----------
     error : the largest error that is reached, at `step`.
     later : largest amount by which any later error exceeds it.
-    z : (step,), measurements that lead to this error.
     history : (steps,), the largest error after each step.
     """
 
     error: float
     step: int
     later: float
-    z: NDArray[np.float64]
     history: NDArray[np.float64]
 
 
@@ -119,15 +117,12 @@ def worst_error(given: ScalarFilter) -> Worst | None:
     high, low = np.full(len(s), -np.inf), np.full(len(s), np.inf)
     high[zero] = low[zero] = 0.0
     tables: dict[float, NDArray[np.int64]] = {}
-    steps: list[tuple[NDArray[np.float64], NDArray[np.float64], float, float, NDArray[np.int64]]] = []
     best, at, late, history = 0.0, 0, 0, list[float]()
     before: tuple[float, float, float] | None = None
     for k, (F, gain) in zip(range(LONGEST), exact_gains(stored), strict=False):
         if K[k] not in tables:
             tables[K[k]] = following(given, stored, float(K[k]), s, z)
-        table = tables[K[k]]
-        steps.append((high, low, F, gain, table))
-        new_high, new_low = _advanced(high, low, F, gain, table, s, z)
+        new_high, new_low = _advanced(high, low, F, gain, tables[K[k]], s, z)
         worst = max(float(new_high.max()), -float(new_low.min()))
         history.append(worst)
         if worst > best:
@@ -141,8 +136,7 @@ def worst_error(given: ScalarFilter) -> Worst | None:
             change = max(each.max() for each in moved)
             later = float(change) / (1 - abs(F))
             if later <= CONVERGED * best and (K[k:] == K[k]).all():
-                z_worst = _measurements(steps[:at], s, z) if at else np.zeros(0)
-                return Worst(best, at, later, z_worst, np.array(history))
+                return Worst(best, at, later, np.array(history))
         high, low = new_high, new_low
     return None
 
@@ -187,27 +181,6 @@ def _advanced(
     np.maximum.at(new_high, to, rest + F * largest[known, None])
     np.minimum.at(new_low, to, rest + F * least[known, None])
     return new_high, new_low
-
-
-def _measurements(
-    steps: Sequence[tuple[Any, ...]], s: NDArray[np.float64], z: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Trace back the measurements that lead to the largest error after the last of the steps."""
-    high, low, F, gain, table = steps[-1]
-    last_high, last_low = _advanced(high, low, F, gain, table, s, z)
-    upward = bool(last_high.max() >= -last_low.min())
-    state = int(last_high.argmax() if upward else last_low.argmin())
-    chosen = np.zeros(len(steps))
-    for k in range(len(steps) - 1, -1, -1):
-        high, low, F, gain, table = steps[k]
-        known = np.flatnonzero(np.isfinite(high))
-        before_upward = upward if F >= 0 else not upward
-        e = (high if before_upward else low)[known, None]
-        values = s[state] - F * s[known, None] - gain * z[None, :] + F * e
-        values = np.where(table[known] == state, values if upward else -values, -np.inf)
-        i, j = np.unravel_index(values.argmax(), values.shape)
-        chosen[k], state, upward = z[j], int(known[i]), before_upward
-    return chosen
 
 
 # -- the stored table -------------------------------------------------------------------------------------------------
