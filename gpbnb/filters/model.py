@@ -507,6 +507,12 @@ def stored_measurements(z: Any, fmt: FloatFormat | FixedFormat | BlockFormats) -
         raise OverflowError(f"measurements: {error}") from None
 
 
+def in_columns(z: Any, m: int) -> Any:
+    """Return numbers (steps, m), which may be given as (steps,) if m = 1."""
+    given = z if hasattr(z, "to_fractions") or isinstance(z, np.ma.MaskedArray) else real_numbers(z)
+    return given.reshape(-1, 1) if m == 1 and given.ndim == 1 else given
+
+
 def real_numbers(values: Any) -> NDArray[Any]:
     """Return measurements as an array of float64 or whole numbers, or of Fractions if those cannot hold them."""
     if np.ma.is_masked(values):

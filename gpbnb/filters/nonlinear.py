@@ -71,10 +71,10 @@ class NonlinearModel:
 
     Parameters
     ----------
-    f : function of x (n,), or of x and u (p,), that returns the next state (n,).
+    f : function of x (n,), or of x and u (p,), that returns the next state (n,), or one number if n = 1.
     F : function with the same arguments that returns its Jacobian (n, n). If None, f is differentiated exactly; see
         :mod:`gpbnb.arithmetic.derivatives`.
-    h : function with the same arguments that returns the predicted measurement (m,).
+    h : function with the same arguments that returns the predicted measurement (m,), or one number if m = 1.
     H : function that returns its Jacobian (m, n); or None.
     Q, R, x0, P0, name, repair, state_names, measurement_names : as for ``LinearModel``; R gives the number m of
         measurements. Q and R may be cycles.
@@ -383,7 +383,7 @@ class NonlinearModel:
             return self._checked("normalize", self.normalize(x), x, (self.n,))
 
     def _checked(self, name: str, found: Any, x: FloatArray, shape: tuple[int, ...]) -> FloatArray:
-        found = _joined(found, x)
+        found = _joined([found] if shape == (1,) and getattr(found, "shape", None) == () else found, x)
         if isinstance(found, FloatArray) and found.format == x.format and found.shape == shape:
             return found
         if isinstance(found, FloatArray):

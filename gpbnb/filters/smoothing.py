@@ -41,7 +41,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import AnyForm, ArrayForm, Form
-from gpbnb.filters.model import LinearModel, identity_in
+from gpbnb.filters.model import LinearModel, identity_in, in_columns
 from gpbnb.filters.named import form_named
 from gpbnb.filters.steps import (
     StepModel,
@@ -184,7 +184,8 @@ class FixedIntervalSmoother:
     Parameters
     ----------
     model : a Kalman filter without known inputs or offsets.
-    z : (steps, m), measurements, NaN or masked if missing; they are rounded when a format stores them.
+    z : (steps, m), or (steps,) if m = 1: measurements, NaN or masked if missing; they are rounded when a format stores
+        them.
     form : "innovation" and "Joseph" compute with covariances. "square root" computes with upper triangular square
         roots, which start from exact factors of Q, R and P0; the format then stores these factors.
 
@@ -227,7 +228,7 @@ class FixedIntervalSmoother:
         form = form_named(self.form)
         if form not in SMOOTHER_FORMS:
             raise ValueError(f'got the {form} form; needed "innovation", "Joseph" or "square root" for a smoother')
-        model, filled = self.model.without_missing(self.z)
+        model, filled = self.model.without_missing(in_columns(self.z, self.model.m))
         self.model.check_measurements(filled, 0)
         if not len(filled):
             raise ValueError("got no measurements; needed one step or more")

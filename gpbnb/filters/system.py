@@ -101,17 +101,26 @@ class LinearFilter:
 
     def _stored(self, fmt: FloatFormat | FixedFormat) -> tuple[NDArray[np.bool_], FloatArray]:
         """Return which coefficients are exact, and all others in the format."""
-        unit = np.zeros(len(self.coefficients), np.bool_)
+        unit, others = np.zeros(len(self.coefficients), np.bool_), self.coefficients.copy()
         if isinstance(fmt, FixedFormat):
-            operations = self.program.operations
+            limits = self.limits_in(fmt)
             unit = abs(self.coefficients) == 1
-            unit[operations[operations[:, 0] >= AT_LEAST, 1]] = False  # limits are data
-        others = self.coefficients.copy()
+            unit[list(limits)] = False  # limits are data
+            others[list(limits)] = list(limits.values())
         others[unit] = Fraction(0)
         try:
             return unit, fmt.store(others)
         except OverflowError:
             raise self._beyond(fmt, others) from None
+
+    def limits_in(self, data: FixedFormat) -> dict[int, Fraction]:
+        """Return the coefficients that are limits; one beyond the data, as 1 in Q15, is their last number instead."""
+        found = dict[int, Fraction]()
+        for code, a, _ in self.program.operations.tolist():
+            if code >= AT_LEAST:
+                value = self.coefficients[a]
+                found[a] = max(value, data.lowest) if code == AT_LEAST else min(value, data.largest)
+        return found
 
     def packed(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
         """Return the coefficients, rounded into a format, as the compiled loops expect them."""

@@ -151,8 +151,7 @@ class IntegerProgram(NamedTuple):
 
 def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
     """Store the coefficients of a filter in words; a coefficient of 1 or -1 is exact, as nothing is multiplied."""
-    program = made.program
-    limits = {a for code, a, _ in program.operations.tolist() if code >= AT_LEAST}
+    program, limits = made.program, made.limits_in(words.data)
     stored = np.empty(len(made.coefficients), dtype=object)
     for i, value in enumerate(made.coefficients):
         fmt = words.data if i in limits else words.coefficients if words.coefficients is not None else words.data
@@ -160,6 +159,7 @@ def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
             stored[i] = value
             continue
         try:
+            value = limits.get(i, value)
             stored[i] = FloatFormat(2, fmt).round(value) if isinstance(fmt, int) else fmt.strict.round(value)
         except OverflowError:
             name = program.coefficient_names[i] if program.coefficient_names else f"coefficient {i}"

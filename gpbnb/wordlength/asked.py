@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_named
 from gpbnb.bounds.gains import check_deterministic
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.blocks import BlockFormats
@@ -95,6 +96,19 @@ def tolerances_of(tolerance: Any, count: int, what: str) -> NDArray[np.float64]:
     if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
         raise ValueError(f"got tolerance {tolerance}; {needed}")
     return np.broadcast_to(tolerances, (count,))
+
+
+def checked_format(fmt: Any, *more: type) -> Any:
+    """Return a format, or that of a name; classes of formats beside FloatFormat and FixedFormat may be allowed, too."""
+    found = format_named(fmt)
+    if not isinstance(found, (FloatFormat, FixedFormat, *more)):
+        others = "".join(f"{each.__name__}, " for each in more)
+        why = "; an answer that is not met has no format" if fmt is None else ""
+        raise TypeError(
+            f'got the format {fmt!r}; needed a FloatFormat, a FixedFormat, {others}or a name such as "float32" or '
+            f'"Q3.12"{why}'
+        )
+    return found
 
 
 def exactly(number: Any) -> Any:

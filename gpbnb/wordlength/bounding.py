@@ -22,6 +22,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
+from gpbnb.wordlength.asked import checked_format
 from gpbnb.wordlength.judges import largest_inputs
 from gpbnb.wordlength.models import ModelSource
 from gpbnb.wordlength.tasks import admitted
@@ -60,14 +61,12 @@ def guarantee(
     within 6.2e-06 for ever, in 24 bits, ties to even, exponents -126 to 127
     """
     given = admitted(model, "have a guarantee", "" if form is None else "have a form")
-    named: Any = format_named(fmt)
+    named = checked_format(fmt, WordFormats)
     horizon = whole_number("horizon", horizon)
     if isinstance(given, LinearModel):
         return of_filters.guarantee(given, named, within, form or Form.INNOVATION, most, horizon)
     if most is not None:
         raise ValueError(f"got most={most} for {given.name}; needed none: only the gain of a Kalman filter settles")
-    if not isinstance(named, (FloatFormat, FixedFormat, WordFormats)):
-        raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat, WordFormats, or a name")
     return _of_system(given, named, largest_inputs(given, within), horizon)
 
 

@@ -22,13 +22,11 @@ from gpbnb.arithmetic.array import NegativeRootError
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, BINARY64, format_named, format_text, rounding_text
+from gpbnb.arithmetic.named import BINARY32, BINARY64, format_text, rounding_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.bounds.guarantee import guarantee, sized_limits
+from gpbnb.bounds.guarantee import sized_limits
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.bounds.system import output_errors
-from gpbnb.bounds.words import WordGuarantee
 from gpbnb.files import replace_file
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, AnyForm, Form, plain_name
@@ -46,6 +44,8 @@ from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.steps import HUNG_FORMS
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, integer_program
+from gpbnb.wordlength.asked import checked_format
+from gpbnb.wordlength.bounding import guarantee
 from gpbnb.wordlength.c_files import Sections, Vectors, refuse_others, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeSource, CodeStep, checked_identifier, word_arithmetic
 from gpbnb.wordlength.emulation import longest
@@ -78,7 +78,7 @@ class Prepared(NamedTuple):
     structure : its structure or form.
     emulate : function that returns the vectors for inputs, (steps, m), in a format.
     inputs : function that returns inputs for a number of steps.
-    bound : function that returns what is proven about the errors, in words, for limits, if anything can be.
+    bounded, form : the linear model whose errors can be bounded, and its form; None if nothing bounds them.
     sections : those of a cascade, as stored; else empty.
     """
 
@@ -88,7 +88,8 @@ class Prepared(NamedTuple):
     structure: str
     emulate: Callable[[Any, Any], Vectors]
     inputs: Callable[[int], NDArray[np.float64]]
-    bound: Callable[[FilterLimits], str] = lambda within: ""
+    bounded: LinearModel | LinearSystem | None = None
+    form: Form | None = None
     sections: Sections = ()
 
 
@@ -153,7 +154,7 @@ def write_code(
     filter.h filter.c test_filter.c filter_vectors.txt Makefile
     """
     given, target = admitted(model, "be written in C"), Path(folder)
-    chosen: Any = format_named(fmt)
+    chosen = checked_format(fmt, WordFormats)
     checked_identifier(name)
     if not overwrite:
         refuse_others(target, name)
@@ -162,16 +163,15 @@ def write_code(
     found = prepared(given, chosen, form, exact)
     data = data_of(given, VECTORS if inputs is None else inputs)
     z = found.inputs(data.steps) if data.z is None else data.z
-    bounded = not isinstance(given, NonlinearSystem | NonlinearModel)
-    if within is not None and not bounded:
+    if within is not None and found.bounded is None:
         raise ValueError(f"got limits for {given.name}; needed none: functions of your own have no bound")
     vectors = found.emulate(z, chosen)
     near = None if found.step.is_exact else _tolerances(found, z, chosen, vectors)
-    bound = found.bound(within) if within is not None else ""
+    bound = "" if within is None or found.bounded is None else _bound(found.bounded, found.form, chosen, within)
     what = ", ".join(dict.fromkeys(each for each in (found.title, found.structure) if each))
     source = CodeSource(found.step, found.arithmetic, name)
     text = f"{what}, in {format_words(chosen)}"
-    files = written_files(source, text, bound, bounded, found.sections, vectors, near)
+    files = written_files(source, text, bound, found.bounded is not None, found.sections, vectors, near)
     target.mkdir(parents=True, exist_ok=True)
     for file, text in files.items():
         replace_file(target / file, text.encode())
@@ -185,14 +185,34 @@ def _tolerances(found: Prepared, z: Any, fmt: FloatFormat, vectors: Vectors) -> 
     return 4 * np.max([np.abs(each[:steps] - vectors.states[:steps]).max(axis=0) for each in moved], axis=0)
 
 
+def _bound(model: LinearModel | LinearSystem, form: Form | None, fmt: AnyFormat, within: FilterLimits) -> str:
+    """Return in words what is proved about the errors within limits."""
+    if isinstance(model, LinearSystem):
+        most = ", ".join(f"{each:.6g}" for each in largest_inputs(model, within).tolist())
+        proved = f"For inputs of at most {most} in size, each output stays within {{}} of that of the exact filter, "
+        proved += "whose coefficients are not rounded, {}."
+    else:
+        sized_limits(within, model.n, model.m, model.x0)
+        proved = (
+            "Within the given limits on state, innovation and measurement, rounding moves the estimates by at most "
+        )
+        proved += "{}, {}."
+    try:
+        guaranteed = guarantee(model, fmt, within, form=form)
+    except (ValueError, OverflowError) as error:
+        return f"No bound: {error}"
+    if guaranteed.steps == 0:
+        return f"No bound: {guaranteed.why}"
+    time = "for ever" if guaranteed.for_ever else f"for {guaranteed.steps} steps, since {guaranteed.why}"
+    return proved.format(", ".join(f"{each:.3g}" for each in guaranteed.bound.tolist()), time)
+
+
 def prepared(given: Filter, fmt: AnyFormat, form: AnyForm | str | None, exact: bool = True) -> Prepared:
     """Return a filter with what is needed to write its code; for the arguments, see :func:`write_code`."""
     if isinstance(fmt, FloatFormat):
         _type_of(fmt)
-    elif isinstance(fmt, (FixedFormat, WordFormats)):
-        _words(fmt)
     else:
-        raise TypeError(f"got the format {fmt!r}; needed BINARY32, BINARY64, a FixedFormat or WordFormats")
+        _words(fmt)
     if isinstance(given, LinearModel):
         if isinstance(form, str) and plain_name(form) == plain_name(CONSTANT_GAIN):
             found = _of_system(settled_filter(given), fmt, CONSTANT_GAIN)
@@ -294,24 +314,8 @@ def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared
         exactly = np.zeros((0, len(start))) if pairs is None else exact(pairs[..., 0]) + exact(pairs[..., 1])
         return _ended(inputs, start, _stored(data.array(exactly), data), np.zeros(done, np.int64))
 
-    def bound(within: FilterLimits) -> str:
-        most = largest_inputs(system, within)
-        try:
-            if isinstance(fmt, FloatFormat):
-                found = output_errors(system, fmt, most)
-            else:
-                found = WordGuarantee(system, most).errors(_words(fmt))
-        except (ValueError, OverflowError) as error:
-            return f"No bound: {error}"
-        largest = ", ".join(f"{each:.6g}" for each in most.tolist())
-        errors = ", ".join(f"{each:.3g}" for each in found.tolist())
-        return (
-            f"For inputs of at most {largest} in size, each output stays within {errors} of that of the exact filter, "
-            "whose coefficients are not rounded, for ever."
-        )
-
     return Prepared(
-        step, _arithmetic(step, fmt), system.name, structure, emulated, _noise(fmt, system.m), bound, sections
+        step, _arithmetic(step, fmt), system.name, structure, emulated, _noise(fmt, system.m), system, sections=sections
     )
 
 
@@ -425,19 +429,6 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
     start = _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), chosen)[0]
     step = CodeStep(without_exact(program, stored), stored, start)
 
-    def bound(within: FilterLimits) -> str:
-        sized_limits(within, model.n, model.m, model.x0)
-        try:
-            found = guarantee(model, fmt, within, chosen)
-        except (ValueError, OverflowError) as error:
-            return f"No bound: {error}"
-        time = "for ever" if found.for_ever else f"for {found.steps} steps, since {found.why}"
-        errors = ", ".join(f"{each:.3g}" for each in found.bound.tolist())
-        return (
-            f"Within the given limits on state, innovation and measurement, rounding moves the estimates by at most "
-            f"{errors}, {time}."
-        )
-
     return Prepared(
         step,
         _arithmetic(step, fmt),
@@ -445,7 +436,8 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepar
         f"{chosen} form" + (_WITH_INPUTS if p else ""),
         lambda z, fmt: _model_vectors(model, z, fmt, chosen),
         lambda steps: simulated_measurements(model, min(steps, model.steps or steps)),
-        bound,
+        bounded=model,
+        form=chosen,
     )
 
 

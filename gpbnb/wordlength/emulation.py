@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import format_named
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.blocks import BlockFormats
@@ -27,7 +25,7 @@ from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, first_integers, integer_program
 from gpbnb.wordlength.answer import format_in_words
-from gpbnb.wordlength.asked import AnyFormat, Data, Function
+from gpbnb.wordlength.asked import AnyFormat, Data, Function, checked_format
 from gpbnb.wordlength.functions import STOPS, exact_outputs, outputs_of
 from gpbnb.wordlength.judges import judge_of_function, measured, system_pairs
 from gpbnb.wordlength.models import ModelSource
@@ -111,12 +109,7 @@ def emulate(
     >>> run.y.to_float().ravel().tolist(), run
     ([0.125, 0.25, 0.375], 8-bit fixed point (4 fraction bits), 3 steps: largest error of each output 0.045)
     """
-    fmt = format_named(fmt)
-    if not isinstance(fmt, (FloatFormat, FixedFormat, WordFormats, BlockFormats)):
-        raise TypeError(
-            f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat, WordFormats, BlockFormats, or a name as "
-            '"float32" or "Q3.12"'
-        )
+    fmt = checked_format(fmt, WordFormats, BlockFormats)
     if reference not in ("given", "stored"):
         raise ValueError(f'got reference {reference!r}; needed "given" or "stored"')
     words = "have formats for data, coefficients and sums" if isinstance(fmt, WordFormats) else ""

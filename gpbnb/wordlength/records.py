@@ -14,7 +14,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import format_named, format_text
+from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.search import Outcome, least_from_which_on
 from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
@@ -22,7 +22,7 @@ from gpbnb.filters.named import form_named, whole_number
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.answer import Basis
-from gpbnb.wordlength.asked import Asked, Data, Function, checked_basis, tolerances_of
+from gpbnb.wordlength.asked import Asked, Data, Function, checked_basis, checked_format, tolerances_of
 from gpbnb.wordlength.judges import judge_for
 from gpbnb.wordlength.models import ModelSource
 from gpbnb.wordlength.tasks import MOST_STEPS, TASK_OF_BASIS, admitted, data_of
@@ -133,13 +133,11 @@ def survey_records(
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a record')
     if isinstance(formats, str) or not isinstance(formats, Iterable):
         raise TypeError(f"got formats {formats!r}; needed a list of formats or names")
-    chosen_formats = tuple(map(format_named, formats))
+    chosen_formats = tuple(map(checked_format, formats))
     if not chosen_formats or len(set(chosen_formats)) != len(chosen_formats):
         count, different = len(chosen_formats), len(set(chosen_formats))
         raise ValueError(f"got {count} formats, {different} different; needed different ones, at least one")
     for fmt in chosen_formats:
-        if not isinstance(fmt, (FloatFormat, FixedFormat)):
-            raise TypeError(f"got {fmt!r}; needed a FloatFormat, a FixedFormat, or a name")
         if isinstance(given, LinearModel | LinearSystem):
             fmt.check_compiled()
     if isinstance(given, LinearModel | NonlinearModel):

@@ -26,7 +26,7 @@ from gpbnb.filters.nonlinear_run import check_form, opened
 from gpbnb.filters.system import LinearSystem, unobserved
 from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, joined, judgement, listed, share_text
-from gpbnb.wordlength.asked import Asked, Function, checked_basis
+from gpbnb.wordlength.asked import Asked, Function, checked_basis, checked_format
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS, fixed_like, in_fixed_point, in_words
 from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, slowest_response
 from gpbnb.wordlength.models import ModelSource
@@ -182,7 +182,7 @@ def judge(
     within: FilterLimits | None = None,
 ) -> Requirement:
     """Judge one format; for the arguments, see :func:`required_precision`."""
-    chosen: Any = format_named(fmt)
+    chosen = checked_format(fmt, WordFormats)
     words = _TASK_IN_WORDS.get(checked_basis(basis), "") if isinstance(chosen, WordFormats) else ""
     given = admitted(model, TASK_OF_BASIS[basis], words, "" if form is None else "have a form")
     data = data_of(given, z)

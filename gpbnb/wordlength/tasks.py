@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gpbnb.filters.design import FilterDesign
-from gpbnb.filters.model import LinearModel, real_numbers
+from gpbnb.filters.model import LinearModel, in_columns
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_system import NonlinearSystem
@@ -140,7 +140,5 @@ def data_of(model: Any, z: Any, seed: int = 0) -> Data:
         )
     if simulated:
         return Data(None, whole_number("steps", z, most=MOST_STEPS), seed)
-    given = z if hasattr(z, "to_fractions") or isinstance(z, np.ma.MaskedArray) else real_numbers(z)
-    if given.ndim == 1 and getattr(model, "m", 0) == 1:
-        given = given.reshape(-1, 1)
+    given = in_columns(z, getattr(model, "m", 0))
     return Data(given, len(given))

@@ -181,7 +181,7 @@ def test_a_singular_prediction_is_refused_with_the_way_out():
         ({"form": "UD"}, ValueError, 'got the UD form; needed "innovation", "Joseph" or "square root"'),
         ({"form": "round"}, ValueError, "got form 'round'; needed one of"),
         ({"z": [[1], [2, 3]]}, ValueError, "got measurements in rows of different lengths"),
-        ({"z": [1, 2]}, ValueError, r"got measurements of shape \(2,\); needed \(steps, 1\)"),
+        ({"z": 1}, ValueError, r"got measurements of shape \(\); needed \(steps, 1\)"),
         ({"z": np.empty((0, 1))}, ValueError, "got no measurements; needed one step or more"),
         ({"z": [[math.inf]]}, ValueError, "measurements: entry 0, 0: got .*; write NaN where one is missing"),
         ({"z": [["three"]]}, ValueError, "measurements: "),

@@ -135,8 +135,8 @@ def test_the_range_is_proved_where_the_worst_input_just_fits():
 
 @pytest.mark.parametrize("fmt", [FixedFormat(0, 15), FixedFormat(3, -1), FixedFormat(0, 15, "chop", "saturate")])
 def test_one_format_for_all_numbers_runs_as_words_do(fmt: FixedFormat) -> None:
-    """Nothing is multiplied by a coefficient of 1, which need not be a number of the format; a limit must be one."""
+    """Nothing is multiplied by a coefficient of 1, which need not be a number of the format; nor need a limit."""
     made, u = LinearSystem([["0.9"]], [["0.1"]]), np.full((9, 1), 0.5)
     assert (made.outputs(u, fmt) == run_words(made, u, WordFormats(fmt)).outputs(1)).all()
-    with pytest.raises(OverflowError, match=r"from -1 to 0\.9999695"):
-        LinearSystem.pid("0.5", "0.1", limits=(-1, 1)).outputs(u, FixedFormat(0, 15))
+    limited = LinearSystem.pid("0.5", "0.1", limits=(-1, 1))
+    assert (limited.outputs(u, fmt) == run_words(limited, u, WordFormats(fmt)).outputs(2)[:, 2:]).all()

@@ -262,7 +262,9 @@ def test_a_header_states_the_bound(tmp_path):
     found = guarantee(models()["one state"], BINARY32, limits(state=9, innovation=9), form=Form.JOSEPH)
     assert f"rounding moves the estimates by at most {found.bound[0]:.3g}, for ever" in header(path)
     path = write_code(LinearSystem.pid(1, "0.1"), BINARY32, tmp_path, within=limits(measurement=1))[0]
-    assert "No bound: the system as given is not stable" in header(path)
+    assert "of the exact filter, whose coefficients are not rounded, for 1000 steps, since the system as" in header(
+        path
+    )
 
 
 def test_a_name_cannot_end_a_comment(tmp_path):

@@ -12,6 +12,7 @@ from gpbnb import (
     BINARY16,
     BINARY32,
     FixedFormat,
+    FixedIntervalSmoother,
     FloatFormat,
     LinearModel,
     LinearSystem,
@@ -106,6 +107,36 @@ def test_a_model_is_refused(given, message):
         read_model({name: each for name, each in {**entries, **given}.items() if each is not None})
 
 
+def test_one_measurement_needs_no_brackets():
+    def bearing(x):
+        return np.arctan2(x[1], x[0])
+
+    noise = {"Q": np.eye(2) / 1024, "R": [["1/1024"]], "x0": [3, 1], "P0": np.eye(2)}
+    one, row = (
+        NonlinearModel(lambda x: x, None, h, None, **noise) for h in (bearing, lambda x: np.stack([bearing(x)]))
+    )
+    z = [0.375, 0.25, 0.3125]
+    for method in ("float32", "Q3.20"):
+        assert np.array_equal(emulate(one, z, method).errors, emulate(row, z, method).errors)
+    smoothed = [FixedIntervalSmoother(WALK, z).run(BINARY32).x for z in (z, [[each] for each in z], np.array(z))]
+    assert all((each == smoothed[0]).all() for each in smoothed)
+
+
+def test_a_limit_beyond_the_data_is_their_last_number(tmp_path):
+    """A PID controller limited to ±1 runs in Q15, whose numbers end below 1."""
+    pid = LinearSystem.pid("0.4", "0.25", limits=(-1, 1))
+    words = FixedFormat(0, 15, overflow="saturate")
+    run = emulate(pid, [0.875] * 9, words)
+    assert run.y.to_fractions().max() == 1 - words.unit == 1 - run.largest.max()
+    assert emulate(pid, [-0.875] * 9, words).largest.max() < words.unit
+    with pytest.raises(OverflowError, match="got high = -2, beyond the range"):
+        emulate(LinearSystem.pid("0.4", "0.25", limits=(-3, -2)), [0.5], "Q15")
+    assert guarantee(pid, words, limits(measurement=0.0625), horizon=9).bound[0] >= words.unit
+    found = required_precision(pid, [0.25, -0.125, 0.5], 0.01, kind="fixed", like="Q15")
+    assert found.met
+    assert "high = 32767;" in write_code(pid, words, tmp_path)[1].read_text()
+
+
 def test_a_call_is_refused():
     for call, message in [
         (lambda: guarantee(None, BINARY32, limits(state=1, innovation=1)), "got a NoneType; needed the path"),
@@ -116,6 +147,7 @@ def test_a_call_is_refused():
         (lambda: survey_records(WALK, 3, 1, BINARY16, steps=5), "got formats FloatFormat.*; needed a list"),
         (lambda: survey_records(WALK, None, 1, [BINARY16]), "got records None; needed"),
         (lambda: emulate(SYSTEM, [1], 32), "got the format 32; needed a FloatFormat, a FixedFormat, WordFormats"),
+        (lambda: write_code(SYSTEM, None, "code"), "got the format None; .*; an answer that is not met has no format"),
         (lambda: emulate(SYSTEM, [1], "float33"), "got format 'float33'; needed one of BINARY16"),
         (lambda: required_precision(SYSTEM, [1], 1, like="Q3.12"), 'kind="fixed" takes a FixedFormat'),
         (lambda: required_precision(SYSTEM, [1], 1, kind="fixed", like="float32"), "needed a FixedFormat or a name"),
