@@ -61,6 +61,7 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
      "got rounding 'sideways'; needed a Rounding or one of 'nearest', 'chop'"),
     # operands
     ("mixed +", lambda: V + W, ValueError, f"got operands in {D4} and {B8}; needed one format; convert one of them"),
+    ("mixed roundings", lambda: V + FloatFormat(10, 4, CHOP).array(V), ValueError, "needed one format; convert one of"),
     ("mixed @", lambda: V @ W, ValueError, f"got operands in {D4} and {B8}; needed one format"),
     ("mixed concatenate", lambda: np.concatenate([V, W]), ValueError, "needed one format; convert one of them"),
     ("mixed solve", lambda: linalg.solve(rows(1), W[:1]), ValueError, "needed one format; convert one of them"),

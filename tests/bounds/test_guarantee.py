@@ -17,7 +17,7 @@ from gpbnb.bounds.adversary import attack, ceiling, random_errors
 from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.guess import GAIN, LOOP, gains, linear_steps, rounding_errors, value_sizes
-from gpbnb.bounds.linear import error_coefficients, peak_gain
+from gpbnb.bounds.linear import peak_gain
 from gpbnb.bounds.probable import probable_error, separate_roundings
 from gpbnb.filters.forms import Form
 from gpbnb.filters.linear_steps import LinearSteps
@@ -25,7 +25,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.run import Run
 from gpbnb.filters.system import biquad, state_space
-from gpbnb.report.guarantees.published import fixif_longitudinal, nile_local_level
+from gpbnb.report.guarantees.published import nile_local_level
 from gpbnb.report.kalman.exact_step import exact_step
 from tests.plain_program import steps_in_python
 from tests.small_filter import named_operations
@@ -217,13 +217,6 @@ def test_a_second_order_section(fmt: FloatFormat) -> None:
     found = from_schedule(filter_schedule(biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), fmt), limits(measurement=1))
     outcome = attack(found, 1000, 100)
     assert 0.3 < outcome.ratio <= 1
-
-
-def test_published_error_coefficients() -> None:
-    """All printed digits of FixIF's example."""
-    models = fixif_longitudinal()
-    found = error_coefficients(models["A"], models["B"], models["C"], models["D"], models["input_bound"])
-    assert [round(float(e), 6) for e in found] == models["published_E"]
 
 
 def test_the_probable_error_is_that_of_independent_roundings() -> None:

@@ -82,11 +82,3 @@ def test_aberration():
     assert year == pytest.approx(20.4955 * ARCSEC, rel=2e-4)
     period = 2 * math.pi * (theory.RADIUS + 640e3) / (orbit * theory.LIGHT)
     assert period == pytest.approx(97.5 * 60, rel=1e-2)
-
-
-def test_what_stands_is_turned_by_the_phase_that_is_zero_by_default():
-    case = Misalignments(gamma=(0, 1e-4, 2e-4))
-    assert theory.measured(case, False) == pytest.approx([1e-4, 2e-4], rel=1e-6)
-    assert theory.effect(case, False).angle == pytest.approx((1e-4, 2e-4), rel=1e-6)
-    assert theory.measured(case, False, phase=np.pi / 2) == pytest.approx([-2e-4, 1e-4], rel=1e-6)
-    assert theory.effect(case, False, np.pi / 2).angle == pytest.approx((-2e-4, 1e-4), rel=1e-6)

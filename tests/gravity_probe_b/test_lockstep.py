@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
@@ -21,32 +20,6 @@ STEPS, COUNT = 300, 5
 @pytest.fixture(scope="module")
 def measured():
     return np.stack([SimpleYear("absolute").simulation(record).measurements(STEPS) for record in range(COUNT)], axis=-1)
-
-
-@pytest.mark.parametrize("form", [form for form in Form if form is not Form.UD], ids=str)
-@pytest.mark.parametrize(
-    "fmt",
-    [
-        FloatFormat(2, 33, Rounding.CHOP),
-        FloatFormat(10, 8),
-        None,
-    ],
-    ids=str,
-)
-def test_every_record_gets_the_digits_of_a_run_of_its_own(fmt, form, measured):
-    told = model(MODELS[0], 10 if fmt is not None and fmt.base == 10 else 2)
-    many = Run(told, fmt, form, (), records=COUNT)
-    estimates = np.concatenate([many.carry(measured[:170], 4), many.carry(measured[170:], 4)])
-    for record in range(COUNT):
-        one = Run(told, fmt, form, (1, STEPS))
-        one.take(measured[:, :, record])
-        assert (many.x[:, record] == one.x[:, 0]).all()
-        assert (many.P == one.P).all()
-        first, last = one.checkpoints().x[:, :4].astype(float)
-        # The conversion of a decimal number has an error of one rounding.
-        np.testing.assert_allclose(estimates[[0, -1], :, record], [first, last], rtol=3e-16, atol=0)
-    assert many.steps == STEPS
-    assert len({tuple(each) for each in many.x.reshape(10, COUNT, -1)[:, :, 0].T.tolist()}) == COUNT
 
 
 def test_a_filter_that_stops_leaves_no_numbers():

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from fractions import Fraction
-from functools import cache
 
 import numpy as np
 import pytest
@@ -15,7 +12,6 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import experiment
-from tests import oracles
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FOUR = FloatFormat(10, 4)
@@ -86,118 +82,3 @@ def test_examples_as_printed():
     }
     square = experiment.example_trial(C, C, C, C)
     assert square.bounds["Examples"] == BETA * ((2 * 2 + 1) * column_sum_norm(c @ c @ c) + 8)
-
-
-# -- exhaustive: all tuples of a small format -----------------------------------------------------
-
-SMALL = [(2, 1, (-2, -1, 0, 1), 4), (2, 2, (-1, 0, 1), 3), (3, 1, (-1, 0, 1), 3), (10, 1, (0,), 3)]
-
-
-def numbers(base, precision, exponents):
-    digits = range(base ** (precision - 1), base**precision)
-    return [Fraction(0), *(s * m * Fraction(base) ** e for e in exponents for m in digits for s in (1, -1))]
-
-
-def all_sums(base, precision, exponents, n, rounding):
-    """Every tuple of n terms and its computed sum."""
-    fl = cache(oracles.floating(base, precision, rounding.value))
-    for terms in itertools.product(numbers(base, precision, exponents), repeat=n):
-        total = terms[0]
-        for term in terms[1:]:
-            total = fl(total + term)
-        yield terms, total
-
-
-@pytest.mark.parametrize(("base", "precision", "exponents", "n"), SMALL)
-def test_chopping_makes_the_first_order_sum_bounds_strict(base, precision, exponents, n):
-    beta = FloatFormat(base, precision, CHOP).unit_roundoff
-    weights = [n - 1, *range(n - 1, 0, -1)]
-    largest = Fraction(0)
-    for terms, computed in all_sums(base, precision, exponents, n, CHOP):
-        error = abs(computed - sum(terms))
-        if error:
-            bound = beta * sum(w * abs(x) for w, x in zip(weights, terms, strict=True))
-            printed = beta * ((n - 1) * abs(sum(terms)) + sum((j - 2) * abs(terms[j - 1]) for j in range(3, n + 1)))
-            assert error <= bound
-            assert error <= printed
-            largest = max(largest, error / bound)
-    assert largest > Fraction(1, 5)
-
-
-@pytest.mark.parametrize(("base", "precision", "exponents", "n"), SMALL)
-def test_equal_weights_are_strict_for_rounding_to_nearest(base, precision, exponents, n):
-    """(n - 1) β Σ|x_j| needs no second-order term (Jeannerod & Rump 2013)."""
-    beta = FloatFormat(base, precision).unit_roundoff
-    largest = Fraction(0)
-    for terms, computed in all_sums(base, precision, exponents, n, NEAREST):
-        error = abs(computed - sum(terms))
-        if error:
-            bound = (n - 1) * beta * sum(map(abs, terms))
-            assert error <= bound
-            largest = max(largest, error / bound)
-    assert largest > Fraction(1, 4)
-
-
-@pytest.mark.parametrize(
-    ("base", "precision", "exponents", "n", "largest"),
-    [
-        (2, 2, (-1, 0, 1), 3, Fraction(8, 9)),
-        (2, 1, (-3, -2, -1, 0, 1), 4, Fraction(1)),
-        (2, 1, (-3, -2), 5, Fraction(4, 3)),
-    ],
-)
-def test_18_of_1984_is_reached_with_four_terms_and_exceeded_with_five(base, precision, exponents, n, largest):
-    beta = FloatFormat(base, precision).unit_roundoff
-    ratios = []
-    for terms, computed in all_sums(base, precision, exponents, n, NEAREST):
-        if computed != sum(terms):
-            printed = (n - 1) * abs(sum(terms)) + sum((j - 2) * abs(terms[j - 1]) for j in range(3, n + 1))
-            ratios.append(abs(computed - sum(terms)) / (beta * printed))
-    assert max(ratios) == largest
-
-
-@pytest.mark.parametrize("rounding", Rounding.documented())
-@pytest.mark.parametrize(("base", "precision", "n"), [(2, 2, 4), (2, 3, 3), (3, 1, 4), (10, 1, 3)])
-def test_products_and_quotients_of_all_significands(base, precision, n, rounding):
-    """n factors, of which the last is also tried as a divisor."""
-    fmt = FloatFormat(base, precision, rounding)
-    fl = cache(oracles.floating(base, precision, rounding.value))
-    digits = range(base ** (precision - 1), base**precision)
-    strict = (1 + fmt.unit_roundoff) ** (n - 1) - 1
-    largest = Fraction(0)
-    for factors in itertools.product(map(Fraction, digits), repeat=n):
-        partial = factors[0]
-        for factor in factors[1:-1]:
-            partial = fl(partial * factor)
-        for computed, true in (
-            (fl(partial * factors[-1]), math.prod(factors)),
-            (fl(partial / factors[-1]), math.prod(factors[:-1]) / factors[-1]),
-        ):
-            error = abs(computed / true - 1)
-            assert error <= strict
-            if rounding is CHOP:
-                assert error <= (n - 1) * fmt.unit_roundoff
-            largest = max(largest, error / ((n - 1) * fmt.unit_roundoff))
-    assert largest > Fraction(1, 7)
-
-
-@pytest.mark.parametrize("rounding", Rounding.documented())
-def test_inner_products_of_all_small_vectors(rounding):
-    """(26) with chopping, and nβ|a||b| in both, over all vectors of three in two bits."""
-    fmt = FloatFormat(2, 2, rounding)
-    fl = cache(oracles.floating(2, 2, rounding.value))
-    # A product of two numbers of two bits is 4, 6 or 9 times a power of two, or zero.
-    products = [Fraction(0), *(s * p * Fraction(2) ** e for p in (4, 6, 9) for e in (-2, -1, 0) for s in (1, -1))]
-    largest = Fraction(0)
-    for terms in itertools.product(products, repeat=3):
-        total = fl(terms[0])
-        for term in terms[1:]:
-            total = fl(total + fl(term))
-        error = abs(total - sum(terms))
-        if error:
-            coarse = 3 * fmt.unit_roundoff * sum(map(abs, terms))
-            assert error <= coarse
-            if rounding is CHOP:
-                assert error <= fmt.unit_roundoff * sum(w * abs(p) for w, p in zip((3, 3, 2), terms, strict=True))
-            largest = max(largest, error / coarse)
-    assert largest > Fraction(3, 10)
