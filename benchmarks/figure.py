@@ -18,7 +18,7 @@ def draw(table: Sequence[Row], path: Path) -> None:
     for row in table:
         if row.library != "gpbnb":
             tasks.setdefault(row.task, []).append(row)
-    fig, (ax,) = figure(height=0.26 * len(tasks) + 0.9)
+    fig, (ax,) = figure(height=0.26 * len(tasks) + 0.9, width=6.4)
     ax.axvline(1.0, color=REFERENCE, lw=1)
     name(ax, "gpbnb", (1.0, -1), REFERENCE)
     names = []

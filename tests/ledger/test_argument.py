@@ -51,7 +51,7 @@ def test_the_picture_follows_the_rule_of_figures_and_shows_the_counts(rows):
     texts = [text.get_text() for text in figure.axes[0].texts]
     for topic, stage in argument.stages(rows).items():
         assert f"{argument.NAMES[topic]}\n" in "".join(texts)
-        assert any(f"{stage.statements} statements, {stage.wrong} wrong" in text for text in texts)
+        assert any(f"{stage.statements} statements,\n{stage.wrong} wrong" in text for text in texts)
     assert all(str(count) in texts for count in argument.inherited(rows).values())
     plt.close(figure)
     html = argument.chain_of_errors(rows).html

@@ -270,7 +270,7 @@ def test_paper_and_a_page_without_script_show_the_still_figure(open_page, pictur
         page.emulate_media(media="print")
         assert still.is_visible()
         assert not live.is_visible()
-        assert still.evaluate("async e => { await e.decode(); return e.naturalWidth }") > 600
+        assert still.evaluate("async e => { await e.decode(); return e.naturalWidth }") > 500
         page.emulate_media(media="screen")
         live.evaluate("e => { e.hidden = true }")
         assert still.is_visible()

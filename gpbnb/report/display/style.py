@@ -61,10 +61,10 @@ MOST_ENTRIES = 6
 _RAMP = LinearSegmentedColormap.from_list("bits", ["#C43C8C", "#7B3FA0", "#16265E"])
 _FEWEST, _MOST = 2.0, 53.0
 
-WIDTH = 6.4
+WIDTH = 4.8
 """Width of a figure in inches."""
 TEXT = 11.0
-"""Size of the text in points. It gives 17 pixels on a desktop and more than 8 on a phone 390 pixels wide."""
+"""Size of the text in points. It gives 17 pixels on a desktop and more than 10 on a phone 390 pixels wide."""
 
 _STYLE: dict[Any, Any] = {
     "figure.dpi": 110,
@@ -128,14 +128,17 @@ class BookFigure(Figure):
                 warnings.warn(defect, stacklevel=2)
 
 
-def figure(columns: int = 1, height: float = 3.6, rows: int = 1, share: str = "") -> tuple[Figure, NDArray[Any]]:
+def figure(
+    columns: int = 1, height: float = 3.6, rows: int = 1, share: str = "", width: float = WIDTH
+) -> tuple[Figure, NDArray[Any]]:
     """Create a figure with panels side by side or one below the other.
 
     Parameters
     ----------
     columns, rows : number of panels; rows fit a phone better than columns.
-    height : height of the whole figure in inches; the width is that of a page of the book.
+    height : height of the whole figure in inches.
     share : axes that the panels share because a reader compares them: "x", "y" or "xy".
+    width : width of the whole figure in inches; the text of a wider figure is smaller on a phone.
 
     Returns
     -------
@@ -146,7 +149,7 @@ def figure(columns: int = 1, height: float = 3.6, rows: int = 1, share: str = ""
         fig, axes = plt.subplots(
             rows,
             columns,
-            figsize=(WIDTH, height),
+            figsize=(width, height),
             squeeze=False,
             sharex="x" in share,
             sharey="y" in share,

@@ -35,18 +35,27 @@ def answer_line(found: Sequence[YearAnswer], ax: Axes) -> list[Artist]:
         artists += ax.plot([seen], [height], "o", color=OBSERVED, ms=8)
         marks = [*((place, f"{t} digits", REFUTED) for place, t in zip(places, printed.decimal, strict=True))]
         for place, words, colour in [*marks, (seen, f"{seen:.0f} bits", OBSERVED)]:
-            side = "right" if place < BINARY32.precision else "center" if height == 0 else "left"
-            artists.append(name(ax, words, (place, height), colour, (0, 11), ha=side))
+            side = "right" if colour == OBSERVED else "left" if place < BINARY64.precision or height else "center"
+            artists.append(
+                name(
+                    ax,
+                    words,
+                    (place, height),
+                    colour,
+                    (4 if side == "right" else 0, 14 if side == "right" else 11),
+                    ha=side,
+                )
+            )
     (every_mark,) = ax.plot([enough], [0], "|", color=VALID, ms=16, mew=3)
     artists.append(every_mark)
-    artists.append(name(ax, f"{enough:.0f} bits", (enough, 0), VALID, (0, -22), ha="center"))
+    artists.append(name(ax, f"{enough:.0f} bits", (enough, 0), VALID, (-4, -22), ha="left"))
     artists += ax.plot([answer], [0], "o", mfc="none", mec=BLACK, ms=18, mew=2)
     for word, fmt in (("binary32", BINARY32), ("binary64", BINARY64)):
         artists.append(ax.axvline(fmt.precision, color=REFERENCE, ls=":"))
         artists.append(name(ax, word, (fmt.precision, -0.75), REFERENCE, (4, 0)))
     for line, word in zip((artists[0], artists[1], every_mark), ("report", "simulated", "every record"), strict=True):
         line.set_label(word)
-    ax.set(xlim=(12, 69), ylim=(-0.9, 1.7), yticks=[1, 0], yticklabels=[f"{DRIFT:,} mas", "1 mas"])
+    ax.set(xlim=(8, 69), ylim=(-0.9, 1.7), yticks=[1, 0], yticklabels=[f"{DRIFT:,} mas", "1 mas"])
     ax.set_xticks(range(20, 70, 10))
     legend(ax, loc="lower right", bbox_to_anchor=(1, 0.97), ncols=3)
     label(ax, "bits", "allowed")

@@ -30,7 +30,7 @@ NAMES = {
     "inversion": "Matrix inversion",
     "kalman": "Kalman filter, (125)",
     "budget": "Error budget",
-    "geometry": "Measurement geometry",
+    "geometry": "Measurement\ngeometry",
     "rolling": "Roll and deroll",
     "integration": "Digital integration",
 }
@@ -84,8 +84,8 @@ def figure(rows: Iterable[Row]) -> Figure:
     """Draw the parts as boxes, and what they pass on as arrows."""
     rows = list(rows)
     found, passed = stages(rows), inherited(rows)
-    fig, (ax,) = style.figure(height=4.6)
-    half = (0.6, 0.31)
+    fig, (ax,) = style.figure(height=5.6)
+    half = (0.64, 0.35)
     for topic, stage in found.items():
         x, y = PLACES[topic]
         corner = (x - half[0], y - half[1])
@@ -98,7 +98,7 @@ def figure(rows: Iterable[Row]) -> Figure:
             Rectangle(corner, 2 * half[0] * stage.wrong / stage.statements, 0.09, facecolor=style.REFUTED, lw=0)
         )
         years = " and ".join(name[-4:] for name in stage.documents)
-        words = f"{NAMES[topic]}\n{years}\n{stage.statements} statements, {stage.wrong} wrong"
+        words = f"{NAMES[topic]}\n{years}\n{stage.statements} statements,\n{stage.wrong} wrong"
         ax.text(x, y + 0.05, words, ha="center", va="center", fontsize=style.TEXT, linespacing=1.3)
     for later, earlier in RESTS_ON:
         count = passed.get((later, earlier), 0)
@@ -110,16 +110,16 @@ def figure(rows: Iterable[Row]) -> Figure:
             "mutation_scale": 14 + 0.5 * count,
         }
         if x1 > x0:
-            start, end, note = (x0 + 0.64, y0), (x1 - 0.64, y1), (0.0, 0.12)
+            start, end, note = (x0 + 0.67, y0), (x1 - 0.67, y1), (0.0, 0.1)
         elif y0 - y1 > 2:
-            start, end, note = (x0 - 0.64, y0), (x1 - 0.64, y1), (-0.44, 0.0)
+            start, end, note = (x0 - 0.67, y0), (x1 - 0.67, y1), (-0.38, 0.0)
             arrow["connectionstyle"] = "arc3,rad=0.32"
         else:
-            start, end, note = (x0, y0 - 0.35), (x1, y1 + 0.35), (0.14, 0.0)
+            start, end, note = (x0, y0 - 0.38), (x1, y1 + 0.38), (0.14, 0.0)
         ax.annotate("", end, start, arrowprops=arrow)
         middle = ((start[0] + end[0]) / 2 + note[0], (start[1] + end[1]) / 2 + note[1])
         ax.text(*middle, str(count), ha="center", va="center", fontsize=style.TEXT, color=arrow["color"])
-    ax.set_xlim(-1.2, 2.2)
+    ax.set_xlim(-1.14, 2.22)
     ax.set_ylim(-0.4, 2.8)
     ax.axis("off")
     return fig

@@ -145,7 +145,7 @@ def _still() -> Figure:
     """Draw the values of a step from top to bottom, with arcs from operands to results and bars for their shares."""
     data = step_data()
     lines = data["lines"]
-    fig, (ax,) = style.figure(height=3.9)
+    fig, (ax,) = style.figure(height=4.2)
     for k, line in enumerate(lines):
         for operand in line["operands"]:
             arc = f"arc3,rad={0.5 if k - operand > 1 else 0.9}"
@@ -168,7 +168,7 @@ def _still() -> Figure:
     ax.set_xlim(-0.75, 2.1)
     ax.set_ylim(0.6 - len(lines), 0.9)
     ax.axis("off")
-    style.legend(ax, loc="upper right")
+    style.legend(ax, loc="lower center", bbox_to_anchor=(0.5, 0.97))
     return fig
 
 
