@@ -1,6 +1,19 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import matplotlib
+import pytest
+
+from gpbnb.arithmetic.kernels import backends
 
 # Set here, not in the environment, which the kernels of the notebooks inherit: they draw inline.
 matplotlib.use("Agg")
+
+
+@pytest.fixture(scope="module")
+def loops_at_once() -> Iterator[None]:
+    """Compile a loop for its first numbers, which exact arithmetic would else compute."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(backends, "LOOPS_AFTER", 0)
+        yield

@@ -11,6 +11,7 @@ from tests.corpus.__main__ import confirmed
 from tests.corpus.draw import Draw, Float
 from tests.corpus.oracle import rounds
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
 ROWS = [*conformance.rows()]
 SEED = 2026
 SOME = (

@@ -8,6 +8,7 @@ from tests.corpus import __main__ as corpus
 from tests.corpus import package
 from tests.corpus.families import FAMILIES
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
 STORED = corpus.stored()
 CHEAP = ("blocks", "functions", "systems", "words")
 """Families that are run whole: their runs share what is compiled."""

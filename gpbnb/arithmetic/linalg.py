@@ -445,7 +445,7 @@ NUMPY: dict[str, Callable[..., Any]] = {
 def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]] | None:
     """Return both factors in one array and the order of the rows; None if the backend cannot compute them."""
     backend = a.backend
-    if not isinstance(backend, Looped):
+    if not isinstance(backend, Looped) or backend.early(len(a) ** 3):
         return None
     factors, order = backend.pack(a.components, backend.matrix_tag), np.arange(len(a))
     try:
@@ -461,7 +461,7 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
 def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
     """Return solutions for the columns of b (n, p); None if the backend cannot compute them."""
     backend = a.backend
-    if not isinstance(backend, Looped) or b.backend is not backend:
+    if not isinstance(backend, Looped) or b.backend is not backend or backend.early(len(a) * b.size):
         return None
     if (compiled := _factored(a, pivot)) is None:
         return None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections import Counter
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import Any, cast
@@ -43,6 +44,9 @@ Array = NDArray[Any]
 Components = tuple[Array, ...]
 
 _FEW = 1 << 18  # numbers that the machine rounds, which other work needs as well: no loop is compiled for them
+LOOPS_AFTER = (
+    20_000  # operations of a kind of numbers, which exact arithmetic does in 0.1 s; to compile a loop takes up to 3
+)
 _MANY = 1000  # multiplications in a product for which a look at the range of its entries pays
 _LEAST_32, _LARGEST_32 = 2.0**-126, float(np.finfo(np.float32).max)
 
@@ -65,6 +69,10 @@ class Backend(ABC):
     def restart(self) -> None:
         """Restart the random numbers of stochastic rounding."""
         self.kernel.restart()
+
+    def early(self, operations: int) -> bool:
+        """Whether the exact backend has done these operations, the next of its kind, before their loop is compiled."""
+        return False
 
     @abstractmethod
     def from_exact(self, m: Array, e: Array) -> Components | None:
@@ -164,6 +172,10 @@ _NAMES = {
 }
 
 
+_DONE: Counter[type[Tag]] = Counter()
+"""Operations of each kind of numbers so far."""
+
+
 class Looped(Backend):
     """Common part of the backends with compiled loops."""
 
@@ -177,6 +189,11 @@ class Looped(Backend):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return backend, (self.rules,)
+
+    def early(self, operations: int) -> bool:
+        kind = type(self.tag)
+        _DONE[kind] += operations
+        return _DONE[kind] <= LOOPS_AFTER and random_state(self.tag) is None
 
     def apply(self, name: str, *operands: Components) -> Components | None:
         tag = self.fusing_tag if name == "fused" else self.tag
@@ -290,6 +307,8 @@ class Looped(Backend):
 
     def compare(self, a: Components, b: Components) -> Array:
         shape = _shape(a, b)
+        if self.early(math.prod(shape)):
+            return self.exact.compare(self.to_exact(a), self.to_exact(b))
         order = np.empty(math.prod(shape), np.int8)
         x, y = (tuple(_flat(part, shape) for part in components) for components in (a, b))
         _along(_loops().compared, (self.tag,), order.size, x, y, order)
@@ -530,6 +549,8 @@ class Pairs(Compiled):
         return m, sign * e, sign
 
     def to_float(self, components: Components) -> Array:
+        if self.early(components[0].size):
+            return self.exact.to_float(self.to_exact(components))
         m, e = (_flat(part, components[0].shape) for part in components)
         x, states = np.empty(m.size), np.empty(m.size, np.int8)
         _along(_radix().to_floats, (), m.size, m, e, x, states)
@@ -612,6 +633,8 @@ class TwoWords(Looped):
 
     def to_float(self, components: Components) -> Array:
         shape = components[0].shape
+        if self.early(components[0].size):
+            return self.exact.to_float(self.to_exact(components))
         x, states = np.empty(math.prod(shape)), np.empty(math.prod(shape), np.int8)
         parts = tuple(_flat(part, shape) for part in components)
         _along(_wide().to_floats, (self.tag,), x.size, parts, x, states)

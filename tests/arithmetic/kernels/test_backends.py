@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 import pickle
+from collections import Counter
 from fractions import Fraction
 from random import Random
 from typing import Any
@@ -16,6 +17,7 @@ from gpbnb.arithmetic import named
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels import backends
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, TwoWords, backend
 from gpbnb.arithmetic.kernels.tags import Free, Hardware32, Hardware64, Limited
 from gpbnb.arithmetic.rounding import Rounding, Rules
@@ -229,3 +231,22 @@ def test_a_product_without_range_checks_has_the_digits_of_the_exact_backend() ->
     a = PRODUCTS["24 bits, even"].array(np.random.default_rng(1).uniform(0.5, 1, (30, 30)))
     exact = a.on_exact_backend()
     assert all(map(np.array_equal, (a @ a).to_pairs(), (exact @ exact).to_pairs()))
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(10, 7), FloatFormat(2, 90), FloatFormat(16, 6)], ids=str)
+def test_the_first_operations_of_a_kind_are_exact_and_the_next_ones_compiled(
+    fmt: FloatFormat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loops, used = backends._loops(), []
+    monkeypatch.setattr(backends, "LOOPS_AFTER", 1000)
+    monkeypatch.setattr(backends, "_DONE", Counter())
+    monkeypatch.setattr(backends, "_loops", lambda: used.append(1) or loops)
+    x, y = fmt.array([1, 2, 3]) / 7, fmt.array([9, -5, 4]) / 11
+    early = [x + y, x * y, np.outer(x, y) @ y, x.sum(), np.cumsum(y)]
+    assert not used
+    assert all(each.backend is fmt.backend for each in early)
+    for _ in range(30):
+        late = [x + y, x * y, np.outer(x, y) @ y, x.sum(), np.cumsum(y)]
+    assert used
+    assert all(each.backend is fmt.backend for each in late)
+    assert all(same(a, b) for a, b in zip(early, late, strict=True))
