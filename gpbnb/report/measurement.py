@@ -22,8 +22,7 @@ so the spin axis points to :math:`(1, -\varphi_3, \varphi_2)` in the absolute fr
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from functools import reduce
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -38,10 +37,7 @@ YEAR = 365 * 86400.0
 """Seconds in a year, as hung1984 counts them."""
 
 Floats = NDArray[np.float64]
-Signal = Literal["gyro", "telescope", "difference"]
-
-SEQUENCE = (3, 2, 1)
-"""Axes of the three rotations, the first rotation first."""
+Signal = Literal["gyro", "telescope"]
 
 STATES = (
     "phi2",
@@ -83,77 +79,24 @@ The transverse misalignments β2, β3, γ2, γ3 have the same columns as the bia
 # -- rotations ------------------------------------------------------------------------------------
 
 
-def rotation(angles: ArrayLike, sequence: Sequence[int] = SEQUENCE) -> Floats:
-    r"""Exact matrix that transforms components to a frame rotated by `angles`.
+def rotation(angles: ArrayLike) -> Floats:
+    r"""Exact matrix (..., 3, 3) that transforms components to a frame rotated by `angles`, (..., 3), in radians.
 
-    .. math:: C = R_1(\alpha_1)\,R_2(\alpha_2)\,R_3(\alpha_3)
+    .. math:: C = R_1(\alpha_1)\,R_2(\alpha_2)\,R_3(\alpha_3) \approx \begin{bmatrix} 1 & \alpha_3 & -\alpha_2 \\
+        -\alpha_3 & 1 & \alpha_1 \\ \alpha_2 & -\alpha_1 & 1 \end{bmatrix}
 
-    for the sequence (3, 2, 1). For another sequence the factors are ordered accordingly, with the first rotation on
-    the right.
-
-    Parameters
-    ----------
-    angles : (..., 3), in radians, about axes 1, 2 and 3.
-    sequence : a permutation of 1, 2, 3.
-
-    Returns
-    -------
-    C : (..., 3, 3), orthogonal.
+    The approximation for small angles is that of hung1982, ch. IV, eqs. (1)-(4), and the same for every sequence.
     """
     each = _angles("angles", angles, 3)
-    if sorted(sequence) != [1, 2, 3]:
-        raise ValueError(f"got sequence {tuple(sequence)}; needed each of 1, 2, 3 once, as in (3, 2, 1)")
-    turns = [_turn(axis, each[..., axis - 1]) for axis in sequence if each[..., axis - 1].any()]
-    if not turns:
-        return np.zeros((*each.shape, 3)) + np.eye(3)
-    return reduce(lambda product, turn: np.asarray(turn @ product), turns)
+    first, second, third = (_turn(axis, each[..., axis - 1]) for axis in (1, 2, 3))
+    return np.asarray(first @ (second @ third))
 
 
-def small_rotation(angles: ArrayLike) -> Floats:
-    r"""The small-angle form of :func:`rotation`, the same for every sequence and orthogonal only to first order.
-
-    .. math:: C \approx \begin{bmatrix} 1 & \alpha_3 & -\alpha_2 \\ -\alpha_3 & 1 & \alpha_1 \\
-        \alpha_2 & -\alpha_1 & 1 \end{bmatrix}
-
-    Parameters
-    ----------
-    angles : (..., 3), in radians.
-
-    References
-    ----------
-    hung1982, ch. IV, eqs. (1)-(4).
-    """
-    each = _angles("angles", angles, 3)
-    C = np.zeros((*each.shape, 3))
-    C[..., (0, 1, 2), (0, 1, 2)] = 1
-    C[..., (0, 1, 2), (1, 2, 0)] = each[..., (2, 0, 1)]
-    C[..., (1, 2, 0), (0, 1, 2)] = -each[..., (2, 0, 1)]
-    return C
-
-
-def angles_of(matrix: ArrayLike) -> Floats:
-    """The three angles of a rotation matrix: the inverse of :func:`rotation` for the sequence (3, 2, 1).
-
-    Parameters
-    ----------
-    matrix : (..., 3, 3), orthogonal with determinant one to 1e-9; the second angle within ±π/2.
-
-    Returns
-    -------
-    angles : (..., 3), in radians.
-    """
-    C = np.asarray(matrix, dtype=np.float64)
-    if C.shape[-2:] != (3, 3):
-        raise ValueError(f"got shape {C.shape}; needed (..., 3, 3)")
-    off = np.abs(C @ np.swapaxes(C, -1, -2) - np.eye(3)).max(initial=0.0)
-    if not off < 1e-9 or not np.all(np.linalg.det(C) > 0):
-        raise ValueError(
-            f"got a matrix whose product with its transpose is {off:.3g} from the identity; needed a rotation: "
-            "build it with rotation(), not with small_rotation()"
-        )
-    first = np.arctan2(C[..., 1, 2], C[..., 2, 2])
-    second = np.arctan2(-C[..., 0, 2], np.hypot(C[..., 0, 0], C[..., 0, 1]))
-    third = np.arctan2(C[..., 0, 1], C[..., 0, 0])
+def angles_of(matrix: Floats) -> Floats:
+    """The three angles (..., 3) of rotation matrices (..., 3, 3): the inverse of :func:`rotation`."""
+    first = np.arctan2(matrix[..., 1, 2], matrix[..., 2, 2])
+    second = np.arctan2(-matrix[..., 0, 2], np.hypot(matrix[..., 0, 0], matrix[..., 0, 1]))
+    third = np.arctan2(matrix[..., 0, 1], matrix[..., 0, 0])
     return np.stack([first, second, third], axis=-1)
 
 
@@ -191,30 +134,17 @@ def deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
 
 # -- what is measured -----------------------------------------------------------------------------
 
-Rotate = Callable[[ArrayLike], Floats]
 
+def into_spacecraft(vector: ArrayLike, phase: ArrayLike, *misalignments: ArrayLike) -> Floats:
+    """Transform a vector (..., 3) from the intermediate frame through the roll and then each misalignment, in radians.
 
-def into_spacecraft(
-    vector: ArrayLike, phase: ArrayLike, *misalignments: ArrayLike, rotate: Rotate = rotation
-) -> Floats:
-    """Transform a vector from the intermediate frame through the roll and then each misalignment.
-
-    Parameters
-    ----------
-    vector : (..., 3), in any unit.
-    phase : ωt, in radians; all arguments are broadcast.
-    misalignments : (..., 3) each, in radians: β to reach the telescope frame, β and γ for the readout frame.
-    rotate : `rotation` or `small_rotation`.
-
-    Returns
-    -------
-    components : (..., 3).
+    The misalignment β leads to the telescope frame, β and γ lead to the readout frame. All arguments are broadcast.
     """
     given, turned = _angles("vector", vector, 3), _finite("phase", phase)
     yz = deroll(given[..., 1:], -turned)
     components = np.concatenate([np.broadcast_to(given[..., :1], (*yz.shape[:-1], 1)), yz], axis=-1)
     for angles in misalignments:
-        components = apply(rotate(angles), components)
+        components = apply(rotation(angles), components)
     return components
 
 
@@ -223,61 +153,24 @@ def apply(matrix: Floats, vector: Floats) -> Floats:
     return np.asarray(np.einsum("...jk,...k->...j", matrix, vector))
 
 
-def star_in_telescope(alpha: ArrayLike, beta: ArrayLike, phase: ArrayLike, rotate: Rotate = rotation) -> Floats:
+def star_in_telescope(alpha: ArrayLike, beta: ArrayLike, phase: ArrayLike) -> Floats:
     r"""Unit vector to the guide star in the telescope frame, :math:`B(\beta)\,R(\omega t)\,A(\alpha)\,(1,0,0)^T`.
 
-    Parameters
-    ----------
-    alpha, beta : (..., 3), in radians: pointing, and misalignment of the telescope frame against the roll frame.
-    phase : ωt, in radians; all three arguments are broadcast.
-    rotate : `rotation` for the exact vector; `small_rotation` for the equation as printed.
-
-    Returns
-    -------
-    x, y, z : (..., 3).
-
-    References
-    ----------
-    hung1982, ch. IV, eq. (1).
+    The angles (..., 3) and the phase are in radians and broadcast; hung1982, ch. IV, eq. (1), for any angles.
     """
-    return into_spacecraft(rotate(alpha)[..., 0], phase, beta, rotate=rotate)
+    return into_spacecraft(rotation(alpha)[..., 0], phase, beta)
 
 
-def spin_in_readout(
-    theta: ArrayLike, beta: ArrayLike, gamma: ArrayLike, phase: ArrayLike, rotate: Rotate = rotation
-) -> Floats:
-    r"""Unit vector along the spin axis in the readout frame.
+def spin_in_readout(theta: ArrayLike, beta: ArrayLike, gamma: ArrayLike, phase: ArrayLike) -> Floats:
+    r"""Unit vector along the spin axis in the readout frame, that of the star with Θ(θ) for A(α), and Γ(γ) in front.
 
-    .. math:: \Gamma(\gamma)\,B(\beta)\,R(\omega t)\,\Theta(\theta)\,(1,0,0)^T
-
-    Parameters
-    ----------
-    theta, beta, gamma : (..., 3), in radians: angles from gyro to intermediate frame, and both misalignments.
-    phase : ωt, in radians; all arguments are broadcast.
-    rotate : `rotation` for the exact vector; `small_rotation` for the equation as printed.
-
-    Returns
-    -------
-    x, y, z : (..., 3).
-
-    References
-    ----------
-    hung1982, ch. IV, eq. (2).
+    The angles (..., 3) and the phase are in radians and broadcast; hung1982, ch. IV, eq. (2), for any angles.
     """
-    return into_spacecraft(rotate(theta)[..., 0], phase, beta, gamma, rotate=rotate)
+    return into_spacecraft(rotation(theta)[..., 0], phase, beta, gamma)
 
 
 def theta_of(phi: ArrayLike, alpha: ArrayLike) -> Floats:
-    """Exact angles θ from gyro to intermediate frame for drift φ and pointing α; to first order, φ + α.
-
-    Parameters
-    ----------
-    phi, alpha : (..., 3), in radians; broadcast.
-
-    Returns
-    -------
-    theta : (..., 3), in radians.
-    """
+    """Exact angles θ from gyro to intermediate frame for drift φ and pointing α; to first order, φ + α."""
     return angles_of(rotation(alpha) @ rotation(phi))
 
 
@@ -288,7 +181,6 @@ def measurement_matrix(
     signal: Signal = "gyro",
     derolled: bool = True,
     nominal_theta: ArrayLike = (0.0, 0.0, 0.0),
-    nominal_alpha: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Floats:
     r"""Two readings, y and z, as a linear function of the unknowns, at given roll phases.
 
@@ -303,9 +195,9 @@ def measurement_matrix(
             + \vec\beta + \vec\gamma\bigr] + b \\
         \text{telescope} &= (1 + \beta_1 J)\,R\,\vec\alpha + \vec\beta
 
-    ``difference`` is gyro minus telescope. Scale factor and rotations about the roll axis multiply the signal. Their
-    columns are evaluated for the nominal signal, and are zero where it is zero. A rate has a column of zeros, because
-    it affects the readings only through the angle that it changes.
+    Scale factor and rotations about the roll axis multiply the signal. Their columns are evaluated for the nominal θ,
+    and are zero where it is zero, as the nominal α is. A rate has a column of zeros, because it affects the readings
+    only through the angle that it changes.
 
     Parameters
     ----------
@@ -313,7 +205,7 @@ def measurement_matrix(
     states : names from `STATES`, one for each column, in this order; rates are per any unit of time.
     signal : which readings to use.
     derolled : whether the readings are transformed into the intermediate frame, as by :func:`deroll`.
-    nominal_theta, nominal_alpha : (..., 3), in radians; broadcast against `phase`. The first element is not used.
+    nominal_theta : (..., 3), in radians; broadcast against `phase`. The first element is not used.
 
     Returns
     -------
@@ -324,29 +216,19 @@ def measurement_matrix(
     ----------
     hung1982, ch. IV, eqs. (1)-(7); bias and scale factor from the classification of ch. II.
     """
-    turned = _finite("phase", phase)
-    theta, alpha = _angles("nominal_theta", nominal_theta, 3), _angles("nominal_alpha", nominal_alpha, 3)
-    H = measurement_rows(
-        np.cos(turned),
-        np.sin(turned),
-        states,
-        signal=signal,
-        derolled=derolled,
-        nominal_theta=theta,
-        nominal_alpha=alpha,
-    )
-    return np.asarray(H, dtype=np.float64) + 0.0  # no minus sign before a zero
+    turned, theta = _finite("phase", phase), _angles("nominal_theta", nominal_theta, 3)
+    rows = measurement_rows(np.cos(turned), np.sin(turned), states, signal=signal, derolled=derolled, theta=theta)
+    return np.asarray(rows, dtype=np.float64) + 0.0  # no minus sign before a zero
 
 
 def measurement_rows(
     cosine: ArrayLike,
     sine: ArrayLike,
-    states: Sequence[str] = GPB_STATES,
+    states: Sequence[str],
     *,
     signal: Signal = "gyro",
     derolled: bool = True,
-    nominal_theta: ArrayLike = (0, 0, 0),
-    nominal_alpha: ArrayLike = (0, 0, 0),
+    theta: ArrayLike = (0, 0, 0),
 ) -> NDArray[Any]:
     """Compute :func:`measurement_matrix` from cosine and sine of the roll phase; Fractions stay exact.
 
@@ -354,49 +236,34 @@ def measurement_rows(
     ----------
     cosine, sine : (...), of ωt; floats, or objects such as Fractions for an exact model.
     states, signal, derolled : as in :func:`measurement_matrix`.
-    nominal_theta, nominal_alpha : (..., 3), numbers of the same type or integers.
-
-    Returns
-    -------
-    H : (..., 2, n), an array of floats if floats are given, otherwise of objects.
+    theta : (..., 3), the nominal θ, numbers of the same type or integers.
     """
-    unknown = [name for name in states if name not in STATES]
-    if unknown or not states or len(set(states)) != len(states):
-        raise ValueError(
-            f"got states {tuple(states)}; needed different names from {', '.join(STATES)}"
-            + (f"; unknown: {', '.join(map(repr, unknown))}" if unknown else "")
-        )
-    if signal not in ("gyro", "telescope", "difference"):
-        raise ValueError(f"got signal {signal!r}; needed 'gyro', 'telescope' or 'difference'")
-    C, S = np.asarray(cosine), np.asarray(sine)
-    theta, alpha = np.asarray(nominal_theta), np.asarray(nominal_alpha)
-    for name, nominal in (("nominal_theta", theta), ("nominal_alpha", alpha)):
-        if nominal.ndim == 0 or nominal.shape[-1] != 3:
-            raise ValueError(f"got {name} of shape {nominal.shape}; needed (..., 3)")
-    gyro, telescope = int(signal != "telescope"), {"gyro": 0, "telescope": 1, "difference": -1}[signal]
-    y, z, zero = np.array([1, 0]), np.array([0, 1]), np.array([0, 0])
-    spin, star = gyro * _transverse(theta), telescope * _transverse(alpha)
+    if not states or len(set(states)) != len(states) or not set(states) <= set(STATES):
+        raise ValueError(f"got states {tuple(states)}; needed different names from {', '.join(STATES)}")
+    C, S, nominal = np.asarray(cosine), np.asarray(sine), np.asarray(theta)
+    y, z, gyro = np.array([1, 0]), np.array([0, 1]), int(signal == "gyro")
+    spin = gyro * _transverse(nominal)
     inertial: dict[str, Any] = {  # columns in the intermediate frame
         "phi2": gyro * z,
         "phi3": -gyro * y,
-        "alpha2": (gyro + telescope) * z,
-        "alpha3": -(gyro + telescope) * y,
-        "beta1": _quarter(spin + star),
+        "alpha2": z,
+        "alpha3": -y,
+        "beta1": _quarter(spin),
         "gamma1": _quarter(spin),
         "scale": spin,
     }
     body: dict[str, Any] = {  # columns in the roll frame
-        "phi2_rate": zero,
-        "phi3_rate": zero,
-        "beta2": (gyro + telescope) * z,
-        "beta3": -(gyro + telescope) * y,
+        "phi2_rate": 0 * y,
+        "phi3_rate": 0 * z,
+        "beta2": z,
+        "beta3": -y,
         "gamma2": gyro * z,
         "gamma3": -gyro * y,
         "bias_y": gyro * y,
         "bias_z": gyro * z,
     }
-    shape = np.broadcast_shapes(C.shape, S.shape, theta.shape[:-1], alpha.shape[:-1])
-    H = np.empty((*shape, 2, len(states)), dtype=np.result_type(C, S, theta, alpha))
+    shape = np.broadcast_shapes(C.shape, S.shape, nominal.shape[:-1])
+    H = np.empty((*shape, 2, len(states)), dtype=np.result_type(C, S, nominal))
     for column, name in enumerate(states):
         if name in body:
             H[..., column] = _turned_back(body[name], C, S) if derolled else body[name]

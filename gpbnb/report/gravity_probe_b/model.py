@@ -73,7 +73,7 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
     C, S = (np.array([wave(t, turn) for t in times], dtype=object) for wave in (_cosine, _sine))
     size = fmpq(26, 5)
     known = np.array([[0, size * _cosine(t, orbit), size * _sine(t, orbit)] for t in times], dtype=object)
-    gyro = measurement_rows(C, S, _COLUMNS, derolled=False, nominal_theta=known)[:, 1]
+    gyro = measurement_rows(C, S, _COLUMNS, derolled=False, theta=known)[:, 1]
     telescope = measurement_rows(C, S, _COLUMNS, signal="telescope", derolled=False)[:, 1]
     H = np.stack([gyro, telescope], axis=1)
     Phi = _diagonal("1 1 1 1 0.9 0.9 1 1 0.999 1")
