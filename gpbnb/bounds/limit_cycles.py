@@ -83,9 +83,10 @@ class LimitCycles:
         if self.cycles is None:
             return f"outputs stay within {most} units of rest; too many states to try each"
         oscillations = sum(cycle.period > 1 for cycle in self.cycles)
+        points = len(self.cycles) - oscillations
         return (
-            f"{len(self.cycles) - oscillations} points of rest and {oscillations} oscillations; outputs stay within "
-            f"{most} units of rest, by a search of {self.searched} states"
+            f"{points} point{'s' * (points != 1)} of rest and {oscillations} oscillation{'s' * (oscillations != 1)}; "
+            f"outputs stay within {most} units of rest, by a search of {self.searched} states"
         )
 
     __repr__ = __str__

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.files import WRITTEN, is_written
 from gpbnb.wordlength.c_source import CodeSource
 
 FLAGS = "-std=c99 -Wall -Wextra -pedantic -ffp-contract=off"
@@ -34,27 +35,16 @@ class Vectors(NamedTuple):
     status: NDArray[np.int64]
 
 
-WRITTEN = "Written by gpbnb."
-"""What the files say; other files of their names are not replaced."""
-
-
 def refuse_others(folder: Path, name: str) -> None:
     """Reject a folder in which files of the names of a filter's code were not written by gpbnb."""
     test = f"test_{name}.c"
     marked = {each: each for each in (f"{name}.h", f"{name}.c", test, "Makefile")} | {f"{name}_vectors.txt": test}
-    others = [each for each, marks in marked.items() if (folder / each).exists() and not _is_written(folder / marks)]
+    others = [each for each, marks in marked.items() if (folder / each).exists() and not is_written(folder / marks)]
     if others:
         raise ValueError(
             f"got the folder {folder}, in which {' and '.join(others)} {'were' if len(others) > 1 else 'was'} not "
             "written by gpbnb; needed a folder without files of these names; name another one"
         )
-
-
-def _is_written(path: Path) -> bool:
-    try:
-        return WRITTEN.encode() in path.read_bytes()
-    except OSError:
-        return False
 
 
 Sections = Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]]
@@ -122,7 +112,7 @@ def _header(
             f"rounded. The test allows each state at most {tolerances.max():.2g}: four times what it changes if every "
             "operation is rounded up, or every one down."
         )
-    paragraphs = _comment(f"{what}.", WRITTEN, flags, bound, functions)
+    paragraphs = _comment(f"{what}.", f"{WRITTEN}.", flags, bound, functions)
     values = ",\n".join(f"    {status.name} = {status.value}" for status in statuses)
     meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in statuses)
     takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
@@ -198,7 +188,7 @@ def _source(source: CodeSource) -> str:
     includes = _KEPT.format(guard=f"{source.name.upper()}_FAST_MATH") if source.arithmetic.floating else ""
     helpers = source.arithmetic.helpers(function)
     parts = [f'#include "{source.name}.h"', includes, constants, helpers, source.start(), function]
-    return f"/* {WRITTEN} */\n" + "\n".join(f"{part.rstrip()}\n" for part in parts if part)
+    return f"/* {WRITTEN}. */\n" + "\n".join(f"{part.rstrip()}\n" for part in parts if part)
 
 
 def _test(source: CodeSource, tolerances: NDArray[np.float64] | None) -> str:
@@ -221,7 +211,7 @@ def _test(source: CodeSource, tolerances: NDArray[np.float64] | None) -> str:
         texts = [f"{each:.9g}" for each in tolerances.tolist()]
         table = f"static const double tolerance[] = {{{', '.join(texts)}}};\n\n"
         most, at, digits = ", double most", ", tolerance[i]", "each within its tolerance"
-    return f"""/* Compare {name}.c with the test vectors of its emulation, {digits}. {WRITTEN} */
+    return f"""/* Compare {name}.c with the test vectors of its emulation, {digits}. {WRITTEN}. */
 {include}#include <stdio.h>
 
 #include "{name}.h"
@@ -291,7 +281,7 @@ def _vectors(source: CodeSource, vectors: Vectors) -> str:
 
 
 def _makefile(name: str) -> str:
-    return f"""# {WRITTEN}
+    return f"""# {WRITTEN}.
 CC = cc
 CFLAGS = {FLAGS} -O2
 LDLIBS = -lm

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import tempfile
 from collections.abc import Callable, Sequence
@@ -12,6 +11,7 @@ from typing import Any
 
 import gpbnb
 from gpbnb.arithmetic.rounding import rounding_named
+from gpbnb.files import is_written
 from gpbnb.filters.forms import CONSTANT_GAIN, plain_name
 from gpbnb.filters.named import form_named
 from gpbnb.names import NAMED_FORMATS, WITHOUT_LOOPS, format_parts
@@ -205,7 +205,7 @@ def read(arguments: Sequence[str] | None) -> argparse.Namespace:
             "Q3.12; to search up to 53 bits or 18 decimal digits, leave --format away"
         )
     sources = [each for each in (given.model, given.measurements, given.inputs) if each]
-    check_files(given.report, sources, given.certificate, given.csv)
+    check_files(given, sources)
     for source in sources:
         try:
             source.open("rb").close()
@@ -243,30 +243,15 @@ def _check(given: argparse.Namespace) -> None:
             raise ValueError(f"got {what} and {', '.join(others)}; needed {needed}")
 
 
-WRITTEN = "# Written by gpbnb"
-"""How a CSV file of the command begins."""
-
-
-def check_files(
-    report: Path | None, sources: Sequence[Path], certificate: Path | None = None, run: Path | None = None
-) -> None:
-    """Reject one file for two purposes, and a file that cannot be written, before anything is computed.
-
-    Raises
-    ------
-    ValueError : one file has two purposes, or a file cannot be written.
-    """
-    written: list[tuple[str, Path]] = []
-    if report:
+def check_files(given: argparse.Namespace, sources: Sequence[Path]) -> None:
+    """Reject one file for two purposes, and a file that may not or cannot be written, before anything is computed."""
+    written = [
+        (f"--{name} {path}", path) for name in ("report", "certificate", "csv") if (path := getattr(given, name))
+    ]
+    if report := given.report:
         if not report.name or report.suffix.lower() == ".json":
             raise ValueError(f"got --report {report}; needed the name of an HTML file; JSON is written beside it")
-        written = [(f"--report {report}", report), (f"--report {report}", report.with_suffix(".json"))]
-    if certificate:
-        written.append((f"--certificate {certificate}", certificate))
-    if run:
-        written.append((f"--csv {run}", run))
-        if run.is_file() and run not in sources and not run.read_bytes().startswith(WRITTEN.encode()):
-            raise ValueError(f"got --csv {run}, which gpbnb has not written; needed another name")
+        written.append((f"--report {report}, beside which JSON is written", report.with_suffix(".json")))
     for option, path in written:
         try:
             path.resolve().exists()
@@ -277,17 +262,14 @@ def check_files(
             what = "is a folder" if path.is_dir() else "is a device or pipe"
         if what:
             raise ValueError(f"got {option}, but {path} {what}; needed a file in a folder; create it first")
-    if report and (beside := report.with_suffix(".json")).exists() and beside not in sources and not _is_report(beside):
-        raise ValueError(
-            f"got --report {report}, beside which JSON is written, and {beside}, which is no report of this command; "
-            "needed another name"
-        )
     files = [*sources, *(path for _, path in written)]
     for place, path in enumerate(files):
         for other in files[:place]:
             if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):
                 raise ValueError(f"got {other} and {path}, which are one file; needed a file for each purpose")
     for option, path in written:
+        if path.exists() and not is_written(path):
+            raise ValueError(f"got {option}, and {path} is a file that gpbnb has not written; needed another name")
         try:
             tempfile.TemporaryFile(dir=path.resolve().parent).close()
         except OSError as error:
@@ -295,14 +277,6 @@ def check_files(
                 f"got {option}, but its folder cannot be written to: {os.strerror(error.errno or 0)}; needed "
                 "a folder that you can write to, on a disk with space"
             ) from None
-
-
-def _is_report(path: Path) -> bool:
-    try:
-        found = json.loads(path.read_bytes())
-    except (ValueError, OSError):
-        return False
-    return isinstance(found, dict) and {"answers", "limiting"} <= found.keys()
 
 
 def _numbers(text: str) -> str | list[str]:

@@ -17,6 +17,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.bounds.guess import FilterLimits
+from gpbnb.files import WRITTEN
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import AnyForm, Form
 from gpbnb.filters.model import LinearModel
@@ -211,6 +212,7 @@ def study(
     errors = _errors(model, z, main.format if met else None, asked.form, tolerances)
     ratios = [(ratio, i) for i, ratio in enumerate(errors) if ratio is not None]
     entries = {
+        "written": WRITTEN,
         "name": getattr(model, "name", getattr(model, "__name__", "a function")),
         "kind": "Kalman filter" if isinstance(model, LinearModel) else kind_of(model).removeprefix("a "),
         "digits": main.digits if met else None,
@@ -434,11 +436,15 @@ def page(entries: dict[str, Any]) -> str:
         f"<pre>{html.escape(report.command or 'gpbnb.wordlength.report.study(...)')}\n\n{html.escape(about)}</pre>",
     ]
     return _PAGE.format(
-        title=html.escape(f"Wordlength for {report.name}"), style=_STYLE, body="\n".join(filter(None, parts))
+        written=WRITTEN,
+        title=html.escape(f"Wordlength for {report.name}"),
+        style=_STYLE,
+        body="\n".join(filter(None, parts)),
     )
 
 
 _PAGE = """<!doctype html>
+<!-- {written} -->
 <html lang="en">
 <head>
 <meta charset="utf-8">

@@ -18,7 +18,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.guarantee import Guarantee, limits
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.files import replace_file
+from gpbnb.files import WRITTEN, replace_file
 from gpbnb.filters.forms import CONSTANT_GAIN
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear_run import simulated
@@ -31,7 +31,7 @@ from gpbnb.wordlength.c_files import refuse_others
 from gpbnb.wordlength.code import VECTORS, write_code
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
-from gpbnb.wordlength.options import IN_FIXED_POINT, QUANTITIES, WRITTEN
+from gpbnb.wordlength.options import IN_FIXED_POINT, QUANTITIES
 from gpbnb.wordlength.report import DEFAULT_STEPS, Part, Question, Report, usual_steps
 from gpbnb.wordlength.tasks import CANNOT, FUNCTION, is_filter, kind_of
 
@@ -214,7 +214,7 @@ def write_run(asked: CommandInput, report: Report, file: Path) -> None:
     numbers = run.x if is_filter(model) else run.y
     kind = "output" if run.form is None else "state"
     names = report.entries["names"] or [f"{kind} {i}" for i in range(run.errors.shape[1])]
-    lines = [WRITTEN, ",".join(["step", *names, *(f"error of {name}" for name in names)])]
+    lines = [f"# {WRITTEN}", ",".join(["step", *names, *(f"error of {name}" for name in names)])]
     values = np.zeros((0, len(names))) if numbers is None else numbers.to_float()
     lines += [",".join(map(repr, [k, *row])) for k, row in enumerate(np.hstack([values, run.errors]).tolist(), 1)]
     replace_file(file, ("\n".join(lines) + "\n").encode())

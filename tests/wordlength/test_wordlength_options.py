@@ -76,12 +76,16 @@ def test_the_light_lists_are_those_of_the_library():
         (["--level", "2"], "got no --simulate and --level; needed --simulate with one of step, sine, noise"),
         (["--state", "5"], "got no basis that uses limits and --state; needed --basis guarantee or probable"),
         (["--measurements", "{absent}"], "absent.csv, which cannot be read: No such file or directory; needed a file"),
-        (["--report", "{folder}/own.html"], "own.json, which is no report of this command; needed another name"),
+        (["--report", "{folder}/own.html"], "own.json is a file that gpbnb has not written; needed another name"),
+        (["--report", "{folder}/notes.html"], "notes.html is a file that gpbnb has not written; needed another name"),
+        (["--csv", "{folder}/own.json"], "own.json is a file that gpbnb has not written; needed another name"),
+        (["--basis", "guarantee", "--certificate", "{folder}/own.json"], "own.json is a file that gpbnb has not"),
     ],
 )
 def test_an_option_is_refused_before_anything_is_read_or_imported(arguments, message, folder, capsys, monkeypatch):
     monkeypatch.setattr(report, "study", lambda *_: pytest.fail("something was computed"))
-    (folder / "own.json").write_text("{}")
+    for name in ("own.json", "notes.html"):
+        (folder / name).write_text("{}")
     names = {"z": folder / "z.csv", "absent": folder / "absent.csv", "folder": folder}
     given = [each.format(**names) for each in arguments]
     tolerance = [] if "--tolerance" in given else ["--tolerance", "1"]
