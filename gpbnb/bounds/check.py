@@ -506,9 +506,10 @@ class Linear:
                 raise NotImplementedError(f"the operation {kind!r}")
             sound = sound and type(p) is type(q) is int and 0 <= q < v and 0 <= p < (len(c) if kind == MULTIPLY else v)
             need(sound, "operations on values that are not known")
-        kept_wide = any(v >= n + m and wide[v - n - m] for v in outputs)
+        stored = [*outputs, *(q for kind, _, q in made["operations"] if kind == MULTIPLY)]
+        kept_wide = any(v >= n + m and wide[v - n - m] for v in stored)
         sound = not self.words or ({each["base"] for each in formats} == {2} and not kept_wide)
-        need(sound, "words with another base, or states that are not stored")
+        need(sound, "words with another base, or states or factors that are not stored")
         self.operations = list(zip(made["operations"], wide, strict=True))
         exactly = {Fraction(1), Fraction(-1)} if self.words else set()  # nothing is multiplied
         self.c = [x if x in exactly else Fraction(kept.store(x), kept.unit) for x in c]

@@ -741,6 +741,21 @@ def test_roundings_that_remain_of_cancelled_terms_count() -> None:
     assert "may exceed its bound" in refused(content | {"bound": ["0.002"]})
 
 
+def test_a_sum_that_wraps_around_is_no_factor() -> None:
+    """Half of 7 + 7 is -1 if sums wrap around at 8, and this was proved to be near 7; a later sum would undo that."""
+    content = in_words()
+    content["format"]["data"] |= {"precision": 6, "fraction_bits": 2}
+    content["format"]["sums"] |= {"precision": 5, "fraction_bits": 2, "overflow": "wrap"}
+    content["filter"] |= {
+        "states": 1, "operations": [["add", 1, 1], ["multiply", 0, 2]], "wide": [True, False], "outputs": [3],
+        "coefficients": ["1/2"], "exact": "as stored", "A": [["0"]], "B": [["1"]],
+    }  # fmt: skip
+    content |= {"bound": ["1/2"], "derived": {"state": ["7.1"]}, "limits": {"measurement": ["7"]}, "back": 1}
+    assert "factors that are not stored" in refused(content)
+    content["filter"] |= {"operations": [["add", 1, 1], ["subtract", 2, 1]], "coefficients": []}
+    prove(content)
+
+
 def test_innovations_of_correlated_measurements_are_limited() -> None:
     """The UD form decorrelates them, which makes the first row of H smaller; its limit is that of the measurement."""
     model = small(H=[[1, 1], [1, "0.5"]], R=[[2, 1], [1, 1]])
