@@ -21,9 +21,8 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.lanes import recorded
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import Form, form_with_program
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_with_program
 from gpbnb.filters.opening import as_packed, widened_array
 from gpbnb.filters.program import Program, innovation_program, loop_program, matrices, sequential_program
 from gpbnb.filters.run import Run

@@ -21,7 +21,7 @@ from gpbnb.filters.contraction import (
     gain_error_bound,
     state_error_bound,
 )
-from gpbnb.filters.forms import AnyForm, Form
+from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import opening
 from gpbnb.filters.recording import recorded_step, step_kind
@@ -71,7 +71,7 @@ class CarriedBound:
     """
 
     def __init__(
-        self, stored: LinearModel, form: AnyForm, first: NDArray[Any] | None, checkpoint_steps: NDArray[np.int64]
+        self, stored: LinearModel, form: Form, first: NDArray[Any] | None, checkpoint_steps: NDArray[np.int64]
     ) -> None:
         self.form, self.checkpoint_steps = form, checkpoint_steps
         given = stored.to_float()

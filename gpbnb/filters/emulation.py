@@ -14,9 +14,8 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
-from gpbnb.filters.forms import AnyForm, Form
+from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel, stored_measurements
-from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_checkpoints, opened
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, log_spaced, reference
@@ -40,7 +39,7 @@ class History:
 
     model: AnyModel
     fmt: FloatFormat | BlockFormats
-    form: AnyForm
+    form: Form
     steps: NDArray[np.int64]
     state: NDArray[np.float64]
     gain: NDArray[np.float64]
@@ -109,7 +108,7 @@ def emulate(
     model: AnyModel,
     z: Any,
     fmt: FloatFormat | BlockFormats,
-    form: AnyForm | str = Form.INNOVATION,
+    form: Form | str = Form.INNOVATION,
     checkpoint_steps: Sequence[int] | None = None,
     true: Checkpoints | None = None,
     sums: Sums = LEFT_TO_RIGHT,

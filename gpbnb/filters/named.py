@@ -1,4 +1,4 @@
-"""Read arguments as users write them: forms by name, and whole numbers."""
+"""Read arguments as users write them: whole numbers and names."""
 
 from __future__ import annotations
 
@@ -9,39 +9,6 @@ from fractions import Fraction
 from typing import Any
 
 from gpbnb.arithmetic.kernels.exact import size_text
-from gpbnb.filters.forms import ALIASES, AnyForm, ArrayForm, Form, plain_name
-
-
-def form_named(form: AnyForm | str) -> AnyForm:
-    """Return a form, or the form with this name; case, blanks and hyphens are ignored.
-
-    Examples
-    --------
-    >>> form_named("ud")
-    <Form.UD: 4>
-    >>> form_named("Cholesky")
-    <ArrayForm.CARLSON: 'Carlson'>
-    """
-    if isinstance(form, (Form, ArrayForm)):
-        return form
-    if isinstance(form, str):
-        wanted = plain_name(form)
-        if wanted in ALIASES:
-            return ALIASES[wanted]
-        for each in (*Form, *ArrayForm):
-            if wanted in (each.name, plain_name(str(each))):
-                return each
-    names = ", ".join(repr(each.name.lower()) for each in (*Form, *ArrayForm))
-    names += f", {', '.join(repr(each.lower()) for each in ALIASES)}"
-    raise ValueError(f"got form {form!r}; needed one of {names} of gpbnb.Form")
-
-
-def form_with_program(form: AnyForm | str) -> Form:
-    """Return a form that guarantees and C code know, or the one with this name."""
-    found = form_named(form)
-    if isinstance(found, ArrayForm):
-        raise ValueError(f"got the {found} form; needed one of {', '.join(map(str, Form))}")
-    return found
 
 
 def whole_number(name: str, value: Any, least: int = 1, most: int | None = None) -> int:

@@ -18,7 +18,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.factors import upper_factors
-from gpbnb.filters.forms import ROOTS, AnyForm, ArrayForm, Form
+from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.listing import Listing
 from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
@@ -42,7 +42,7 @@ from gpbnb.filters.steps import (
     unscented_step,
 )
 
-NONLINEAR_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD, ArrayForm.SYMMETRIZED, *ROOTS)
+NONLINEAR_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD, Form.SYMMETRIZED, *ROOTS)
 """Forms of an extended filter. An unscented one has the innovation form only."""
 
 BLOCK_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD)
@@ -74,7 +74,7 @@ class NonlinearRun:
         self,
         model: NonlinearModel,
         fmt: FloatFormat | BlockFormats,
-        form: AnyForm = Form.INNOVATION,
+        form: Form = Form.INNOVATION,
         checkpoint_steps: Sequence[int] = (),
     ) -> None:
         check_form(model, form, isinstance(fmt, BlockFormats))
@@ -172,7 +172,7 @@ class NonlinearRun:
     @property
     def kept(self) -> list[tuple[int, int]]:
         """The entries of the covariance, its factors or its root that are not always zero."""
-        upper = self.form in (Form.UD, ArrayForm.CARLSON)
+        upper = self.form in (Form.UD, Form.CARLSON)
         return [(i, j) for i, j in np.ndindex(self.model.n, self.model.n) if not upper or i <= j]
 
     def program(self, exact: bool = True) -> tuple[Program, list[NDArray[Any]]]:
@@ -316,7 +316,7 @@ def _fault(error: Exception) -> str:
     return "an argument outside the domain of a function" if isinstance(error, DomainError) else "a division by zero"
 
 
-def check_form(model: NonlinearModel, form: AnyForm, blocks: bool = False) -> None:
+def check_form(model: NonlinearModel, form: Form, blocks: bool = False) -> None:
     """Reject a form that a nonlinear filter, or its blocks, do not have."""
     if model.method == "unscented":
         if form is not Form.INNOVATION or blocks:
@@ -336,7 +336,7 @@ def check_form(model: NonlinearModel, form: AnyForm, blocks: bool = False) -> No
 def opened(
     model: AnyModel,
     fmt: FloatFormat | BlockFormats,
-    form: AnyForm,
+    form: Form,
     checkpoint_steps: Sequence[int] = (),
     bounded: bool = False,
     sums: Sums = LEFT_TO_RIGHT,

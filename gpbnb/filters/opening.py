@@ -32,7 +32,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
 from gpbnb.filters.factors import factors_of_each, inverses_of_each, roots_of_each
-from gpbnb.filters.forms import ROOTS, AnyForm, Form
+from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.model import INPUTS, LETTERS, LinearModel, remembered, stored_arrays
 from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.steps import FACTORED
@@ -57,7 +57,7 @@ class Opening(NamedTuple):
     repairs: tuple[Repair, ...]
 
 
-def opening(model: LinearModel, fmt: FloatFormat | None, form: AnyForm, tag: Tag) -> Opening:
+def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -> Opening:
     """Return what a filter starts with.
 
     Parameters

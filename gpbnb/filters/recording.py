@@ -21,7 +21,7 @@ from gpbnb.arithmetic.machine import CODES, operands_of, packed_one, takes_numbe
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
-from gpbnb.filters.forms import AnyForm, ArrayForm, Form
+from gpbnb.filters.forms import Form
 from gpbnb.filters.steps import FACTORED, BlockAlgebra, BlockStorage, LinearStep, LinearTaken
 
 _TRUTHS = (CODES["compare"], CODES["combine"])
@@ -49,7 +49,7 @@ class StepKind(NamedTuple):
     alike : whether a number that several formats have is stored alike in all of them.
     """
 
-    form: AnyForm
+    form: Form
     n: int
     m: int
     model: tuple[Known, ...]
@@ -62,7 +62,7 @@ class StepKind(NamedTuple):
 
 
 def step_kind(
-    form: AnyForm,
+    form: Form,
     model: dict[str, NDArray[Any]],
     fmt: Any,
     blocks: tuple[int, ...] = (0, 0, 0, 0, 0),
@@ -155,7 +155,7 @@ def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], Line
         exact = np.frombuffer(known.entries, np.uint8).reshape(known.shape)
         seen = np.where(exact == 0, 0, np.where((exact == 1) & (tape.one > 0), tape.one, places[known.letter]))
         given[known.letter] = stored.made(seen)
-    P = np.triu(places["P"]) if kind.form in (Form.UD, ArrayForm.CARLSON) else places["P"]
+    P = np.triu(places["P"]) if kind.form in (Form.UD, Form.CARLSON) else places["P"]
     x, z, carried = (state.made(places[letter]) for letter in ("x", "z", "carried"))
     fused, order, block, number = kind.sums
     sums = formats[number] if number >= 0 else None

@@ -21,10 +21,9 @@ from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed
 from gpbnb.filters.contraction import Contraction
-from gpbnb.filters.forms import AnyForm, ArrayForm, Form
+from gpbnb.filters.forms import WITH_PROGRAM, Form, form_named
 from gpbnb.filters.kernels.widened import widen
 from gpbnb.filters.model import INPUTS, LinearModel, identity_in
-from gpbnb.filters.named import form_named
 from gpbnb.filters.opening import (
     Opening,
     as_packed,
@@ -91,7 +90,7 @@ class Run:
         self,
         model: LinearModel,
         fmt: FloatFormat | BlockFormats | None,
-        form: AnyForm | str,
+        form: Form | str,
         checkpoint_steps: Sequence[int],
         sums: Sums = LEFT_TO_RIGHT,
         compensated: bool = False,
@@ -108,7 +107,7 @@ class Run:
         self.model, self.fmt, self.form = model, fmt, form_named(form)
         self.checkpoint_steps = _ascending(checkpoint_steps)
         self._check(sums, compensated, bounded, records)
-        compensated = compensated or self.form is ArrayForm.COMPENSATED
+        compensated = compensated or self.form is Form.COMPENSATED
         self.sums = sums
         #: The arithmetic from which the run draws random numbers, if it has any.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(*sums)
@@ -162,7 +161,7 @@ class Run:
                 f"got known inputs in the {form} form, which is not defined with them; needed another "
                 'form, such as "innovation"'
             )
-        if inputs or isinstance(form, ArrayForm):
+        if inputs or form not in WITH_PROGRAM:
             if sums != LEFT_TO_RIGHT or compensated:
                 raise ValueError(
                     f"got sums or compensated with {'known inputs' if inputs else f'the {form} form'}; needed neither; "
@@ -171,7 +170,7 @@ class Run:
             if self.block_formats is not None:
                 raise ValueError(
                     f"got formats of blocks with {'known inputs' if inputs else f'the {form} form'}; needed neither; "
-                    f"the forms of blocks are {', '.join(map(str, Form))}"
+                    f"the forms of blocks are {', '.join(map(str, WITH_PROGRAM))}"
                 )
         if compensated and form not in (Form.INNOVATION, Form.JOSEPH):
             raise ValueError(f"got compensated summation in the {form} form; needed the innovation form or Joseph's")

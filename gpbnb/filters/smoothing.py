@@ -40,9 +40,8 @@ from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.factors import upper_factors
-from gpbnb.filters.forms import AnyForm, ArrayForm, Form
+from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel, identity_in, in_columns
-from gpbnb.filters.named import form_named
 from gpbnb.filters.steps import (
     StepModel,
     corrected,
@@ -55,7 +54,7 @@ from gpbnb.filters.steps import (
     updated,
 )
 
-SMOOTHER_FORMS = (Form.INNOVATION, Form.JOSEPH, ArrayForm.CARLSON)
+SMOOTHER_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.CARLSON)
 """Forms of the filter that a smoother has; the last one computes square roots, forwards and backwards."""
 
 Each = TypeVar("Each")
@@ -105,7 +104,7 @@ class _PassedRoot(NamedTuple):
 
 
 def smooth_covariances(
-    algebra: Algebra, form: AnyForm, models: Sequence[StepModel], x: Matrix, P: Matrix, z: Sequence[Matrix]
+    algebra: Algebra, form: Form, models: Sequence[StepModel], x: Matrix, P: Matrix, z: Sequence[Matrix]
 ) -> list[SmoothedStep]:
     """Smooth with covariances, over numbers of any kind.
 
@@ -215,7 +214,7 @@ class FixedIntervalSmoother:
 
     model: LinearModel
     z: Any
-    form: AnyForm | str = Form.INNOVATION
+    form: Form | str = Form.INNOVATION
 
     def __post_init__(self) -> None:
         if not isinstance(self.model, LinearModel):
@@ -253,7 +252,7 @@ class FixedIntervalSmoother:
         OverflowError : a number leaves the range of the format.
         """
         try:
-            steps = self._by_roots(fmt) if self.form is ArrayForm.CARLSON else self._by_covariances(fmt)
+            steps = self._by_roots(fmt) if self.form is Form.CARLSON else self._by_covariances(fmt)
         except ZeroDivisionError:
             raise ZeroDivisionError(
                 f"got a singular innovation covariance or predicted covariance of {self.model.name} in "

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gpbnb.arithmetic.algebra import Algebra, Matrix, as_computed
-from gpbnb.filters.forms import AnyForm, ArrayForm, Form
+from gpbnb.filters.forms import Form
 
 
 class BlockStorage(NamedTuple):
@@ -95,7 +95,7 @@ def reduction(algebra: Algebra, K: Matrix, H: Matrix) -> Matrix:
     return algebra.rounded(algebra.identity(H.shape[1]) - algebra.times(K, H))
 
 
-def updated(algebra: Algebra, form: AnyForm, model: StepModel, V: Matrix, K: Matrix) -> Matrix:
+def updated(algebra: Algebra, form: Form, model: StepModel, V: Matrix, K: Matrix) -> Matrix:
     r"""Return :math:`(I - KH)V`, (101), or in Joseph's form :math:`((I - KH)V)(I - KH)^T + (KR)K^T`."""
     times, W = algebra.times, reduction(algebra, K, model.H)
     P = times(W, V)
@@ -134,7 +134,7 @@ def predicted_in(blocks: BlockAlgebra, Phi: Matrix, P: Matrix, Q: Matrix) -> Mat
 
 def measured_in(
     blocks: BlockAlgebra,
-    form: AnyForm,
+    form: Form,
     H: Matrix,
     R: Matrix,
     V: Matrix,
@@ -155,7 +155,7 @@ def measured_in(
     about("the covariance")
     own = StepModel(None, stored.covariance(H), None, stored.covariance(R))
     P = updated(blocks.covariance, form, own, V, stored.covariance(K))
-    if form is ArrayForm.SYMMETRIZED:
+    if form is Form.SYMMETRIZED:
         P = (P + P.T) / 2
     definite = np.all(np.diagonal(P) > 0)
     for pivot in found.pivots:
@@ -454,10 +454,10 @@ class Factored(NamedTuple):
     covariance: Callable[[Matrix], Matrix]
 
 
-FACTORED: dict[AnyForm, Factored] = {
+FACTORED: dict[Form, Factored] = {
     Form.UD: Factored(predict_ud, observe_ud, covariance_of_factors),
-    ArrayForm.POTTER: Factored(predict_root, observe_potter, covariance_of_root),
-    ArrayForm.CARLSON: Factored(predict_root, observe_carlson, covariance_of_root),
+    Form.POTTER: Factored(predict_root, observe_potter, covariance_of_root),
+    Form.CARLSON: Factored(predict_root, observe_carlson, covariance_of_root),
 }
 """Forms with factors or roots."""
 
@@ -488,14 +488,14 @@ class LinearStep:
 
     def __init__(
         self,
-        form: AnyForm,
+        form: Form,
         blocks: BlockAlgebra,
         given: dict[str, Any],
         about: Callable[[str], None] = unnamed,
         compensated: bool = False,
     ) -> None:
         self.form, self.blocks, self.given, self.about = form, blocks, given, about
-        self.compensated = compensated or form is ArrayForm.COMPENSATED
+        self.compensated = compensated or form is Form.COMPENSATED
 
     def taken(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
         """Take a step from an estimate (n,), a covariance, factors or a root (n, n), and what compensation carries."""

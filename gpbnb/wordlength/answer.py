@@ -13,7 +13,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text, rounding_text
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.forms import AnyForm
+from gpbnb.filters.forms import Form
 from gpbnb.filters.words import WordFormats
 
 Basis = Literal["emulation", "bound", "guarantee", "probable"]
@@ -56,7 +56,7 @@ class Requirement:
     text: str
     why: str = ""
     notes: tuple[str, ...] = ()
-    form: AnyForm | None = None
+    form: Form | None = None
     irregular: tuple[int, ...] = ()
     processor_format: str = ""
     alone: dict[str, int | None] = field(default_factory=dict)

@@ -18,7 +18,7 @@ from gpbnb.arithmetic.named import format_named
 from gpbnb.bounds.gains import check_deterministic
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.forms import AnyForm, Form
+from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.words import WordFormats
@@ -46,7 +46,7 @@ class Asked:
     tolerance: Any
     basis: Basis = "emulation"
     within: FilterLimits | None = None
-    form: AnyForm = Form.INNOVATION
+    form: Form = Form.INNOVATION
     highest: int | None = None
     progress: bool = False
 

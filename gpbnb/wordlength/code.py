@@ -29,10 +29,9 @@ from gpbnb.bounds.guarantee import sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.files import replace_file
 from gpbnb.filters.design import FilterDesign
-from gpbnb.filters.forms import CONSTANT_GAIN, AnyForm, Form, plain_name
+from gpbnb.filters.forms import CONSTANT_GAIN, Form, form_named, form_with_program, plain_name
 from gpbnb.filters.listing import kalman_program
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_named, form_with_program
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun, simulated
 from gpbnb.filters.nonlinear_system import NonlinearSystem
@@ -98,7 +97,7 @@ def write_code(
     fmt: AnyFormat | str,
     folder: str | Path,
     *,
-    form: AnyForm | str | None = None,
+    form: Form | str | None = None,
     name: str = "filter",
     inputs: Any = None,
     within: FilterLimits | None = None,
@@ -207,7 +206,7 @@ def _bound(model: LinearModel | LinearSystem, form: Form | None, fmt: AnyFormat,
     return proved.format(", ".join(f"{each:.3g}" for each in guaranteed.bound.tolist()), time)
 
 
-def prepared(given: Filter, fmt: AnyFormat, form: AnyForm | str | None, exact: bool = True) -> Prepared:
+def prepared(given: Filter, fmt: AnyFormat, form: Form | str | None, exact: bool = True) -> Prepared:
     """Return a filter with what is needed to write its code; for the arguments, see :func:`write_code`."""
     if isinstance(fmt, FloatFormat):
         _type_of(fmt)
@@ -359,7 +358,7 @@ def _one_format(fmt: AnyFormat) -> FloatFormat | FixedFormat:
     return fmt
 
 
-def _of_nonlinear_model(model: NonlinearModel, fmt: AnyFormat, form: AnyForm, exact: bool) -> Prepared:
+def _of_nonlinear_model(model: NonlinearModel, fmt: AnyFormat, form: Form, exact: bool) -> Prepared:
     run = NonlinearRun(model, _one_format(fmt), form)  # type: ignore[arg-type]
     program, members = run.program(exact)
     stored = _coefficients(members)
@@ -410,7 +409,7 @@ def _nonlinear_vectors(system: NonlinearSystem, u: Any, fmt: FloatFormat | Fixed
 # -- Kalman filters ---------------------------------------------------------------------------------------------------
 
 
-def _of_model(model: LinearModel, fmt: AnyFormat, form: AnyForm | str) -> Prepared:
+def _of_model(model: LinearModel, fmt: AnyFormat, form: Form | str) -> Prepared:
     chosen = form_with_program(form)
     if isinstance(fmt, WordFormats):
         raise ValueError(

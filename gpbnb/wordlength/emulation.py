@@ -15,9 +15,8 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.forms import AnyForm, Form
+from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel, stored_measurements
-from gpbnb.filters.named import form_named
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import opened, true_states
 from gpbnb.filters.opening import stored_start
@@ -55,7 +54,7 @@ class EmulatedRun:
     errors: NDArray[np.float64]
     reason: str = ""
     indefinite: int | None = None
-    form: AnyForm | None = None
+    form: Form | None = None
     repairs: tuple[str, ...] = ()
 
     @property
@@ -83,7 +82,7 @@ def emulate(
     z: Numbers | int,
     fmt: AnyFormat | str,
     *,
-    form: AnyForm | str | None = None,
+    form: Form | str | None = None,
     reference: Literal["given", "stored"] = "given",
     seed: int = 0,
 ) -> EmulatedRun:
@@ -134,7 +133,7 @@ def _in_format(pairs: NDArray[np.float64], fmt: Any) -> FloatArray:
     return found
 
 
-def _filter(model: Any, data: Data, fmt: Any, form: AnyForm, stored: bool) -> EmulatedRun:
+def _filter(model: Any, data: Data, fmt: Any, form: Form, stored: bool) -> EmulatedRun:
     sound, z = measured(model, data)
     kept = stored_measurements(z, fmt)
     run = opened(sound, fmt, form)

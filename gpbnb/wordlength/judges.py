@@ -21,7 +21,7 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.probable import probable_error, probable_output_errors
 from gpbnb.bounds.system import guessed_errors, output_errors
 from gpbnb.bounds.words import WordGuarantee
-from gpbnb.filters.forms import AnyForm, ArrayForm, Form
+from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
@@ -69,8 +69,8 @@ class Judge:
     beyond: str = ""
     untraced: str = ""
     model: AnyModel | None = None
-    form: AnyForm = Form.INNOVATION
-    of_form: Callable[[AnyForm], Judge] | None = None
+    form: Form = Form.INNOVATION
+    of_form: Callable[[Form], Judge] | None = None
 
     def error(self, fmt: Any) -> Outcome:
         """Return the largest error or bound as a multiple of the tolerance; or infinity, with the reason."""
@@ -212,7 +212,7 @@ def _simulated(model: AnyModel, data: Data) -> NDArray[Any]:
         ) from None
 
 
-def _of_record(model: AnyModel, data: Data, tolerances: NDArray[np.float64], form: AnyForm, bounded: bool) -> Judge:
+def _of_record(model: AnyModel, data: Data, tolerances: NDArray[np.float64], form: Form, bounded: bool) -> Judge:
     """Judge the errors of one run with a measurement record, or its bounds."""
     sound, z = measured(model, data)
     if not bounded and isinstance(sound, NonlinearModel):
@@ -221,7 +221,7 @@ def _of_record(model: AnyModel, data: Data, tolerances: NDArray[np.float64], for
 
     lacking = cache(lambda: _without_variance(sound, z))
 
-    def of_form(form: AnyForm) -> Judge:
+    def of_form(form: Form) -> Judge:
         errors = partial(_recorded, sound, z, form, true, lacking)
         return Judge(errors, tolerances, beyond="the bound says nothing", model=sound, form=form, of_form=of_form)
 
@@ -231,7 +231,7 @@ def _of_record(model: AnyModel, data: Data, tolerances: NDArray[np.float64], for
 def _recorded(
     model: AnyModel,
     z: NDArray[Any],
-    form: AnyForm,
+    form: Form,
     true: NDArray[np.float64] | None,
     lacking: Callable[[], str],
     fmt: Any,
@@ -268,14 +268,14 @@ def _without_variance(model: Any, z: NDArray[Any]) -> str:
 
 
 def _for_ever(
-    model: LinearModel, data: Data, tolerances: Any, basis: Basis, form: AnyForm, within: FilterLimits | None
+    model: LinearModel, data: Data, tolerances: Any, basis: Basis, form: Form, within: FilterLimits | None
 ) -> Judge:
     """Judge the guarantee for all measurements within limits, or three deviations of the probable error."""
     if within is None:
         raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
     sized = sized_limits(within, model.n, model.m, model.x0)
-    if isinstance(form, ArrayForm):
-        raise ValueError(f'got the {form} form and basis "{basis}"; needed one of {", ".join(map(str, Form))}')
+    if form not in WITH_PROGRAM:
+        raise ValueError(f'got the {form} form and basis "{basis}"; needed one of {", ".join(map(str, WITH_PROGRAM))}')
     if model.steps is not None:
         raise ValueError(f'got a model of {model.steps} steps and basis "{basis}"; needed one that goes on for ever')
     outside: tuple[str, ...] = ()

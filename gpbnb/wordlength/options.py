@@ -12,8 +12,7 @@ from typing import Any
 import gpbnb
 from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.files import is_written
-from gpbnb.filters.forms import CONSTANT_GAIN, plain_name
-from gpbnb.filters.named import form_named
+from gpbnb.filters.forms import CONSTANT_GAIN, form_named, plain_name
 from gpbnb.names import NAMED_FORMATS, WITHOUT_LOOPS, format_parts
 from gpbnb.sweeps.numbers import plain_integer, plain_number
 

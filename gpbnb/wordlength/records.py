@@ -16,9 +16,9 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.search import Outcome, least_from_which_on
-from gpbnb.filters.forms import AnyForm, Form
+from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_named, whole_number
+from gpbnb.filters.named import whole_number
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.answer import Basis
@@ -91,7 +91,7 @@ def survey_records(
     tolerance: Any,
     formats: Sequence[FloatFormat | FixedFormat | str],
     *,
-    form: AnyForm | str | None = None,
+    form: Form | str | None = None,
     basis: Basis = "emulation",
     steps: int | None = None,
     executor: Executor | None = None,
@@ -179,7 +179,7 @@ def _data(model: Any, records: Any, steps: int | None) -> tuple[Data, ...]:
 
 
 def _outcomes(
-    model: Any, tolerance: Any, formats: tuple[Any, ...], form: AnyForm, basis: Basis, data: Data
+    model: Any, tolerance: Any, formats: tuple[Any, ...], form: Form, basis: Basis, data: Data
 ) -> list[Outcome]:
     """Return the error / tolerance of one record in each format, and why it is infinite."""
     most = max(fmt.precision for fmt in formats)

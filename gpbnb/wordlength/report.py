@@ -19,9 +19,9 @@ from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.files import WRITTEN
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.forms import AnyForm, Form
+from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_named, whole_number
+from gpbnb.filters.named import whole_number
 from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.poles import stored_response
 from gpbnb.filters.system import LinearSystem
@@ -140,7 +140,7 @@ class Part(NamedTuple):
     label: str
     basis: Basis
     model: Any
-    form: AnyForm | None
+    form: Form | None
     structure: str = ""
 
 

@@ -18,9 +18,9 @@ from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text, roundin
 from gpbnb.arithmetic.search import CHECKED, Search, largest_by_default, largest_compiled
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
-from gpbnb.filters.forms import AnyForm, Form
+from gpbnb.filters.forms import Form, form_named, form_with_program
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_named, form_with_program, whole_number
+from gpbnb.filters.named import whole_number
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, opened
 from gpbnb.filters.system import LinearSystem, unobserved
@@ -47,7 +47,7 @@ def required_precision(
     like: FloatFormat | FixedFormat | WordFormats | str | None = None,
     basis: Basis = "emulation",
     within: FilterLimits | None = None,
-    form: AnyForm | str | None = None,
+    form: Form | str | None = None,
     base: int = 2,
     rounding: Rounding | str = Rounding.NEAREST,
     range: tuple[int, int] | None = None,
@@ -177,7 +177,7 @@ def judge(
     z: Any,
     tolerance: Any,
     *,
-    form: AnyForm | str | None = None,
+    form: Form | str | None = None,
     basis: Basis = "emulation",
     within: FilterLimits | None = None,
 ) -> Requirement:
@@ -347,7 +347,7 @@ def _better_form(judge: Judge, search: Callable[[Judge], Search[FloatFormat]]) -
     return f"the form {min(met)[1]} needs {min(met)[2]}" if met else ""
 
 
-def _repairs(given: Any, sound: Any, fmt: FloatFormat | None, form: AnyForm) -> list[str]:
+def _repairs(given: Any, sound: Any, fmt: FloatFormat | None, form: Form) -> list[str]:
     """Return the changes of the covariances of a model and, if there is an answer, of its run in the format."""
     more = [] if fmt is None else opened(sound, fmt, form).repairs[len(sound.repairs) :]
     return [str(each) for each in (*given.repairs, *more)]

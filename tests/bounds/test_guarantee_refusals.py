@@ -14,7 +14,7 @@ from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.units import largest_errors, stored_sizes
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.run import Run, reference_states
 
 FORMAT = FloatFormat(2, 11)
@@ -141,7 +141,7 @@ def test_a_filter_that_measures_nothing(rounding: Rounding, x0: list[Any]) -> No
     """Its estimate is the first one, predicted: from zero it stays zero, otherwise only roundings of that decay."""
     model, fmt = two_states(H=[[0, 0]], x0=x0), FloatFormat(2, 7, rounding)
     for within in (limits(measurement=10), limits(state=1, innovation=10)):
-        for form in Form:
+        for form in WITH_PROGRAM:
             found = guarantee(model, fmt, within, form=form)
             assert found.for_ever
             run = Run(model, fmt, form, ())

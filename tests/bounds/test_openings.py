@@ -12,7 +12,7 @@ from gpbnb import FixedFormat, FloatFormat, LinearModel, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.gains import schedule
 from gpbnb.bounds.guarantee import guarantee, limits
-from gpbnb.filters.forms import ArrayForm, Form
+from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
 from gpbnb.report.wordlengths.study import companion_run
 
@@ -103,7 +103,7 @@ def test_companions_are_for_the_run_of_the_model_as_given(monkeypatch: Any) -> N
     ((UQ, P),) = opened
     assert np.array_equal(UQ, user.exactly(user.letters["UQ"]))
     assert np.array_equal(P, user.exactly(user.P))
-    assert user.repairs == Run(model, NINE, ArrayForm.POTTER, ()).repairs
+    assert user.repairs == Run(model, NINE, Form.POTTER, ()).repairs
 
 
 def test_a_covariance_that_must_not_be_raised_has_neither_run_nor_guarantee() -> None:

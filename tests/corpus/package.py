@@ -32,7 +32,7 @@ from gpbnb import (
     survey_records,
     write_code,
 )
-from gpbnb.filters.named import form_named
+from gpbnb.filters.forms import form_named
 from gpbnb.filters.nonlinear_run import opened
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums
 from gpbnb.filters.words import run_words

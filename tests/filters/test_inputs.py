@@ -11,11 +11,11 @@ from gpbnb import BINARY64, FloatFormat, LinearModel, Rounding, required_precisi
 from gpbnb.bounds.gains import schedule
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.emulation import compare_runs, emulate
-from gpbnb.filters.forms import ArrayForm, Form
+from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, Sums, reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
 
-FORMS = (*Form, *ArrayForm)
+FORMS = tuple(Form)
 STEPS = 40
 
 

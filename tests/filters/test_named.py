@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from gpbnb.filters.forms import ArrayForm, Form
-from gpbnb.filters.named import form_named
+from gpbnb.filters.forms import Form, form_named
 
 NAMES = {
     "innovation": Form.INNOVATION,
     "Joseph": Form.JOSEPH,
     "ud": Form.UD,
-    "symmetrized": ArrayForm.SYMMETRIZED,
-    "symmetrised": ArrayForm.SYMMETRIZED,
-    "compensated": ArrayForm.COMPENSATED,
-    "Potter": ArrayForm.POTTER,
-    "Carlson": ArrayForm.CARLSON,
-    "Cholesky": ArrayForm.CARLSON,
-    "square root": ArrayForm.CARLSON,
-    "square-root": ArrayForm.CARLSON,
+    "symmetrized": Form.SYMMETRIZED,
+    "symmetrised": Form.SYMMETRIZED,
+    "compensated": Form.COMPENSATED,
+    "Potter": Form.POTTER,
+    "Carlson": Form.CARLSON,
+    "Cholesky": Form.CARLSON,
+    "square root": Form.CARLSON,
+    "square-root": Form.CARLSON,
     "hung": Form.HUNG,
     "Hung second gain": Form.HUNG_SECOND_GAIN,
 }
@@ -35,13 +34,12 @@ def test_the_class_of_forms_takes_a_name(name):
     assert Form(name) is Form[name.strip().upper().replace(" ", "_").replace("-", "_")]
 
 
-@pytest.mark.parametrize("value", ["Carlson", "U D F", 5, -1, None, 1.5])
+@pytest.mark.parametrize("value", ["U D F", 9, -1, None, 1.5])
 def test_the_class_of_forms_lists_its_names(value):
-    needed = "needed one of 'hung', 'hung_second_gain', 'innovation', 'joseph', 'ud', or a number from 0 to 4"
-    with pytest.raises(ValueError, match=f"got form {value!r}; {needed}"):
+    with pytest.raises(ValueError, match=f"got form {value!r}; needed one of 'hung', .*, 'cholesky', .* of gpbnb.Form"):
         Form(value)
 
 
-@pytest.mark.parametrize("form", [*Form, *ArrayForm], ids=str)
+@pytest.mark.parametrize("form", list(Form), ids=str)
 def test_a_form_is_found_by_the_name_that_is_shown(form):
     assert form_named(str(form)) is form

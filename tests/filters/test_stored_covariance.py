@@ -16,7 +16,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters import bounded_steps
 from gpbnb.filters.emulation import emulate
-from gpbnb.filters.forms import ArrayForm, Form
+from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import simulated_measurements
@@ -49,7 +49,7 @@ def test_every_model_can_be_stored_and_factored(fmt):
         run = Run(model, fmt, Form.UD, ())
         assert list(stored.repairs) == run.repairs[: len(stored.repairs)]
         assert len(set(run.repairs)) == len(run.repairs)
-        for form in (Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON):
+        for form in (Form.UD, Form.POTTER, Form.CARLSON):
             assert Run(model, fmt, form, ()).repairs == run.repairs
     assert changed > len(MODELS) / 5
 
@@ -144,7 +144,7 @@ def test_a_covariance_of_rank_one_has_positive_variances_in_every_form(form):
     assert 5 <= required_precision(ALIKE, z, 0.01, form=form).digits <= 9
 
 
-@pytest.mark.parametrize("form", [Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON])
+@pytest.mark.parametrize("form", [Form.UD, Form.POTTER, Form.CARLSON])
 def test_a_bound_begins_with_the_distance_of_the_factors_from_the_covariance(form, monkeypatch):
     """Above it, and by no more than a few roundings of float64."""
     model, fmt, asked = chain(2, "0.1"), FloatFormat(2, 8), []

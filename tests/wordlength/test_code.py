@@ -30,6 +30,7 @@ from gpbnb import (
 )
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.design import FilterDesign
+from gpbnb.filters.forms import WITH_PROGRAM
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
@@ -153,7 +154,7 @@ def test_what_zeros_leave_without_use_ends_the_code_as_the_emulation():
     """An inverse that a zero row of H multiplies may overflow; a factor that multiplies a zero gain is not computed."""
     formats = BINARY32, FixedFormat(2, 13, "even"), FixedFormat(3, 6, "even", "saturate")
     models = [(sparse(seed), formats[seed % 3]) for seed in range(40, 46)]
-    cases = [(model, fmt, form) for model, fmt in models for form in Form if fits(model, fmt, form)]
+    cases = [(model, fmt, form) for model, fmt in models for form in WITH_PROGRAM if fits(model, fmt, form)]
     assert len(cases) > 15
     z = np.random.default_rng(0).uniform(-1, 1, (12, 2))
     assert [disagreement(model, fmt, form, z[:, : model.m]) for model, fmt, form in cases] == [""] * len(cases)
@@ -167,7 +168,7 @@ def fits(model, fmt, form):
         return False
 
 
-@pytest.mark.parametrize("form", Form, ids=str)
+@pytest.mark.parametrize("form", WITH_PROGRAM, ids=str)
 @pytest.mark.parametrize("fmt", [FixedFormat(17, -1), FixedFormat(0, 15, "even", "saturate")])
 def test_a_format_without_the_number_one_is_refused(fmt, form, tmp_path):
     whole, even = fmt.fraction_bits > 0, np.array([[2]])

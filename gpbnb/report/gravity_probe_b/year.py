@@ -22,7 +22,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.emulation import emulate, relative
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.filters.simulation import Simulation
@@ -167,7 +167,7 @@ BOUND_COLUMNS = (
     Column("base", "integer", 2, 16),
     Column("precision", "integer", 0, 53),
     Column("rounding", "text", choices=tuple(rounding.value for rounding in Rounding.documented())),
-    Column("form", "text", choices=tuple(form.name.lower() for form in Form)),
+    Column("form", "text", choices=tuple(form.name.lower() for form in WITH_PROGRAM)),
     Column("step", "integer", 1, YEAR),
     *(Column(f"{name}_{axis}", low=0) for name in ("drift", "rate") for axis in (2, 3)),
     *(Column(name, low=0) for name in ("state", "gain", "covariance")),

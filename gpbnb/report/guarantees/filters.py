@@ -20,7 +20,7 @@ from gpbnb.arithmetic.named import rounding_text
 from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.bounds.adversary import attack, responses, shares_of
 from gpbnb.bounds.guarantee import FilterGuarantee, closed_loops, guarantee
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.random_filters import (
@@ -268,7 +268,7 @@ load = partial(load_rows, SWEEP, FilterRow)
 
 
 _VALUES: dict[str, Sequence[Any]] = {
-    "form": [form.name.lower() for form in Form],
+    "form": [form.name.lower() for form in WITH_PROGRAM],
     "rounding": [rounding.value for rounding in DETERMINISTIC],
     "kind": KINDS,
     "range": RANGES,

@@ -16,7 +16,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.guarantee import limits
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import reference_states
 
@@ -53,7 +53,7 @@ class Drawn:
 def draw(seed: int) -> Drawn:
     """Draw a filter; its seed determines all random numbers."""
     rng = np.random.default_rng([35, seed])
-    form, kind = list(Form)[seed % len(Form)], KINDS[seed // len(Form) % len(KINDS)]
+    form, kind = WITH_PROGRAM[seed % len(WITH_PROGRAM)], KINDS[seed // len(WITH_PROGRAM) % len(KINDS)]
     fmt = _format(rng)
     n, m = int(rng.integers(1, 5)), int(rng.integers(1, 3))
     model = _model(rng, kind, n, m)

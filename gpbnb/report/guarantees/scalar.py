@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.guarantee import guarantee, limits
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
@@ -69,12 +69,14 @@ class Worst:
 def draw(seed: int) -> ScalarFilter:
     """Draw a scalar filter; its seed determines all random numbers."""
     rng = np.random.default_rng([37, seed])
-    rounding = DETERMINISTIC[seed // len(Form) % len(DETERMINISTIC)]
+    rounding = DETERMINISTIC[seed // len(WITH_PROGRAM) % len(DETERMINISTIC)]
     fmt = FloatFormat(2, int(rng.integers(3, 7)), rounding, -4, 5, bool(rng.integers(2)))
     sixteenths = rng.integers((-20, 1, 0, 1, 1), (21, 33, 51, 51, 51))
     Phi, H, Q, R, P0 = (exact([[int(each)]]) / 16 for each in sixteenths)
     model = LinearModel(Phi, H, Q, R, exact([0]), P0, name="a scalar filter")
-    return ScalarFilter(model, fmt, list(Form)[seed % len(Form)], fmt.round(Fraction(int(rng.integers(1, 65)), 16)))
+    return ScalarFilter(
+        model, fmt, WITH_PROGRAM[seed % len(WITH_PROGRAM)], fmt.round(Fraction(int(rng.integers(1, 65)), 16))
+    )
 
 
 def numbers(fmt: FloatFormat, most: Fraction) -> NDArray[np.float64]:
@@ -236,7 +238,7 @@ def table(rows: Sequence[ScalarRow]) -> Table:
     """Tabulate the distribution of worst error / bound by form."""
     header = ("form", "filters", "compared", "least", "lower quartile", "median", "upper quartile", "largest")
     body = []
-    for form in Form:
+    for form in WITH_PROGRAM:
         chosen = [row for row in rows if row.form == form.name.lower()]
         ratios = [float(row.ratio) for row in chosen if row.result == "compared"]
         spread = np.quantile(ratios, (0, 0.25, 0.5, 0.75, 1)) if ratios else ()

@@ -19,7 +19,7 @@ from gpbnb.arithmetic.bounds import column_sum
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import BoundedHistory, emulate_with_bound
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.kalman import report_bounds
 from gpbnb.report.stored_rows import columns, sweep
@@ -227,7 +227,7 @@ COLUMNS = (Column("seed", "integer", 0), *columns(Summary))
 
 def trials_of_seed(seed: int, directory: Path | None = None) -> list[tuple[str, ...]]:
     """Return the rows for one seed of the random filters."""
-    return lines(seed, [trial(kind, fmt, form, seed) for kind, fmt, form in product(KINDS, FORMATS, Form)])
+    return lines(seed, [trial(kind, fmt, form, seed) for kind, fmt, form in product(KINDS, FORMATS, WITH_PROGRAM)])
 
 
 SWEEP = sweep("kalman/ensembles", COLUMNS, 3, lambda: range(REPEATS), trials_of_seed)
