@@ -1,4 +1,4 @@
-"""The machine: rows without a result, functions recorded for many lanes, and the errors of double-double arithmetic."""
+"""The machine: random programs, rows without a result, functions for many lanes, errors of double-double numbers."""
 
 from __future__ import annotations
 
@@ -13,6 +13,89 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.lanes import recorded
 from gpbnb.arithmetic.machine import CODES, OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT, code_of, evaluate, fault_of, tables
+from tests.oracles import floating
+
+INPUTS, ROWS = 12, 150
+OPERATIONS = {
+    "add": lambda x, y: x + y,
+    "subtract": lambda x, y: x - y,
+    "multiply": lambda x, y: x * y,
+    "divide": lambda x, y: x / y,
+    "negative": lambda x, y: -x,
+    "absolute": lambda x, y: abs(x),
+}
+NAMES = (*OPERATIONS, "choose", "compare", "combine")
+FORMATS = [
+    *(FloatFormat(2, t, rounding) for t in (1, 11, 24, 26, 40, 52, 53) for rounding in ("nearest", "chop")),
+    *(FloatFormat(2, t, rounding) for t in (2, 24, 33, 53) for rounding in ("even", "up", "down")),
+    FloatFormat(2, 20, "odd"),
+    *(FloatFormat(*each, "half up") for each in ((2, 11), (2, 30), (2, 52), (2, 53), (10, 9), (16, 6), (16, 13))),
+    *(FloatFormat(16, t, rounding) for t in (1, 6, 13) for rounding in ("nearest", "chop", "even")),
+    *(FloatFormat(10, t, rounding) for t in (1, 8, 9, 18) for rounding in ("nearest", "chop")),
+    FloatFormat(10, 12, "even"),
+    FloatFormat(2, 11, "even", -14, 15),
+    FloatFormat(2, 24, "even", -126, 127),
+    FloatFormat(2, 64, "even"),
+    FloatFormat(10, 25),
+]
+
+
+def rounded(x, fmt):
+    return floating(fmt.base, fmt.precision, fmt.rounding.value, fmt.emin)(Fraction(x))
+
+
+def drawn(rng, exact, fmt):
+    """Draw a program whose results stay within small powers of the base, and compute it with fractions."""
+    rows, truths = [], [False, True]
+    while len(rows) < ROWS:
+        name = str(rng.choice(NAMES))
+        a, b, c = rng.integers(0, len(exact), 3).tolist()
+        p, q = rng.integers(0, len(truths), 2).tolist()
+        x, y, z = exact[a], exact[b], exact[c]
+        if name == "compare":
+            orders = int(rng.integers(8))
+            rows.append((CODES[name], a, b, orders, len(truths)))
+            truths.append(bool(orders >> ((x > y) - (x < y) + 1) & 1))
+            continue
+        if name == "combine":
+            table = int(rng.integers(16))
+            rows.append((CODES[name], p, q, table, len(truths)))
+            truths.append(bool(table >> (2 * truths[p] + truths[q]) & 1))
+            continue
+        if name == "divide" and y == 0:
+            continue
+        if name == "choose":
+            row, result = (p, b, c), y if truths[p] else z
+        else:
+            row = a, b, 0
+            result = rounded(OPERATIONS[name](x, y), fmt)
+        if result and not Fraction(1, 200) < abs(result) < 200:
+            continue
+        rows.append((CODES[name], *row, len(exact)))
+        exact.append(result)
+    return np.array(rows, np.int64), truths
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_a_program_has_the_digits_of_fractions(fmt):
+    rng = np.random.default_rng([fmt.base, fmt.precision])
+    given = [rounded(Fraction(int(each), 24), fmt) for each in rng.integers(-400, 400, INPUTS)]
+    exact = [Fraction(0), *given]
+    rows, expected = drawn(rng, exact, fmt)
+    kind, formats = tables([fmt])
+    packed = fmt.backend.pack(fmt.array(exact[: 1 + INPUTS]).components)
+    alone = packed.ndim == 1
+    for lanes in (1, 5):
+        shape = () if alone and lanes == 1 else (lanes, *packed.shape[1:])
+        values, truths = np.zeros((len(exact), *shape), packed.dtype), np.zeros((len(expected), *shape[:1]), np.uint8)
+        values[: len(packed)] = packed if not shape else packed[:, np.newaxis]
+        truths[1] = 1
+        assert evaluate(kind, formats, code_of(rows, np.zeros(ROWS, np.int64)), values, truths) == ROWS
+        for lane in range(lanes):
+            numbers = values if not shape else values[:, lane]
+            found = fmt.backend.to_exact(fmt.backend.unpack(numbers))
+            assert [fmt.kernel.to_fraction(*each) for each in zip(*found, strict=True)] == exact
+            assert (truths if not shape else truths[:, lane]).astype(bool).tolist() == expected
 
 
 @pytest.mark.parametrize(
