@@ -173,7 +173,7 @@ def simulated_measurements(model: LinearModel, steps: int, seed: int = 0) -> NDA
     if steps > MOST_SIMULATED:
         raise ValueError(
             f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: more take hours; try fewer, and see "
-            "how the answer grows with gpbnb.report.wordlengths.study.required_precision_by_steps"
+            "how the answer grows with their number"
         )
     model.check_steps(steps)
     start, resolution = tuple(map(float, model.x0)), fine_resolution(model)

@@ -13,7 +13,6 @@ from gpbnb import required_precision
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import WITH_PROGRAM, Form
-from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import log_spaced, reference
 from gpbnb.report.guarantees import table as guarantees
 from gpbnb.report.wordlengths import study
@@ -53,18 +52,6 @@ def test_normal_numbers_are_those_of_numpy():
 
 
 # -- study --------------------------------------------------------------------------------------------
-
-
-def test_growth_knows_nothing_of_what_comes_later():
-    """Neither a last measurement far off, nor a last Q of rank one, which few bits make indefinite."""
-    Phi, H, R, P0 = [["0.99", "0.1"], [0, "0.97"]], [[1, "0.3"]], [["0.4"]], [[2, 0], [0, 1]]
-    calm, thin = [["1e-3", 0], [0, "2e-3"]], [["1.4e-4", "7e-3"], ["7e-3", "0.35"]]
-    model, z = LinearModel(Phi, H, calm, R, [3, -1], P0), Z[:7, :1].copy()
-    z[6] = 1e6
-    later = LinearModel(Phi, H, [calm] * 6 + [thin], R, [3, -1], P0)
-    alone = [required_precision(model, z[:k], 1e-4) for k in (2, 6)]
-    assert study.required_precision_by_steps(later, z, 1e-4, (2, 6)) == tuple(alone)
-    assert study.required_precision_by_steps(later, z, 1e-4, (7,))[0].tried != alone[1].tried
 
 
 def test_spans_hold_every_number():

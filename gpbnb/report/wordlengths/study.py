@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -23,34 +22,9 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.report.kalman import report_bounds
-from gpbnb.wordlength.answer import Requirement
-from gpbnb.wordlength.required import required_precision
 
 Curve = Sequence[tuple[int, float]]
 """Steps, and a number at each."""
-
-
-def required_precision_by_steps(
-    model: LinearModel, z: NDArray[Any], tolerance: float | Sequence[float], steps: Sequence[int], **options: Any
-) -> tuple[Requirement, ...]:
-    """Return answers of :func:`gpbnb.required_precision` for several numbers of first steps.
-
-    Parameters
-    ----------
-    options : form, basis, base and rounding for that function.
-    """
-    if not all(1 <= k <= len(z) for k in steps):
-        raise ValueError(f"got steps {list(steps)} and {len(z)} measurements; needed from 1 to {len(z)} steps")
-    return tuple(required_precision(_first(model, k), z[:k], tolerance, **options) for k in steps)
-
-
-def _first(model: LinearModel, steps: int) -> LinearModel:
-    """Return the model for `steps` steps; later matrices of its cycle need not be rounded and checked."""
-    given = [letter for letter in ("Phi", "H", "Q", "R", "B", "b", "d") if getattr(model, letter) is not None]
-    cut = {letter: getattr(model, letter)[:steps] for letter in given}
-    if model.u is not None and model.u.ndim == 2:
-        cut["u"] = model.u[:steps]
-    return replace(model, **cut, steps=None if model.steps is None else steps)
 
 
 class UpdateStagnation(NamedTuple):
