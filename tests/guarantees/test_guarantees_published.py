@@ -1,4 +1,4 @@
-"""gpbnb.report.guarantees.comparison: published numbers beside ours."""
+"""Published filters and numbers beside ours, rows of the survey that come out again, and stored certificates."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.linear import error_coefficients
-from gpbnb.report.guarantees import comparison
-from gpbnb.report.guarantees.published import fixif_longitudinal
+from gpbnb.report.guarantees import certificates, comparison, survey, table
+from gpbnb.report.guarantees.published import dynamax_tracking, filterpy_fusion, fixif_longitudinal, px4_landing_target
 from tests.oracles import floating
 
 
@@ -53,3 +54,38 @@ def test_every_printed_digit_of_fixif_is_ours():
     given = fixif_longitudinal()
     ours = error_coefficients(given["A"], given["B"], given["C"], given["D"], given["input_bound"])
     assert [round(float(each), 6) for each in ours] == given["published_E"]
+
+
+@pytest.mark.parametrize("seed", [8, 9, 26, 27])
+def test_a_row_comes_out_again(seed: int) -> None:
+    (row,) = (row for row in survey.load() if row.seed == seed)
+    assert survey.compute(seed) == row
+
+
+def test_the_noises_of_dynamax_s_tracking_are_independent() -> None:
+    """Its notebook has Q = 0.001 I and an initial covariance of 0.1 I."""
+    model, unit = dynamax_tracking(), np.eye(4, dtype=int)
+    assert (model.Q[0] == exact(unit) / 1000).all()
+    assert (exact(unit) / 10 == model.P0).all()
+    assert (model.R[0] == exact(np.eye(2, dtype=int))).all()
+
+
+def test_noises_of_filterpy_and_px4_are_those_of_their_time_steps() -> None:
+    """filterpy: white noise of an intensity of 0.02, R = 2². PX4: an acceleration of variance 10 that lasts a step."""
+    model, dt = filterpy_fusion(), Fraction(1, 10)
+    assert (model.Q[0] == Fraction(1, 50) * exact([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])).all()
+    assert (model.R[0, 0, 0], model.Phi[0, 0, 1]) == (2**2, dt)
+    model, dt = px4_landing_target(), Fraction(1, 50)
+    assert (model.Q[0] == 10 * exact([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])).all()
+    assert (model.R[0, 0, 0], model.Phi[0, 0, 1]) == (Fraction(5, 1000), dt)
+
+
+def test_every_certificate_of_the_book_is_stored_and_proved() -> None:
+    rows = certificates.load()
+    assert [row.name for row in rows] == list(certificates.guarantees())
+    assert {row.verdict for row in rows} == {"proved"}
+
+
+def test_every_filter_of_the_chapter_has_a_certificate() -> None:
+    assert {row.name for row in table.load()} <= certificates.guarantees().keys()
+    assert not certificates.guarantees().keys() & certificates.WITHOUT.keys()
