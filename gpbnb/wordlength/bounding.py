@@ -22,10 +22,9 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.asked import checked_format
+from gpbnb.wordlength.asked import admitted, checked_format
 from gpbnb.wordlength.judges import largest_inputs
 from gpbnb.wordlength.models import ModelSource
-from gpbnb.wordlength.tasks import admitted
 
 
 def guarantee(

@@ -43,14 +43,13 @@ from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.steps import HUNG_FORMS
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, integer_program
-from gpbnb.wordlength.asked import checked_format
+from gpbnb.wordlength.asked import admitted, checked_format, data_of
 from gpbnb.wordlength.bounding import guarantee
 from gpbnb.wordlength.c_files import Sections, Vectors, refuse_others, written_files
 from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeSource, CodeStep, checked_identifier, word_arithmetic
 from gpbnb.wordlength.emulation import longest
 from gpbnb.wordlength.judges import largest_inputs, system_pairs
 from gpbnb.wordlength.models import ModelSource
-from gpbnb.wordlength.tasks import admitted, data_of
 
 VECTORS = 100
 """Steps of the test vectors."""

@@ -24,11 +24,10 @@ from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, first_integers, integer_program
 from gpbnb.wordlength.answer import format_in_words
-from gpbnb.wordlength.asked import AnyFormat, Data, Function, checked_format
+from gpbnb.wordlength.asked import AnyFormat, Asked, Data, Function, checked_format
 from gpbnb.wordlength.functions import STOPS, exact_outputs, outputs_of
 from gpbnb.wordlength.judges import judge_of_function, measured, system_pairs
 from gpbnb.wordlength.models import ModelSource
-from gpbnb.wordlength.tasks import admitted, data_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -113,12 +112,12 @@ def emulate(
         raise ValueError(f'got reference {reference!r}; needed "given" or "stored"')
     words = "have formats for data, coefficients and sums" if isinstance(fmt, WordFormats) else ""
     blocks = "have formats for blocks" if isinstance(fmt, BlockFormats) else ""
-    given = admitted(model, words, blocks, "" if form is None else "have a form")
-    data, stored = data_of(given, z, seed), reference == "stored"
+    asked, stored = Asked.of(model, z, words, blocks, form=form, seed=seed), reference == "stored"
+    given, data = asked.model, asked.data
     if stored and not isinstance(given, LinearModel | LinearSystem):
         raise ValueError('got reference="stored" for functions, which round their own constants; needed "given"')
-    if isinstance(given, LinearModel | NonlinearModel):
-        return _filter(given, data, fmt, form_named(Form.INNOVATION if form is None else form), stored)
+    if asked.of_filter():
+        return _filter(given, data, fmt, asked.form, stored)
     if isinstance(given, LinearSystem):
         return _system(given, data, fmt, stored)
     return _function(given, data, fmt)

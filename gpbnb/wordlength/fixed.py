@@ -262,7 +262,7 @@ def _integer_bits(asked: Asked) -> int:
     if isinstance(model, LinearSystem):
         if data.z is None:
             return 0 if asked.within is None else bits_for(float(np.max(asked.within.measurement)))
-        return bits_for(float(_sizes(model, data.z).max()))
+        return _holding_limits(model, bits_for(float(_sizes(model, data.z).max())))
     sizes = [0.0]
     if asked.of_filter():
         noise = model.noise if isinstance(model, NonlinearModel) else model
@@ -273,6 +273,12 @@ def _integer_bits(asked: Asked) -> int:
     if data.z is not None and not hasattr(data.z, "to_fractions"):
         sizes.append(float(np.abs(np.asarray(data.z, dtype=np.float64)).max()))
     return bits_for(max(sizes))
+
+
+def _holding_limits(system: LinearSystem, bits: int) -> int:
+    """Return integer bits, or more if the limits of a system need more, whether or not a run reaches them."""
+    limits = system.as_filter().limits_in(FixedFormat(1100, 0)).values()
+    return max([bits, *(math.frexp(each if each > 0 else math.nextafter(each, 0))[1] for each in limits)])
 
 
 def _sizes(system: LinearSystem, z: Any) -> NDArray[np.float64]:
@@ -364,4 +370,4 @@ def _stored_integer_bits(asked: Asked) -> int:
         return _integer_bits(asked)
     program, sizes = model.as_filter().program, _sizes(model, asked.data.z)
     kept = np.concatenate([np.ones(program.n + program.m, np.bool_), ~program.wide])
-    return bits_for(float(sizes[kept].max()))
+    return _holding_limits(model, bits_for(float(sizes[kept].max())))

@@ -22,10 +22,21 @@ from gpbnb.filters.named import whole_number
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.answer import Basis
-from gpbnb.wordlength.asked import Asked, Data, Function, checked_basis, checked_format, tolerances_of
+from gpbnb.wordlength.asked import (
+    MOST_STEPS,
+    TASK_OF_BASIS,
+    Asked,
+    Data,
+    Function,
+    admitted,
+    checked_basis,
+    checked_format,
+    data_of,
+    is_filter,
+    tolerances_of,
+)
 from gpbnb.wordlength.judges import judge_for
 from gpbnb.wordlength.models import ModelSource
-from gpbnb.wordlength.tasks import MOST_STEPS, TASK_OF_BASIS, admitted, data_of
 
 MOST_RECORDS = 1_000_000
 """Largest number of records to simulate."""
@@ -140,7 +151,7 @@ def survey_records(
     for fmt in chosen_formats:
         if isinstance(given, LinearModel | LinearSystem):
             fmt.check_compiled()
-    if isinstance(given, LinearModel | NonlinearModel):
+    if is_filter(given):
         tolerance = tolerances_of(tolerance, given.n, "states").tolist()
         if any(fmt.limits is None for fmt in chosen_formats):
             given.check_sizes()
@@ -157,7 +168,7 @@ def _data(model: Any, records: Any, steps: int | None) -> tuple[Data, ...]:
     """Return the measurements of each record."""
     if isinstance(records, (int, np.integer)):
         count = whole_number("records", records, most=MOST_RECORDS)
-        if not isinstance(model, LinearModel | NonlinearModel):
+        if not is_filter(model):
             raise ValueError(f"got {count} records to simulate; needed a list: only a Kalman filter simulates them")
         if steps is None:
             raise ValueError(f"got {count} records to simulate without steps; needed steps=, how many each has")
@@ -170,7 +181,7 @@ def _data(model: Any, records: Any, steps: int | None) -> tuple[Data, ...]:
     data = tuple(data_of(model, z) for z in records)
     if not data:
         raise ValueError("got no records; needed at least one")
-    if isinstance(model, LinearModel | NonlinearModel):
+    if is_filter(model):
         for number, each in enumerate(data):
             shape = np.shape(each.z)
             if len(shape) != 2 or shape[1] != model.m or not shape[0]:

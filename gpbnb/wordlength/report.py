@@ -28,13 +28,12 @@ from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.sweeps import machine
 from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, format_in_words
-from gpbnb.wordlength.asked import exactly, tolerances_of
+from gpbnb.wordlength.asked import exactly, is_filter, kind_of, tolerances_of
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource
 from gpbnb.wordlength.options import IN_FIXED_POINT
 from gpbnb.wordlength.ranges import binary_ranges
 from gpbnb.wordlength.required import judge, required_precision
-from gpbnb.wordlength.tasks import is_filter, kind_of
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms that a report compares; the requested form comes first."""

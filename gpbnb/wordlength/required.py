@@ -18,7 +18,7 @@ from gpbnb.arithmetic.rounding import Rounding, digit_unit, digits_text, roundin
 from gpbnb.arithmetic.search import CHECKED, Search, largest_by_default, largest_compiled
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
-from gpbnb.filters.forms import Form, form_named, form_with_program
+from gpbnb.filters.forms import Form, form_with_program
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.nonlinear import NonlinearModel
@@ -26,11 +26,10 @@ from gpbnb.filters.nonlinear_run import check_form, opened
 from gpbnb.filters.system import LinearSystem, unobserved
 from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, joined, judgement, listed, share_text
-from gpbnb.wordlength.asked import Asked, Function, checked_basis, checked_format
+from gpbnb.wordlength.asked import TASK_OF_KIND, Asked, Function, checked_basis, checked_format
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS, fixed_like, in_fixed_point, in_words
 from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, slowest_response
 from gpbnb.wordlength.models import ModelSource
-from gpbnb.wordlength.tasks import TASK_OF_BASIS, TASK_OF_KIND, admitted, data_of
 
 _TASK_IN_WORDS: dict[str, str] = {
     **dict.fromkeys(PROOFS, "have a guarantee in fixed-point words"),
@@ -140,10 +139,19 @@ def required_precision(
     if kind not in TASK_OF_KIND:
         raise ValueError(f"got kind {kind!r}; needed one of {', '.join(map(repr, TASK_OF_KIND))}")
     words = kind == "words" or (kind == "fixed" and not isinstance(format_named(like), FixedFormat))
-    tasks = [TASK_OF_BASIS[checked_basis(basis)], TASK_OF_KIND[kind], "" if form is None else "have a form"]
-    given = admitted(model, *tasks, _TASK_IN_WORDS.get(basis, "") if words else "")
-    data = data_of(given, z, seed)
-    found = form_named(Form.INNOVATION if form is None else form)
+    tasks = (TASK_OF_KIND[kind], _TASK_IN_WORDS.get(checked_basis(basis), "") if words else "")
+    asked = Asked.of(
+        model,
+        z,
+        *tasks,
+        tolerance=tolerance,
+        basis=basis,
+        within=within,
+        form=form,
+        highest=highest,
+        seed=seed,
+        progress=progress,
+    )
     options = {"base": base != 2, "rounding": rounding != Rounding.NEAREST, "range": range is not None}
     if like is not None and (names := [name for name, value in options.items() if value]):
         raise ValueError(f"got {' and '.join(names)} beside like; needed like alone, which sets them")
@@ -151,7 +159,6 @@ def required_precision(
         raise ValueError(
             f'got highest={highest} and kind "{kind}"; needed none: only kind "float" has a highest precision to set'
         )
-    asked = Asked(given, data, tolerance, basis, within, found, highest, progress)
     if kind in ("fixed", "words"):
         if base != 2 or range is not None:
             raise ValueError(
@@ -162,7 +169,7 @@ def required_precision(
             if like is not None:
                 raise ValueError('got like for kind="words"; needed none: the search sets all formats')
             return in_words(asked, rounding_named(rounding), bits or MOST_COEFFICIENT_BITS)
-        return in_fixed_point(asked, fixed_like(like, given), rounding_named(rounding), bits)
+        return in_fixed_point(asked, fixed_like(like, asked.model), rounding_named(rounding), bits)
     if coefficient_bits is not None:
         raise ValueError(
             'got coefficient_bits for floating point; needed none: kind="fixed" has coefficients of their own'
@@ -184,10 +191,8 @@ def judge(
     """Judge one format; for the arguments, see :func:`required_precision`."""
     chosen = checked_format(fmt, WordFormats)
     words = _TASK_IN_WORDS.get(checked_basis(basis), "") if isinstance(chosen, WordFormats) else ""
-    given = admitted(model, TASK_OF_BASIS[basis], words, "" if form is None else "have a form")
-    data = data_of(given, z)
-    asked = Asked(given, data, tolerance, basis, within, form_named(form or Form.INNOVATION))
-    if isinstance(given, LinearModel | LinearSystem) and not isinstance(chosen, WordFormats):
+    asked = Asked.of(model, z, words, form=form, tolerance=tolerance, basis=basis, within=within)
+    if isinstance(asked.model, LinearModel | LinearSystem) and not isinstance(chosen, WordFormats):
         chosen.check_compiled()
     precision = chosen.data.precision if isinstance(chosen, WordFormats) else chosen.precision
     found, judge = for_ever_or_over(
@@ -197,7 +202,7 @@ def judge(
         lambda outcome: not math.isinf(outcome.ratio),
     )
     notes = judge.warnings() if found.ratio <= 1 else ()
-    return judgement(chosen, basis, data.steps, found.ratio, found.why, judge.steps is not None, notes)
+    return judgement(chosen, basis, asked.data.steps, found.ratio, found.why, judge.steps is not None, notes)
 
 
 # -- floating point ---------------------------------------------------------------------------------------------------

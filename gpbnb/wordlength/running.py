@@ -26,6 +26,7 @@ from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_inputs, simulated_measurements
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.answer import Basis, format_in_words
+from gpbnb.wordlength.asked import CANNOT, FUNCTION, is_filter, kind_of
 from gpbnb.wordlength.bounding import guarantee
 from gpbnb.wordlength.c_files import refuse_others
 from gpbnb.wordlength.code import VECTORS, write_code
@@ -33,7 +34,6 @@ from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
 from gpbnb.wordlength.options import IN_FIXED_POINT, QUANTITIES
 from gpbnb.wordlength.report import DEFAULT_STEPS, Part, Question, Report, usual_steps
-from gpbnb.wordlength.tasks import CANNOT, FUNCTION, is_filter, kind_of
 
 
 class CommandInput(NamedTuple):

@@ -28,7 +28,7 @@ from gpbnb import (
     survey_records,
     write_code,
 )
-from gpbnb.wordlength.tasks import CANNOT, WHY, admitted, kind_of
+from gpbnb.wordlength.asked import CANNOT, WHY, admitted, kind_of
 
 STEPS = 12
 WALK = {"Phi": [["0.9"]], "H": [[1]], "Q": [["0.01"]], "R": [[1]], "x0": [0], "P0": [[1]]}
