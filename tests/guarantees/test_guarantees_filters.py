@@ -1,7 +1,8 @@
-"""Random Kalman filters against their guarantees: the survey, and scalar filters, with emulation by fractions."""
+"""Random Kalman filters against their guarantees: emulation without the package, the survey, and scalar filters."""
 
 from __future__ import annotations
 
+from collections import Counter
 from fractions import Fraction
 from functools import cache
 from itertools import product
@@ -16,16 +17,64 @@ from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.guarantees import filters, scalar
-from gpbnb.report.guarantees.random_filters import DETERMINISTIC, Drawn, draw
-from tests.oracles import EXACT
-from tests.plain_filters import Filter
+from gpbnb.report.guarantees.random_filters import DETERMINISTIC, KINDS, RANGES, Drawn, draw
+from tests.oracles import EXACT, rounds
+from tests.plain_filters import Filter, Refused
+
+
+def compared(drawn, steps, rng):
+    """Run a filter without the package and with it, compare all numbers by ==, and return how the run ends."""
+    fmt = drawn.fmt
+    z = rng.standard_normal((steps, drawn.model.m)) * 10.0 ** rng.uniform(-2, 3)
+    r = rounds(fmt)
+    measured = [[Fraction(each) for each in row] for row in z.tolist()]
+
+    def stored():
+        return Filter.of(drawn.model, fmt, drawn.form), [[r(each) for each in row] for row in measured]
+
+    try:
+        run = Run(drawn.model, fmt, drawn.form, range(1, steps + 1))
+        run.take(z)
+    except ValueError as error:
+        if "compiled loops" in str(error):
+            return "no compiled loops"
+        with pytest.raises(Refused):
+            stored()
+        return "refused"
+    except OverflowError:  # of the model or of a measurement
+        with pytest.raises(OverflowError):
+            stored()
+        return "not stored"
+    found, _ = stored()
+    gains, covariances = run.exactly(run.G).tolist(), run.exactly(run.C).tolist()
+    for k, row in enumerate(measured):
+        if run.stopped == k + 1:
+            with pytest.raises(ArithmeticError):
+                found.step(row)
+            return "stopped"
+        assert found.step(row) == run.exactly(run.X[k])[:, 0].tolist()
+        assert covariances[k] == found.P
+        assert gains[k] == found.K
+    return "equal"
+
+
+def test_a_filter_in_integers_gives_the_digits_of_a_run():
+    """In every form, rounding, kind of model and range, in bases 2, 10 and 16, from the model as given."""
+    rng = np.random.default_rng(8)
+    ends, seen = Counter(), set()
+    for seed in range(80):
+        drawn = draw(seed)
+        end = compared(drawn, 12, rng)
+        ends[end] += 1
+        if end == "equal":
+            limited = "unlimited" if drawn.fmt.emin is None else ("subnormal" if drawn.fmt.subnormal else "flushed")
+            seen |= {drawn.form, drawn.kind, drawn.fmt.rounding, drawn.fmt.base, limited, drawn.model.n}
+    assert ends["equal"] > 65, ends
+    assert seen >= {*WITH_PROGRAM, *KINDS, *DETERMINISTIC, 2, 10, 16, *RANGES, 1, 3, 4}
 
 
 def test_a_first_gain_without_a_result_ends_the_run_there():
-    drawn = draw(20261173)
-    run = Run(drawn.model, drawn.fmt, drawn.form, range(1, 4))
-    run.take(np.ones((3, drawn.model.m)))
-    assert (run.stopped, run.steps) == (1, 0)
+    assert compared(draw(20261173), 3, np.random.default_rng(8)) == "stopped"
 
 
 # -- the survey -------------------------------------------------------------------------------------------------------
