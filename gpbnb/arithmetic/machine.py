@@ -76,10 +76,10 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
     ----------
     tag : the arithmetic of a run, from which all its parts draw random numbers.
     """
-    from gpbnb.arithmetic.kernels import machine
+    from gpbnb.arithmetic.kernels import machine, quick
 
-    whole = np.zeros((len(formats), machine.COLUMNS), np.int64)
-    numbers = np.zeros((len(formats), machine.NUMBERS))
+    whole = np.zeros((len(formats), quick.COLUMNS), np.int64)
+    numbers = np.zeros((len(formats), quick.NUMBERS))
     state = tags.random_state(tag)
     random = np.zeros(2, np.uint64) if state is None else state
     if formats[0] is None:
@@ -93,7 +93,7 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
             raise ValueError("no loops")
         kinds.add(_row(fmt, found, whole[i], numbers[i]))
     (kind,) = kinds
-    made: Any = machine.Quick() if whole[:, machine.QUICK].all() else machine.Careful()
+    made: Any = machine.Careful() if (whole[:, quick.HOW] == quick.NONE).any() else machine.Quick()
     if kind == "pairs":
         made = machine.InPairs(bool(whole[:, _SHORT].all()))
     elif kind == "words":
@@ -105,7 +105,7 @@ _SHORT = 5  # the column that tells whether a decimal format has few digits and 
 
 
 def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float64]) -> str:
-    from gpbnb.arithmetic.kernels import machine
+    from gpbnb.arithmetic.kernels import quick
 
     if isinstance(tag, tags.Wide):
         whole[:14] = (*tag[:7], *tag.lowest, *tag.largest, tag.saturates)
@@ -133,23 +133,35 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
         low, high = max(tag.gradual, tag.least), min(tag.largest, -tag.lowest)
         low = low or 2.0**-960
     whole[:3], numbers[:] = (bits, precision, mode), limits
-    exact = mode == EVEN and precision == 53
-    fixed = fmt.rules.limits is not None and fmt.rules.limits.fixed
-    quick = bits == 1 and not fixed and mode in (AWAY, EVEN, HALF_UP, ZERO, tags.UP, tags.DOWN)
-    short = exact or (mode in (AWAY, EVEN) and precision <= tags.SAFE_TWICE)
-    how = machine.SHORT if short else machine.TIED if precision == 53 and mode == AWAY else machine.LONG
-    unit = 1 << (53 - precision)
-    half, even = unit >> 1, mode == EVEN and not exact
-    nearest = half - even if mode in (AWAY, EVEN, HALF_UP) else 0
-    outward = unit - 1
-    ties_up = mode == HALF_UP
-    below = outward if mode == tags.DOWN else nearest - ties_up
-    above = outward if mode == tags.UP else nearest
-    sticky = even or ties_up or mode == tags.DOWN, even or mode == tags.UP
-    low, high = max(low, machine.LEAST), min(high, 1 / machine.LEAST)
-    bits_low, bits_high = np.array([low, high]).view(np.int64).tolist()
-    whole[3:13] = quick, how, unit, below, above, *sticky, even, bits_low, bits_high - bits_low
+    low, high = max(low, quick.LEAST), min(high, 1 / quick.LEAST)
+    least, most = np.array([low, high]).view(np.int64).tolist()
+    whole[3:14] = *_rounding(bits, precision, mode, fmt.rules), least, most - least, *_outward(precision, mode)
     return "floats"
+
+
+def _rounding(bits: int, precision: int, mode: int, rules: Any) -> tuple[int, int, int, int, int]:
+    """How quick results are rounded, and the columns from CLEAR to EVEN."""
+    from gpbnb.arithmetic.kernels import quick
+
+    if mode in (tags.ODD, tags.RANDOM) or (rules.limits is not None and rules.limits.fixed):
+        return quick.NONE, 0, 0, 0, 0
+    if bits == 4:
+        return quick.HEXADECIMAL if mode in (AWAY, ZERO) else quick.NONE, 0, 56 - 4 * precision, mode == AWAY, 0
+    exact, unit = mode == EVEN and precision == 53, 1 << (53 - precision)
+    even = mode == EVEN and not exact
+    how = quick.LONG if mode in (AWAY, EVEN, ZERO) else quick.DIRECTED
+    if exact or (mode in (AWAY, EVEN) and precision <= tags.SAFE_TWICE):
+        how = quick.SHORT
+    elif precision == 53 and mode == AWAY:
+        how = quick.TIED
+    return how, -unit, 53 - precision, (unit >> 1 if mode in (AWAY, EVEN) else 0) - even, even
+
+
+def _outward(precision: int, mode: int) -> tuple[int, int, int, int]:
+    """The columns from BELOW_ZERO on, which round in directions: what is added to sizes, and more if digits are cut."""
+    unit, ties_up = 1 << (53 - precision), mode == HALF_UP
+    half, down, up = ties_up * (unit >> 1), mode == tags.DOWN, mode == tags.UP
+    return half - ties_up + down * (unit - 1), half + up * (unit - 1), ties_up or down, up
 
 
 def _code(mode: Any) -> int:
@@ -301,10 +313,10 @@ class Memory:
 
 def is_far(numbers: NDArray[Any]) -> bool:
     """Whether some numbers are too small or too large for quick computation."""
-    from gpbnb.arithmetic.kernels import machine
+    from gpbnb.arithmetic.kernels import quick
 
     sizes = np.abs(numbers)
-    return bool((((sizes < machine.LEAST) & (sizes > 0)) | (sizes > 1 / machine.LEAST)).any())
+    return bool((((sizes < quick.LEAST) & (sizes > 0)) | (sizes > 1 / quick.LEAST)).any())
 
 
 def functions(kind: Any, far: bool, alone: bool) -> Iterator[int]:

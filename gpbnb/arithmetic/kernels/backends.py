@@ -18,16 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.exact import kernel, one_per_format, size_text
-from gpbnb.arithmetic.kernels.selection import fusing_tag, tag_of, wide_tag
+from gpbnb.arithmetic.kernels.selection import tag_of, wide_tag
 from gpbnb.arithmetic.kernels.tags import (
     FARTHEST,
     LEAST,
     LIMIT,
-    Binary,
     Free,
     Hardware32,
     Hardware64,
-    Hexadecimal,
     Limited,
     LongEven,
     Random,
@@ -160,6 +158,7 @@ class Exact(Backend):
         return np.frompyfunc(getattr(self.kernel, name), inputs, outputs)
 
 
+_CODED = {"round_": "round"}  # names of operations that the machine calls otherwise
 _NAMES = {
     "add": "addition",
     "subtract": "subtraction",
@@ -203,7 +202,7 @@ class Looped(Backend):
         size = math.prod(shape)
         out = self._empty(size)
         flat = [tuple([_flat(part, shape) for part in components]) for components in operands]
-        if name == "round_" and 0 < size <= _FEW and self._machine is not None:
+        if name == "round_" and 0 < size <= _FEW:
             found = _machine().rounded(*self._machine, self.pack(flat[0]))
             return None if found is None else tuple(part.reshape(shape) for part in self.unpack(found))
         inputs = [self._seen(each) for each in flat]
@@ -215,8 +214,8 @@ class Looped(Backend):
 
     @cached_property
     def _machine(self) -> Any:
-        """The kind and columns of the format on the machine; None if random numbers are drawn."""
-        return None if random_state(self.tag) is not None else _machine().tables([self])
+        """The kind and columns of the format on the machine."""
+        return _machine().tables([self], self.tag)
 
     @property
     def fusing_tag(self) -> Tag | None:
@@ -371,6 +370,7 @@ class Floats(Compiled):
     def __init__(self, rules: Rules, tag: Tag) -> None:
         super().__init__(rules, tag)
         self.bits = rules.base.bit_length() - 1
+        self._random = random_state(tag) is not None
         if isinstance(tag, Hardware64):
             self.lowest_power, self.highest_power = -1074, 1024
 
@@ -422,11 +422,36 @@ class Floats(Compiled):
             return (np.asarray(0.0 - operands[0][0]),)
         if name == "absolute":
             return (np.asarray(np.abs(operands[0][0])),)
-        return super().apply(name, *operands)
+        shape = _shape(*operands)
+        size, flat = math.prod(shape), [_flat(each[0], shape) for each in operands]
+        if name == "round_" and 0 < size <= _FEW and not (_floats.cache_info().currsize or self._random):
+            found = _machine().rounded(*self._machine, flat[0])
+            return None if found is None else (found.reshape(shape),)
+        code, (_, formats), loops = _machine().CODES[_CODED.get(name, name)], self._machine, _floats()
+        out, given, gone = np.empty(size), (*flat, flat[0], flat[0])[:3], False
+        for part in slices(size):
+            numbers = formats.address, code, part.stop - part.start, *(each[part] for each in given), out[part]
+            gone |= bool((self._random or loops.along(*numbers)) and loops.carefully_along(*numbers))
+        return None if gone else (out.reshape(shape),)
 
-    @cached_property
-    def fusing_tag(self) -> Tag | None:
-        return fusing_tag(self.rules) if isinstance(self.tag, Binary | Hexadecimal) else self.tag
+    def fold(self, name: str, components: Components) -> Components | None:
+        a = components[0]
+        out = np.array(a[0], np.float64, order="C")
+        return (out,) if self._accumulated(name, a, out, 0) else None
+
+    def scan(self, components: Components) -> Components | None:
+        out = np.empty(components[0].shape)
+        out[:1] = components[0][:1]
+        return (out,) if self._accumulated("add", components[0], out, 1) else None
+
+    def _accumulated(self, name: str, a: Array, out: Array, keep: int) -> bool:
+        """Combine rows from left to right, in `out` or its rows; return whether the format has all results."""
+        width, flat, found, gone = math.prod(a.shape[1:]), _flat(a, a.shape), out.reshape(-1), False
+        code, (_, formats), loops = _machine().CODES[name], self._machine, _floats()
+        for part in slices(len(a) - 1, width):
+            rows = part.start + 1, part.stop + 1
+            gone |= bool(loops.accumulate(formats.address, code, rows, width, keep, flat, found))
+        return not gone
 
     @property
     def matrix_tag(self) -> Tag:
@@ -717,6 +742,13 @@ def _shape(*operands: Components) -> tuple[int, ...]:
     if all(components[0].shape == first for components in operands[1:]):
         return first
     return np.broadcast_shapes(*(components[0].shape for components in operands))
+
+
+@lru_cache(maxsize=1)
+def _floats() -> Any:
+    from gpbnb.arithmetic.kernels import floats
+
+    return floats
 
 
 @lru_cache(maxsize=1)

@@ -13,7 +13,6 @@ A result below 2**-960, where r might underflow, or of at least 2**1023 becomes 
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -108,15 +107,6 @@ def operations(clear: Any, ties: bool, free: bool) -> dict[str, Any]:
         return fit(fmt, q, down, a == 0.0)
 
     @inner(forceinline=True)
-    def root(fmt: Any, a: Any) -> Any:
-        s = math.sqrt(a)
-        if ties and fmt.precision <= SAFE_TWICE:
-            return fit(fmt, s, np.int64(0), a == 0.0)
-        # Neither does a square root.
-        down = np.int64(0) if ties and fmt.precision == 53 and fmt.nearest else direction(fmt, s, fma(-s, s, a))
-        return fit(fmt, s, down, a == 0.0)
-
-    @inner(forceinline=True)
     def round_(fmt: Any, x: Any) -> Any:
         return fit(fmt, x + 0.0, np.int64(0), x == 0.0)
 
@@ -125,7 +115,6 @@ def operations(clear: Any, ties: bool, free: bool) -> dict[str, Any]:
         "subtract": subtract,
         "multiply": multiply,
         "quotient": quotient,
-        "root": root,
         "round_": round_,
     }
 

@@ -84,6 +84,16 @@ def select(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
 
 
 @intrinsic
+def start(typingctx: Any, array: Any) -> Any:
+    """The entries of an array whose entries follow each other in memory."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return context.make_array(array)(context, builder, args[0]).data
+
+    return types.CPointer(array.dtype)(array), codegen
+
+
+@intrinsic
 def at(typingctx: Any, entries: Any, index: Any) -> Any:
     """The entries at an address from an index on."""
 

@@ -1,4 +1,4 @@
-"""Compiled loops over whole arrays: entry by entry, folds, and matrix products.
+"""Compiled loops over whole arrays: entry by entry and folds of numbers that are not float64, and matrix products.
 
 If a result leaves the range of its backend, a loop returns True or raises OverflowError, and its output is invalid.
 """

@@ -12,7 +12,6 @@ place where it differs.
 
 from __future__ import annotations
 
-import math
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -20,10 +19,21 @@ import numpy as np
 from numba import types
 
 from gpbnb.arithmetic.kernels import decimal, doubledouble, shortdecimal, wide
-from gpbnb.arithmetic.kernels.bits import at, bits, call, entries, fma, from_bits, select, words
+from gpbnb.arithmetic.kernels.bits import at, call, entries, words
 from gpbnb.arithmetic.kernels.careful import carefully, masked
 from gpbnb.arithmetic.kernels.compiling import address_of, addressed, borrowing, compiled, inner
-from gpbnb.arithmetic.kernels.doubledouble import two_sum
+from gpbnb.arithmetic.kernels.quick import (
+    COLUMNS,
+    LONG,
+    NUMBER,
+    NUMBERS,
+    RANDOM,
+    SHORT,
+    WHOLE,
+    basic,
+    other,
+    rule_of,
+)
 from gpbnb.arithmetic.kernels.tags import (
     ABSOLUTE,
     ADD,
@@ -34,7 +44,6 @@ from gpbnb.arithmetic.kernels.tags import (
     DIVIDE,
     FUSED,
     MULTIPLY,
-    NEGATIVE,
     NONZERO,
     ROOT,
     ROUND,
@@ -72,8 +81,6 @@ after their operands are gathered; or together, since their operands and results
 
 # Entries of the tables of formats, of a program, of the numbers that it runs on and of a run. Each holds addresses of
 # arrays, and integers; see gpbnb.arithmetic.machine and gpbnb.arithmetic.loop, which make them.
-WHOLE, NUMBER, RANDOM = range(3)
-"""The columns of formats, int64 and float64, whose meaning depends on the kind; seed and count of random numbers."""
 A, B, C, OUT, BEGINS, OPERATIONS, FORMAT, TOGETHER, ROOM, SEGMENTS, ROWS = range(11)
 """Operands and results of rows, uint32; where segments begin, and their operations, formats and how their rows run,
 int64; room for the operands of a segment, float64; and how many segments and rows there are."""
@@ -90,59 +97,7 @@ VALUES, TRUTHS = range(2)
 
 # -- float64 with masks ------------------------------------------------------------------------------------------------
 
-COLUMNS, NUMBERS = 16, 7  # of each format
-# Columns of Formats.whole.
-BITS, PRECISION, MODE, QUICK, HOW, UNIT, BELOW_ZERO, ABOVE_ZERO, STICKY_BELOW, STICKY_ABOVE, TO_EVEN, LOW, SPAN = range(
-    13
-)
-_SIGN, _MAGNITUDE = np.int64(-(2**63)), np.int64(2**63 - 1)
-_EXPONENT, _HALF_ULP = np.int64(0x7FF << 52), np.int64(53 << 52)
-_ADD, _MULTIPLY = np.int64(ADD), np.int64(MULTIPLY)
-LONG, SHORT, TIED = range(3)
-"""How quick results are rounded: by the sign of a residual, without, or by the size of the residual, which tells ties
-away from zero in 53 bits."""
-_UNIT_OF_EXACT_PRODUCTS = np.int64(1 << 27)  # products of numbers of at most 26 bits are exact
-_SHORT, _LONG = np.int64(SHORT), np.int64(LONG)
-
-
-@inner(forceinline=True)
-def _rounded(how: Any, p: Any, r: Any, rule: Any) -> Any:
-    """Round p + r, where p is p + r to nearest with ties to even; also return whether it is out of range."""
-    unit, below, above, sticky_below, sticky_above, to_even, low, span = rule
-    u = bits(p)
-    size = u & _MAGNITUDE
-    if how == TIED:
-        half = from_bits((u & _EXPONENT) - _HALF_ULP)
-        size += np.int64(r == (half if p > 0.0 else -half))
-    else:
-        r = 0.0 if how == SHORT else r  # rounding twice is correct
-        negative = u < 0
-        size -= np.int64(((r < 0.0) & (p > 0.0)) | ((r > 0.0) & (p < 0.0)))
-        sticky = select(negative, sticky_below, sticky_above) & np.int64(r != 0.0)
-        odd = to_even & np.int64((size & unit) != 0)
-        size = (size + select(negative, below, above) + (sticky | odd)) & -unit
-    # Sizes are so far from the ends of float64 that no product or quotient of other numbers is zero.
-    gone = (np.uint64(size - low) > np.uint64(span)) & (size != 0)
-    return from_bits(size | (u & _SIGN)) + 0.0, np.int64(gone)
-
-
-@borrowing(error_model="numpy", forceinline=True)
-def _basic(operation: Any, how: Any, rule: Any, x: Any, y: Any) -> Any:
-    """A product, quotient or sum, and whether it is out of range."""
-    if operation == MULTIPLY:
-        p = x * y
-        r = fma(x, y, -p)
-    elif operation == DIVIDE:
-        p = x / y
-        r = fma(-p, y, x)
-        r = 0.0 if how == TIED else -r if y < 0.0 else r  # no quotient is a tie
-    else:
-        y = -y if operation == SUBTRACT else y
-        p = x + y
-        c = p - x
-        r = (x - (p - c)) + (y - c)
-    found, gone = _rounded(how, p, r, rule)
-    return found, gone | np.int64((operation == DIVIDE) & (y == 0.0))
+_ADD, _MULTIPLY, _SHORT, _LONG = map(np.int64, (ADD, MULTIPLY, SHORT, LONG))
 
 
 @borrowing(forceinline=True)
@@ -150,7 +105,7 @@ def _along(operation: Any, how: Any, sign: Any, rule: Any, a: Any, b: Any, c: An
     """Compute c from a and b, entry by entry; return whether a result left the range."""
     any_gone = np.int64(0)
     for i in range(count):
-        c[i], gone = _basic(operation, how, rule, a[i], sign * b[i])
+        c[i], gone = basic(operation, how, rule, a[i], sign * b[i])
         any_gone |= gone
     return any_gone
 
@@ -162,40 +117,23 @@ def _all_along(operation: Any, how: Any, rule: Any, a: Any, b: Any, c: Any, coun
     if operation == MULTIPLY:
         if how == SHORT:
             return _along(_MULTIPLY, _SHORT, 1.0, rule, a, b, c, count)
-        return _along(_MULTIPLY, _LONG, 1.0, rule, a, b, c, count)
+        if how == LONG:
+            return _along(_MULTIPLY, _LONG, 1.0, rule, a, b, c, count)
+        return _along(_MULTIPLY, how, 1.0, rule, a, b, c, count)
     if how == SHORT:
         return _along(_ADD, _SHORT, sign, rule, a, b, c, count)
-    return _along(_ADD, _LONG, sign, rule, a, b, c, count)
+    if how == LONG:
+        return _along(_ADD, _LONG, sign, rule, a, b, c, count)
+    return _along(_ADD, how, sign, rule, a, b, c, count)
 
 
 @borrowing
 def _one_by_one(operation: Any, how: Any, rule: Any, a: Any, b: Any, out: Any, count: Any, values: Any) -> Any:
     any_gone = np.int64(0)
     for i in range(count):
-        values[out[i]], gone = _basic(operation, how, rule, values[a[i]], values[b[i]])
+        values[out[i]], gone = basic(operation, how, rule, values[a[i]], values[b[i]])
         any_gone |= gone
     return any_gone
-
-
-@borrowing(error_model="numpy")
-def _other(operation: Any, how: Any, rule: Any, x: Any, y: Any, z: Any) -> Any:
-    """The result of another operation on numbers, as :func:`_basic`."""
-    if operation in (NEGATIVE, ABSOLUTE):
-        return (0.0 - x if operation == NEGATIVE else abs(x)), np.int64(0)
-    p, r = x, 0.0
-    if operation == ROOT:
-        p = math.sqrt(x)
-        r = 0.0 if how == TIED else fma(-p, p, x)  # nor is a root
-    elif operation == FUSED:
-        if rule[0] == 1 and how == SHORT:  # 53 bits, ties to even
-            p = fma(x, y, z)
-        elif rule[0] >= _UNIT_OF_EXACT_PRODUCTS:
-            p, r = two_sum(x * y, z)
-            how = _LONG
-        else:
-            return x, np.int64(1)
-    found, gone = _rounded(how, p, r, rule)
-    return found, gone | np.int64(p != p)
 
 
 @borrowing
@@ -221,14 +159,6 @@ def _row(code: Any, lanes: Any, o: Any) -> Any:
     return lanes * a, lanes * b, lanes * c, lanes * entries(code, OUT, np.uint32)[o], c
 
 
-@borrowing
-def _rule(formats: Any, f: Any) -> Any:
-    """How results of a format are rounded, and the range of their sizes."""
-    whole = at(entries(formats, WHOLE, np.int64), COLUMNS * f)
-    rule = whole[UNIT], whole[BELOW_ZERO], whole[ABOVE_ZERO], whole[STICKY_BELOW], whole[STICKY_ABOVE], whole[TO_EVEN]
-    return whole[HOW], (*rule, whole[LOW], whole[SPAN])
-
-
 @inner(forceinline=True)
 def _rounds(operation: Any) -> Any:
     """Whether a result may be rounded, or have another sign."""
@@ -241,17 +171,17 @@ def _quick_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     operations, numbers = entries(code, OPERATIONS, np.int64), entries(code, FORMAT, np.int64)
     begins, together = entries(code, BEGINS, np.int64), entries(code, TOGETHER, np.int64)
     any_gone, f, after = np.int64(0), np.int64(0), np.int64(0)
-    how, rule = _rule(formats, f)
+    how, rule = rule_of(formats, f)
     for s in range(code[SEGMENTS]):
         begin, count, operation = begins[s], begins[s + 1] - begins[s], operations[s]
         if begin < after:
             continue
         if numbers[s] != f:
             f = numbers[s]
-            how, rule = _rule(formats, f)
+            how, rule = rule_of(formats, f)
         a, b = at(entries(code, A, np.uint32), begin), at(entries(code, B, np.uint32), begin)
         c, out = at(entries(code, C, np.uint32), begin), at(entries(code, OUT, np.uint32), begin)
-        if together[s] != ONE_BY_ONE and how != TIED:
+        if together[s] != ONE_BY_ONE:
             first, second = at(values, a[0]), at(values, b[0])
             if together[s] == GATHERED:
                 first = entries(code, ROOM, np.float64)
@@ -270,7 +200,7 @@ def _quick_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
                 x, y, z = a[i], b[i], c[i]
                 if _rounds(operation):
                     third = values[z] if operation == FUSED else 0.0
-                    values[out[i]], gone = _other(operation, how, rule, values[x], values[y], third)
+                    values[out[i]], gone = other(operation, how, rule, values[x], values[y], third)
                     any_gone |= gone
                 else:
                     any_gone |= _without_rounding(operation, values, truths, x, y, z, np.int64(z), out[i])
@@ -284,21 +214,21 @@ def _quick_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     begins, any_gone = entries(code, BEGINS, np.int64), np.int64(0)
     for s in range(code[SEGMENTS]):
         operation = operations[s]
-        how, rule = _rule(formats, numbers[s])
+        how, rule = rule_of(formats, numbers[s])
         if operation == SKIP:
             continue
         for o in range(begins[s], begins[s + 1]):
             a, b, c, out, third = _row(code, lanes, o)
-            if operation <= MULTIPLY and how != TIED:
+            if operation <= MULTIPLY:
                 any_gone |= _all_along(operation, how, rule, at(values, a), at(values, b), at(values, out), lanes)
                 continue
             for i in range(lanes):
                 if operation <= DIVIDE:
-                    values[out + i], gone = _basic(operation, how, rule, values[a + i], values[b + i])
+                    values[out + i], gone = basic(operation, how, rule, values[a + i], values[b + i])
                     any_gone |= gone
                 elif _rounds(operation):
                     z = values[c + i] if operation == FUSED else 0.0
-                    values[out + i], gone = _other(operation, how, rule, values[a + i], values[b + i], z)
+                    values[out + i], gone = other(operation, how, rule, values[a + i], values[b + i], z)
                     any_gone |= gone
                 else:
                     any_gone |= _without_rounding(operation, values, truths, a + i, b + i, c + i, third, out + i)
@@ -336,11 +266,6 @@ def _careful_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     for i in range(lanes):
         least = min(least, _careful_lane(formats, code, held, lanes, i))
     return least
-
-
-LEAST = 2.0**-480
-"""Least size of the numbers with which the machine computes quickly, and the inverse of the largest: no product and no
-quotient of two of them leaves float64."""
 
 
 # -- other numbers -----------------------------------------------------------------------------------------------------

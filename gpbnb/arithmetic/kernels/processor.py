@@ -1,4 +1,4 @@
-"""Bases 2 and 16 as processors compute, on float64: every rounding mode, a limited range, fused multiply-add.
+"""Bases 2 and 16 as processors compute, on float64: every rounding mode, a limited range.
 
 As in :mod:`gpbnb.arithmetic.kernels.binary`, an operation yields the nearest float64 p and the sign of the exact
 result minus p. Below the smallest normal number B of a format, all numbers have the same spacing as those from B to 2B.
@@ -9,7 +9,6 @@ Results beyond the range become NaN, and later results stay NaN.
 
 from __future__ import annotations
 
-import math
 from functools import cache
 from typing import Any
 
@@ -98,9 +97,9 @@ _DROPPED = {Two: _dropped_binary, Sixteen: _dropped_hexadecimal}
 def operations(digits: Any, mode: Any) -> dict[str, Any]:
     """Make the scalar operations for a class of digits and a class of rounding mode."""
     if mode is ShortEven:
-        return {**_short(_within), "fused": operations(digits, Even)["fused"]}
+        return _short(_within)
     if mode is LongEven:
-        return {**_with_residuals(_fit_53, 0), "fused": _fused_of_53}
+        return _with_residuals(_fit_53, 0)
     dropped = inner(forceinline=True)(_DROPPED[digits])
     round_magnitude = inner(forceinline=True)(_MODES[mode])
 
@@ -156,28 +155,16 @@ def _with_residuals(fit: Any, exact_product: int) -> dict[str, Any]:
         return fit(fmt, q, -r if b < 0.0 else r, a == 0.0)
 
     @inner(forceinline=True)
-    def root(fmt: Any, a: Any) -> Any:
-        s = math.sqrt(a)
-        return fit(fmt, s, fma(-s, s, a), a == 0.0)
-
-    @inner(forceinline=True)
     def round_(fmt: Any, x: Any) -> Any:
         y = fit(fmt, x, 0.0, x == 0.0)
         return y if abs(x) < np.inf else np.nan
-
-    @inner(forceinline=True)
-    def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-        w, rest, zero = fused_sum(a, b, c)
-        return fit(fmt, w, rest, zero)
 
     return {
         "add": add,
         "subtract": subtract,
         "multiply": multiply,
         "quotient": quotient,
-        "root": root,
         "round_": round_,
-        "fused": fused,
     }
 
 
@@ -284,17 +271,12 @@ def _short(within: Any) -> dict[str, Any]:
     def quotient(fmt: Any, a: Any, b: Any) -> Any:
         return within(fmt, _nearest_even(fmt, a / b), a == 0.0)
 
-    @inner(forceinline=True)
-    def root(fmt: Any, a: Any) -> Any:
-        return within(fmt, _nearest_even(fmt, math.sqrt(a)), a == 0.0)
-
     return {
         "add": add,
         "add_product": add_product,
         "subtract": subtract,
         "multiply": multiply,
         "quotient": quotient,
-        "root": root,
         "round_": _round_even,
     }
 
@@ -315,14 +297,6 @@ def fused_sum(a: Any, b: Any, c: Any) -> Any:
     zero = (a == 0.0) | (b == 0.0)
     w = w if zero | (abs(p) >= LEAST) else np.nan
     return w, (low if low != 0.0 else lowest), (w == 0.0) & (zero | (c != 0.0))
-
-
-@inner(forceinline=True)
-def _fused_of_53(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    w, rest, zero = fused_sum(a, b, c)
-    # Where s + v is a tie, the residual `lowest` may make the other neighbour the nearest.
-    near = fma(a, b, c)
-    return _fit_53(fmt, near if w == w else w, rest if near == w else w - near, zero)
 
 
 # -- by the machine ----------------------------------------------------------------------------------
@@ -358,10 +332,6 @@ def _machine(rounded: Any) -> dict[str, Any]:
         return rounded(a / b)
 
     @inner(forceinline=True)
-    def root(fmt: Any, a: Any) -> Any:
-        return rounded(math.sqrt(a))
-
-    @inner(forceinline=True)
     def round_(fmt: Any, x: Any) -> Any:
         return rounded(x)
 
@@ -370,29 +340,14 @@ def _machine(rounded: Any) -> dict[str, Any]:
         "subtract": subtract,
         "multiply": multiply,
         "quotient": quotient,
-        "root": root,
         "round_": round_,
     }
 
 
-@inner(forceinline=True)
-def _fused_single(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    # The product is exact, and the sum is rounded to odd, so that the second rounding is correct.
-    s, r = two_sum(a * b, c)
-    u = bits(abs(s)) - np.int64(((r < 0.0) & (s > 0.0)) | ((r > 0.0) & (s < 0.0)))
-    odd = from_bits(u | np.int64(r != 0.0))
-    return _single(odd if s >= 0.0 else 0.0 - odd)
-
-
-@inner(forceinline=True)
-def _fused_double(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    return _double(fma(a, b, c))
-
-
 # Sums, products, quotients and roots of 24-bit numbers may be rounded to 53 bits first, which never creates a tie.
 MACHINE = {
-    Hardware32: {**_machine(_single), "fused": _fused_single},
-    Hardware64: {**_machine(_double), "fused": _fused_double},
+    Hardware32: _machine(_single),
+    Hardware64: _machine(_double),
 }
 
 

@@ -95,7 +95,7 @@ def quotient(fmt: Any, a: Any, b: Any) -> Any:
 
 
 def root(fmt: Any, a: Any) -> Any:
-    """fl(sqrt(a)), where the caller has made sure that a is not negative."""
+    """fl(sqrt(a)), where the caller has made sure that a is not negative; not for numbers that are float64."""
     raise _only_compiled("root")
 
 
@@ -180,7 +180,7 @@ def _implementation(fmt: Any, name: str) -> Any:
 
 
 def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    """fl(a * b + c), rounded once; only for ``Limited``, ``Hardware32`` and ``Hardware64``."""
+    """fl(a * b + c), rounded once; only for ``Wide``."""
     raise _only_compiled("fused")
 
 

@@ -49,14 +49,17 @@ class Hexadecimal(NamedTuple):
 
 
 class Decimal(NamedTuple):
-    """Base 10, precision 1 to 18; a number is ``(significand, exponent)``, an array is int64 (..., 2)."""
+    """Base 10, precision 1 to 18; a number is ``(significand, exponent)``, an array is int64 (..., 2).
+
+    ``LimitedDecimal`` computes the same; sums and products of arrays take it 1.2 times as long.
+    """
 
     precision: int
     nearest: bool
 
 
 class ShortDecimal(NamedTuple):
-    """Base 10, precision 1 to 8: the same numbers as ``Decimal``, computed faster."""
+    """Base 10, precision 1 to 8: the same numbers as ``Decimal``, computed two to four times as fast."""
 
     precision: int
     nearest: bool
