@@ -1,14 +1,15 @@
 """A system whose step is a function of your own, and the operations of this step as a program for C code.
 
-The step is traced once, see :mod:`gpbnb.arithmetic.traced`. Runs repeat the trace in compiled code, and
+The step is recorded once, see :mod:`gpbnb.arithmetic.traced`. Runs repeat it, see :mod:`gpbnb.filters.repeating`, and
 :meth:`NonlinearSystem.program` lists the same operations with the codes of :mod:`gpbnb.filters.program`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from inspect import signature
 from typing import Any, cast
 
@@ -28,6 +29,7 @@ from gpbnb.filters.listing import Listing
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, sized, whole_number
 from gpbnb.filters.program import Builder, Program, entries, without_exact
+from gpbnb.filters.repeating import RepeatedStep, StepTaken
 
 Step = Callable[[Any, Any, Any], tuple[Any, Any]]
 """A function ``step(fmt, x, u)`` that returns the next state and the output."""
@@ -138,8 +140,15 @@ class NonlinearSystem:
         fmt = format_named(fmt) if type(fmt) is str else fmt  # isinstance would ask a traced format for its class
         if type(fmt) is BlockFormats or not callable(getattr(fmt, "array", None)):
             raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or a name")
-        found: tuple[Any, FloatArray] = self._whole_run(fmt, self.inputs_in(fmt, u))
-        return found
+        rows, first = self.inputs_in(fmt, u), (fmt.array(self.x0),)
+        step = RepeatedStep(self._taken, [fmt], first, len(rows))
+        states, outputs = list[Any](), list[Any]()
+        for row in rows:
+            step.take([row])
+            states.append(step.states[0])
+            outputs.append(step.gain)
+        apart = any(isinstance(each, list) for each in states)
+        return [list(each) for each in states] if apart else np.stack(states), cast(Any, np.stack(outputs))
 
     def advance(self, fmt: Any, x: Any, u: Any) -> FloatArray:
         """Take one step from a state (n,) with inputs (m,); return the next state and the output, (n + p,)."""
@@ -187,20 +196,18 @@ class NonlinearSystem:
 
     @cached_property
     def _one_step(self) -> TracedFunction:
-        return TracedFunction(self._stepped)
+        return TracedFunction(partial(NonlinearSystem._stepped, self))
 
-    @cached_property
-    def _whole_run(self) -> TracedFunction:
-        return TracedFunction(self._run)
+    @property
+    def refusal(self) -> str:
+        """Why the step cannot be traced; empty if it can be."""
+        with contextlib.suppress(ValueError):
+            self._one_step.recorded((self.n,), (self.m,))
+        return self._one_step.refusal
 
-    def _run(self, fmt: Any, u: Any) -> Any:
-        x, states, outputs = fmt.array(self.x0), list[Any](), list[Any]()
-        for row in u:
-            x, output = self._parts(fmt, x, row)
-            states.append(x)
-            outputs.append(output)
-        apart = any(isinstance(each, list) for each in states)
-        return [list(each) for each in states] if apart else np.stack(states), np.stack(outputs)
+    def _taken(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
+        after, output = self._parts(formats[0], *states, *given)
+        return StepTaken((after,), output, True)
 
     def _stepped(self, fmt: Any, x: Any, u: Any) -> Any:
         return np.concatenate(self._parts(fmt, x, u))

@@ -17,7 +17,7 @@ from gpbnb.arithmetic.exits import unseen
 from gpbnb.arithmetic.interpreting import InLoops, OnIntegers, Segment
 from gpbnb.arithmetic.kernels.backends import Looped
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.tape import Tape
+from gpbnb.arithmetic.tape import FEW_OPERATIONS, Tape
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
 
 
@@ -51,10 +51,13 @@ class RepeatedStep:
     function : the step.
     formats : its formats; the first is that of its functions.
     states : the arrays before the first step.
+    steps : number of steps, if it is known: few operations run on integers, which need no loading.
     """
 
-    def __init__(self, function: StepFunction, formats: Sequence[Any], states: tuple[FloatArray, ...]) -> None:
-        self._function, self._formats = function, formats
+    def __init__(
+        self, function: StepFunction, formats: Sequence[Any], states: tuple[FloatArray, ...], steps: int | None = None
+    ) -> None:
+        self._function, self._formats, self._steps = function, formats, steps
         self._states: tuple[FloatArray, ...] | None = states
         self._inside: _Inside | None = None
         self._made = dict[Any, _Inside | None]()
@@ -83,6 +86,8 @@ class RepeatedStep:
         ----------
         kind : tells steps apart that have other operations.
         """
+        if type(self._formats[0]) is TracedFormat:  # part of a function that is traced itself
+            self._made[kind] = None
         if kind not in self._made:
             self._made[kind] = self._opened(given, kind)
         inside = self._made[kind]
@@ -127,7 +132,7 @@ class RepeatedStep:
         if isinstance(found, str) or isinstance(again, str) or not found.tape.equals(again.tape):
             return None
         try:
-            return _Inside(found, formats)
+            return _Inside(found, formats, self._steps)
         except (ArithmeticError, ValueError, TypeError):
             return None
 
@@ -156,10 +161,11 @@ class RepeatedStep:
 class _Inside:
     """A recorded step with its numbers."""
 
-    def __init__(self, recorded: RecordedArrays, formats: Sequence[Any]) -> None:
+    def __init__(self, recorded: RecordedArrays, formats: Sequence[Any], steps: int | None) -> None:
         self.recorded, self._formats = recorded, formats
-        loops = isinstance(formats[0].backend, Looped)
         tape = recorded.tape
+        few = steps is not None and steps * len(tape.instructions) < FEW_OPERATIONS
+        loops = isinstance(formats[0].backend, Looped) and not few
         self._run: InLoops | OnIntegers = InLoops(tape, formats) if loops else OnIntegers(tape, formats[0])
         if not self._run.sound or not self._run.run(self._run.ready(recorded.once)):
             raise OverflowError("got a constant beyond the range of the loops")

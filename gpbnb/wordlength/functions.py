@@ -27,6 +27,9 @@ from gpbnb.wordlength.asked import Data, Function
 SPARE_BITS = 37
 """Bits that the reference has beyond the highest precision; a second run that checks it has half as many again."""
 
+Prepared = TracedFunction | NonlinearSystem | FixedIntervalSmoother
+"""What records its operations itself."""
+
 STOPS = (ZeroDivisionError, OverflowError, DomainError, WholeNumberError, np.linalg.LinAlgError)
 """Errors that end a function in a format."""
 
@@ -34,14 +37,14 @@ STOPS = (ZeroDivisionError, OverflowError, DomainError, WholeNumberError, np.lin
 class Referenced(NamedTuple):
     """A function, its inputs, and `true`, its outputs in the reference, (steps, p)."""
 
-    run: TracedFunction | FixedIntervalSmoother
+    run: Prepared
     z: NDArray[Any] | None
     true: NDArray[Any]
 
     @property
     def untraced(self) -> str:
         """Why the user's function cannot be traced; empty if it can be."""
-        return self.run.refusal if isinstance(self.run, TracedFunction) else ""
+        return "" if isinstance(self.run, FixedIntervalSmoother) else self.run.refusal
 
     def errors(self, fmt: Any) -> NDArray[np.float64] | Outcome:
         """Return the largest error of each output, or why the function stops."""
@@ -63,14 +66,17 @@ def referenced(run: Function, data: Data, base: int, most: int) -> tuple[Referen
             raise ValueError(f"got z for a smoother, which has its record; needed its number of steps, {len(run.z)}")
     elif inputs is None and isinstance(run, NonlinearSystem):
         raise ValueError(f"got a number of steps for {run.name}; needed its inputs, of shape (steps, {run.m})")
-    made = run if isinstance(run, (FixedIntervalSmoother, TracedFunction)) else TracedFunction(run)
+    made = run if isinstance(run, Prepared) else TracedFunction(run)
     digits = max(most, largest_by_default(base)) + math.ceil(SPARE_BITS / math.log2(base))
     short, true = (_reference(made, FloatFormat(base, each), inputs, steps) for each in (digits, digits * 3 // 2))
     return Referenced(made, inputs, true), short, digits
 
 
 def _reference(
-    run: TracedFunction | FixedIntervalSmoother, fmt: FloatFormat, z: NDArray[Any] | None, steps: int | None
+    run: Prepared,
+    fmt: FloatFormat,
+    z: NDArray[Any] | None,
+    steps: int | None,
 ) -> NDArray[Any]:
     try:
         return exact_outputs(outputs_of(run, fmt, z, steps))
@@ -101,7 +107,7 @@ def exact_outputs(found: FloatArray) -> NDArray[Any]:
 
 
 def outputs_of(
-    run: TracedFunction | FixedIntervalSmoother,
+    run: Prepared,
     fmt: FloatFormat | FixedFormat,
     z: NDArray[Any] | None,
     steps: int | None,
