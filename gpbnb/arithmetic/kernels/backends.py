@@ -42,9 +42,7 @@ Array = NDArray[Any]
 Components = tuple[Array, ...]
 
 _FEW = 1 << 18  # numbers that the machine rounds, which other work needs as well: no loop is compiled for them
-LOOPS_AFTER = (
-    20_000  # operations of a kind of numbers, which exact arithmetic does in 0.1 s; to compile a loop takes up to 3
-)
+LOOPS_AFTER = 20_000  # operations of a kind, which exact arithmetic does in 0.1 s; compiling a loop takes up to 3 s
 _MANY = 1000  # multiplications in a product for which a look at the range of its entries pays
 _LEAST_32, _LARGEST_32 = 2.0**-126, float(np.finfo(np.float32).max)
 
