@@ -71,7 +71,8 @@ def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
     slow = "keep" in content and max(content["keep"], content["back"], content["steps"] or 0) > _LONG
     together = content.get("phases", 1) < content.get("period", 1)
     for factor in SLOW if slow else RAISED[together:]:
-        content = json.loads(written(guess._replace(bound=guess.bound * larger * factor)))
+        if factor > 1:
+            content = json.loads(written(guess._replace(bound=guess.bound * larger * factor)))
         if together and factor > RAISED[2]:
             content["phases"] = content["period"]
         try:
