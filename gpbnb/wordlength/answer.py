@@ -105,9 +105,7 @@ _EVIDENCE = {
 def evidence(basis: Basis, steps: int | None, ends: bool = False) -> tuple[str, str]:
     """Return how an error is known, as "observed in 60 steps", and what had to meet the tolerance.
 
-    Parameters
-    ----------
-    ends : whether a guarantee holds for these steps only.
+    `ends` is whether a guarantee holds for these steps only.
     """
     texts = ("guaranteed for {}", "by a guarantee for {}") if ends and basis == "guarantee" else _EVIDENCE[basis]
     known, needed = (text.format(f"{steps} step{'s' * (steps != 1)}") for text in texts)

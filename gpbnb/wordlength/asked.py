@@ -230,13 +230,7 @@ def is_filter(model: Any) -> bool:
 
 
 def admitted(model: Any, *tasks: str) -> Any:
-    """Read a model of any kind, and refuse what it cannot do.
-
-    Raises
-    ------
-    ValueError : it cannot do one of the tasks, keys of :data:`CANNOT`; the message says what to use.
-    ValueError, TypeError, OSError : as for :func:`gpbnb.read_model`.
-    """
+    """Read a model of any kind, and refuse tasks, keys of :data:`CANNOT`, that it cannot do, with what to use."""
     library = type(model).__module__.partition(".")[0]
     own = isinstance(model, NonlinearModel | FilterDesign) or (callable(model) and library not in SYSTEMS)
     found = model if own else read_model(model)
@@ -253,12 +247,7 @@ def admitted(model: Any, *tasks: str) -> Any:
 
 
 def data_of(model: Any, z: Any, seed: int = 0) -> Data:
-    """Return what a model is run with: (steps, m), (steps,) for one measurement or input, or a number of steps.
-
-    Raises
-    ------
-    ValueError : another shape, a number of steps below 1, or a seed where nothing is simulated.
-    """
+    """Return what a model is run with: (steps, m), (steps,) for one measurement or input, or a number of steps."""
     if isinstance(z, str | Path) or z is None:
         raise ValueError(f"got {z!r} for z; needed measurements or inputs, (steps, m), or a number of steps")
     simulated = not isinstance(z, list | tuple) and not hasattr(z, "to_fractions") and np.ndim(z) == 0

@@ -62,12 +62,7 @@ def written_files(
 ) -> dict[str, str]:
     """Return the text of each file by its name.
 
-    Parameters
-    ----------
-    what, bound : what the filter is, and what is proven about its errors, which may be empty, in words.
-    bounded : whether its errors can be bounded.
-    sections : those of a cascade, as stored; else empty.
-    tolerances : (n,), how far each state may be from its vectors; None if it may not.
+    `what` and `bound` are sentences; `tolerances`, (n,), is how far each state may be from its vectors.
     """
     name = source.name
     return {

@@ -94,16 +94,7 @@ class Judge:
 
 
 def judge_for(asked: Asked, base: int = 2, most: int = 0) -> Judge:
-    """Check a question about a model, and return what answers it.
-
-    Parameters
-    ----------
-    base, most : base and most digits of the formats to try, for the reference of a function.
-
-    Raises
-    ------
-    ValueError, TypeError, OverflowError : for a reason given in :func:`gpbnb.required_precision`.
-    """
+    """Check a question, and return what answers it; `base` and `most` digits are for a function's reference."""
     model, data, basis = asked.model, asked.data, asked.basis
     check_within(asked.within, basis)
     if isinstance(model, LinearSystem):
@@ -121,13 +112,7 @@ def judge_for(asked: Asked, base: int = 2, most: int = 0) -> Judge:
 def for_ever_or_over(
     asked: Asked, judge: Judge, ask: Callable[[Judge], Answer], has_bound: Callable[[Answer], bool]
 ) -> tuple[Answer, Judge]:
-    """Ask a judge for a bound for ever and, if it has none, one for a bound over the steps of the data.
-
-    Returns
-    -------
-    found : what `ask` returns.
-    judge : the judge that found it.
-    """
+    """Ask a judge for a bound for ever or, if it has none, over the steps of the data; return that judge, too."""
     found = ask(judge)
     if not has_bound(found) and judge.over is not None:
         later = judge.over(asked.data.steps)
@@ -414,13 +399,7 @@ def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, w
 
 
 def largest_inputs(system: LinearSystem, within: FilterLimits) -> NDArray[np.float64]:
-    """Return the limits on the inputs of a system, (m,).
-
-    Raises
-    ------
-    TypeError : `within` is not a result of :func:`gpbnb.bounds.guarantee.limits`.
-    ValueError : limits for another number of states or inputs, or limits on the states or innovations.
-    """
+    """Return the limits on the inputs of a system, (m,), and refuse limits on its states or innovations."""
     if isinstance(within, FilterLimits) and (np.isfinite(within.state).any() or np.isfinite(within.innovation).any()):
         raise ValueError(
             f"got limits on states or innovations for {system.name}; needed limits on its inputs alone: write "
@@ -445,16 +424,7 @@ def slowest_response(system: LinearSystem, steps: int) -> str:
 
 
 def weak_evidence(system: LinearSystem, true: NDArray[np.float64], tolerances: NDArray[np.float64]) -> tuple[str, ...]:
-    """Return why the errors of a run may say little about other runs, in a sentence each; empty if nothing does.
-
-    A run that ends before the slowest response has decayed does not show how errors add up. An output that stays within
-    its tolerance would also meet it if it were zero.
-
-    Parameters
-    ----------
-    true : (steps, p, 2), outputs of the system as given.
-    tolerances : (p,).
-    """
+    """Say if a run, with outputs `true` (steps, p, 2), is shorter than the system's memory, or if zero would do."""
     found = list[str]()
     if slow := slowest_response(system, len(true)):
         found.append(

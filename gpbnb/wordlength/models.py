@@ -281,14 +281,7 @@ class FilterSource(NamedTuple):
 
 
 def read_filter(source: str | Path | Mapping[str, Any], u: Numbers | None = None) -> FilterSource:
-    """Read a filter, and a digital filter in several structures, from a TOML file or a mapping.
-
-    The arguments are those of :func:`read_model`.
-
-    Raises
-    ------
-    ValueError, OSError : as for :func:`read_model`.
-    """
+    """Read a model as :func:`read_model` does, and a digital filter in several structures."""
     model, design, named = _of_file(source, u)
     if design is None:
         return FilterSource(model)

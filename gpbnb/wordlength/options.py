@@ -177,15 +177,7 @@ def _add_files(made: argparse.ArgumentParser) -> None:
 
 
 def read(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Read the command line, and convert the texts of numbers to numbers.
-
-    Raises
-    ------
-    ValueError : a value that its option does not take; options that are not compatible; one file for two purposes; a
-        report that cannot be written.
-    OSError : a file cannot be read.
-    SystemExit : after showing help or the version, or if the command line has an unknown option.
-    """
+    """Read and check the command line, and convert the texts of numbers to numbers."""
     given = parser().parse_args(arguments)
     for name in ("tolerance", "level", *QUANTITIES):
         _replace(given, name, _numbers, "numbers with commas between: 0.01,1/3,inf")

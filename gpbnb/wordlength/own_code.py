@@ -15,16 +15,9 @@ _RUN = dict[str, Path]()
 
 
 def function_at(text: Any, key: str, folder: Path, loaded: dict[Path, ModuleType]) -> Callable[..., Any]:
-    """Return the function that an entry such as ``step = "model.py:step"`` names; one that is given is itself.
+    """Return the function that an entry such as ``step = "model.py:step"`` names from a folder, or is itself.
 
-    Parameters
-    ----------
-    folder : the folder from which the path leads on.
-    loaded : files that were run before for the same model, which are not run again.
-
-    Raises
-    ------
-    ValueError : no such file or function, or an error in the file, with its line.
+    A file that is among those `loaded` for the same model is not run again.
     """
     if callable(text):
         return text

@@ -175,17 +175,8 @@ def study(
 ) -> Report:
     """Find the answer for each basis and form or structure, and collect what explains it.
 
-    Parameters
-    ----------
-    source : origin of the measurements; by default whether they were given or simulated.
-    command : the command that reproduces the report.
-    tell : function called with a line of text before and after each search.
-
-    Raises
-    ------
-    ValueError : for a reason given in :func:`gpbnb.required_precision`; missing measurements
-        with a basis that holds for all of them.
-    OverflowError : for a reason given there.
+    `source` says where measurements come from, `command` reproduces the report, `tell` is called with a line of text
+    before and after each search.
     """
     parts, z, structures = asked.parts(), asked.measured(), asked.source.structures
     lacking = dict(asked.source.lacking) if len(structures) > 1 else {}
