@@ -9,8 +9,7 @@ import pytest
 
 from gpbnb.report.ledger.checks import rolling as material
 from gpbnb.report.rolling import experiment, theory
-from gpbnb.report.rolling.experiment import SWEEP
-from gpbnb.report.rolling.flicker import record
+from gpbnb.report.rolling.experiment import SWEEP, record
 from gpbnb.report.rolling.theory import DRIFTS, LEVEL, YEAR
 
 

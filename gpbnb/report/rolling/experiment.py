@@ -16,12 +16,23 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
-from gpbnb.report.rolling.flicker import record
 from gpbnb.report.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
 from gpbnb.report.stored_rows import sweep
 from gpbnb.sweeps import Column
 
 YEAR_SAMPLES = round(YEAR / INTERVAL)
+
+
+def record(level: float, samples: int, channels: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    r"""Generate independent records of 1/f noise (samples, channels); each starts at rest.
+
+    White noise passes through :func:`gpbnb.report.rolling.theory.impulse_response` (Kasdin 1995). The one-sided density
+    of samples taken Δt apart is :math:`\pi A\,\Delta t/\sin(\pi f\Delta t)`, and A/f at low frequencies, whatever Δt.
+    A channel's noise does not depend on the number of channels.
+    """
+    white = np.stack([source.standard_normal(samples) for source in rng.spawn(channels)], axis=1)
+    response = math.sqrt(math.pi * level) * theory.impulse_response(samples)[:, np.newaxis]
+    return np.asarray(scipy.signal.fftconvolve(white, response, axes=0)[:samples])
 
 
 def derolled_record(
