@@ -84,5 +84,8 @@ def test_the_command_writes_a_run_and_keeps_quiet(tmp_path, monkeypatch, capsys)
     assert "emulation" in capsys.readouterr().err
     (tmp_path / "run.csv").write_text("1\n")
     assert main(asked) == 2
-    assert "got --csv run.csv, a file that gpbnb has not written; needed another name" in capsys.readouterr().err
+    assert (
+        "got --csv run.csv, and run.csv is a file that gpbnb has not written; needed another name"
+        in capsys.readouterr().err
+    )
     assert (tmp_path / "run.csv").read_text() == "1\n"
