@@ -1,5 +1,7 @@
 """Author or scan: the rule, and the data to which it is applied."""
 
+from dataclasses import replace
+
 import pytest
 
 from gpbnb.report import ledger
@@ -53,5 +55,7 @@ def test_an_entry_shows_the_characters_of_a_damaged_scan(rows):
     html = ledger.ledger_page([row], page).html
     assert '<p class="scan"><code>r33 Cut Swt Yy; = (9); -62 -Sut Cut Z,</code></p>' in html
     assert html.index('class="scan"') < html.index("<details>")
+    html = ledger.ledger_page([replace(row, finding=compare(True, "1"))], page).html
+    assert html.index('class="scan"') > html.index("<details>")  # a right statement needs nobody to charge
     legible = rows["hung1982.IV.six-frames"]
     assert 'class="scan"' not in ledger.ledger_page([legible], page).html
