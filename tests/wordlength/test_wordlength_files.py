@@ -28,6 +28,14 @@ MODEL = 'name = "Füllstand °C"\nA = [[0.5]]\nB = [[1]]\n'
         ("# a remark\nrange\n\n1\n", [[1]]),
         ('"a, b",c\r\n1,\r\n,2\r\n', [[1, math.nan], [math.nan, 2]]),
         (" 1 , 2 \n", [[1, 2]]),
+        ("# time; a remark\n1\n", [[1]]),
+        ('"a; b",c\n1,2\n', [[1, 2]]),
+        ("Na,K\n1,2\n", [[1, 2]]),
+        # without the blank line, the last measurement would come a step early
+        ("z\n1\n2\n\n3\n", [[1], [2], [math.nan], [3]]),
+        ("\nz\n\n1\n\n\n2\r\n\r\n# a remark\n3\n\n\n", [[1], [math.nan], [math.nan], [2], [math.nan], [3]]),
+        ('1\n\n""\n', [[1], [math.nan], [math.nan]]),
+        ("1,2\n\n3,4\n\n", [[1, 2], [3, 4]]),
     ],
 )
 def test_measurements_are_read(text, rows, tmp_path):

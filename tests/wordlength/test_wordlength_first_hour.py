@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 
 import numpy as np
@@ -36,24 +35,6 @@ SYSTEM = LinearSystem([["0.9"]], [["0.1"]])
 STEP = NonlinearSystem(lambda fmt, x, u: (x + u / 8, x), [0])
 WITHIN = limits(measurement=0.001)
 TOML = "Phi=[[1,1],[0,1]]\nH=[[1,0]]\nQ=[[1,0],[0,1]]\nR=[[1]]\nx0=[0,0]\nP0=[[1,0],[0,1]]\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "rows"),
-    [
-        ("# time; a remark\n1\n", [[1]]),
-        ('"a; b",c\n1,2\n', [[1, 2]]),
-        ("Na,K\n1,2\n", [[1, 2]]),
-        # without the blank line, the last measurement would come a step early
-        ("z\n1\n2\n\n3\n", [[1], [2], [math.nan], [3]]),
-        ("\nz\n\n1\n\n\n2\r\n\r\n# a remark\n3\n\n\n", [[1], [math.nan], [math.nan], [2], [math.nan], [3]]),
-        ('1\n\n""\n', [[1], [math.nan], [math.nan]]),
-        ("1,2\n\n3,4\n\n", [[1, 2], [3, 4]]),
-    ],
-)
-def test_a_file_is_read(text, rows, tmp_path):
-    (tmp_path / "z.csv").write_text(text)
-    np.testing.assert_array_equal(read_measurements(tmp_path / "z.csv"), rows)
 
 
 @pytest.fixture
