@@ -22,6 +22,8 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from tests import oracles
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
+
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=1000)
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

@@ -16,6 +16,8 @@ from gpbnb.arithmetic.elementary import ELEMENTARY, ELEMENTARY_PAIRS
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32, BINARY64
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
+
 AMPLE = 1200  # bits; no argument below leads within 2**-1000 of a tie that is not hit exactly
 FORMATS = {
     "binary16": BINARY16,

@@ -14,6 +14,8 @@ from gpbnb.arithmetic.algebra import EXACT, inverse_in_order, product_in_order
 from gpbnb.arithmetic.definiteness import factor, is_definite
 from gpbnb.arithmetic.rational import exact, inverse_of
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
+
 
 @pytest.fixture
 def without_elimination(monkeypatch):

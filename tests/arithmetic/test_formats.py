@@ -23,6 +23,8 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from tests import oracles
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
+
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
 
 

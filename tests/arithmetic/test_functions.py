@@ -14,6 +14,8 @@ from gpbnb.arithmetic import elementary
 from gpbnb.arithmetic.elementary import ELEMENTARY
 from gpbnb.arithmetic.named import BFLOAT16, BINARY32
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
+
 FORMATS = [FloatFormat(2, 11), FloatFormat(10, 4), FloatFormat(2, 113), FloatFormat(2, 24, Rounding.CHOP)]
 
 

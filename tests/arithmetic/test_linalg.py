@@ -19,6 +19,8 @@ from gpbnb.arithmetic.kernels.tags import Hardware64
 from gpbnb.arithmetic.rounding import Rounding
 from tests import oracles
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
+
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = [FloatFormat(2, 6), FloatFormat(3, 4, CHOP), FloatFormat(10, 3, CHOP), FloatFormat(10, 3)]
 

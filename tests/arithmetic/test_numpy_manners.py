@@ -11,6 +11,8 @@ import pytest
 from gpbnb import BINARY32, BINARY64, BINARY128, FixedFormat, FloatArray, FloatFormat, Rounding, linalg
 from tests.oracles import Numbers
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
+
 FORMATS = [BINARY32, BINARY128, FloatFormat(10, 5), FixedFormat(7, 8)]
 INDICES = [1, -1, slice(1, None), (0, 2), (slice(None), 0), [2, 0], ([0, 1], [2, 2]), ..., (..., np.newaxis, 1)]
 

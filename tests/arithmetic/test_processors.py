@@ -19,6 +19,8 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from tests.oracles import floating
 
+pytestmark = pytest.mark.usefixtures("loops_at_once")
+
 TRUEDIV = operator.truediv
 BINARY = [operator.add, operator.sub, operator.mul, TRUEDIV]
 DETERMINISTIC = [mode for mode in Rounding if mode is not Rounding.STOCHASTIC]
