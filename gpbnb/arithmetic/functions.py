@@ -309,9 +309,9 @@ def cumsum(x: Any, axis: int | None = None) -> Any:
     given = lines(x, axis)
     if not len(given):
         return x
-    late = not given.backend.early(10 * given.size)
-    if late and (components := given.backend.scan(given.components)) is not None:
-        whole: Any = given.from_components(given.backend, components, given.format)
+    backend, entries = given.backend, given.components  # which derivatives do not have, and so are refused
+    if not backend.early(10 * given.size) and (components := backend.scan(entries)) is not None:
+        whole: Any = given.from_components(backend, components, given.format)
         return whole if axis is None else whole.moved(lambda a: np.moveaxis(a, 0, axis))
     sums = [given[0]]
     for line in given[1:]:

@@ -445,9 +445,12 @@ NUMPY: dict[str, Callable[..., Any]] = {
 def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]] | None:
     """Return both factors in one array and the order of the rows; None if the backend cannot compute them."""
     backend = a.backend
-    if not isinstance(backend, Looped) or backend.early(len(a) ** 3):
+    if not isinstance(backend, Looped):
         return None
-    factors, order = backend.pack(a.components, backend.matrix_tag), np.arange(len(a))
+    entries = a.components  # which derivatives do not have, and so are refused
+    if backend.early(len(a) ** 3):
+        return None
+    factors, order = backend.pack(entries, backend.matrix_tag), np.arange(len(a))
     try:
         for part in slices(len(a), a.size):
             column = _loops().lu(backend.matrix_tag, factors, order, pivot, part.start, part.stop)
@@ -461,9 +464,10 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
 def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
     """Return solutions for the columns of b (n, p); None if the backend cannot compute them."""
     backend = a.backend
-    if not isinstance(backend, Looped) or b.backend is not backend or backend.early(len(a) * b.size):
+    if not isinstance(backend, Looped) or b.backend is not backend:
         return None
-    if (compiled := _factored(a, pivot)) is None:
+    entries = b.components
+    if backend.early(len(a) * entries[0].size) or (compiled := _factored(a, pivot)) is None:
         return None
     tag, order = backend.matrix_tag, compiled[1]
     factors, columns = backend.pack(compiled[0].components, tag), backend.pack(b[order].components, tag)
