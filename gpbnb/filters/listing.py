@@ -66,8 +66,8 @@ def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
     order = [*(at for letter in matrices for at in places[letter].ravel().tolist()), 0, tape.one]
     listing = Listing(
         tape,
-        Builder(len(states), len(inputs)),
-        {place: i for i, place in enumerate([*states, *inputs])},
+        states,
+        inputs,
         {place: i for i, place in enumerate(order)},
         {tape.one},
     )
@@ -100,9 +100,8 @@ class Listing:
 
     Parameters
     ----------
-    build : the program under construction.
-    values, coefficients : numbers of values and of coefficients, by their places on the tape; 0 and perhaps 1 are
-        coefficients.
+    states, inputs : places on the tape, -1 for a state that the operations do not use.
+    coefficients : numbers of coefficients, by their places; 0 and perhaps 1 are coefficients.
     nonzero : places of coefficients that are not zero.
     exact : whether functions are refused whose digits C's library does not guarantee.
     """
@@ -110,14 +109,14 @@ class Listing:
     def __init__(
         self,
         tape: Tape,
-        build: Builder,
-        values: dict[int, int],
+        states: Sequence[int],
+        inputs: Sequence[int],
         coefficients: dict[int, int],
         nonzero: set[int],
         exact: bool = True,
     ) -> None:
-        self._tape, self._build, self._nonzero, self._exact = tape, build, nonzero, exact
-        self._values, self._coefficients = values, coefficients
+        self._tape, self._build, self._nonzero, self._exact = tape, Builder(len(states), len(inputs)), nonzero, exact
+        self._values, self._coefficients = {at: i for i, at in enumerate([*states, *inputs])}, coefficients
         self._truths = {0: _FALSE, 1: _TRUE}
         #: Comparisons and combinations that have not been needed yet.
         self._waiting: dict[int, tuple[str, int, int, int]] = {}

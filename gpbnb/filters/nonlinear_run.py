@@ -23,7 +23,7 @@ from gpbnb.filters.listing import Listing
 from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.opening import double_doubles_of
-from gpbnb.filters.program import Builder, Program, entries
+from gpbnb.filters.program import Program, entries
 from gpbnb.filters.recording import block_algebra
 from gpbnb.filters.reference import Step, agreed
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
@@ -202,8 +202,8 @@ class NonlinearRun:
         coefficients = {at: i for i, at in enumerate(order)} | dict.fromkeys(zeros, len(order) - 2)
         listing = Listing(
             tape,
-            Builder(len(states), self.model.m + len(u)),
-            {at: i for i, at in enumerate([*states, *z.tolist(), *u])},
+            states,
+            [*z.tolist(), *u],
             coefficients,
             {tape.one, *(at for at, value in constants.items() if value)},
             exact,

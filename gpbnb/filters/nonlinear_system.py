@@ -28,7 +28,7 @@ from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.listing import Listing
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, sized, whole_number
-from gpbnb.filters.program import Builder, Program, entries, without_exact
+from gpbnb.filters.program import Program, entries, without_exact
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
 
 Step = Callable[[Any, Any, Any], tuple[Any, Any]]
@@ -180,11 +180,11 @@ class NonlinearSystem:
         distinct = list(dict.fromkeys(constants.values()))  # the first is zero
         numbers = {value: i for i, value in enumerate(distinct)}
         after, n = returned.components[0].tolist(), self.n
-        p, inputs = len(after) - n, n + self.m
+        p = len(after) - n
         listing = Listing(
             tape,
-            Builder(n + p, self.m),
-            {place: place - 1 if place <= n else place - 1 + p for place in range(1, 1 + inputs)},
+            [*range(1, 1 + n), *[-1] * p],
+            range(1 + n, 1 + n + self.m),
             {place: numbers[value] for place, value in constants.items()},
             {place for place, value in constants.items() if value},
             exact,
