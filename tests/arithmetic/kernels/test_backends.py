@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gpbnb import BFLOAT16
-from gpbnb.arithmetic import named
+from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -242,11 +242,16 @@ def test_the_first_operations_of_a_kind_are_exact_and_the_next_ones_compiled(
     monkeypatch.setattr(backends, "_DONE", Counter())
     monkeypatch.setattr(backends, "_loops", lambda: used.append(1) or loops)
     x, y = fmt.array([1, 2, 3]) / 7, fmt.array([9, -5, 4]) / 11
-    early = [x + y, x * y, np.outer(x, y) @ y, x.sum(), np.cumsum(y)]
+
+    def results() -> list[FloatArray]:
+        product, fused, sums = np.outer(x, y) @ y, x.multiply_add(y, x), [x.sum(), x.prod(), np.cumsum(y)]
+        return [x - y, x / y, np.sqrt(x), product, fused, *sums, linalg.inv(np.outer(x, y) + fmt.eye(3))]
+
+    early = results()
     assert not used
     assert all(each.backend is fmt.backend for each in early)
     for _ in range(30):
-        late = [x + y, x * y, np.outer(x, y) @ y, x.sum(), np.cumsum(y)]
+        late = results()
     assert used
     assert all(each.backend is fmt.backend for each in late)
     assert all(same(a, b) for a, b in zip(early, late, strict=True))
