@@ -14,6 +14,8 @@ def test_compared_operations_are_counted(tmp_path):
     file = tmp_path / "operations.md"
     file.write_text("| base | all | different |\n| --- | --- | --- |\n| 2 | 1,200 | 0 |\n| 10 | 34 | 5 |\n\nNotes.\n")
     assert evidence.operations(file) == Checked(1234, 5)
+    file.write_text("| compiler | builds | different |\n| --- | --- | --- |\n| gcc | 1,200 | 3 |\n")
+    assert evidence.compiled(file) == Checked(1203, 3)
     file.write_text("| base | compared |\n| --- | --- |\n| 2 | 7 |\n")
     with pytest.raises(ValueError, match="needed the columns 'all' and 'different'"):
         evidence.operations(file)

@@ -18,6 +18,7 @@ from gpbnb import (
     limit_cycles,
     linalg,
 )
+from gpbnb.interrupts import interruptible
 
 FORMATS = [BINARY32, FloatFormat(2, 20, "chop"), FloatFormat(10, 12, "up"), FloatFormat(10, 25)]
 SYSTEM = LinearSystem.from_coefficients(["0.2", "0.1"], [1, "-1.2", "0.5"])
@@ -80,3 +81,11 @@ def test_an_interrupt_acts_before_a_long_product_ends(monkeypatch):
     finally:
         signal.signal(signal.SIGINT, before)
     assert calls == [(1 << 22) // 40_000]
+
+
+def test_an_interrupted_command_says_so_in_one_line_with_the_status_of_shells(capsys):
+    def run():
+        raise KeyboardInterrupt
+
+    assert interruptible("python -m gpbnb.wordlength", run) == 130
+    assert capsys.readouterr().err == "python -m gpbnb.wordlength: interrupted\n"
