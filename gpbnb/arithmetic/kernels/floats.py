@@ -142,34 +142,36 @@ def _fitted(fmt: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
 
 
 @inner(forceinline=True)
-def _run(operation: Any, how: Any, sign: Any, rule: Any, a: Any, b: Any, out: Any, count: Any) -> Any:
+def _run(operation: Any, how: Any, sign: Any, rule: Any, doubtful: Any, a: Any, b: Any, out: Any, count: Any) -> Any:
     any_gone = np.int64(0)
     for i in range(count):
         if operation == tags.ROOT:
             out[i], gone = other(operation, how, rule, a[i], a[i], a[i])
         else:
-            x, y = a[i], sign * b[i]
-            out[i], gone = basic(operation, how, rule, x, y)
-            if operation == tags.MULTIPLY:
-                gone |= np.int64((out[i] == 0.0) & (x != 0.0) & (y != 0.0))
-            elif operation == tags.DIVIDE:
-                gone |= np.int64((out[i] == 0.0) & (x != 0.0))
+            out[i], gone = basic(operation, how, rule, a[i], sign * b[i])
+            if operation in (tags.MULTIPLY, tags.DIVIDE):
+                gone |= doubtful & np.int64(out[i] == 0.0)
         any_gone |= gone
     return any_gone
 
 
 @borrowing
-def _at_once(operation: Any, how: Any, rule: Any, a: Any, b: Any, out: Any, count: Any) -> Any:
-    """Compute and round in one pass, in three quarters of the time of two."""
+def _at_once(operation: Any, how: Any, rule: Any, doubtful: Any, a: Any, b: Any, out: Any, count: Any) -> Any:
+    """Compute and round in one pass, in three quarters of the time of two.
+
+    Parameters
+    ----------
+    doubtful : 1 where products and quotients that are zero may have underflowed, else 0.
+    """
     if operation == tags.MULTIPLY:
-        return _run(_MULTIPLY, _SHORT, 1.0, rule, a, b, out, count)
+        return _run(_MULTIPLY, _SHORT, 1.0, rule, doubtful, a, b, out, count)
     if operation == tags.DIVIDE:
-        return _run(_DIVIDE, _SHORT, 1.0, rule, a, b, out, count)
+        return _run(_DIVIDE, _SHORT, 1.0, rule, doubtful, a, b, out, count)
     if operation == tags.ROOT:
         if how == SHORT:
-            return _run(_ROOT, _SHORT, 1.0, rule, a, b, out, count)
-        return _run(_ROOT, _LONG, 1.0, rule, a, b, out, count)
-    return _run(_ADD, _SHORT, -1.0 if operation == tags.SUBTRACT else 1.0, rule, a, b, out, count)
+            return _run(_ROOT, _SHORT, 1.0, rule, doubtful, a, b, out, count)
+        return _run(_ROOT, _LONG, 1.0, rule, doubtful, a, b, out, count)
+    return _run(_ADD, _SHORT, -1.0 if operation == tags.SUBTRACT else 1.0, rule, doubtful, a, b, out, count)
 
 
 @borrowing
@@ -178,7 +180,7 @@ def _along(formats: Any, operation: Any, a: Any, b: Any, c: Any, out: Any, room:
     fmt = masked(entries(formats, WHOLE, np.int64), entries(formats, NUMBER, np.float64))
     how, rule = rule_of(formats, 0)
     together = (how == SHORT and operation <= tags.ROOT) or (how == LONG and operation == tags.ROOT)
-    if together and not _at_once(operation, how, rule, a, b, out, count):
+    if together and not _at_once(operation, how, rule, np.int64(fmt.below != fmt.below), a, b, out, count):
         return np.int64(0)
     p, r, exact = room, at(room, _TOGETHER), (how == SHORT) & (fmt.precision == 53)
     if operation == tags.ROUND:
