@@ -21,7 +21,7 @@ from gpbnb.arithmetic import named
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.scalar import add, divide, load, matmul, multiply, negative, store, subtract
+from gpbnb.arithmetic.kernels.scalar import add, load, matmul, multiply, negative, quotient, store, subtract
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
@@ -63,10 +63,10 @@ def compiled_steps(fmt: Any, model: Any, x0: Any, P0: Any, x: Any, P: Any, steps
         a, b = load(fmt, S, (0, 0)), load(fmt, S, (0, 1))
         c, d = load(fmt, S, (1, 0)), load(fmt, S, (1, 1))
         determinant = subtract(fmt, multiply(fmt, a, d), multiply(fmt, b, c))
-        store(fmt, S, (0, 0), divide(fmt, d, determinant))
-        store(fmt, S, (0, 1), negative(fmt, divide(fmt, b, determinant)))
-        store(fmt, S, (1, 0), negative(fmt, divide(fmt, c, determinant)))
-        store(fmt, S, (1, 1), divide(fmt, a, determinant))
+        store(fmt, S, (0, 0), quotient(fmt, d, determinant))
+        store(fmt, S, (0, 1), negative(fmt, quotient(fmt, b, determinant)))
+        store(fmt, S, (1, 0), negative(fmt, quotient(fmt, c, determinant)))
+        store(fmt, S, (1, 1), quotient(fmt, a, determinant))
         matmul(fmt, PHt, S, K)
         matmul(fmt, Phi, x0, u)
         matmul(fmt, H, u, y)
