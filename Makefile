@@ -111,7 +111,7 @@ format: .venv/with-dev ## let ruff lay out the code and mend what it can
 exactness: .venv/made-for ## the golden corpus, other inputs each day compared with independent arithmetic, and more altered statements; SLICE, SEED
 	$(PY) -m tests.corpus $(if $(SLICE),--slice $(SLICE))
 	$(PY) -m tests.corpus.conformance --seed $(SEED) $(if $(SLICE),--slice $(SLICE))
-	$(if $(SLICE),,GPBNB_ALTERATIONS=more $(PY) -m pytest -q tests/ledger/test_alterations.py)
+	$(if $(SLICE),,GPBNB_ALTERATIONS=more $(PY) -m pytest -q tests/ledger/test_verdicts.py)
 
 bench: .venv/with-bench ## timings against peers, side by side, the short formats against gfloat, and guarantees
 	$(PY) -m benchmarks
