@@ -231,7 +231,7 @@ def measure() -> list[Row]:
 def measure_emulation() -> list[Row]:
     """``emulate``, whose reference and errors may take twice the time of its run, beside the run alone."""
     table: list[Row] = []
-    for n, steps, turns in ((10, 1000, 20), (100, 100, 5)):
+    for n, steps, turns in ((10, 1000, 20), (50, 100, 5)):
         (Phi, _, Q, H, _, R, *_), x0, P0 = model(n)
         given = LinearModel(Phi=Phi, H=H, Q=Q, R=R, x0=x0[:, 0], P0=(P0 + P0.T) / 2)
         z = np.random.default_rng(n).standard_normal((steps, M))

@@ -74,6 +74,8 @@ class Tape:
         self._segments_begin: list[tuple[int, int]] = []
         self._checked = set[int]()
         self._guarded = False
+        #: The longest that it may become.
+        self.most = MOST_OPERATIONS
         #: First operations of each quantity, and its name.
         self.labels: list[tuple[int, str]] = []
         if one:
@@ -195,8 +197,8 @@ class Tape:
         code = CODES[name]
         truth = name in ("compare", "combine")
         size, begin = first.size, self._truths if truth else self._values
-        if len(self._instructions) + 5 * size > 5 * MOST_OPERATIONS:
-            self.refuse(f"it takes more than {MOST_OPERATIONS} operations")
+        if len(self._instructions) + 5 * size > 5 * self.most:
+            self.refuse(f"it takes more than {self.most} operations")
         if size and (not self._segments_begin or self._segments_begin[-1][1] != fmt):
             self._segments_begin.append((len(self._instructions) // 5, fmt))
         if size == 1:

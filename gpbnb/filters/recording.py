@@ -19,7 +19,7 @@ from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
 from gpbnb.arithmetic.interpreting import Constants
 from gpbnb.arithmetic.machine import CODES, operands_of, packed_one, takes_numbers
 from gpbnb.arithmetic.rounding import Order
-from gpbnb.arithmetic.tape import Tape
+from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
 from gpbnb.filters.forms import Form
 from gpbnb.filters.steps import FACTORED, BlockAlgebra, BlockStorage, LinearStep, LinearTaken
@@ -147,7 +147,7 @@ def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], Line
         places[letter] = np.arange(at, at + int(np.prod(shape))).reshape(shape)
         at += places[letter].size
     tape = Tape(at - 1, one=kind.one)
-    tape.fuses, tape.alike = True, kind.alike
+    tape.fuses, tape.alike, tape.most = True, kind.alike, 2 * MOST_OPERATIONS
     formats = [TracedFormat(tape, i) for i in range(max(*kind.blocks, kind.sums[-1]) + 1)]
     state, gain, covariance, innovation, stored = (formats[i] for i in kind.blocks)
     given = dict[str, Any]()
@@ -161,7 +161,12 @@ def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], Line
     sums = formats[number] if number >= 0 else None
     blocks = block_algebra((state, gain, covariance, innovation), fused, order, block, sums)
     step = LinearStep(kind.form, blocks, given, tape.about, kind.compensated)
-    return tape, places, step.taken(x, covariance.made(P), carried, z)
+    try:
+        return tape, places, step.taken(x, covariance.made(P), carried, z)
+    except UntraceableError:
+        raise ValueError(
+            f"got a filter with n = {n} and m = {m}; needed a step of at most {tape.most} operations: about 100 states"
+        ) from None
 
 
 def block_algebra(
