@@ -125,15 +125,9 @@ def measured(
 
 @lru_cache(maxsize=16)
 def _recorded(n: int, m: int, nonzero: tuple[bytes, ...]) -> tuple[Any, ...]:
-    """Record a step of :func:`measured`.
+    """Record a step of :func:`measured`; `nonzero` says which entries of the matrices are not zero in every step.
 
-    Parameters
-    ----------
-    nonzero : which entries of the matrices are not zero in every step, by the bytes 0 and 1.
-
-    Returns
-    -------
-    Places of the matrices, the operations and the number of places, and the places of the next state and of z.
+    Returns places of the matrices, the operations, the number of places, and the places of the next state and of z.
     """
     shapes = [(n,), (n,), (m,), (n, n), (n, n), (m, n), (m, m)]
     ends = 1 + np.cumsum([math.prod(shape) for shape in shapes])
