@@ -28,14 +28,19 @@ from left to right. All that does not depend on the step before is computed for 
 
 from __future__ import annotations
 
-import math
+import operator
 from collections.abc import Iterable
+from functools import lru_cache, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.compiling import borrowing, compiled
+from gpbnb.arithmetic.lanes import recorded
+from gpbnb.arithmetic.loop import Loop
+from gpbnb.arithmetic.named import BINARY64
+from gpbnb.arithmetic.tape import Tape
+from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.steps import StepModel
 
 Array = NDArray[np.float64]
@@ -96,8 +101,8 @@ def contraction_start(P: Array, de: Array, dE: Array) -> Contraction:
     P : (n, n), initial covariance, which defines the weights.
     de, dE : (n,) and (n, n), componentwise bounds on the errors of the initial state and covariance; zero if exact.
     """
-    L = np.empty(P.shape)
-    _weights(np.ascontiguousarray((P + P.T) / 2), L)
+    (found,), _ = recorded(_weights, P.shape).begin(BINARY64, ((P + P.T) / 2)[np.newaxis])
+    L = found[0] if len(found) else np.full(P.shape, np.nan)
     Y, delta = _inverse(L)
     aY, up = np.abs(Y), 1 + _many(len(P), 0)
     eta = float(_norm(_times(aY, de[:, np.newaxis])) / (1 - delta))
@@ -185,13 +190,10 @@ def contraction_steps(before: Contraction, model: StepModel, repeated: Repeated,
 
 def _closed_loops(model: StepModel, K: Array, L: Array) -> tuple[Array, Array]:
     """Return the closed loop of each step, and weights before the first and after each step, by Joseph's form."""
-    n = len(L)
-    C, weights = np.eye(n) - _times(K, model.H), np.empty((len(K) + 1, n, n))
+    C = np.eye(len(L)) - _times(K, model.H)
     A = model.Phi - _times(K, _times(model.H, model.Phi))
-    weights[0] = L
-    by_noise = _times(_times(C, model.Q), _turned(C)), _times(_times(K, model.R), _turned(K))
-    _propagate_weights(A, *by_noise, weights)
-    return A, weights
+    by_noise, by_measurement = _times(_times(C, model.Q), _turned(C)), _times(_times(K, model.R), _turned(K))
+    return A, _propagated_weights(L, A, by_noise, by_measurement)
 
 
 def _closed_norm(
@@ -330,129 +332,108 @@ def _norm(A: Array) -> Array:
     return np.sqrt(_sums(np.square(A).reshape(*A.shape[:-2], -1)))
 
 
-def _norm2(X: Array) -> Array:
-    """Upper bounds on the largest singular values."""
-    norms = np.empty(X.shape[:-2])
-    _bound_norms2(_times(_turned(X), X).reshape(-1, *X.shape[-1:] * 2), norms.reshape(-1))
-    return norms
-
-
 def _rows(L: Array) -> Array:
     return np.sqrt(_sums(L * L))
 
 
 def _times(A: Array, B: Array) -> Array:
     """Products of matrices, or of each pair of matrices; zeros of A are skipped, so that none meets an infinity."""
-    product = np.zeros((*A.shape[:-1], B.shape[-1]))
-    _add_products(
-        *(np.require(each, requirements=["C", "W"]).reshape(-1, *each.shape[-2:]) for each in (A, B, product))
-    )
-    return product
+    left, right = _steps_last(A), _steps_last(B)
+    product = np.zeros((len(left), *right.shape[1:]))
+    finite = np.isfinite(right).all()
+    for k in range(len(right)):
+        a = left[:, k, np.newaxis]
+        terms = a * right[k]
+        product += terms if finite else np.where(a == 0, 0.0, terms)
+    return np.moveaxis(product, (0, 1), (-2, -1))
 
 
-@compiled
-def _add_products(A: Any, B: Any, product: Any) -> None:
-    for step in range(A.shape[0]):
-        for i in range(A.shape[1]):
-            for k in range(A.shape[2]):
-                a = A[step, i, k]
-                if a != 0.0:
-                    for j in range(B.shape[2]):
-                        product[step, i, j] += a * B[step, k, j]
+def _steps_last(A: Array) -> Array:
+    """Return matrices (steps, n, m) as (n, m, steps), so that NumPy computes all steps in one inner loop."""
+    return np.ascontiguousarray(np.moveaxis(A, (-2, -1), (0, 1)))
 
 
-@compiled
-def _bound_norms2(B: Any, norms: Any) -> None:
-    """Bound the largest singular values of matrices X by B = X'X.
+def _norm2(X: Array) -> Array:
+    """Upper bounds on the largest singular values, from B = X'X.
 
     Bisection finds a mu for which elimination shows mu - B positive. If elimination succeeds, all eigenvalues of a
     matrix with trace t are above -2 (n + 2) u t (Rump 2006).
     """
-    n = B.shape[1]
-    M = np.empty((n, n))
-    for step in range(B.shape[0]):
-        trace = 0.0
-        for i in range(n):
-            trace += B[step, i, i]
-        if not trace < np.inf:
-            norms[step] = np.inf
-            continue
-        low, high = trace / n * 0.999, trace
-        while high - low > max(1e-3 * abs(1 - high), 1e-11) * low + 1e-300:  # only its distance from 1 matters
-            middle = low + (high - low) / 2
-            if not low < middle < high:
-                break
-            if _is_positive(middle, B[step], M):
-                high = middle
-            else:
-                low = middle
-        above = high * (1 + 4 * n * (n + 2) * _U) + 4 * (n + 2) * _U * trace
-        norms[step] = math.sqrt(above) * (1 + 4 * _U)
+    n = X.shape[-1]
+    B = _times(_turned(X), X).reshape(-1, n, n)
+    trace = _sums(np.diagonal(B, axis1=1, axis2=2))
+    low, high, at = trace / n * 0.999, trace.copy(), np.flatnonzero(trace < np.inf)
+    while len(at):
+        below, above = low[at], high[at]
+        middle = below + (above - below) / 2
+        close = np.maximum(1e-3 * np.abs(1 - above), 1e-11)  # only its distance from 1 matters
+        wide = (above - below > close * below + 1e-300) & (below < middle) & (middle < above)
+        at, middle = at[wide], middle[wide]
+        positive = _are_positive(middle, B[at])
+        high[at[positive]], low[at[~positive]] = middle[positive], middle[~positive]
+    above = high * (1 + 4 * n * (n + 2) * _U) + 4 * (n + 2) * _U * trace
+    return np.where(trace < np.inf, np.sqrt(above) * (1 + 4 * _U), np.inf).reshape(X.shape[:-2])
 
 
-@borrowing
-def _is_positive(mu: float, B: Any, M: Any) -> bool:
-    n = B.shape[0]
-    for i in range(n):
-        for j in range(n):
-            M[i, j] = -B[i, j]
-        M[i, i] += mu
+def _are_positive(mu: Array, B: Array) -> NDArray[np.bool_]:
+    """Tell for each matrix whether elimination finds only positive pivots of mu - B."""
+    n, positive = B.shape[-1], np.ones(len(mu), np.bool_)
+    M = np.eye(n)[..., np.newaxis] * mu - _steps_last(B)
     for k in range(n):
-        if not M[k, k] > 0:
-            return False
-        for i in range(k + 1, n):
-            factor = M[i, k] / M[k, k]
-            for j in range(k + 1, n):
-                M[i, j] -= factor * M[k, j]
-    return True
+        positive &= M[k, k] > 0
+        M[k + 1 :, k + 1 :] -= (M[k + 1 :, k] / M[k, k])[:, np.newaxis] * M[k, k + 1 :]
+    return positive
 
 
-@compiled
-def _propagate_weights(A: Any, by_noise: Any, by_measurement: Any, weights: Any) -> None:
-    """Set the weights after each step: those before it, through the closed loop, and two covariances added."""
-    n = A.shape[1]
-    AL, W = np.empty((n, n)), np.empty((n, n))
-    for step in range(A.shape[0]):
-        AL[:] = 0.0
-        for i in range(n):
-            for k in range(n):
-                if A[step, i, k] != 0.0:
-                    for j in range(k + 1):
-                        AL[i, j] += A[step, i, k] * weights[step, k, j]
-        W[:] = 0.0
-        for i in range(n):
-            for j in range(n):
-                for k in range(n):
-                    if AL[i, k] != 0.0:
-                        W[i, j] += AL[i, k] * AL[j, k]
-                W[i, j] = W[i, j] + by_noise[step, i, j] + by_measurement[step, i, j]
-        for i in range(n):
-            for j in range(i):
-                W[i, j] = W[j, i] = (W[i, j] + W[j, i]) / 2
-        _weights(W, weights[step + 1])
+def _propagated_weights(L: Array, A: Array, *added: Array) -> Array:
+    """Return weights (steps + 1, n, n): those before the first step, and after each step; they stay after an overflow.
+
+    The machine repeats :func:`_weights_after` in binary64. No bound depends on its roundings: all weights are valid.
+    """
+    own = np.stack([A, *added], axis=1)
+    usable = np.isfinite(own).all(axis=(1, 2, 3)) & np.isfinite(L).all()
+    own = own[: len(own) if usable.all() else int(np.argmin(usable))]
+    tape, places, after = _recorded_weights(len(L))
+    lower = np.tril_indices(len(L))
+    rows = tape.instructions.astype(np.int64)
+    loop = Loop([BINARY64], rows, tape.formats, tape.sizes, places[0][lower], after[lower])
+    loop.hold_constants(tape.all_constants)
+    loop.states = L[lower]
+    kept, _, _ = loop.take(0, own.reshape(len(own), places[1:].size), int(places[1, 0, 0]), after.ravel())
+    weights = np.concatenate([L[np.newaxis], kept.reshape(-1, *L.shape)])
+    return np.concatenate([weights, np.repeat(weights[-1:], len(A) - len(kept), axis=0)])
 
 
-@compiled
-def _weights(W: Any, L: Any) -> None:
-    """Set L to a nonsingular lower factor of about W.
+@lru_cache(maxsize=16)
+def _recorded_weights(n: int) -> tuple[Tape, NDArray[np.int64], NDArray[np.int64]]:
+    """Record :func:`_weights_after`; return its tape, the places of what it takes (4, n, n), and of what it gives."""
+    tape, places = Tape(4 * n * n), 1 + np.arange(4 * n * n).reshape(4, n, n)
+    places[0] = np.tril(places[0])
+    return tape, places, _weights_after(*map(TracedFormat(tape).made, places)).components[0]
+
+
+def _weights_after(L: Any, A: Any, *added: Any) -> Any:
+    """Return a factor of ALL'A' and the covariances that are added to it, the mean of their two halves."""
+    i, j = np.tril_indices(len(L))
+    AL = A @ L
+    product = reduce(operator.add, (AL[i] * AL[j]).T)
+    halves = (reduce(lambda total, each: total + each[at], added, product) for at in ((i, j), (j, i)))
+    return _weights((L * 0).at[i, j].set(sum(halves) * 0.5))
+
+
+def _weights(W: Any) -> Any:
+    """Return a nonsingular lower factor of about W, of which only the lower half is read.
 
     Any such factor is valid, so lost pivots are replaced by small ones.
     """
-    n = W.shape[0]
-    L[:] = 0.0
-    for j in range(n):
-        pivot = W[j, j]
+    L = W * 0
+    for j in range(len(W)):
+        column, least = W[j:, j], abs(W[j, j]) * 1e-13
         for k in range(j):
-            pivot -= L[j, k] * L[j, k]
-        least = 1e-13 * abs(W[j, j])
-        if not pivot > least:
-            pivot = least if least > 0 else 1.0
-        L[j, j] = math.sqrt(pivot)
-        for i in range(j + 1, n):
-            entry = W[i, j]
-            for k in range(j):
-                entry -= L[i, k] * L[j, k]
-            L[i, j] = entry / L[j, j]
+            column = column - L[j:, k] * L[j, k]
+        root = np.sqrt(np.where(column[0] > least, column[0], np.where(least > 0, least, 1)))
+        L = L.at[j, j].set(root).at[j + 1 :, j].set(column[1:] / root)
+    return L
 
 
 @np.errstate(all="ignore")

@@ -39,11 +39,8 @@ from gpbnb.filters.steps import FACTORED, HUNG_FORMS, combined_gain
 LEAST_SHARE = 2.0**-60
 """Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""
 
-BLOCK = 256
-"""Number of steps whose bounds are computed at a time."""
-
-LONG_BLOCK = 1024
-"""Number of steps whose results are kept at a time."""
+LONGEST_BLOCK, SHORTEST_BLOCK, NUMBERS = 4096, 256, 1 << 17
+"""Most and fewest steps whose results are kept at a time, and numbers of these results between the two."""
 
 
 class Sums(NamedTuple):
@@ -189,6 +186,11 @@ class Run:
         return start._replace(x0=x0, P0=as_packed(formats.covariance, P0))
 
     @property
+    def block(self) -> int:
+        """Number of steps whose results are kept at a time."""
+        return min(max(NUMBERS // (self.x.size + self.P.size), SHORTEST_BLOCK), LONGEST_BLOCK)
+
+    @property
     def bounded(self) -> bool:
         """Whether the run also computes its contraction bound."""
         return self._carried is not None
@@ -223,9 +225,9 @@ class Run:
     def _advance_bounded(self, carried: CarriedBound, z: NDArray[Any]) -> Iterator[None]:
         """Take steps with packed measurements, and the bound over a block of them at a time."""
         exact_z = widened(z) if z.dtype == np.float64 else double_doubles(self.exactly(z))
-        for begin in range(0, len(z), BLOCK):
-            first, end = self.steps, begin + BLOCK
-            x, K, P = self.take_block(z[begin:end])
+        for begin in range(0, len(z), self.block):
+            first = self.steps
+            x, K, P = self.take_block(z[begin : begin + self.block])
             if done := len(x) - 1:
                 each = (widened(part) for part in (P, K[1:], self.letters["UR" if self.form in FACTORED else "R"]))
                 estimates, measured = widened_estimates(x), exact_z[begin : begin + done]
@@ -266,10 +268,10 @@ class Run:
         if np.ndim(z) != 3 or np.shape(z)[1:] != (self.model.m, self.records):
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m}, {self.records})")
         out = np.full((len(z), states, self.records), np.nan)
-        for begin in range(0, len(z), LONG_BLOCK):
+        for begin in range(0, len(z), self.block):
             if self.stopped:
                 break
-            x = self.take_block(as_packed(self.fmt, z[begin : begin + LONG_BLOCK]))[0][1:, :states]
+            x = self.take_block(as_packed(self.fmt, z[begin : begin + self.block]))[0][1:, :states]
             some = out[begin : begin + len(x)]
             if x.dtype == np.float64:
                 some[:] = x if x.ndim == 3 else x[..., 0]
@@ -315,9 +317,9 @@ class Run:
         """Continue as :meth:`take` does, and give estimates and covariances, as :meth:`take_block`."""
         self.model.check_measurements(z, self.steps)
         packed = self.pack_measurements(z)
-        for begin in range(0, len(packed), LONG_BLOCK):
+        for begin in range(0, len(packed), self.block):
             if not self.stopped:
-                x, _, P = self.take_block(packed[begin : begin + LONG_BLOCK])
+                x, _, P = self.take_block(packed[begin : begin + self.block])
                 yield x, P
 
     def pack_measurements(self, z: Any) -> NDArray[Any]:

@@ -14,7 +14,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.recording import ProgramPart, RecordedStep
 from gpbnb.interrupts import slices
 
-_LONGEST_BLOCK, _NUMBERS = 1024, 1 << 17
+_LONGEST_BLOCK, _NUMBERS = 4096, 1 << 17
 """Most steps of a block, and numbers that it keeps."""
 
 LARGEST_KEPT = 1 << 18
