@@ -41,6 +41,8 @@ _EXACT: dict[str, Callable[..., Any]] = {
 }
 """Functions whose exact value is a Fraction."""
 
+_WHOLE = ("floor", "ceil", "trunc", "rint")
+
 _BY_FLOAT64 = frozenset((*ELEMENTARY, *ELEMENTARY_PAIRS, "floor", "ceil", "trunc", "rint", "fmod"))
 
 _ENCLOSURES: dict[str, Callable[..., Any]] = {
@@ -134,6 +136,8 @@ def _by_float64(name: str, *arrays: Any) -> tuple[Any, Any] | None:
     given = [x.components[0] for x in arrays]
     with np.errstate(all="ignore"):
         y = np.asarray(getattr(np, name)(*given)) + 0.0  # no zero has a sign
+        if name in _WHOLE and fmt.limits is None:  # each format has the whole numbers around its numbers
+            return arrays[0].from_components(fmt.backend, (y,), fmt), np.False_
         ends, unusual = y[np.newaxis], np.zeros(y.shape, np.bool_)
         if name not in _EXACT:
             size = np.abs(y)
@@ -161,18 +165,18 @@ def _by_arb(name: str, arrays: Any, indices: Iterable[tuple[int, ...]]) -> Any:
 
 
 def _rounded(name: str, values: Sequence[Fraction], fmt: Any, place: str) -> Pair:
-    if (whole := _rational(name, values)) is not None:
-        pair: Pair = fmt.kernel.from_ratio(whole.numerator, whole.denominator)
-        return pair
-    enclosure, given = _ENCLOSURES.get(name) or getattr(arb, name), f"np.{name} of {' and '.join(map(_shown, values))}"
-    kernel, before, bits = fmt.kernel, ctx.prec, 128
-    drawn, limits = kernel.count, kernel.limits
+    kernel: ExactKernel = fmt.kernel
+    if name in _EXACT:
+        return kernel.from_ratio(*Fraction(_EXACT[name](*values)).as_integer_ratio())
+    enclosure, before, bits = _ENCLOSURES.get(name) or getattr(arb, name), ctx.prec, 128
+    while bits < min(kernel.precision * kernel.base.bit_length(), _MOST_BITS):
+        bits *= 2
+    first, drawn, limits = bits, kernel.count, kernel.limits
     modulus = float(limits.largest - limits.lowest) if limits and limits.overflow == "wrap" else None
 
     def rounded(end: Any) -> Pair:
         kernel.count = drawn  # so that stochastic rounding compares both ends with the same random bits
-        pair: Pair = kernel.from_ratio(*_ratio(end, kernel))
-        return pair
+        return kernel.from_ratio(*_ratio(end, kernel))
 
     finite = False
     try:
@@ -185,11 +189,16 @@ def _rounded(name: str, values: Sequence[Fraction], fmt: Any, place: str) -> Pai
                 # In a format that wraps around, ends that are a whole range apart round to the same number, too.
                 if low == high and (modulus is None or bool(4 * ball.rad() < modulus)):
                     return low
-            elif bits > 1024:
+            # No ball separates a rational value from a tie.
+            if bits == first and (whole := _rational(name, values)) is not None:
+                kernel.count = drawn
+                return kernel.from_ratio(*whole.as_integer_ratio())
+            if not finite and bits > 1024:
                 break
             bits *= 2
     finally:
         ctx.prec = before
+    given = f"np.{name} of {' and '.join(map(_shown, values))}"
     if finite:
         raise ValueError(f"got {given}{place}; needed an argument that is smaller, or further from a tie")
     raise DomainError(f"got {given}{place}; needed an argument for which the result is finite and real")
@@ -205,10 +214,8 @@ def _shown(value: Fraction) -> str:
 
 
 def _rational(name: str, values: Sequence[Fraction]) -> Fraction | None:
-    """Return a value that is rational, which no ball can separate from a tie; None where it is irrational, or none."""
+    """Return a value that is rational; None where it is irrational, or none."""
     x, y = values[0], values[-1]
-    if name in _EXACT:
-        return Fraction(_EXACT[name](*values))
     if name == "arctan2":
         return Fraction(0) if not x and y >= 0 else None
     if name == "hypot":
