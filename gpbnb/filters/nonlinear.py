@@ -338,7 +338,7 @@ class NonlinearModel:
         """Return h, (m,), and its Jacobian, (m, n), at a state."""
         return self._with_jacobian("h", "H", x, u)
 
-    def value(self, name: str, x: FloatArray, u: FloatArray | None) -> FloatArray:
+    def value(self, name: str, x: FloatArray, u: FloatArray | None = None) -> FloatArray:
         """Return f or h at a state, checked to be of its shape and format."""
         function = getattr(self, name)
         with kept_in(x.format):

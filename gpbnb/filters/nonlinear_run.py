@@ -13,7 +13,6 @@ from gpbnb.arithmetic.array import FloatArray, NegativeRootError, WholeNumberErr
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints
@@ -25,7 +24,7 @@ from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.opening import double_doubles_of
 from gpbnb.filters.program import Program, entries
 from gpbnb.filters.recording import block_algebra
-from gpbnb.filters.reference import Step, agreed
+from gpbnb.filters.reference import PreciseSteps, agreed, stacked
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
@@ -101,7 +100,7 @@ class NonlinearRun:
             P = self._factors(upper_factors(sound.P0), stored_in)
         self._stored = of_state.array
         self._weights = [of_state.array(each) for each in model.weights()] if model.method == "unscented" else []
-        self._u = None if model.u is None else of_state.array(model.u)
+        self._u = _inputs(model, of_state)
         formats = list(dict.fromkeys([*each, stored_in]))
         self._blocks_at = [formats.index(block) for block in each]
         self._present: NDArray[np.bool_] | None = None
@@ -306,6 +305,10 @@ class NonlinearRun:
         return np.asarray(combined_gain(K, H.to_fractions(), UR.to_fractions()))
 
 
+def _inputs(model: NonlinearModel, fmt: FloatFormat) -> Any:
+    return None if model.u is None else fmt.array(model.u)
+
+
 def _fault(error: Exception) -> str:
     if isinstance(error, OverflowError):
         return "overflow"
@@ -357,28 +360,26 @@ def true_states(model: AnyModel, z: Any) -> NDArray[np.float64]:
     """
     if not isinstance(model, NonlinearModel):
         return reference_states(model, z)
-    return double_doubles(np.array([x for x, _, _ in nonlinear_reference(model, z)], dtype=object))
+    return double_doubles_of(nonlinear_reference(model, z).x)
 
 
-def nonlinear_reference(model: NonlinearModel, z: Any) -> list[Step]:
-    """Return estimate, gain and covariance after every step, as Fractions, in bits that agree with twice as many."""
+def nonlinear_reference(model: NonlinearModel, z: Any) -> PreciseSteps:
+    """Return estimate, gain and covariance after every step, in bits that agree with a run in fewer bits."""
     measured = exact(z)
     return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
 
 
 def nonlinear_checkpoints(model: NonlinearModel, z: Any, checkpoint_steps: Sequence[int]) -> Checkpoints:
     """Return some steps of :func:`nonlinear_reference`; `z` may be an array of a format."""
-    found = nonlinear_reference(model, z.to_fractions() if hasattr(z, "to_fractions") else z)
-    x, K, P = (np.array([found[step - 1][i] for step in checkpoint_steps], dtype=object) for i in range(3))
-    return Checkpoints(tuple(checkpoint_steps), x, K, P)
+    measured = z.to_fractions() if hasattr(z, "to_fractions") else z
+    return nonlinear_reference(model, measured).checkpoints(checkpoint_steps)
 
 
-def _steps(model: NonlinearModel, z: NDArray[Any], bits: int) -> list[Step] | str:
+def _steps(model: NonlinearModel, z: NDArray[Any], bits: int) -> PreciseSteps | str:
     """Return all steps in some bits, or why the run stops."""
-    run = NonlinearRun(model, FloatFormat(2, bits), Form.INNOVATION, range(1, len(z) + 1))
-    run.take(z)
-    saved = run.checkpoints()
-    return run.reason or list(zip(saved.x, saved.K, saved.P, strict=True))
+    run = NonlinearRun(model, FloatFormat(2, bits))
+    done = [(run.x, run._step.gain, run.P) for _ in run.steps_taken(z)]
+    return run.reason or stacked(done)
 
 
 def simulated(model: AnyModel, steps: int, seed: int = 0) -> NDArray[np.float64]:
@@ -391,11 +392,17 @@ def simulated(model: AnyModel, steps: int, seed: int = 0) -> NDArray[np.float64]
         return simulated_measurements(model, steps, seed)
     model.check_steps(steps)
     noise, fmt, rng = model.noise, FloatFormat(2, 53), np.random.default_rng(seed)
-    roots = [[covariance_root(each) for each in cycle] for cycle in (noise.Q, noise.R)]
-    x, unit, z = fmt.array(noise.x0), np.asarray(fine_resolution(noise)), np.empty((steps, model.m))
+    roots = [[fmt.array(covariance_root(each)) for each in cycle] for cycle in (noise.Q, noise.R)]
+    u, unit, z = _inputs(model, fmt), np.asarray(fine_resolution(noise)), np.empty((steps, model.m))
+
+    def take(formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
+        (x,), (of_Q, w, of_R, v, *u) = states, given
+        x = model.value("f", x, *u) + of_Q @ w
+        return StepTaken((x,), model.value("h", x, *u) + of_R @ v, True)
+
+    step = RepeatedStep(take, [fmt], (fmt.array(noise.x0),))
     for k in range(steps):
-        u = None if model.u is None else fmt.array(model.u[k])
-        w, v = (fmt.array(cycle[k % len(cycle)]) @ fmt.array(rng.standard_normal(len(cycle[0]))) for cycle in roots)
-        x = model.value("f", x, u) + w
-        z[k] = (model.value("h", x, u) + v).to_float()
+        (of_Q, w), (of_R, v) = ((each[k % len(each)], fmt.array(rng.standard_normal(len(each[0])))) for each in roots)
+        step.take([of_Q, w, of_R, v, *([] if u is None else [u[k]])])
+        z[k] = step.gain.to_float()
     return np.asarray(np.rint(z / unit) * unit)

@@ -7,22 +7,26 @@ The innovation form subtracts most of a large variance when a sensor is precise.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.recording import block_algebra
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
 from gpbnb.filters.steps import LinearStep
 
+FEW_BITS = 40
+"""Bits of the first run, which compiled loops compute."""
+
 BITS = 256
-"""Bits of the first run; each further run has twice as many."""
+"""Bits of the second run; each further run has twice as many."""
 
 MOST_BITS = 4096
 """Bits of the last run."""
@@ -30,33 +34,44 @@ MOST_BITS = 4096
 MOST_STEPS = 100_000
 """Largest number of steps; a thousand take roughly a second."""
 
-AGREEMENT = 2.0**-104
-"""Largest difference of two runs, relative to the largest value of each entry over all steps."""
+AGREEMENT = 104
+"""Bits in which two runs agree, relative to the largest value of each entry over all steps, unless the first is short.
+
+If the first run has 40 bits, 20 are enough, because the second run has 216 bits more. Its error is then below 2**-104
+even if errors were as large as the square roots of roundings.
+"""
 
 SINGULAR = "the innovation covariance may be singular"
 """Why a reference is not determined, unless a run says more."""
 
-Step = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
+
+class PreciseSteps(NamedTuple):
+    """Estimates (steps, n), gains (steps, n, m) and covariances (steps, n, n) after every step."""
+
+    x: FloatArray
+    K: FloatArray
+    P: FloatArray
+
+    def checkpoints(self, steps: Sequence[int] | NDArray[np.int64]) -> Checkpoints:
+        """Return the exact values after some steps, which count from 1."""
+        rows = [int(step) - 1 for step in steps]
+        return Checkpoints([row + 1 for row in rows], *(each[rows].to_fractions() for each in self))
 
 
-def precise_steps(model: LinearModel, z: Any) -> list[Step]:
-    """Return estimate (n,), gain (n, m) and covariance (n, n) after every step, in bits that agree with twice as many.
+def precise_steps(model: LinearModel, z: Any) -> PreciseSteps:
+    """Return all steps in bits that agree with a run in fewer bits.
 
     Parameters
     ----------
     model : also with known inputs and offsets.
     z : (steps, m), measurements.
-
-    Returns
-    -------
-    steps : exact values of high-precision results, as Fractions.
     """
     measured = exact(z)
     return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
 
 
-def agreed(name: str, count: int, steps: Callable[[int], list[Step] | str]) -> list[Step]:
-    """Return steps in bits that agree with twice as many.
+def agreed(name: str, count: int, steps: Callable[[int], PreciseSteps | str]) -> PreciseSteps:
+    """Return steps in bits that agree with a run in fewer bits.
 
     Parameters
     ----------
@@ -69,29 +84,34 @@ def agreed(name: str, count: int, steps: Callable[[int], list[Step] | str]) -> l
             f"{name}: its reference needs more than double-double, and {count:,} steps; needed at most "
             f"{MOST_STEPS:,}: R is very small beside H P H', or P0 very large; scale or correct the model"
         )
-    bits = BITS
-    found: list[Step] | str = SINGULAR
+    bits, agreement = BITS, FEW_BITS // 2
+    try:
+        found = steps(FEW_BITS)
+    except ValueError:  # a covariance is not definite in so few bits, or any run raises the same error
+        found = SINGULAR
     while bits <= MOST_BITS:
         before, found = found, steps(bits)
-        if not isinstance(before, str) and not isinstance(found, str) and _agree(before, found):
+        if not isinstance(before, str) and not isinstance(found, str) and _agree(before, found, agreement):
             return found
-        bits *= 2
+        bits, agreement = 2 * bits, AGREEMENT
     why = found if isinstance(found, str) else SINGULAR
     raise ArithmeticError(
         f"{name}: its reference is not determined in {MOST_BITS} bits; {why}: scale or correct the model"
     )
 
 
-def _agree(some: list[Step], others: list[Step]) -> bool:
-    """Whether two runs agree, relative to the largest value of each entry."""
-    for k in range(3):
-        one, other = (np.array([step[k] for step in steps]) for steps in (some, others))
-        if np.any(np.max(np.abs(one - other), axis=0) > np.max(np.abs(other), axis=0) * Fraction(AGREEMENT)):
+def _agree(some: PreciseSteps, others: PreciseSteps, bits: int) -> bool:
+    """Whether two runs agree in some bits, relative to the largest value of each entry."""
+    for each in zip(some, others, strict=True):
+        pairs = [one.to_pairs() for one in each]
+        least = min(int(e.min()) for _, e in pairs)
+        one, other = (m * 2 ** (e - least) for m, e in pairs)
+        if np.any(np.abs(one - other).max(axis=0) * 2**bits > np.abs(other).max(axis=0)):
             return False
     return True
 
 
-def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> list[Step] | str:
+def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> PreciseSteps | str:
     """Return all steps in some bits, or why there are none: an innovation covariance is singular in them."""
     fmt = FloatFormat(2, bits)
     given = {letter: each[np.newaxis] if each.ndim == 1 else each for letter, each in model.arrays(fmt).items()}
@@ -103,12 +123,18 @@ def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> list[Step] | str:
         found = step.taken(x, P, carried, measured)
         return StepTaken((found.x, found.P, found.carried), found.K, found.definite)
 
-    step, done = RepeatedStep(take, [fmt], (x, P, x * 0)), list[Step]()
+    step, done = RepeatedStep(take, [fmt], (x, P, x * 0)), list[tuple[FloatArray, ...]]()
     members = [list(each) for each in given.values()]
     try:
         for k, measured in enumerate(fmt.array(z)):
             step.take([measured, *(each[k % len(each)] for each in members)])
-            done.append(tuple(each.to_fractions() for each in (step.states[0], step.gain, step.states[1])))
+            done.append((step.states[0], step.gain, step.states[1]))
     except ZeroDivisionError:
         return SINGULAR
-    return done
+    return stacked(done)
+
+
+def stacked(steps: Sequence[tuple[Any, ...]]) -> PreciseSteps:
+    """Return estimates, gains and covariances of one step after the other."""
+    x, K, P = (cast(Any, np.stack)(each) for each in zip(*steps, strict=True))
+    return PreciseSteps(x, K, P)

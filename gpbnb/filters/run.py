@@ -27,6 +27,7 @@ from gpbnb.filters.model import INPUTS, LinearModel, identity_in
 from gpbnb.filters.opening import (
     Opening,
     as_packed,
+    double_doubles_of,
     opening,
     widened_array,
 )
@@ -499,9 +500,7 @@ def reference(
         count = run.saved
         at = np.array([0, *run.checkpoint_steps[:count]])
         if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C[:count]])):
-            steps = precise_steps(model, z)
-            x, K, P = zip(*(steps[step - 1] for step in run.checkpoint_steps), strict=True)
-            return Checkpoints(tuple(int(each) for each in run.checkpoint_steps), *(np.array(v) for v in (x, K, P)))
+            return precise_steps(model, z).checkpoints(run.checkpoint_steps)
     if run.stopped:
         raise ArithmeticError(f"{model.name}: the reference stopped at step {run.stopped}; scale or correct the model")
     return run.checkpoints()
@@ -532,7 +531,7 @@ def reference_states(model: LinearModel, z: Any) -> NDArray[np.float64]:
     for x, P in run.blocks(z):
         if run.stopped or _loses_digits(model, np.arange(done, done + len(P)), P):
             try:
-                return double_doubles(np.array([each for each, *_ in precise_steps(model, z)], dtype=object))
+                return double_doubles_of(precise_steps(model, z).x)
             except OverflowError as error:
                 raise OverflowError(
                     f"{model.name} without rounding: {error}; a model that is not stable takes fewer steps"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from small_filter import exact_steps
 
+from gpbnb import FloatFormat
 from gpbnb.filters import reference as precise_reference
 from gpbnb.filters import run as filter_run
 from gpbnb.filters.model import LinearModel
@@ -32,12 +33,14 @@ def test_one_step_with_a_precise_sensor_is_enough_for_more_digits():
 
 
 @pytest.mark.parametrize(("share", "agree"), [(Fraction(1, 2), True), (Fraction(3, 2), False)])
-def test_results_agree_in_104_bits_of_the_largest_of_each_entry(share, agree):
+@pytest.mark.parametrize("bits", [20, 104])
+def test_results_agree_in_some_bits_of_the_largest_of_each_entry(bits, share, agree):
+    fmt = FloatFormat(2, 120)
     some, other = (
-        [(np.array([value]), np.array([[1]]), np.array([[1]])) for value in values]
-        for values in ((1, Fraction(4)), (1, 4 + 4 * share / 2**104))
+        precise_reference.PreciseSteps(fmt.array([[1], [last], [0]]), fmt.array([[[1]]] * 3), fmt.array([[[1]]] * 3))
+        for last in (4, 4 + 4 * share / 2**bits)
     )
-    assert precise_reference._agree(some, other) is agree
+    assert precise_reference._agree(some, other, bits) is agree
 
 
 def states(model, z):
