@@ -17,16 +17,15 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.kernels import doubledouble, tags
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
-from gpbnb.arithmetic.kernels.scalar import load, put, round_
+from gpbnb.arithmetic.kernels.scalar import add, less, load, multiply, put, round_, store, subtract
 from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
 from gpbnb.bounds.gains import Schedule
 from gpbnb.bounds.guarantee import FilterGuarantee, closed_loops
 from gpbnb.bounds.guess import FilterLimits, linear_steps
 from gpbnb.bounds.units import largest_errors, units
-from gpbnb.filters.kernels.linear import effects, execute
 from gpbnb.filters.kernels.widened import widened
 from gpbnb.filters.opening import as_packed
-from gpbnb.filters.program import MULTIPLY, SUBTRACT
+from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT, Program
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +182,31 @@ def _corrected(K: Any, nu: Any, predicted: Any, c: Any) -> None:
 
 
 @inner
+def _execute(fmt: Any, operations: Any, outputs: Any, coefficients: Any, x: Any, z: Any, values: Any) -> None:
+    """Take one step in the arithmetic that the tag selects, and overwrite x and the workspace `values`."""
+    n, m = x.shape[0], z.shape[0]
+    for i in range(n):
+        put(fmt, values, i, load(fmt, x, i))
+    for i in range(m):
+        put(fmt, values, n + i, load(fmt, z, i))
+    for o in range(operations.shape[0]):
+        code, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
+        right = load(fmt, values, b)
+        if code == MULTIPLY:
+            put(fmt, values, n + m + o, multiply(fmt, load(fmt, coefficients, a), right))
+        elif code == ADD:
+            put(fmt, values, n + m + o, add(fmt, load(fmt, values, a), right))
+        elif code == SUBTRACT:
+            put(fmt, values, n + m + o, subtract(fmt, load(fmt, values, a), right))
+        else:
+            limit = load(fmt, coefficients, a)
+            beyond = less(fmt, right, limit) if code == AT_LEAST else less(fmt, limit, right)
+            put(fmt, values, n + m + o, limit if beyond else right)
+    for i in range(n):
+        store(fmt, x, i, load(fmt, values, outputs[i]))
+
+
+@inner
 def _error_ahead(fmt: Any, given: Any, plan: Any, k: int, x: Any, x_exact: Any, values: Any) -> float:
     """Return the weighted error one step after step k + 1, with a measurement from the middle of the range."""
     exactly, m, then = DoubleDouble(), given.HPhi.shape[1], _row(given, k + 1)
@@ -195,7 +219,7 @@ def _error_ahead(fmt: Any, given: Any, plan: Any, k: int, x: Any, x_exact: Any, 
         put(fmt, z, r, c)
         put(exactly, nu, r, doubledouble.operate(tags.SUBTRACT, widened(fmt, c), load(exactly, nu, r)))
     _corrected(given.K[then], nu, beyond, moved)
-    execute(fmt, given.operations, given.outputs, given.coefficients[then], later, z, values)
+    _execute(fmt, given.operations, given.outputs, given.coefficients[then], later, z, values)
     return _worth(fmt, plan.rows[k + 1], later, moved)
 
 
@@ -238,7 +262,7 @@ def greedy(fmt: Any, given: Any, plan: Any, x: Any, x_exact: Any, chosen: Any, e
             for i in range(n):
                 excess = max(excess, _share(abs(following[i, 0]), given.limits.state[i]))
             trial[:] = x
-            execute(fmt, given.operations, given.outputs, given.coefficients[at], trial, tried.z, values)
+            _execute(fmt, given.operations, given.outputs, given.coefficients[at], trial, tried.z, values)
             if excess > 1.0:
                 score = -1e300 * min(excess, 1e7)
             elif k + 1 == steps or not plan.ahead:
@@ -342,7 +366,6 @@ def ceiling(found: FilterGuarantee, z: NDArray[np.float64], state: int) -> float
     parts, table = linear_steps(given, np.arange(given.steps)), units(given.fmt)
     rows, known = responses(given, parts.F, state, steps), 0.0
     values, x = np.empty(first + len(program.operations)), given.x0.astype(np.float64)
-    effect, sizes = np.empty((len(values), program.n)), np.empty((len(values), program.n))
     powers, total = {0.0, *table.exact.tolist()}, 0.0
     for k in range(steps):
         at = k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
@@ -358,12 +381,25 @@ def ceiling(found: FilterGuarantee, z: NDArray[np.float64], state: int) -> float
                 exact = values[a] == 0 or values[b] == 0 or abs(values[first + o]) <= table.aligned
             if not exact and values[first + o]:
                 errors[o] = largest_errors(given.fmt, np.abs(values[first + o]))
-        effects(program.operations, program.outputs, coefficients, first, effect, sizes)
-        total += float(np.abs(effect[first:] @ rows[k]) @ errors)
+        total += float(np.abs(_effects(program, coefficients)[first:] @ rows[k]) @ errors)
         innovation = z[k] - given.HPhi[at, :, :, 0] @ x
         known += float(rows[k] @ (parts.loop[at] @ x + parts.gain[at] @ innovation))
         x = values[program.outputs]
     return total + abs(known)
+
+
+def _effects(program: Program, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the effect of an error in each value on the states after the step, (n + m + o, n)."""
+    first = program.n + program.m
+    effects = np.zeros((first + len(program.operations), program.n))
+    np.add.at(effects, (program.outputs, np.arange(program.n)), 1.0)
+    for v, (code, a, b) in reversed(list(enumerate(program.operations.tolist(), first))):
+        if code == MULTIPLY:
+            effects[b] += coefficients[a] * effects[v]
+        else:
+            effects[a] += effects[v]
+            effects[b] += effects[v] if code == ADD else -effects[v]
+    return effects
 
 
 def random_errors(found: FilterGuarantee, steps: int, center: Any = None) -> NDArray[np.float64]:

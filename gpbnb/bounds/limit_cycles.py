@@ -18,14 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.conversion import MaybeNone
-from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.bounds.words import bounded_rounding
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.program import ADD, SUBTRACT, Program, matrices
 from gpbnb.filters.system import LinearSystem, is_stable
 from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program, integers_of, run_integers, successors
-from gpbnb.interrupts import slices
 
 MOST_STATES, LARGEST_SEARCH = 2**24, 2**28
 """Largest number of states that a search tries, by default and at all."""
@@ -177,11 +175,7 @@ def _read(program: Program) -> NDArray[np.bool_]:
 
 def _cycles(following: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Return the numbers of the states on each cycle of a map, -1 where a state leaves it."""
-    on_cycle = np.zeros(len(following), np.bool_)
-    visit = np.zeros(len(following), np.int64)
-    for part in slices(len(following)):
-        _mark(following, visit, on_cycle, part.start, part.stop)
-    left, found = set(np.flatnonzero(on_cycle).tolist()), list[NDArray[np.int64]]()
+    left, found = set(_on_cycles(following).tolist()), list[NDArray[np.int64]]()
     while left:
         at = first = next(iter(left))
         numbers = list[int]()
@@ -195,18 +189,16 @@ def _cycles(following: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return found
 
 
-@compiled
-def _mark(following: Any, visit: Any, on_cycle: Any, begin: int, end: int) -> None:
-    """Mark the states on cycles; `visit` is zero, and becomes the number of the walk that first met a state."""
-    for start in range(begin, end):
-        at = start
-        while at >= 0 and visit[at] == 0:
-            visit[at] = start + 1
-            at = following[at]
-        if at >= 0 and visit[at] == start + 1:
-            while not on_cycle[at]:
-                on_cycle[at] = True
-                at = following[at]
+def _on_cycles(following: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the numbers of the states on cycles: what is left once states without a predecessor are left out."""
+    predecessors = np.bincount(following[following >= 0], minlength=len(following))
+    out = np.flatnonzero(predecessors == 0)
+    while len(out):
+        after = following[out]
+        after, times = np.unique(after[after >= 0], return_counts=True)
+        predecessors[after] -= times
+        out = after[predecessors[after] == 0]
+    return np.flatnonzero(predecessors)
 
 
 def _cycle(

@@ -6,8 +6,7 @@ constant coefficients from the start, and each of its structures is another prog
 several purposes, so that they cannot disagree:
 
 * :mod:`gpbnb.filters.linear_steps` runs it in any format, digit for digit like the filter itself;
-* :mod:`gpbnb.filters.kernels.linear` computes the effect of a rounding error in each operation on the result of the
-  step;
+* :mod:`gpbnb.bounds.adversary` follows the effect of a rounding error in each operation on the result of the step;
 * :func:`matrices` computes the linear function of (x, z) that the step approximates;
 * :mod:`gpbnb.filters.words` runs it on integers, with formats of their own for coefficients, data and sums;
 * :mod:`gpbnb.wordlength.code` prints it as C.

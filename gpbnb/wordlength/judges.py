@@ -234,7 +234,8 @@ def _recorded(
         errors = np.asarray(run.bounds[0])
     else:
         states = run.states(stored)
-        errors = (states - true[: len(states)]).sum(axis=2)
+        off = states - true[: len(states)]
+        errors = off[..., 0] + off[..., 1]
     if run.stopped is not None:
         return Outcome(math.inf, f"the run is refused: {run.reason}", run.reason.startswith("overflow"))
     if run.indefinite is not None and true is not None:

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
+from gpbnb.arithmetic.loop import Loop
+from gpbnb.arithmetic.tape import Tape
+from gpbnb.arithmetic.traced import TracedFormat
+from gpbnb.interrupts import slices
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
 from gpbnb.report.rolling.theory import INTERVAL
@@ -31,22 +33,6 @@ class Rotation(NamedTuple):
     def drift_error(self, drift: float) -> float:
         """Return the largest error in mas of a ramp of `drift` mas a year that is derolled with this rotation."""
         return float(np.max(self.size * self.step * (drift * self.interval / YEAR)))
-
-
-@compiled
-def _rotate(fmt, step, state, marks, out):  # type: ignore[no-untyped-def]
-    a, b = load(fmt, step, 0), load(fmt, step, 1)
-    c, s = load(fmt, state, 0), load(fmt, state, 1)
-    n = 0
-    for k in range(len(marks)):
-        for _ in range(marks[k] - n):
-            c, s = (
-                subtract(fmt, multiply(fmt, c, a), multiply(fmt, s, b)),
-                add(fmt, multiply(fmt, s, a), multiply(fmt, c, b)),
-            )
-        n = marks[k]
-        store(fmt, out, (k, 0), c)
-        store(fmt, out, (k, 1), s)
 
 
 @cache
@@ -86,12 +72,21 @@ def recursion(
     backend = fmt.backend
     if not isinstance(backend, Compiled):
         raise ValueError(f"got {fmt}; needed base 2, 10 or 16 and at most 53 bits, 18 or 13 digits; take fewer")
-    angle = fmt.array(list(_exact_turn(1, period, interval)))
-    start = fmt.array([1, 0])
-    step, state = (backend.pack(a.components) for a in (angle, start))
-    out = np.empty((len(marks), *step.shape), dtype=step.dtype)
-    _rotate(backend.tag, step, state, marks, out)
-    return _compared(period, interval, marks, FloatArray.from_packed(out, fmt).to_fractions())
+    tape, places = Tape(4), 1 + np.arange(4).reshape(2, 2)
+    (c, s), (a, b) = TracedFormat(tape).made(places)
+    after = np.stack([each.components[0] for each in (c * a - s * b, s * a + c * b)])
+    loop = Loop([fmt], tape.instructions.astype(np.int64), tape.formats, tape.sizes, places[0], after)
+    loop.states, angle = (
+        backend.pack(fmt.array(x).components) for x in ([1, 0], list(_exact_turn(1, period, interval)))
+    )
+    loop.hold(places[1], angle)
+    nothing, found = np.zeros(0, np.int64), []
+    for gap in np.diff(marks, prepend=0).tolist():
+        for part in slices(gap, len(loop.rows)):
+            own = np.empty((part.stop - part.start, 0, *loop.values.shape[1:]), loop.values.dtype)
+            loop.take(part.start, own, 0, nothing)
+        found.append(loop.states.reshape(angle.shape))
+    return _compared(period, interval, marks, FloatArray.from_packed(np.stack(found), fmt).to_fractions())
 
 
 def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: float = INTERVAL) -> Rotation:
