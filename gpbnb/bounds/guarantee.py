@@ -188,17 +188,6 @@ def sized_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] =
     return FilterLimits(*found)
 
 
-def check_within(within: Any, basis: str) -> None:
-    """Reject limits for an answer that does not use them, or limits that are none."""
-    if within is not None and not isinstance(within, FilterLimits):
-        raise TypeError(f"got within={within!r}; needed the result of limits(...)")
-    if within is not None and basis in ("emulation", "bound"):
-        raise ValueError(
-            f'got limits and basis "{basis}", which takes the measurements as they are; needed no limits; leave out '
-            'within=, or ask with basis "guarantee" or "probable"'
-        )
-
-
 def guarantee(
     model: LinearModel,
     fmt: FloatFormat | FixedFormat,

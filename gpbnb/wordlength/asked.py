@@ -31,8 +31,8 @@ from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.answer import Basis, Requirement, evidence, joined
-from gpbnb.wordlength.models import SYSTEMS, read_model
+from gpbnb.wordlength.answer import Basis, Requirement, joined
+from gpbnb.wordlength.models import MODELS, SYSTEMS, read_model
 
 AnyFormat = FloatFormat | FixedFormat | WordFormats | BlockFormats
 Function = Callable[..., Any]
@@ -63,31 +63,31 @@ class Asked:
     @classmethod
     def of(cls, model: Any, z: Any, *tasks: str, form: Any = None, seed: int = 0, **more: Any) -> Asked:
         """Read a model, its data and its form; refuse what a model of its kind cannot do, see :func:`admitted`."""
-        basis = TASK_OF_BASIS[checked_basis(more.get("basis", "emulation"))]
-        given = admitted(model, basis, *tasks, "" if form is None else "have a form")
+        basis = checked_basis(more.get("basis", "emulation"))
+        given = admitted(model, TASK_OF_BASIS[basis], *tasks, "" if form is None else "have a form")
         chosen = form_named(Form.INNOVATION if form is None else form)
-        return cls(given, data_of(given, z, seed), form=chosen, **more)
-
-    def of_filter(self) -> bool:
-        """Whether the model is a Kalman filter."""
-        return is_filter(self.model)
-
-    def evidence(self, ends: bool) -> tuple[str, str]:
-        """Return how an error is known, and what had to meet the tolerance."""
-        return evidence(self.basis, self.data.steps, ends)
+        found = cls(given, data_of(given, z, seed), form=chosen, **more)
+        if found.within is not None and not isinstance(found.within, FilterLimits):
+            raise TypeError(f"got within={found.within!r}; needed the result of limits(...)")
+        if found.within is not None and basis in ("emulation", "bound"):
+            raise ValueError(
+                f'got limits and basis "{basis}", which takes the measurements as they are; needed no limits; leave '
+                'out within=, or ask with basis "guarantee" or "probable"'
+            )
+        return found
 
     def answer(
         self, fmt: Any, ratio: float, tried: Any, ends: bool, text: str, why: str, notes: Sequence[str], **more: Any
     ) -> Requirement:
         """Return an answer, with its text before notes; `ends` is whether it holds for the steps of the data only."""
         notes, for_ever = tuple(filter(None, notes)), self.basis in ("guarantee", "probable") and not ends
-        form = self.form if self.of_filter() else None
+        form = self.form if is_filter(self.model) else None
         steps = None if for_ever else self.data.steps
         return Requirement(fmt, ratio, self.basis, steps, tried, joined(text, notes), why, notes, form, **more)
 
     def check_sizes(self, like: FloatFormat | FixedFormat) -> None:
         """Reject a filter that compiled loops do not hold, or a rounding that a basis does not cover."""
-        if self.of_filter():
+        if is_filter(self.model):
             if like.limits is None:
                 self.model.check_sizes()
             if self.basis in ("guarantee", "probable"):
@@ -232,7 +232,7 @@ def is_filter(model: Any) -> bool:
 def admitted(model: Any, *tasks: str) -> Any:
     """Read a model of any kind, and refuse tasks, keys of :data:`CANNOT`, that it cannot do, with what to use."""
     library = type(model).__module__.partition(".")[0]
-    own = isinstance(model, NonlinearModel | FilterDesign) or (callable(model) and library not in SYSTEMS)
+    own = isinstance(model, (*MODELS, FilterDesign)) or (callable(model) and library not in SYSTEMS)
     found = model if own else read_model(model)
     kind = kind_of(found)
     for task in filter(None, tasks):

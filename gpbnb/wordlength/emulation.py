@@ -24,7 +24,7 @@ from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, first_integers, integer_program
 from gpbnb.wordlength.answer import format_in_words
-from gpbnb.wordlength.asked import AnyFormat, Asked, Data, Function, checked_format
+from gpbnb.wordlength.asked import AnyFormat, Asked, Data, Function, checked_format, is_filter
 from gpbnb.wordlength.functions import STOPS, exact_outputs, outputs_of
 from gpbnb.wordlength.judges import judge_of_function, measured, system_pairs
 from gpbnb.wordlength.models import ModelSource
@@ -116,7 +116,7 @@ def emulate(
     given, data = asked.model, asked.data
     if stored and not isinstance(given, LinearModel | LinearSystem):
         raise ValueError('got reference="stored" for functions, which round their own constants; needed "given"')
-    if asked.of_filter():
+    if is_filter(given):
         return _filter(given, data, fmt, asked.form, stored)
     if isinstance(given, LinearSystem):
         return _system(given, data, fmt, stored)

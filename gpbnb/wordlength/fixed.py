@@ -24,8 +24,8 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.sections import scaled
 from gpbnb.filters.system import LinearFilter, LinearSystem
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.answer import Requirement, joined, share_text
-from gpbnb.wordlength.asked import Asked
+from gpbnb.wordlength.answer import Requirement, evidence, joined, share_text
+from gpbnb.wordlength.asked import Asked, is_filter
 from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, measured, slowest_response
 
 LARGEST_FRACTION = 60
@@ -174,7 +174,7 @@ class _FixedSearch:
                 return f"{text} {'fails' if bits == 1 else 'fail'}: {reasons[bits]}{cure}"
             return f"{text} {'gives' if bits == 1 else 'give'} {ratios[bits]:.3g} times the tolerance"
 
-        known, needed = asked.evidence(ends)
+        known, needed = evidence(asked.basis, asked.data.steps, ends)
         if found.fmt is None:
             cause = self.blame(largest) or self.unstable()
             why = cause or f"{rejection(largest)}; {most}"
@@ -264,7 +264,7 @@ def _integer_bits(asked: Asked) -> int:
             return 0 if asked.within is None else bits_for(float(np.max(asked.within.measurement)))
         return _holding_limits(model, bits_for(float(_sizes(model, data.z).max())))
     sizes = [0.0]
-    if asked.of_filter():
+    if is_filter(model):
         noise = model.noise if isinstance(model, NonlinearModel) else model
         sizes += [
             abs(float(each)) for letter in ("Phi", "H", "Q", "R", "x0", "P0") for each in getattr(noise, letter).flat
@@ -358,7 +358,7 @@ def in_words(asked: Asked, rounding: Rounding, bits: int) -> Requirement:
             words = narrow
             break
     ratio = judge.proof(words).ratio
-    known, _ = asked.evidence(judge.steps is not None)
+    known, _ = evidence(asked.basis, asked.data.steps, judge.steps is not None)
     text, notes = f"{words}: {share_text(ratio)}, {known}", judge.warnings()
     return replace(data, format=words, ratio=ratio, text=joined(text, notes), why="", notes=notes)
 

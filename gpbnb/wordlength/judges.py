@@ -16,7 +16,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import Outcome
-from gpbnb.bounds.guarantee import FilterGuarantee, check_within, guarantee, guessed, sized_limits
+from gpbnb.bounds.guarantee import FilterGuarantee, guarantee, guessed, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.probable import probable_error, probable_output_errors
 from gpbnb.bounds.system import guessed_errors, output_errors
@@ -31,7 +31,7 @@ from gpbnb.filters.run import reference
 from gpbnb.filters.system import LinearSystem, is_stable, system_inputs
 from gpbnb.filters.words import WordFormats, run_words
 from gpbnb.wordlength.answer import Basis
-from gpbnb.wordlength.asked import AnyFormat, Asked, Data, tolerances_of
+from gpbnb.wordlength.asked import AnyFormat, Asked, Data, is_filter, tolerances_of
 from gpbnb.wordlength.functions import Referenced, referenced
 
 Found = NDArray[np.float64] | Outcome
@@ -96,10 +96,9 @@ class Judge:
 def judge_for(asked: Asked, base: int = 2, most: int = 0) -> Judge:
     """Check a question, and return what answers it; `base` and `most` digits are for a function's reference."""
     model, data, basis = asked.model, asked.data, asked.basis
-    check_within(asked.within, basis)
     if isinstance(model, LinearSystem):
         return _of_system(model, data, asked.tolerance, basis, asked.within)
-    if not asked.of_filter():
+    if not is_filter(model):
         return judge_of_function(model, data, asked.tolerance, base, most)[0]
     tolerances = tolerances_of(asked.tolerance, model.n, "states")
     if basis in ("emulation", "bound"):

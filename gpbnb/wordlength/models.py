@@ -103,6 +103,9 @@ ModelSource: TypeAlias = (
 """What a model is read from."""
 
 
+MODELS = (LinearModel, LinearSystem, NonlinearModel, NonlinearSystem, FixedIntervalSmoother)
+"""Models of this package, which are read as they are."""
+
 Own = TypeVar("Own", NonlinearModel, NonlinearSystem, FixedIntervalSmoother)
 
 
@@ -161,7 +164,7 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
     if isinstance(source, (str, Path, Mapping)):
         return _of_file(source, u, structure)[0]
     library, kind = type(source).__module__.partition(".")[0], type(source).__name__
-    own = isinstance(source, LinearModel | LinearSystem | NonlinearModel | NonlinearSystem | FixedIntervalSmoother)
+    own = isinstance(source, MODELS)
     of_filter = own or (library == "filterpy" and kind in FILTERS)
     if structure is not None and of_filter:
         raise ValueError(

@@ -25,8 +25,8 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, opened
 from gpbnb.filters.system import LinearSystem, unobserved
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, joined, judgement, listed, share_text
-from gpbnb.wordlength.asked import TASK_OF_KIND, Asked, Function, checked_basis, checked_format
+from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, evidence, joined, judgement, listed, share_text
+from gpbnb.wordlength.asked import TASK_OF_KIND, Asked, Function, checked_basis, checked_format, is_filter
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS, fixed_like, in_fixed_point, in_words
 from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, slowest_response
 from gpbnb.wordlength.models import ModelSource
@@ -239,7 +239,7 @@ def _in_floating_point(asked: Asked, like: FloatFormat) -> Requirement:
     base = like.base
     highest = _highest(asked, like)
     asked.check_sizes(like)
-    lasting = asked.of_filter() and asked.basis in ("guarantee", "probable")
+    lasting = is_filter(asked.model) and asked.basis in ("guarantee", "probable")
     bounds = asked.basis == "bound" or (asked.basis != "emulation" and not lasting)
     with tqdm(desc="precisions", unit="run", disable=not asked.progress) as bar:
 
@@ -362,7 +362,7 @@ def _float_answer(
     asked: Asked, found: Search[FloatFormat], ends: bool, notes: list[str], cause: str, like: FloatFormat
 ) -> Requirement:
     fmt, tried, base = found.fmt, dict(found.tried), like.base
-    known, needed = asked.evidence(ends)
+    known, needed = evidence(asked.basis, asked.data.steps, ends)
     processors = list[tuple[str, float]]()
     for name, each in _processors_with(fmt):
         if each.precision <= found.largest and not any(ratio <= 1 for _, ratio in processors):
