@@ -111,33 +111,6 @@ def test_probabilistic_gamma_in_a_simulation():
     assert size[int((1 - failure) * trials)] > 0.5 * gamma_probabilistic(n, Fraction(u), failure)
 
 
-REFUSED = [
-    (exact, ([1, None],), TypeError, r"entry 1: got None of type NoneType; needed a str, int, float"),
-    (exact, ([[1, "abc"]],), ValueError, r"entry 0, 1: got 'abc'; needed a number such as"),
-    (exact, ([float("nan")],), ValueError, r"entry 0: got nan; needed a finite number; remove or replace"),
-    (exact, ([float("-inf")],), ValueError, r"entry 0: got -inf; needed a finite number"),
-    (exact, ([1j],), TypeError, r"entry 0: got 1j of type complex; needed"),
-    (exact, ([True],), TypeError, r"entry 0: got the truth value True; .*write 1 or 0"),
-    (max_norm, ([[1, 2]],), ValueError, r"got shape \(1, 2\); needed a vector \(n,\)"),
-    (max_norm, (5,), ValueError, r"got shape \(\); needed a vector \(n,\)"),
-    (column_sum_norm, ([1, 2],), ValueError, r"got shape \(2,\); needed a matrix \(m, n\); reshape"),
-    (row_sum_norm, (5,), ValueError, r"got shape \(\); needed a matrix \(m, n\)"),
-    (gamma, (-1, Fraction(1, 4)), ValueError, r"got n = -1, unit roundoff 1/4; needed both at least 0"),
-    (gamma, (1, Fraction(-1, 4)), ValueError, r"got n = 1, unit roundoff -1/4; needed both"),
-    (gamma, (4, Fraction(1, 4)), ValueError, r"got 4 roundings .* 0.25, a product of 1; needed less than 1; use more"),
-    (gamma_probabilistic, (9, Fraction(1, 4), 0), ValueError, r"got failure = 0; needed a probability above 0 and"),
-    (gamma_probabilistic, (9, Fraction(1, 4), 1), ValueError, r"got failure = 1; needed"),
-    (gamma_probabilistic, (-1, Fraction(1, 4)), ValueError, r"got n = -1, unit roundoff 0.25; needed n >= 0"),
-    (gamma_probabilistic, (9, Fraction(1)), ValueError, r"got n = 9, unit roundoff 1.0; .*use more digits"),
-]
-
-
-@pytest.mark.parametrize(("function", "arguments", "error", "message"), REFUSED)
-def test_refused_with_what_came_and_what_was_needed(function, arguments, error, message):
-    with pytest.raises(error, match=message):
-        function(*arguments)
-
-
 def test_numbers_that_float64_does_not_hold_are_rounded_up():
     tiny = Fraction(1, 10**20)
     values = [

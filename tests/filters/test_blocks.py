@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, FixedFormat, FloatFormat, Form, LinearModel
-from gpbnb.filters.blocks import BLOCKS, BlockFormats
+from gpbnb import BINARY32, FloatFormat, Form, LinearModel
+from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.run import Run, Sums
 
@@ -37,21 +37,6 @@ def test_an_overflow_names_the_quantity_of_the_block_whose_range_it_leaves():
         run.take(np.full((3, 1), 9.0) if name == "state" else np.zeros((3, 1)))
         assert run.stopped is not None
         assert quantity in run.reason
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
-    [
-        ({"gain": FixedFormat(2, 8)}, TypeError, "got gain FixedFormat"),
-        ({"gain": FloatFormat(10, 5)}, ValueError, "got base 10 for gain and 2 for state; needed one base"),
-        ({"gain": FloatFormat(2, 8, "stochastic")}, ValueError, "got stochastic rounding for gain"),
-        ({"gain": FloatFormat(2, 60)}, ValueError, "60 bits"),
-        ({"sums": FloatFormat(2, 20)}, ValueError, "needed at least as many digits"),
-    ],
-)
-def test_formats_that_do_not_fit_are_refused(arguments, error, message):
-    with pytest.raises(error, match=message):
-        BlockFormats(**(dict.fromkeys(BLOCKS, BINARY32) | arguments))
 
 
 @pytest.mark.parametrize("options", [{"sums": Sums(fmt=BINARY32)}, {"compensated": True}, {"bounded": True}])

@@ -38,32 +38,6 @@ def test_cycles_of_matrices_have_periods_of_their_own():
     assert model.H[1].tolist() == [[0, 1]]
 
 
-@pytest.mark.parametrize(
-    ("letter", "value", "message"),
-    [
-        ("Phi", [[1, 0, 0], [0, 1, 0]], r"got Phi of shape \(2, 3\); needed \(2, 2\)"),
-        ("Phi", [1, 2], "got Phi of shape"),
-        ("H", [[1, 0, 0]], r"got H of shape \(1, 3\); needed \(m, 2\)"),
-        ("H", np.empty((0, 2)), "got H of shape"),
-        ("H", [[1, "nan"]], "H: entry 0, 1: got 'nan'; needed a finite number"),
-        ("Q", [[1, 0], [0, math.inf]], "Q: entry 1, 1"),
-        ("Q", [[1, 2], [1, 1]], r"got Q with 2.0 at \(0, 1\) and 1.0 at \(1, 0\); needed a symmetric matrix"),
-        ("Q", [[1, 0], [0, -1]], "got Q with a least eigenvalue near -1; needed a positive semidefinite matrix"),
-        ("Q", [[1]], r"got Q of shape \(1, 1\); needed \(2, 2\)"),
-        ("R", [[0]], "got R with a least eigenvalue near 0; needed a positive definite matrix"),
-        ("R", [["-0.1"]], "needed a positive definite matrix"),
-        ("R", [[1, 0], [0, 1]], "got R of shape"),
-        ("P0", [[1, 2], [2, 1]], "got P0 with a least eigenvalue near -1"),
-        ("P0", [1, 2], r"got P0 of shape \(2,\); needed \(2, 2\)"),
-        ("x0", [[1], [2]], r"got x0 of shape \(2, 1\); needed \(n,\)"),
-        ("x0", [], "got x0 of shape"),
-    ],
-)
-def test_bad_models_are_refused_with_the_cure(letter, value, message):
-    with pytest.raises(ValueError, match=message):
-        LinearModel(**(GOOD | {letter: value}))
-
-
 def test_semidefiniteness_is_decided_exactly():
     rank_one = [[1, 2], [2, 4]]
     assert LinearModel(**(GOOD | {"Q": rank_one, "P0": [[0, 0], [0, 0]]})).Q[0, 1, 1] == 4

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import pytest
 
@@ -90,27 +88,6 @@ def test_searches_take_a_system():
         required_precision(SYSTEMS[0], u, 1e-3, kind="fixed", like=FixedFormat(2, 1)).format
         == required_precision(loop, u, 1e-3, kind="fixed", like=FixedFormat(2, 1)).format
     )
-
-
-@needs(
-    ("step", "message"),
-    [
-        (lambda fmt, x, u: (np.sin(x), u), "got np.sin in the step, for which C has no function with the digits"),
-        (lambda fmt, x, u: (np.hypot(x, u), u), "got np.hypot in the step"),
-        (lambda fmt, x, u: (x.multiply_add(u, x), u), "got np.multiply_add in the step"),
-        (lambda fmt, x, u: (x // u, u), "got np.floor_divide in the step"),
-        (lambda fmt, x, u: (x if x[0] > 0 else u, u), "cannot be traced: it branches on a comparison"),
-        (lambda fmt, x, u: (x * fmt.precision, u), "cannot be traced: it asks for fmt.precision"),
-        (lambda fmt, x, u: x, "got a TracedArray from the step; needed two, the next state and the output"),
-        (lambda fmt, x, u: (x, u, u), "got 3 parts from the step; needed two"),
-        (lambda fmt, x, u: ([x, x], u), "got 2 states and 1 outputs from the step; needed 1 states"),
-        (lambda fmt, x, u: (x, u[:0]), "got 1 states and 0 outputs from the step"),
-        (lambda fmt, x, u: (x, 0.5), "got a float from the step; needed arrays of the format"),
-    ],
-)
-def test_steps_without_a_program_are_refused(step, message):
-    with pytest.raises(ValueError, match=re.escape(message)):
-        NonlinearSystem(step, [1]).program(BINARY32)
 
 
 def test_what_has_no_program_runs_nevertheless():

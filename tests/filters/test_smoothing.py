@@ -172,27 +172,3 @@ def test_a_singular_prediction_is_refused_with_the_way_out():
     for form in FORMS:
         with pytest.raises(ZeroDivisionError, match=r"got a singular .*24 bits; needed pivots .* to the diagonals"):
             FixedIntervalSmoother(certain, [[1], [2]], form).run(FloatFormat(2, 24))
-
-
-@pytest.mark.parametrize(
-    ("changed", "kind", "message"),
-    [
-        ({"model": "walk"}, TypeError, "got a model str; needed a LinearModel"),
-        ({"form": "UD"}, ValueError, 'got the UD form; needed "innovation", "Joseph" or "square root"'),
-        ({"form": "round"}, ValueError, "got form 'round'; needed one of"),
-        ({"z": [[1], [2, 3]]}, ValueError, "got measurements in rows of different lengths"),
-        ({"z": 1}, ValueError, r"got measurements of shape \(\); needed \(steps, 1\)"),
-        ({"z": np.empty((0, 1))}, ValueError, "got no measurements; needed one step or more"),
-        ({"z": [[math.inf]]}, ValueError, "measurements: entry 0, 0: got .*; write NaN where one is missing"),
-        ({"z": [["three"]]}, ValueError, "measurements: "),
-        ({"model": LinearModel([[1]], [[1]], [[1]], [[1]], [0], [[1]], b=[1])}, ValueError, "with known inputs"),
-        (
-            {"model": LinearModel(lambda k: [[k]], [[1]], [[1]], [[1]], [0], [[1]], steps=1)},
-            ValueError,
-            "got 2 steps; needed at most 1",
-        ),
-    ],
-)
-def test_errors_say_what_is_needed(changed, kind, message):
-    with pytest.raises(kind, match=message):
-        FixedIntervalSmoother(**{"model": scalar(), "z": [[1], [2]], **changed})

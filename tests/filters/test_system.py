@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from fractions import Fraction
 
 import numpy as np
@@ -62,23 +61,6 @@ def test_probable_errors_are_three_standard_deviations():
     )
     ratios = dict(required_precision(system, 1, 1e-3, basis="probable", within=limits(measurement=1)).tried)
     assert ratios[12] == pytest.approx((3 * probable_error(found)[1] + 2 * 2**-13) / 1e-3, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"z": 80}, "got a number of steps for .*, a linear system; needed inputs"),
-        ({"z": np.ones((7, 2))}, r"needed \(steps, 1\)"),
-        ({"z": U * math.nan}, "needed a finite number"),
-        ({"tolerance": 0}, "needed an error above 0 for each of the 1 outputs"),
-        ({"tolerance": "a tenth"}, "got tolerance 'a tenth'"),
-        ({"z": True}, "got steps True"),
-        ({"basis": "probable"}, "without limits"),
-    ],
-)
-def test_what_is_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        required_precision(**{"model": SMALL, "z": U, "tolerance": 1e-3} | arguments)
 
 
 @pytest.mark.parametrize("x0", [[1, 0], [0, 1], [1, 1]])

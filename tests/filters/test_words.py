@@ -40,26 +40,6 @@ def test_overflow_names_operation_and_step():
         run_words(system, np.full((9, 1), 3.0), words)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((FixedFormat(0, 15), 0), "got 0 bits for coefficients"),
-        ((FixedFormat(0, 15), FixedFormat(1, 14), FixedFormat(9, 8)), "got sums with 8 fraction bits and data with 15"),
-        ((FixedFormat(0, 15, "stochastic"),), "got stochastic rounding for the data"),
-    ],
-)
-def test_formats_of_words_that_are_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        WordFormats(*arguments)
-
-
-def test_other_formats_are_refused():
-    with pytest.raises(TypeError, match="got data 16"):
-        WordFormats(16)
-    with pytest.raises(TypeError, match="got coefficients 'Q14'"):
-        WordFormats(FixedFormat(0, 15), "Q14")
-
-
 def test_a_coefficient_beyond_its_range_is_named():
     system = LinearSystem.from_coefficients(["0.5"], [1, "-1.9", "0.95"])
     with pytest.raises(

@@ -160,36 +160,6 @@ def test_its_own_measurements_are_seeded():
     assert required_precision(MODEL, 5, 1e-3, seed=1).tried != required_precision(MODEL, 5, 1e-3, seed=2).tried
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"tolerance": 0}, "got tolerance 0; needed an error above 0"),
-        ({"tolerance": (1.0, -1.0)}, "got tolerance"),
-        ({"tolerance": math.nan}, "got tolerance nan"),
-        ({"tolerance": (math.inf, math.inf)}, "one finite"),
-        ({"base": 3}, "got base 3; needed one with compiled loops"),
-        ({"basis": "hope"}, "got basis 'hope'; needed one of 'emulation', 'bound', 'guarantee', 'probable'"),
-        ({"basis": "guarantee"}, 'got basis "guarantee" without limits; needed within='),
-        ({"tolerance": (1, 2, 3)}, r"got tolerance .* of shape \(3,\); .*: one number, or 2 in a row"),
-        ({"tolerance": ((1.0, 1.0),)}, r"of shape \(1, 2\)"),
-        ({"tolerance": "small"}, "got tolerance 'small'; needed an error above 0 for each of the 2 states"),
-        ({"tolerance": None}, "got tolerance None"),
-        ({"form": "square"}, "got form 'square'; needed one of 'hung', .*'ud'"),
-        ({"z": 0}, "got steps 0; needed a whole number, at least 1"),
-        ({"z": 2.5}, "got steps 2.5; needed a whole number"),
-        ({"z": np.where(np.arange(60) == 7, np.inf, 1.0)[:, None]}, "got inf for measurement 0 of step 8; .*or NaN"),
-        (
-            {"z": np.ones((5, 2))},
-            r"got 5 measurements of shape \(2,\); needed one measurement for each of the steps, .* \(1,\)",
-        ),
-        ({"z": Z[:0]}, "got 0 measurements"),
-    ],
-)
-def test_what_is_refused(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        required_precision(**{"model": MODEL, "z": STEPS, "tolerance": 1e-3} | arguments)
-
-
 @pytest.mark.parametrize("form", ["innovation", "Joseph", "UD"])
 def test_a_state_without_variance_is_named(form):
     """P0 = Q = 0: the gain is zero, and so is the variance, without any rounding."""

@@ -48,26 +48,6 @@ def test_a_kalman_filter_from_arrays_in_a_file(tmp_path):
         ]
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"Kp": 1}, "Ki missing; needed Kp, Ki and perhaps Kd"),
-        ({"Kp": 1, "Ki": 1, "Kx": 1}, "Kx unknown; needed Kp, Ki and perhaps Kd, leak, limits"),
-        ({"Kp": 1, "Ki": 1, "limits": [2, 1]}, "limits"),
-        ([[1, 2, 3]], r"got a list of shape \(1, 3\); needed \(b, a\), or sections"),
-        ("bad.json", r"bad.json is not JSON"),
-        ("list.json", r"list.json: got a list; needed an object with Phi"),
-        ("sos.csv", r"sos.csv is not TOML: .*; needed a TOML file with .*; NPZ, MAT and JSON files"),
-    ],
-)
-def test_what_cannot_be_read_is_refused_with_what_can(given, message, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for name, text in (("bad.json", "{"), ("list.json", "[1]"), ("sos.csv", "1,2,3\n")):
-        (tmp_path / name).write_text(text)
-    with pytest.raises(ValueError, match=message):
-        read_model(given)
-
-
 def test_the_command_writes_a_run_and_keeps_quiet(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "walk.toml").write_text(WALK)

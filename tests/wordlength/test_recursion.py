@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from gpbnb import BFLOAT16, FixedFormat, FloatFormat, LinearSystem, NonlinearModel, required_precision, survey_records
-from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.wordlength import examples
 from tests.surveying import survey
@@ -87,19 +86,6 @@ def test_a_function_that_stops_in_few_digits():
     found = required_precision(rest, [["0.57", "0.42"]], 1e-2)
     assert dict(found.tried)[found.digits] <= 1
     assert found.digits > 3
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"within": limits(state=1, innovation=1)}, 'got limits and basis "emulation"'),
-        ({"tolerance": [1, 1]}, "got tolerance"),
-        ({"base": 3}, "got base 3"),
-    ],
-)
-def test_options_that_a_function_cannot_have_are_refused(options, message):
-    with pytest.raises(ValueError, match=message):
-        required_precision(**{"model": smoother, "z": Z, "tolerance": 1e-3} | options)
 
 
 def muller(steps):

@@ -185,27 +185,6 @@ def test_a_guarantee_for_a_system_takes_limits_on_the_measurement(tmp_path, caps
         assert "needed --measurement" in shown
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (
-            ["--basis", "guarantee"],
-            "got --basis guarantee with no limits; needed --state and --innovation, or --measure",
-        ),
-        (["--basis", "guarantee", "--state", "5"], "needed a finite limit for each measurement, or for each state and"),
-        (["--basis", "guarantee", "--state", "5,x"], "got --state 5,x; needed numbers with commas between"),
-        (["--basis", "guarantee", "--measurement", "1,2,3"], "got 3 limits on the measurement; needed one, or 1"),
-        (["--basis", "guarantee", "--measurement=-1"], "on the measurement; needed numbers that are not negative"),
-        (["--basis", "bound", "--measurement", "5"], "got no basis that uses limits and --measurement; needed --ba"),
-        (["--basis", "guarantee", "--measurement", "5", "--form", "Cholesky"], "got the Carlson form and basis"),
-    ],
-)
-def test_limits_that_are_missing_or_of_no_use_are_refused(files, capsys, options, message):
-    given = [str(files[0] / "model.toml"), "--tolerance", "0.01", "--steps", "20"]
-    assert main([*given, *options]) == 2
-    assert message in capsys.readouterr().err
-
-
 def test_the_command_takes_known_inputs(files, capsys):
     folder, z = files[0], files[1][:9]
     (folder / "z.csv").write_text("\n".join((folder / "z.csv").read_text(encoding="utf-8").split("\n")[:10]))

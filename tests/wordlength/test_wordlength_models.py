@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import control
 import numpy as np
 import pytest
@@ -149,27 +147,3 @@ def test_a_system_of_control_gives_its_outputs(given):
     times = np.arange(STEPS) * (1 if given.dt is True else given.dt)
     theirs = control.forced_response(given, times, u.T, squeeze=False).outputs.T
     np.testing.assert_allclose(model.outputs(u).sum(axis=2), theirs, **CLOSE)
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        (signal.StateSpace(*MIMO), "got a StateSpaceContinuous without a time step, so a continuous system"),
-        (signal.lti(B2, A2), "got a TransferFunctionContinuous without a time step, so a continuous system"),
-        (signal.dlti(B2, A2, dt=0), "got a TransferFunctionDiscrete with dt = 0; needed a discrete system"),
-        (signal.dlti(B2, A2, dt=-1), "got a TransferFunctionDiscrete with dt = -1; needed a discrete system"),
-        (signal.dlti(B2, A2, dt=math.nan), "got a TransferFunctionDiscrete with dt = nan; needed a discrete system"),
-        (control.ss(*MIMO), "got a StateSpace without a time step, so a continuous system"),
-        (control.tf([1], [1, 1]), "got a TransferFunction without a time step, so a continuous system"),
-        (control.ss(*MIMO, None), "got a StateSpace with dt = None; needed a discrete system; set dt"),
-        (control.tf([1, 2, 3], [1, 1], 0.1), "got a TransferFunction without a state-space form: "),
-        (signal.dlti([1, 2, 3], [1, 1], dt=1), "got a TransferFunctionDiscrete without a state-space form: Improper"),
-        (
-            control.tf([[[1], [1]]], [[[1, 0.5], [1, 0.2, 0.1]]], 0.1),
-            "got a TransferFunction without a state-space form",
-        ),
-    ],
-)
-def test_a_system_that_is_not_discrete_or_has_no_states_is_refused(given, message):
-    with pytest.raises(ValueError, match=f"^{message}"):
-        read_model(given)

@@ -50,22 +50,6 @@ def test_a_system_is_shown_in_three_lines():
     ]
 
 
-@pytest.mark.parametrize(
-    ("names", "error", "message"),
-    [
-        (["a"], ValueError, "got 1 state_names, 'a'; needed 3 names"),
-        (["a", "a", "b"], ValueError, "got state_names 'a', 'a', 'b'; needed 3 different names that are not empty"),
-        (["a", " ", "b"], ValueError, "needed 3 different names that are not empty"),
-        (["a", 1, "b"], TypeError, r"got state_names \['a', 1, 'b'\]; needed a list of 3 names"),
-        ("abc", ValueError, "got 1 state_names, 'abc'; needed 3 names"),
-        (7, TypeError, "got state_names 7; needed a list of 3 names"),
-    ],
-)
-def test_names_that_do_not_fit_are_refused(names, error, message):
-    with pytest.raises(error, match=message):
-        replace(tilt(), state_names=names)
-
-
 def test_a_process_that_never_settles_is_told_what_to_ask_instead():
     integrator = LinearSystem([[1]], [["0.1"]], state_names=["charge (C)"])
     found = required_precision(integrator, 3, 0.1, basis="probable", within=limits(measurement=1))

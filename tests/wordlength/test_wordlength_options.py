@@ -60,41 +60,6 @@ def test_the_light_lists_are_those_of_the_library():
         assert simulated_inputs(kind, 1, 3, 2).shape == (3, 2)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--tolerance", "1_0"], "got --tolerance 1_0; needed numbers with commas between: 0.01,1/3,inf"),
-        (["--tolerance", "1/0"], "got --tolerance 1/0; needed numbers with commas"),
-        (["--steps", "1_0"], "got --steps 1_0; needed a whole number"),
-        (["--base", "7"], "got --base 7; needed one of 2, 10, 16"),
-        (["--rounding", "sideways"], "got rounding 'sideways'; needed"),
-        (["--form", "square"], "got form 'square'; needed"),
-        (["--format", "bf17"], "got format 'bf17'; needed one of BINARY16, "),
-        (["--format", "Q15", "--digits", "9"], "got --format and --digits; needed --format alone"),
-        (["--emin", "-5"], "got one of --emin and --emax; needed both"),
-        (["--simulate", "sine", "--measurements", "{z}"], "got --simulate and --measurements; needed one of them"),
-        (["--level", "2"], "got no --simulate and --level; needed --simulate with one of step, sine, noise"),
-        (["--state", "5"], "got no basis that uses limits and --state; needed --basis guarantee or probable"),
-        (["--measurements", "{absent}"], "absent.csv, which cannot be read: No such file or directory; needed a file"),
-        (["--report", "{folder}/own.html"], "own.json is a file that gpbnb has not written; needed another name"),
-        (["--report", "{folder}/notes.html"], "notes.html is a file that gpbnb has not written; needed another name"),
-        (["--csv", "{folder}/own.json"], "own.json is a file that gpbnb has not written; needed another name"),
-        (["--basis", "guarantee", "--certificate", "{folder}/own.json"], "own.json is a file that gpbnb has not"),
-    ],
-)
-def test_an_option_is_refused_before_anything_is_read_or_imported(arguments, message, folder, capsys, monkeypatch):
-    monkeypatch.setattr(report, "study", lambda *_: pytest.fail("something was computed"))
-    for name in ("own.json", "notes.html"):
-        (folder / name).write_text("{}")
-    names = {"z": folder / "z.csv", "absent": folder / "absent.csv", "folder": folder}
-    given = [each.format(**names) for each in arguments]
-    tolerance = [] if "--tolerance" in given else ["--tolerance", "1"]
-    assert main([str(folder / "system.toml"), *tolerance, *given]) == 2
-    shown = capsys.readouterr()
-    assert message in shown.err
-    assert shown.out == ""
-
-
 @pytest.mark.parametrize("option", ["--report", "--certificate"])
 def test_a_device_or_pipe_is_refused_and_stays(option, folder, capsys, computed):
     # Replacing /dev/null by a page, as root, would harm every program on the machine.
