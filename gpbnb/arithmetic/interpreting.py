@@ -85,6 +85,7 @@ class Numbers:
         count, dtype = (2, np.float64) if backend is None else (backend.count, backend.dtype)
         parts = () if count == 1 else (count,)
         shape = (1,) * bool(parts) if lanes is None else (lanes,)
+        self._parts, self._made = parts, FloatArray if formats[0] is None else type(formats[0].array([]))
         #: Their kind, and their columns.
         self.kind, self.tables = machine.tables(formats, tag)
         #: (places, [lanes], [parts]) and (truths, [lanes]).
@@ -97,11 +98,54 @@ class Numbers:
         lanes = self.values.ndim - numbers.ndim
         self.values[places] = numbers[(slice(None), *(np.newaxis,) * lanes)]
 
-    def hold_constants(self, constants: Iterable[Constants]) -> None:
-        """Set the constants of a tape."""
+    def hold_constants(self, constants: Iterable[Constants]) -> bool:
+        """Set the constants of a tape; return whether the machine holds them all."""
+        fmt = self.formats[0]
         for each in constants:
             if each.places:
-                self.hold(each.places, machine.packed_constants(self.formats[0], each))
+                packed = machine.packed_constants(None, each) if fmt is None else self.packed(each.rounded(fmt))
+                if packed is None:
+                    return False
+                self.hold(each.places, packed)
+        return True
+
+    @staticmethod
+    def packed(numbers: FloatArray) -> NDArray[Any] | None:
+        """Return numbers as the machine takes them; None if it does not hold them."""
+        fmt: Any = numbers.format
+        held = numbers.backend is fmt.backend
+        return fmt.backend.pack(numbers.components) if held else None
+
+    def unpacked(self, numbers: Any, shape: tuple[int, ...], fmt: Any) -> FloatArray:
+        """Return numbers of the machine, of one lane, as an array."""
+        return self._made.from_packed(numbers.reshape(*shape, *self._parts), fmt)
+
+    def at(self, places: NDArray[np.int64]) -> NDArray[Any]:
+        """Return the numbers at some places."""
+        found: NDArray[Any] = self.values[places]
+        return found
+
+    def truth(self, place: int) -> bool:
+        """Return whether a truth value holds in all lanes."""
+        return bool(self.truths[place].all())
+
+    @staticmethod
+    def ready(segments: Iterable[Segment]) -> list[Any]:
+        """Return operations and calls as :meth:`run` takes them."""
+        return [(machine.code_of(each.rows, each.formats), len(each.rows), each.call) for each in segments]
+
+    def run(self, ready: list[Any]) -> bool:
+        """Run operations and calls; return whether the machine holds every result."""
+        for code, count, call in ready:
+            if count and self.evaluate(code) < count:
+                return False
+            if call is not None:
+                given = (self.unpacked(self.values[each], each.shape, self.formats[0]) for each in call.operands)
+                packed = self.packed(call.function(*given))
+                if packed is None:
+                    return False
+                self.hold(call.results, packed)
+        return True
 
     def first_without_result(self, rows: NDArray[Any], formats: NDArray[np.int64]) -> int:
         """Return the first of some operations that has no result, by halving: one of them has none."""
@@ -117,100 +161,43 @@ class Numbers:
         return machine.evaluate_in(self.memory, self.kind, self.tables, code)
 
 
-class InLoops(Numbers):
-    """Numbers of a tape on the machine.
+class OnIntegers:
+    """Numbers of a program as significands and exponents of Python, which hold the numbers of every format.
 
     Parameters
     ----------
-    tape : its operations.
-    formats : the formats that it names, all with the same kind of numbers.
+    fmt : the format. sizes : numbers of places, and of truth values.
     """
 
-    def __init__(self, tape: Any, formats: Sequence[Any]) -> None:
-        super().__init__(formats, tape.sizes)
-        self._alone = self.truths.ndim > 1
-        constants = [each.rounded(formats[0]) for each in tape.all_constants]
-        self._array = type(constants[0])
-        places = (np.array(each.places, np.int64) for each in tape.all_constants)
-        #: Whether the machine holds all constants.
-        self.sound = all(self.put(at, each) for at, each in zip(places, constants, strict=True))
+    def __init__(self, fmt: Any, sizes: tuple[int, int]) -> None:
+        self._kernel: ExactKernel = fmt.kernel
+        self._significands, self._exponents = [0] * sizes[0], [0] * sizes[0]
+        self._truths, self._fmt, self._made = [False, True] + [False] * (sizes[1] - 2), fmt, type(fmt.array([]))
 
-    def put(self, places: NDArray[np.int64], numbers: FloatArray) -> bool:
-        """Set numbers; return whether the machine holds them."""
-        backend = numbers.backend
-        if backend is not numbers.format.backend:
-            return False
-        if self._alone:
-            self.values[places, 0] = backend.pack(numbers.components)  # type: ignore[attr-defined]
-        else:
-            self.values[places] = numbers.components[0]
+    def hold(self, places: Any, numbers: Any) -> None:
+        """Set numbers, pairs of significands and exponents."""
+        for place, (significand, exponent) in zip(places, numbers, strict=True):
+            self._significands[place], self._exponents[place] = significand, exponent
+
+    def hold_constants(self, constants: Iterable[Constants]) -> bool:
+        """Set the constants of a tape, all of which it holds."""
+        for each in constants:
+            self.hold(each.places, self.packed(each.rounded(self._fmt)))
         return True
-
-    def move(self, places: NDArray[np.int64], to: NDArray[np.int64]) -> None:
-        """Copy numbers to other places."""
-        self.values[to] = self.values[places]
-
-    def array(self, places: NDArray[np.int64], fmt: Any) -> FloatArray:
-        """Return the numbers at some places."""
-        found = self.values[places, 0] if self._alone else self.values[places]
-        return self._array.from_packed(found, fmt)
-
-    def truth(self, place: int) -> bool:
-        """Return a truth value."""
-        return bool(self.truths[place].all())
 
     @staticmethod
-    def ready(segments: Iterable[Segment]) -> list[Any]:
-        """Return operations and calls as :meth:`run` takes them."""
-        return [(machine.code_of(each.rows, each.formats), len(each.rows), each.call) for each in segments]
+    def packed(numbers: FloatArray) -> NDArray[Any]:
+        """Return numbers as pairs, (..., 2)."""
+        return np.stack(numbers.on_exact_backend().components, axis=-1)
 
-    def run(self, ready: list[Any]) -> bool:
-        """Run operations and calls; return whether the machine holds every result."""
-        for code, count, call in ready:
-            if count and self.evaluate(code) < count:
-                return False
-            if call is not None:
-                fmt = self.formats[0]
-                if not self.put(call.results, call.function(*(self.array(each, fmt) for each in call.operands))):
-                    return False
-        return True
+    def unpacked(self, numbers: Any, shape: tuple[int, ...], fmt: Any) -> FloatArray:
+        """Return pairs as an array."""
+        pairs = np.array(numbers, dtype=object).reshape(*shape, 2)
+        return self._made.from_pairs(pairs[..., 0], pairs[..., 1], fmt)
 
-
-class OnIntegers:
-    """Numbers of a tape as significands and exponents of Python, which hold the numbers of every format."""
-
-    def __init__(self, tape: Any, fmt: Any) -> None:
-        self._kernel: ExactKernel = fmt.kernel
-        values, truths = tape.sizes
-        self._significands, self._exponents = [0] * values, [0] * values
-        self._truths, self._fmt = [False, True] + [False] * (truths - 2), fmt
-        #: Whether it holds all constants.
-        self.sound = True
-        for each in tape.all_constants:
-            numbers = each.rounded(fmt)
-            self.put(np.array(each.places, np.int64), numbers)
-            self._array = type(numbers)
-
-    def put(self, places: NDArray[np.int64], numbers: FloatArray) -> bool:
-        """Set numbers."""
-        m, e = (part.ravel().tolist() for part in numbers.on_exact_backend().components)
-        for place, significand, exponent in zip(places.ravel().tolist(), m, e, strict=True):
-            self._significands[place], self._exponents[place] = significand, exponent
-        return True
-
-    def move(self, places: NDArray[np.int64], to: NDArray[np.int64]) -> None:
-        """Copy numbers to other places."""
-        for numbers in (self._significands, self._exponents):
-            found = [numbers[i] for i in places.tolist()]
-            for place, number in zip(to.tolist(), found, strict=True):
-                numbers[place] = number
-
-    def array(self, places: NDArray[np.int64], fmt: Any) -> FloatArray:
+    def at(self, places: NDArray[np.int64]) -> list[tuple[int, int]]:
         """Return the numbers at some places."""
-        listed = places.ravel().tolist()
-        pair = np.empty((2, len(listed)), dtype=object)
-        pair[0], pair[1] = ([each[i] for i in listed] for each in (self._significands, self._exponents))
-        return self._array.from_pairs(*pair.reshape(2, *places.shape), fmt)
+        return [(self._significands[i], self._exponents[i]) for i in places.tolist()]
 
     def truth(self, place: int) -> bool:
         """Return a truth value."""
@@ -226,7 +213,8 @@ class OnIntegers:
         for rows, call in ready:
             _run_exactly(self._kernel, rows, self._significands, self._exponents, self._truths)
             if call is not None:
-                self.put(call.results, call.function(*(self.array(each, self._fmt) for each in call.operands)))
+                given = (self.unpacked(self.at(each), each.shape, self._fmt) for each in call.operands)
+                self.hold(call.results.tolist(), self.packed(call.function(*given)))
         return True
 
 

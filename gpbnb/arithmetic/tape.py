@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.interpreting import Call, Constants, InLoops, OnIntegers, Segment
+from gpbnb.arithmetic.interpreting import Call, Constants, Numbers, OnIntegers, Segment
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.machine import CODES, NAMES, operands_of
 
@@ -271,15 +271,22 @@ class Tape:
         results : (m,), places.
         """
         fmt: Any = inputs.format
-        own = np.arange(1, 1 + self.inputs)
+        found = None
         if len(self._instructions) >= 5 * FEW_OPERATIONS and isinstance(fmt.backend, Compiled):
-            loops = InLoops(self, [fmt])
-            if loops.sound and loops.put(own, inputs) and loops.run(loops.ready(self.segments)):
-                return loops.array(results, fmt)
-        integers = OnIntegers(self, fmt)
-        integers.put(own, inputs)
-        integers.run(integers.ready(self.segments))
-        return integers.array(results, fmt)
+            found = self._run_on(Numbers([fmt], self.sizes), inputs, results)
+        if found is None:
+            found = self._run_on(OnIntegers(fmt, self.sizes), inputs, results)
+            assert found is not None  # integers hold every number
+        return found
+
+    def _run_on(self, numbers: Numbers | OnIntegers, inputs: FloatArray, results: Places) -> FloatArray | None:
+        packed = numbers.packed(inputs)
+        if packed is None or not numbers.hold_constants(self.all_constants):
+            return None
+        numbers.hold(np.arange(1, 1 + self.inputs), packed)
+        if not numbers.run(numbers.ready(self.segments)):
+            return None
+        return numbers.unpacked(numbers.at(results.ravel()), results.shape, inputs.format)
 
     @property
     def segments(self) -> list[Segment]:

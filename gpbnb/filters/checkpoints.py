@@ -38,6 +38,34 @@ class Packed(NamedTuple):
         return np.asarray(FloatArray.from_packed(self.numbers, self.fmt).to_fractions(), dtype=object)
 
 
+class Progress:
+    """How far a run has come, which of its steps are saved, and why it has ended.
+
+    Parameters
+    ----------
+    checkpoint_steps : steps, 1 or more, whose results are saved, in ascending order.
+    """
+
+    def __init__(self, checkpoint_steps: Sequence[int]) -> None:
+        self.checkpoint_steps = _ascending(checkpoint_steps)
+        #: Number of steps done, and of checkpoints saved.
+        self.steps, self.saved = 0, 0
+        #: The first step at which a variance or a pivot of the innovation covariance was not positive.
+        self.indefinite: int | None = None
+        #: The step that has no result and ended the run, and why.
+        self.stopped: int | None = None
+        self.reason = ""
+
+    def done(self, definite: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Count some steps, all definite or not, and return the rows of those to save."""
+        first, saved = self.steps, self.saved
+        self.steps += len(definite)
+        if self.indefinite is None and not definite.all():
+            self.indefinite = first + 1 + int(np.argmin(definite))
+        self.saved = int(np.searchsorted(self.checkpoint_steps, self.steps, side="right"))
+        return self.checkpoint_steps[saved : self.saved] - first - 1
+
+
 class Checkpoints:
     """Exact values after some steps, object arrays of Fractions: x (c, n), K (c, n, m), P (c, n, n).
 
@@ -82,6 +110,16 @@ class Checkpoints:
         pairs = ((self.x, true.x), (self.K, true.K), (self.P, true.P))
         x, K, P = ((a - b[:count]).astype(np.float64) for a, b in pairs)
         return x, K, P
+
+
+def _ascending(checkpoint_steps: Sequence[int]) -> NDArray[np.int64]:
+    """Return checkpoint steps as an array; reject those that are no whole numbers or do not ascend."""
+    steps = np.array(checkpoint_steps).reshape(-1)
+    if steps.size and steps.dtype.kind not in "iu":
+        raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed whole numbers")
+    if steps.size and (steps[0] <= 0 or np.any(steps[1:] <= steps[:-1])):
+        raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more")
+    return steps.astype(np.int64)
 
 
 def _exactly(values: NDArray[Any] | Packed) -> NDArray[Any]:

@@ -305,10 +305,10 @@ class NonlinearModel:
         object.__setattr__(made, "noise", noise)
         return made, filled
 
-    def seen(self, k: int) -> NDArray[np.bool_] | None:
-        """Return which measurements are present in step k + 1, (m,); None if none is missing in any step."""
-        H = self.noise.H
-        return None if len(H) == 1 else np.array([bool(each) for each in H[k % len(H)][:, 0]])
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """Which measurements are present in each step, (p, m); p is 1 if none is missing in any."""
+        return np.asarray(self.noise.H[:, :, 0] != 0, np.bool_)
 
     def weights(self) -> tuple[Fraction, NDArray[Any], NDArray[Any]]:
         r"""Return :math:`n + \lambda`, and the exact weights (2n + 1,) of the sigma points in means and covariances.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
-from gpbnb.filters.checkpoints import Checkpoints
+from gpbnb.filters.checkpoints import Checkpoints, Progress
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.listing import Listing
@@ -24,7 +24,7 @@ from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.opening import double_doubles_of
 from gpbnb.filters.program import Program, entries
 from gpbnb.filters.recording import block_algebra
-from gpbnb.filters.reference import PreciseSteps, agreed, stacked
+from gpbnb.filters.reference import PreciseSteps, agreed, joined
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
@@ -55,8 +55,8 @@ class _Ahead(NamedTuple):
     P: Any
 
 
-class NonlinearRun:
-    """A run of a nonlinear filter, one step after another; its attributes are those of a linear one.
+class NonlinearRun(Progress):
+    """A run of a nonlinear filter.
 
     Parameters
     ----------
@@ -77,38 +77,39 @@ class NonlinearRun:
         checkpoint_steps: Sequence[int] = (),
     ) -> None:
         check_form(model, form, isinstance(fmt, BlockFormats))
+        super().__init__(checkpoint_steps)
         each = [getattr(fmt, name) for name in BLOCKS] if isinstance(fmt, BlockFormats) else [fmt] * len(BLOCKS)
         of_state, of_covariance = each[0], each[2]
         self.model, self.fmt, self.form = model, fmt, form
-        self.checkpoint_steps = tuple(int(step) for step in checkpoint_steps)
-        self.steps, self.reason = 0, ""
-        self.indefinite: int | None = None
-        self.stopped: int | None = None
-        self._saved: list[tuple[int, Any, Any, Any]] = []
+        self._kept: list[tuple[FloatArray, ...]] = []
         for block in each:
             identity_in(block, 1)
         stored_in = fmt.model if isinstance(fmt, BlockFormats) else fmt
         sound = model.noise.definite_in(stored_in)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(sound.repairs)
-        arrays = sound.arrays(stored_in)
-        self._R, self._Q = list(arrays["R"]), list(arrays["Q"])
-        P = arrays["P0"]
+        given = sound.arrays(stored_in)
+        P = given["P0"]
         if form in FACTORED:
-            self._R = [stored_in.store(upper_factors(one)) for one in sound.R]
-            self._Q = [self._factors(upper_factors(one), stored_in) for one in sound.Q]
-            P = self._factors(upper_factors(sound.P0), stored_in)
-        self._stored = of_state.array
-        self._weights = [of_state.array(each) for each in model.weights()] if model.method == "unscented" else []
-        self._u = _inputs(model, of_state)
+            given["R"] = stored_in.store(np.stack([upper_factors(one) for one in sound.R]))
+            given["Q"] = cast(Any, np.stack)([self._factors(one, stored_in) for one in sound.Q])
+            P = self._factors(sound.P0, stored_in)
+        #: What a step is given of the model, in cycles, by names.
+        self.given = {letter: given[letter] for letter in "QR"}
+        if model.method == "unscented":
+            weights = zip(("scale", "means", "covariances"), model.weights(), strict=True)
+            self.given |= {name: of_state.array(np.array([each])) for name, each in weights}
+        if model.u is not None:
+            self.given["u"] = of_state.array(model.u)
+        if len(model.noise.H) > 1:
+            self.given["seen"] = of_state.array(model.seen.astype(int))
         formats = list(dict.fromkeys([*each, stored_in]))
-        self._blocks_at = [formats.index(block) for block in each]
-        self._present: NDArray[np.bool_] | None = None
-        start = of_state.array(arrays["x0"]), of_covariance.array(P)
-        self._step = RepeatedStep(self._stepped, formats, start)
+        self._stored, self._blocks_at = of_state.array, [formats.index(block) for block in each]
+        start = of_state.array(given["x0"]), of_covariance.array(P)
+        self._step = RepeatedStep(self._stepped, formats, start, list(self.given.values()))
 
-    def _factors(self, factors: NDArray[Any], fmt: FloatFormat) -> FloatArray:
-        stored = fmt.store(factors)
+    def _factors(self, covariance: NDArray[Any], fmt: FloatFormat) -> FloatArray:
+        stored = fmt.store(upper_factors(covariance))
         return root_of_factors(stored) if self.form in ROOTS else stored
 
     @property
@@ -123,48 +124,44 @@ class NonlinearRun:
 
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
-        for _ in self.steps_taken(z):
+        for _ in self.blocks(z):
             pass
 
     def states(self, z: Any) -> NDArray[np.float64]:
         """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
-        found = [double_doubles_of(self.x) for _ in self.steps_taken(z)]
-        return np.array(found, dtype=np.float64).reshape(-1, self.model.n, 2)
+        found = [double_doubles_of(each.states[0]) for each in self.blocks(z)]
+        return np.concatenate([np.zeros((0, self.model.n, 2)), *found])
 
-    def steps_taken(self, z: Any) -> Iterator[int]:
-        """Take one step after the other, and give the number of those done."""
+    def blocks(self, z: Any) -> Iterator[StepTaken]:
+        """Continue as :meth:`take` does, and give what the steps give, some at a time.
+
+        The gain is (K,), or with factors or roots the gains of one measurement after the other, H, and factors of R.
+        """
         self.model.noise.check_measurements(z, self.steps)
-        for measured in self._stored(z):
-            if self.stopped is not None:
-                return
-            try:
-                definite = self._take(self.steps, measured)
-            except (ZeroDivisionError, OverflowError, DomainError, WholeNumberError) as error:
-                self.stopped = self.steps + 1
-                self.reason = f"{_fault(error)} at step {self.stopped}"
-                return
-            self.steps += 1
-            if not definite and self.indefinite is None:
-                self.indefinite = self.steps
-            at = len(self._saved)
-            if at < len(self.checkpoint_steps) and self.checkpoint_steps[at] == self.steps:
-                self._saved.append((self.steps, self.x, self._step.gain, self.P))
-            yield self.steps
+        if self.stopped is not None or not len(z):
+            return
+        try:
+            for found in self._step.take(self._stored(z)):
+                rows = self.done(found.definite)
+                if len(rows):
+                    self._kept.append(tuple(each[rows] for each in (*found.states, *found.gain)))
+                yield found
+        except (ZeroDivisionError, OverflowError, DomainError, WholeNumberError) as error:
+            self.stopped = self.steps + 1
+            self.reason = f"{_fault(error)} at step {self.stopped}"
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""
-        n, m = self.model.n, self.model.m
-        x, K, P = np.empty((len(self._saved), n), object), np.empty((len(self._saved), n, m), object), []
-        for at, (step, state, K_saved, covariance) in enumerate(self._saved):
-            x[at], K[at] = state.to_fractions(), self._whole_gain(step - 1, K_saved)
-            P.append(self.covariance(covariance))
-        steps = tuple(step for step, *_ in self._saved)
-        return Checkpoints(steps, x, K, np.array(P, dtype=object).reshape(-1, n, n))
-
-    def covariance(self, P: FloatArray) -> NDArray[Any]:
-        """Return the exact covariance, as Fractions, from a covariance, its factors or its root."""
-        given: NDArray[Any] = P.to_fractions()
-        return FACTORED[self.form].covariance(given) if self.form in FACTORED else given
+        steps = [int(step) for step in self.checkpoint_steps[: self.saved]]
+        if not steps:
+            n, m = self.model.n, self.model.m
+            return Checkpoints(steps, *(np.zeros((0, *shape), object) for shape in ((n,), (n, m), (n, n))))
+        whole = (cast(Any, np.concatenate)(each).to_fractions() for each in zip(*self._kept, strict=True))
+        x, P, K, *factors = whole
+        if self.form in FACTORED:
+            K = np.array([combined_gain(*each) for each in zip(K, *factors, strict=True)])
+            P = np.array([FACTORED[self.form].covariance(each) for each in P])
+        return Checkpoints(steps, x, K, P)
 
     # -- one step ---------------------------------------------------------------------------------------
 
@@ -173,6 +170,11 @@ class NonlinearRun:
         """The entries of the covariance, its factors or its root that are not always zero."""
         upper = self.form in (Form.UD, Form.CARLSON)
         return [(i, j) for i, j in np.ndindex(self.model.n, self.model.n) if not upper or i <= j]
+
+    def held(self, x: FloatArray, P: FloatArray) -> FloatArray:
+        """Return estimates (k, n) and covariances (k, n, n), or factors or roots, as states of a program, (k, ...)."""
+        at = [i * self.model.n + j for i, j in self.kept]
+        return cast(Any, np.concatenate)([x, P.reshape(len(P), -1)[:, at]], axis=1)
 
     def program(self, exact: bool = True) -> tuple[Program, list[NDArray[Any]]]:
         """Return the operations of a step, and its coefficients but 0 and 1, which are the last, each with its cycle.
@@ -187,12 +189,12 @@ class NonlinearRun:
         ------
         ValueError : the step cannot be traced, or has a function that C lacks; the message says why.
         """
-        found = self._step.recorded(self._given(0, self._stored(np.zeros(self.model.m))))
+        found = self._step.recorded(self._step.given(self._stored(np.zeros(self.model.m))))
         tape, (x, P, z, *places) = found.tape, found.places
-        members = [np.stack([each.to_fractions() for each in cycle]) for cycle in (self._Q, self._R)]
-        members += [each.reshape(1, -1).to_fractions() for each in self._weights]
-        u = [each for array in places[len(members) :] for each in array.tolist()]
-        known = [at for array in places[: len(members)] for at in array.ravel().tolist()]
+        cycles = {name: (cycle, at) for (name, cycle), at in zip(self.given.items(), places, strict=True)}
+        _, u = cycles.pop("u", (None, np.array([], int)))
+        members = [cycle.reshape(len(cycle), *cycle.shape[1:] or (1,)).to_fractions() for cycle, _ in cycles.values()]
+        known = [at for _, each in cycles.values() for at in each.ravel().tolist()]
         constants = {at: value for at, value in tape.constants_in(self.fmt).items() if at not in (0, tape.one)}
         members.append(np.array([list(constants.values())], dtype=object))
         order = [*known, *constants, 0, tape.one]
@@ -202,7 +204,7 @@ class NonlinearRun:
         listing = Listing(
             tape,
             states,
-            [*z.tolist(), *u],
+            [*z.tolist(), *u.tolist()],
             coefficients,
             {tape.one, *(at for at, value in constants.items() if value)},
             exact,
@@ -221,34 +223,26 @@ class NonlinearRun:
         )
         return program, members
 
-    def _given(self, k: int, z: FloatArray) -> list[FloatArray]:
-        known = [] if self._u is None else [self._u[k]]
-        return [z, self._member(self._Q, k), self._member(self._R, k), *self._weights, *known]
-
-    def _take(self, k: int, z: FloatArray) -> bool:
-        self._present = self.model.seen(k)
-        kind = None if self._present is None else self._present.tobytes()
-        return self._step.take(self._given(k, z), kind)
-
     def _stepped(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
-        each = [formats[i] for i in self._blocks_at]
-        blocks = block_algebra(each)
-        taken = (self._unscented if self.model.method == "unscented" else self._extended)(blocks, *states, *given)
-        x, *others = taken.states
-        return taken._replace(states=(self.model.normalized(x), *others))
+        blocks = block_algebra([formats[i] for i in self._blocks_at])
+        take = self._unscented if self.model.method == "unscented" else self._extended
+        x, P = states
+        taken = take(blocks, x, P, dict(zip(("z", *self.given), given, strict=True)))
+        x, P = taken.states
+        return taken._replace(states=(self.model.normalized(x), P))
 
-    def _extended(self, blocks: BlockAlgebra, x: Any, P: Any, z: Any, Q: Any, R: Any, u: Any = None) -> StepTaken:
+    def _extended(self, blocks: BlockAlgebra, x: Any, P: Any, given: dict[str, Any]) -> StepTaken:
         """Predict, then update once or several times, each time with h and H at the last estimate."""
-        model = self.model
+        model, u = self.model, given.get("u")
         x, F = model.moved(x, u)
-        predicted, definite = self._predicted(blocks, F, P, Q)
-        ahead, K, positive = _Ahead(x, predicted), None, True
+        predicted, definite = self._predicted(blocks, F, P, given["Q"])
+        ahead, K, positive = _Ahead(x, predicted), (), True
         for _ in range(model.iterations):
             expected, H = model.measured(x, u)
-            y = model.difference(z, expected)
+            y = model.difference(given["z"], expected)
             if x is not ahead.x:
                 y = y - H @ (ahead.x - x)
-            x, P, K, positive = self._updated(blocks, self._seen(H), R, self._seen(y), ahead)
+            x, P, K, positive = self._updated(blocks, _seen(given, H), given["R"], _seen(given, y), ahead)
         return StepTaken((x, P), K, definite & positive)
 
     def _predicted(self, blocks: BlockAlgebra, F: Any, P: Any, Q: Any) -> tuple[Any, Any]:
@@ -257,56 +251,34 @@ class NonlinearRun:
             return FACTORED[self.form].predict(taken(F), P, taken(Q))
         return predicted_in(blocks, F, P, Q), True
 
-    def _updated(self, blocks: BlockAlgebra, H: Any, R: Any, y: Any, ahead: _Ahead) -> tuple[Any, Any, Any, Any]:
+    def _updated(self, blocks: BlockAlgebra, H: Any, R: Any, y: Any, ahead: _Ahead) -> tuple[Any, ...]:
         """Return estimate, covariance, gain, and whether all variances and pivots are positive."""
         stored = blocks.stored
         if self.form in FACTORED:  # what the measurements correct is zero before them
             observe = FACTORED[self.form].observe
             observe = partial(observe, stored=stored) if self.form is Form.UD else observe
             step = observed(observe, H, R, y, ahead.x * 0, ahead.P, stored)
-            return ahead.x + step.x, step.P, (step.gains, H, R), step.definite
+            return ahead.x + step.x, step.P, (np.stack(step.gains, axis=1), H, R), step.definite
         found = measured_in(blocks, self.form, H, R, ahead.P)
-        return corrected_by(blocks.state, stored.state(found.K), ahead.x, y), found.P, found.K, found.definite
+        return corrected_by(blocks.state, stored.state(found.K), ahead.x, y), found.P, (found.K,), found.definite
 
-    def _unscented(
-        self, blocks: BlockAlgebra, x: Any, P: Any, z: Any, Q: Any, R: Any, scale: Any, means: Any, covariances: Any,
-        u: Any = None,
-    ) -> StepTaken:  # fmt: skip
-        model = self.model
+    def _unscented(self, blocks: BlockAlgebra, x: Any, P: Any, given: dict[str, Any]) -> StepTaken:
+        model, u = self.model, given.get("u")
         step = UnscentedModel(
             lambda x: model.value("f", x, u),
             lambda x: model.value("h", x, u),
-            lambda a, b: self._seen(model.difference(a, b)),
-            scale,
-            means,
-            covariances,
-            Q,
-            R,
+            lambda a, b: _seen(given, model.difference(a, b)),
+            *(given[name] for name in ("scale", "means", "covariances", "Q", "R")),
         )
-        found = unscented_step(blocks.state, step, x, P, z)
-        return StepTaken((found.x, found.P), found.K, found.definite)
-
-    def _seen(self, numbers: Any) -> Any:
-        """Return numbers (m,) or (m, n) with zeros where a measurement of this step is missing."""
-        seen = self._present
-        if seen is None or seen.all():
-            return numbers
-        return np.where(seen.reshape(-1, *(1,) * (numbers.ndim - 1)), numbers, 0)
-
-    @staticmethod
-    def _member(cycle: list[FloatArray], k: int) -> FloatArray:
-        return cycle[k % len(cycle)]
-
-    def _whole_gain(self, k: int, gain: Any) -> NDArray[Any]:
-        if not isinstance(gain, tuple):
-            return np.asarray(gain.to_fractions(), dtype=object)
-        columns, H, UR = gain
-        K = np.stack([each.to_fractions() for each in columns], axis=1)
-        return np.asarray(combined_gain(K, H.to_fractions(), UR.to_fractions()))
+        found = unscented_step(blocks.state, step, x, P, given["z"])
+        return StepTaken((found.x, found.P), (found.K,), found.definite)
 
 
-def _inputs(model: NonlinearModel, fmt: FloatFormat) -> Any:
-    return None if model.u is None else fmt.array(model.u)
+def _seen(given: dict[str, Any], numbers: Any) -> Any:
+    """Return numbers (m,) or (m, n) with zeros where a measurement of this step is missing."""
+    if "seen" not in given:
+        return numbers
+    return np.where(given["seen"].reshape(-1, *(1,) * (numbers.ndim - 1)) != 0, numbers, 0)
 
 
 def _fault(error: Exception) -> str:
@@ -378,8 +350,8 @@ def nonlinear_checkpoints(model: NonlinearModel, z: Any, checkpoint_steps: Seque
 def _steps(model: NonlinearModel, z: NDArray[Any], bits: int) -> PreciseSteps | str:
     """Return all steps in some bits, or why the run stops."""
     run = NonlinearRun(model, FloatFormat(2, bits))
-    done = [(run.x, run._step.gain, run.P) for _ in run.steps_taken(z)]
-    return run.reason or stacked(done)
+    found = [(each.states[0], each.gain[0], each.states[1]) for each in run.blocks(z)]
+    return run.reason or joined(found)
 
 
 def simulated(model: AnyModel, steps: int, seed: int = 0) -> NDArray[np.float64]:
@@ -392,17 +364,16 @@ def simulated(model: AnyModel, steps: int, seed: int = 0) -> NDArray[np.float64]
         return simulated_measurements(model, steps, seed)
     model.check_steps(steps)
     noise, fmt, rng = model.noise, FloatFormat(2, 53), np.random.default_rng(seed)
-    roots = [[fmt.array(covariance_root(each)) for each in cycle] for cycle in (noise.Q, noise.R)]
-    u, unit, z = _inputs(model, fmt), np.asarray(fine_resolution(noise)), np.empty((steps, model.m))
+    roots = [fmt.array(np.stack([covariance_root(each) for each in cycle])) for cycle in (noise.Q, noise.R)]
+    unit = np.asarray(fine_resolution(noise))
+    cycles = roots if model.u is None else [*roots, fmt.array(model.u)]
 
     def take(formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
-        (x,), (of_Q, w, of_R, v, *u) = states, given
+        (x,), (w, v, of_Q, of_R, *u) = states, given
         x = model.value("f", x, *u) + of_Q @ w
         return StepTaken((x,), model.value("h", x, *u) + of_R @ v, True)
 
-    step = RepeatedStep(take, [fmt], (fmt.array(noise.x0),))
-    for k in range(steps):
-        (of_Q, w), (of_R, v) = ((each[k % len(each)], fmt.array(rng.standard_normal(len(each[0])))) for each in roots)
-        step.take([of_Q, w, of_R, v, *([] if u is None else [u[k]])])
-        z[k] = step.gain.to_float()
+    step = RepeatedStep(take, [fmt], (fmt.array(noise.x0),), cycles)
+    w, v = np.split(rng.standard_normal((steps, model.n + model.m)), [model.n], axis=1)
+    z = np.concatenate([each.gain.to_float() for each in step.take(fmt.array(w), fmt.array(v))])
     return np.asarray(np.rint(z / unit) * unit)

@@ -7,7 +7,7 @@ The step is recorded once, see :mod:`gpbnb.arithmetic.traced`. Runs repeat it, s
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from inspect import signature
@@ -113,7 +113,7 @@ class NonlinearSystem:
 
     def __call__(self, fmt: Any, u: Any) -> FloatArray:
         """Return the outputs of a run in a format, (steps, p); the parameters are those of :meth:`states`."""
-        return self._run_in(fmt, u)[1]
+        return cast(Any, np.concatenate)([each.gain for each in self._run_in(fmt, u)])
 
     def states(self, fmt: Any, u: Any) -> FloatArray:
         """Return state and output after each step of a run in a format, (steps, n + p).
@@ -130,25 +130,16 @@ class NonlinearSystem:
         ValueError, TypeError : inputs of another shape; a step that does not return states (n,) and outputs (p,).
         OverflowError, ZeroDivisionError, NegativeRootError : an operation has no result in the format.
         """
-        states, outputs = self._run_in(fmt, u)
-        if isinstance(states, list):
-            states = np.stack([np.stack([convert(each, outputs.format) for each in row]) for row in states])
-        return cast(Any, np.concatenate)([states, outputs], axis=1)
+        rows = [(_in_one_format(each.states[0], each.gain.format), each.gain) for each in self._run_in(fmt, u)]
+        return cast(Any, np.concatenate)([np.concatenate(each, axis=1) for each in rows])
 
-    def _run_in(self, fmt: Any, u: Any) -> tuple[Any, FloatArray]:
-        """Return states, in rows of entries if they have formats of their own, and outputs after each step."""
+    def _run_in(self, fmt: Any, u: Any) -> Iterator[StepTaken]:
+        """Give outputs and states, in a list if they have formats of their own, after some steps at a time."""
         fmt = format_named(fmt) if type(fmt) is str else fmt  # isinstance would ask a traced format for its class
         if type(fmt) is BlockFormats or not callable(getattr(fmt, "array", None)):
             raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or a name")
-        rows, first = self.inputs_in(fmt, u), (fmt.array(self.x0),)
-        step = RepeatedStep(self._taken, [fmt], first, len(rows))
-        states, outputs = list[Any](), list[Any]()
-        for row in rows:
-            step.take([row])
-            states.append(step.states[0])
-            outputs.append(step.gain)
-        apart = any(isinstance(each, list) for each in states)
-        return [list(each) for each in states] if apart else np.stack(states), cast(Any, np.stack(outputs))
+        rows = self.inputs_in(fmt, u)
+        return RepeatedStep(self._taken, [fmt], (fmt.array(self.x0),)).take(rows)
 
     def advance(self, fmt: Any, x: Any, u: Any) -> FloatArray:
         """Take one step from a state (n,) with inputs (m,); return the next state and the output, (n + p,)."""
@@ -225,6 +216,11 @@ class NonlinearSystem:
                 "and at least one output"
             )
         return after if any(each.format != fmt for each in after) else np.stack(after), np.stack(output)
+
+
+def _in_one_format(states: Any, fmt: Any) -> Any:
+    """Return states of some steps, (steps, n), in the format of the run."""
+    return np.stack([convert(each, fmt) for each in states], axis=1) if isinstance(states, list) else states
 
 
 def _flat(part: Any) -> list[Any]:

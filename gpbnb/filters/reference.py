@@ -123,18 +123,14 @@ def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> PreciseSteps | str
         found = step.taken(x, P, carried, measured)
         return StepTaken((found.x, found.P, found.carried), found.K, found.definite)
 
-    step, done = RepeatedStep(take, [fmt], (x, P, x * 0)), list[tuple[FloatArray, ...]]()
-    members = [list(each) for each in given.values()]
+    step = RepeatedStep(take, [fmt], (x, P, x * 0), list(given.values()))
     try:
-        for k, measured in enumerate(fmt.array(z)):
-            step.take([measured, *(each[k % len(each)] for each in members)])
-            done.append((step.states[0], step.gain, step.states[1]))
+        return joined([(each.states[0], each.gain, each.states[1]) for each in step.take(fmt.array(z))])
     except ZeroDivisionError:
         return SINGULAR
-    return stacked(done)
 
 
-def stacked(steps: Sequence[tuple[Any, ...]]) -> PreciseSteps:
-    """Return estimates, gains and covariances of one step after the other."""
-    x, K, P = (cast(Any, np.stack)(each) for each in zip(*steps, strict=True))
+def joined(parts: Sequence[tuple[FloatArray, FloatArray, FloatArray]]) -> PreciseSteps:
+    """Return estimates, gains and covariances of some steps after others."""
+    x, K, P = (cast(Any, np.concatenate)(each) for each in zip(*parts, strict=True))
     return PreciseSteps(x, K, P)

@@ -19,7 +19,7 @@ from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Limits, Order
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
-from gpbnb.filters.checkpoints import Checkpoints, Packed
+from gpbnb.filters.checkpoints import Checkpoints, Packed, Progress
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.forms import WITH_PROGRAM, Form, form_named
 from gpbnb.filters.kernels.widened import widen
@@ -65,7 +65,7 @@ LEFT_TO_RIGHT = Sums()
 """Each product and each sum is rounded in the format of the run, from left to right."""
 
 
-class Run:
+class Run(Progress):
     """A resumable run of a filter: inputs, state and checkpoints.
 
     Parameters
@@ -103,7 +103,7 @@ class Run:
             )
         fmt = fmt.model if isinstance(fmt, BlockFormats) else fmt
         self.model, self.fmt, self.form = model, fmt, form_named(form)
-        self.checkpoint_steps = _ascending(checkpoint_steps)
+        super().__init__(checkpoint_steps)
         self._check(sums, compensated, bounded, records)
         compensated = compensated or self.form is Form.COMPENSATED
         self.sums = sums
@@ -125,13 +125,6 @@ class Run:
         self.X, self.G, self.C = (
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, records), (n, m), (n, n))
         )
-        #: Number of steps done, and of checkpoints saved.
-        self.steps, self.saved = 0, 0
-        #: The first step at which a variance or a pivot of the innovation covariance was not positive.
-        self.indefinite: int | None = None
-        #: The step at which a division by zero, or a number beyond the range of the backend, ended the run, and why.
-        self.stopped: int | None = None
-        self.reason = ""
         if fmt is not None:
             identity_in(fmt, 1)
         self._compensation = np.zeros_like(self.x)
@@ -349,15 +342,12 @@ class Run:
             self._stepper = self._made_stepper()
         at = 0
         while at < len(z) and self.stopped is None:
-            first, begin = self.steps, self.saved
-            found = self._stepper.take(first, z[at : at + self._stepper.longest], self.x, self._compensation, self.P)
-            done = len(found.x)
-            at += done
-            self.steps += done
-            if self.indefinite is None and not found.definite.all():
-                self.indefinite = first + 1 + int(np.argmin(found.definite))
-            self.saved = int(np.searchsorted(self.checkpoint_steps, self.steps, side="right"))
-            rows = self.checkpoint_steps[begin : self.saved] - first - 1
+            begin = self.saved
+            found = self._stepper.take(
+                self.steps, z[at : at + self._stepper.longest], self.x, self._compensation, self.P
+            )
+            at += len(found.x)
+            rows = self.done(found.definite)
             for array, each in zip((self.X, self.G, self.C), (found.x, found.K, found.P), strict=True):
                 array[begin : self.saved] = each[rows]
             resumes = found.stop is not None and found.stop.fault.overflows and self._limits is None
@@ -438,16 +428,6 @@ def _nearest_floats(pairs: NDArray[np.int64], out: NDArray[np.float64]) -> None:
             out[at] = m / power if e < 0 else float(m * power)
         except OverflowError:
             out[at] = math.copysign(math.inf, m)
-
-
-def _ascending(checkpoint_steps: Sequence[int]) -> NDArray[np.int64]:
-    """Return checkpoint steps as an array; reject those that are no whole numbers or do not ascend."""
-    steps = np.array(checkpoint_steps).reshape(-1)
-    if steps.size and steps.dtype.kind not in "iu":
-        raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed whole numbers")
-    if steps.size and (steps[0] <= 0 or np.any(steps[1:] <= steps[:-1])):
-        raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more")
-    return steps.astype(np.int64)
 
 
 def widened(packed: NDArray[Any]) -> NDArray[np.float64]:

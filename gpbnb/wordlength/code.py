@@ -361,17 +361,17 @@ def _of_nonlinear_model(model: NonlinearModel, fmt: AnyFormat, form: Form, exact
     run = NonlinearRun(model, _one_format(fmt), form)  # type: ignore[arg-type]
     program, members = run.program(exact)
     stored = _coefficients(members)
-    step = CodeStep(without_exact(program, stored), stored, _held(run).to_fractions())
+    step = CodeStep(without_exact(program, stored), stored, run.held(run.x[None], run.P[None])[0].to_fractions())
 
     def emulated(z: Any, fmt: Any) -> Vectors:
         run = NonlinearRun(model, fmt, form)
-        start = _stored(_held(run), fmt)
-        states = [_stored(_held(run), fmt) for _ in run.steps_taken(z)]
+        start = _stored(run.held(run.x[None], run.P[None])[0], fmt)
+        states = [_stored(run.held(*each.states), fmt) for each in run.blocks(z)]
         inputs = fmt.array(z)
         if model.u is not None:
             inputs = np.concatenate([inputs, fmt.array(model.u[: len(z)])], axis=1)
-        kept = np.array(states, start.dtype).reshape(-1, len(start))
-        return _ended(_stored(inputs, fmt), start, kept, _statuses(len(states), run.indefinite))
+        kept = np.concatenate([start[None][:0], *states])
+        return _ended(_stored(inputs, fmt), start, kept, _statuses(len(kept), run.indefinite))
 
     return Prepared(
         step,
@@ -381,12 +381,6 @@ def _of_nonlinear_model(model: NonlinearModel, fmt: AnyFormat, form: Form, exact
         emulated,
         lambda steps: simulated(model, min(steps, model.steps or steps)),
     )
-
-
-def _held(run: NonlinearRun) -> Any:
-    """Return estimate and covariance, or its factors or root, as the states of a program."""
-    at = [i * run.model.n + j for i, j in run.kept]
-    return np.concatenate([run.x, run.P.reshape(-1)[at]])
 
 
 def _nonlinear_vectors(system: NonlinearSystem, u: Any, fmt: FloatFormat | FixedFormat, p: int) -> Vectors:

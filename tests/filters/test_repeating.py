@@ -22,7 +22,7 @@ def sight(method="extended", **options):
 def by_operations(monkeypatch, make, z):
     """States of a run whose steps are not repeated."""
     with monkeypatch.context() as patch:
-        patch.setattr(RepeatedStep, "_opened", lambda self, given, kind: None)
+        patch.setattr(RepeatedStep, "_opened", lambda self, given, steps: None)
         return make().states(z)
 
 
