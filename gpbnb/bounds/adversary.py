@@ -23,9 +23,10 @@ from gpbnb.bounds.gains import Schedule
 from gpbnb.bounds.guarantee import FilterGuarantee, closed_loops
 from gpbnb.bounds.guess import FilterLimits, linear_steps
 from gpbnb.bounds.units import largest_errors, units
-from gpbnb.filters.kernels.widened import widened
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT, Program
+
+_POWERS = np.array([10.0**k for k in range(23)])  # exact
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +65,30 @@ def _overloaded_number(fmt: Any, x: Any) -> Any:
     if getattr(fmt, "instance_class", None) in PAIRS:
         return lambda fmt, x: round_(fmt, _scaled(x))
     return lambda fmt, x: round_(fmt, x)
+
+
+def widened(fmt: Any, a: Any) -> Any:
+    """Convert a number to double-double: exactly in bases 2 and 16, within four roundings in base 10."""
+    raise TypeError("got a call of widened from Python; needed one from a function compiled by numba")
+
+
+@overload(widened, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
+def _overloaded_widened(fmt: Any, a: Any) -> Any:
+    def of_float(fmt: Any, a: Any) -> Any:
+        return a, 0.0
+
+    def of_pair(fmt: Any, a: Any) -> Any:
+        high = np.float64(a[0])
+        x, e = (high, np.float64(a[0] - np.int64(high))), a[1]
+        while e > 0:
+            x = doubledouble.operate(tags.MULTIPLY, x, (_POWERS[min(e, 22)], 0.0))
+            e -= min(e, 22)
+        while e < 0:
+            x = doubledouble.operate(tags.DIVIDE, x, (_POWERS[min(-e, 22)], 0.0))
+            e += min(-e, 22)
+        return x
+
+    return of_pair if getattr(fmt, "instance_class", None) in PAIRS else of_float
 
 
 @inner

@@ -2,36 +2,62 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-_POWERS = np.array([10.0**k for k in range(23)])  # exact
+from gpbnb.arithmetic.kernels.doubledouble import LEAST, LIMIT
+
+_LAST = 22
+_POWERS = np.array([10.0**k for k in range(_LAST + 1)])  # exact
 _SPLITTER = 2.0**27 + 1
 
 
 def nearest_floats(pairs: NDArray[np.int64]) -> NDArray[np.float64]:
     """Convert decimal numbers, (..., 2), to the nearest float64; NaN where that takes more digits."""
-    return _converted(pairs)[0]
+    m, e = pairs[..., 0], pairs[..., 1]
+    x, power = m.astype(np.float64), _POWERS[np.minimum(np.abs(e), _LAST)]
+    return np.where(_takes_one_operation(pairs), np.where(e < 0, x / power, x * power), np.nan)
 
 
 def nearest_double_doubles(pairs: NDArray[np.int64]) -> NDArray[np.float64]:
     """Convert decimal numbers, (..., 2), to the nearest double-doubles; NaN where that takes more digits."""
-    high, x, power, divided = _converted(pairs)
-    factor = np.where(divided, high, x)
-    p = factor * power
-    (a, b), (c, d) = _halves(factor), _halves(power)
-    rest = ((a * c - p) + a * d + b * c) + b * d  # factor * power - p, exactly
-    return np.stack([high, np.where(divided, ((x - p) - rest) / power, rest)], axis=-1)
+    return np.where(_takes_one_operation(pairs)[..., np.newaxis], double_doubles_near(pairs), np.nan)
 
 
-def _converted(pairs: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
-    """Return nearest float64, significands, the power by which each is multiplied or divided, and which are divided."""
+def _takes_one_operation(pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
+    return (np.abs(pairs[..., 0]) < 2**53) & (np.abs(pairs[..., 1]) <= _LAST)
+
+
+@np.errstate(all="ignore")
+def double_doubles_near(pairs: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Convert decimal numbers, (..., 2), to double-doubles, with a rounding for each 22 powers of ten.
+
+    Numbers of at least 2**996 or, except for zero, below 2**-850 become NaN.
+    The operations are those of :mod:`gpbnb.arithmetic.kernels.doubledouble` for a second number of one float64.
+    """
     m, e = pairs[..., 0], pairs[..., 1]
-    x = np.where((np.abs(m) < 2**53) & (np.abs(e) <= 22), m, np.nan)
-    power, divided = _POWERS[np.minimum(np.abs(e), 22)], e < 0
-    return np.where(divided, x / power, x * power), x, power, divided
+    high = m.astype(np.float64)
+    low = (m - high.astype(np.int64)).astype(np.float64)
+    while (left := (e != 0) & (high != 0) & ~np.isnan(high)).any():
+        e = np.where(left, e, 0)
+        power = _POWERS[np.minimum(np.abs(e), _LAST)]
+        result = np.where(e < 0, high / power, high * power)
+        factor = np.where(e < 0, result, high)
+        product = factor * power
+        rest = _rest(factor, power, product)
+        low = np.where(e < 0, ((high - product) + (low - rest)) / power, rest + low * power)
+        high = result + low
+        low -= high - result
+        within = ((np.abs(high) >= LEAST) & (np.abs(high) < LIMIT)) | (m == 0)
+        high, low = np.where(within, high, np.nan), np.where(within, low, np.nan)
+        e = e - np.clip(e, -_LAST, _LAST)
+    return np.stack([high, low], axis=-1)
+
+
+def _rest(a: NDArray[np.float64], b: NDArray[np.float64], product: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ab minus the product, exactly."""
+    (c, d), (f, g) = _halves(a), _halves(b)
+    return ((c * f - product) + c * g + d * f) + d * g
 
 
 def _halves(a: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
+from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.arithmetic.loop import drop_decayed
 from gpbnb.arithmetic.machine import OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT
 from gpbnb.arithmetic.named import format_text
@@ -22,7 +22,6 @@ from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed, Progress
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.forms import WITH_PROGRAM, Form, form_named
-from gpbnb.filters.kernels.widened import widen
 from gpbnb.filters.model import INPUTS, LinearModel, identity_in
 from gpbnb.filters.opening import (
     Opening,
@@ -31,7 +30,7 @@ from gpbnb.filters.opening import (
     opening,
     widened_array,
 )
-from gpbnb.filters.pairs import nearest_floats
+from gpbnb.filters.pairs import double_doubles_near, nearest_floats
 from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
 from gpbnb.filters.stepping import Block, Stepper, Stop
@@ -433,15 +432,13 @@ def _nearest_floats(pairs: NDArray[np.int64], out: NDArray[np.float64]) -> None:
 def widened(packed: NDArray[Any]) -> NDArray[np.float64]:
     """Convert results of compiled loops in any format, (k, n, m) or (k, n, m, 2), to double-double.
 
-    In base 10, this is faster than :func:`gpbnb.filters.opening.widened_array`, but only within four roundings.
+    In base 10, this is faster than :func:`gpbnb.filters.opening.widened_array`, but rounds for each 22 powers of ten.
     """
     if packed.ndim == 3:
         return widened_array(packed)
     if packed.dtype == np.float64:
         return np.ascontiguousarray(packed)
-    wide = np.empty(packed.shape)
-    widen(Decimal(1, True), packed, wide)  # of any precision
-    return wide
+    return double_doubles_near(packed)
 
 
 def widened_estimates(packed: NDArray[Any]) -> NDArray[np.float64]:
