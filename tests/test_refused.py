@@ -12,6 +12,7 @@ import math
 import operator
 import os
 import tempfile
+from dataclasses import replace
 from datetime import date
 from decimal import Decimal
 from fractions import Fraction
@@ -29,6 +30,10 @@ import gpbnb
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounds import gamma, gamma_probabilistic
 from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm, row_sum_norm
+from gpbnb.bounds import inverse
+from gpbnb.bounds.gains import schedule
+from gpbnb.bounds.guarantee import from_schedule
+from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters import emulation
 from gpbnb.filters.blocks import BLOCKS
 from gpbnb.filters.run import Sums
@@ -86,6 +91,15 @@ def mapping(**changes):
     return {name: each for name, each in (TWO | changes).items() if each is not None}
 
 
+def driven():
+    return model(B=[[1], [0]], u=[[1]] * 5)
+
+
+def nonlinear(**changes):
+    noise = {"Q": [[0, 0], [0, "0.01"]], "R": [["0.5", "0.1"], ["0.1", 1]], "x0": [0, 1], "P0": [[1, 0], [0, 1]]}
+    return gpbnb.NonlinearModel(**{"f": lambda x: x, "F": None, "h": lambda x: x, "H": None} | noise | changes)
+
+
 def ask(model=None, z=60, tolerance=1e-3, **options):
     return gpbnb.required_precision(model or gpbnb.LinearModel(**TWO), z, tolerance, **options)
 
@@ -101,14 +115,15 @@ def stepped(step):
 NAMES = {name: getattr(gpbnb, name) for name in gpbnb.__all__} | {
     each.__name__: each
     for each in (
-        *(ask, blocks, command, given, mapping, model, stepped, FloatArray, Sums, judge, read_measurements, exact),
-        *(gamma, gamma_probabilistic, max_norm, column_sum_norm, row_sum_norm, Decimal, Fraction, date),
-        *(arb, control, math, mpmath, operator),
+        *(ask, blocks, command, driven, given, mapping, model, nonlinear, stepped, replace, Sums),
+        *(FloatArray, FilterLimits, from_schedule, schedule, judge, read_measurements, exact, Decimal, Fraction, date),
+        *(gamma, gamma_probabilistic, max_norm, column_sum_norm, row_sum_norm, arb, control, math, mpmath, operator),
     )
 }
 NAMES |= {
     "np": np,
     "emulation": emulation,
+    "inverse": inverse,
     "signal": signal,
     "D4": (D4 := gpbnb.FloatFormat(10, 4)),
     "B8": (B8 := gpbnb.FloatFormat(2, 8)),

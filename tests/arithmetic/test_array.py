@@ -329,27 +329,3 @@ class TestLeavingTheFormat:
         stream.seek(0)
         assert np.load(stream).tolist() == [0.5, -2.0, 0.0]
         assert pickle.loads(pickle.dumps(self.LONG)).tolist() == self.LONG.tolist()
-
-    def test_unknown_names_have_a_hint(self) -> None:
-        for wrong, near in [
-            (lambda x: x.summ(), "the nearest is x.sum"),
-            (lambda x: x.dtype, "the nearest is x.format"),
-            (lambda x: x.sort(), r"write np\.sort\(x\)"),
-            (lambda x: x.norm(), r"write np\.linalg\.norm\(x\)"),
-            (lambda x: x.nanmax(), r"the nearest is x\.max"),
-            (lambda x: np.nanmin(x), r"the nearest is np\.min"),
-            (lambda x: np.average(x), "the nearest is np.mean"),
-            (lambda x: np.cumprod(x), "the nearest is np.prod"),
-        ]:
-            with pytest.raises((AttributeError, TypeError), match=near):
-                wrong(self.HALF)
-
-    @pytest.mark.parametrize(
-        "wrong", [lambda x: x.strides, lambda x: x.str, lambda x: x.zzz, lambda x: np.logaddexp(x, x), np.unwrap]
-    )
-    def test_a_name_with_nothing_like_it_lists_what_there_is(self, wrong) -> None:
-        with pytest.raises(
-            (AttributeError, TypeError), match=r"needed one of (T, all|absolute, add|all, allclose),"
-        ) as no:
-            wrong(self.HALF)
-        assert "nearest" not in str(no.value)

@@ -56,23 +56,6 @@ def test_operations_on_entries_are_rounded_and_masks_select():
         x.at[:2].set([1, 2, 3])
 
 
-def test_an_assignment_is_refused_with_the_way():
-    for assign in [
-        lambda x: x.__setitem__(0, 1),
-        lambda x: x.__delitem__(0),
-        lambda x: np.put(x, 0, 1),
-        lambda x: np.copyto(x, x),
-        lambda x: np.place(x, [True, False], [1]),
-        lambda x: np.putmask(x, [True, False], 1),
-        lambda x: np.put_along_axis(x, np.array([0]), 1, 0),
-        lambda x: np.fill_diagonal(x.reshape(1, 2), 1),
-    ]:
-        with pytest.raises(
-            TypeError, match=r"which cannot be changed; needed a copy with other entries: x = x.at\[i\].set\("
-        ):
-            assign(BINARY32.array([1, 2]))
-
-
 def matrices(fmt, n, seed):
     rng = np.random.default_rng(seed)
     a = fmt.array(rng.normal(size=(n, n)))

@@ -10,7 +10,6 @@ import pytest
 from gpbnb import BINARY32, FixedFormat, FloatFormat, peek, required_precision
 from gpbnb.arithmetic import linalg, tape
 from gpbnb.arithmetic.traced import TracedFunction
-from tests.oracles import fixed, floating, limited
 
 FORMATS = {
     "24 bits, away": FloatFormat(2, 24),
@@ -54,20 +53,6 @@ def limiter(fmt, z):
     return found
 
 
-def goertzel(fmt, z):
-    c, one, two = fmt.array("1.6"), fmt.array(0), fmt.array(0)
-    for x in z[:20]:
-        one, two = (x / 8 + c * one) - two, one
-    return (one * one / 4 + two * two / 4) - c * one / 4 * two
-
-
-def newton_root(fmt, z):
-    a, x = abs(z) + 1, fmt.array(np.ones(len(z)))
-    for _ in range(6):
-        x = (x + a / x) / 2
-    return x
-
-
 def angles(fmt, z):
     """Elementary functions are calls between compiled operations."""
     angle, found = fmt.array(0), []
@@ -101,7 +86,7 @@ def kalman(fmt, z):
     return np.stack([*found, linalg.lu(P).upper[1]])
 
 
-FUNCTIONS = [pi_controller, limiter, goertzel, newton_root, angles, many_functions, kalman]
+FUNCTIONS = [pi_controller, limiter, angles, many_functions, kalman]
 
 
 def numbers(found):
@@ -119,45 +104,6 @@ def test_traced_functions_have_the_digits_of_the_function(function, monkeypatch)
             assert numbers((fmt.restart(), traced(fmt, Z[:50]))[1]) == expected, name
             assert traced.refusal == ""
             assert bool(traced.reason) == (name == "stochastic")
-
-
-@pytest.mark.parametrize(
-    ("fmt", "r"),
-    [
-        (FloatFormat(2, 24), floating(2, 24, "nearest")),
-        (FloatFormat(2, 24, "down"), floating(2, 24, "down")),
-        (FloatFormat(10, 8, "even"), floating(10, 8, "even")),
-        (FixedFormat(4, 12, "chop", "saturate"), lambda x: limited(12, 4, "saturate")(fixed(12, "chop")(x))),
-        (FixedFormat(4, 12, "even", "wrap"), lambda x: limited(12, 4, "wrap")(fixed(12, "even")(x))),
-    ],
-    ids=["24 bits, away", "24 bits, floor", "8 decimal digits, even", "saturating", "wrapping"],
-)
-def test_traced_functions_equal_plain_loops_over_fractions(fmt, r, monkeypatch):
-    monkeypatch.setattr(tape, "FEW_OPERATIONS", 0)
-    z = [r(Fraction(str(each))) for each in Z]
-    kp, ki, a, b = (r(Fraction(each)) for each in ("0.8", "0.05", "0.95", "0.05"))
-    i, y, found = Fraction(0), Fraction(0), []
-    for each in z:
-        e = r(each - y)
-        i = min(max(r(i + r(ki * e)), -1), 1)
-        y = r(r(a * y) + r(b * min(max(r(r(kp * e) + i), -1), 1)))
-        found.append(y)
-    assert TracedFunction(pi_controller)(fmt, list(map(str, Z))).to_fractions().tolist() == found
-
-    roots = []
-    for each in z:
-        given, x = r(abs(each) + 1), Fraction(1)
-        for _ in range(6):
-            x = r(r(x + r(given / x)) / 2)
-        roots.append(x)
-    assert TracedFunction(newton_root)(fmt, list(map(str, Z))).to_fractions().tolist() == roots
-
-    c, one, two = r(Fraction("1.6")), Fraction(0), Fraction(0)
-    for each in z[:20]:
-        one, two = r(r(r(each / 8) + r(c * one)) - two), one
-    power = r(r(r(one * one) / 4) + r(r(two * two) / 4))
-    power = r(power - r(r(r(c * one) / 4) * two))
-    assert TracedFunction(goertzel)(fmt, list(map(str, Z))).to_fractions() == power
 
 
 OPERATIONS = [

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 from small_filter import exact_steps
 
-from gpbnb import BINARY64, FloatFormat, LinearModel, Rounding, required_precision
-from gpbnb.bounds.gains import schedule
-from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb import FloatFormat, LinearModel, Rounding, required_precision
 from gpbnb.filters.emulation import compare_runs, emulate
 from gpbnb.filters.forms import Form
-from gpbnb.filters.run import Run, Sums, reference
+from gpbnb.filters.run import Run, reference
 from gpbnb.filters.simulation import Simulation, fine_resolution, simulated_measurements
 
 FORMS = tuple(Form)
@@ -111,50 +109,6 @@ def test_functions_of_the_step_are_cycles():
     for basis in ("emulation", "bound"):
         a, b = (required_precision(each, z, 1e-2, basis=basis).tried for each in (varying, cycle))
         assert a == b
-
-
-def test_inputs_are_refused_where_they_would_be_ignored():
-    cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=[[1]] * 5)
-    fmt, within = FloatFormat(2, 24), limits(state=1, innovation=1)
-    z = np.zeros((5, 1))
-    for call in (
-        lambda: schedule(cart, fmt, Form.INNOVATION),
-        lambda: Simulation(cart, (0.0, 0.0), 0, 0.1),
-        lambda: guarantee(cart, fmt, within),
-        lambda: required_precision(cart, z, 0.1, basis="guarantee", within=within),
-        lambda: required_precision(cart, z, 0.1, basis="probable", within=within),
-    ):
-        with pytest.raises(
-            ValueError, match=r"got a linear model with known inputs or offsets; needed none|known inputs, cannot "
-        ):
-            call()
-    for form in ("Hung", "Hung second gain"):
-        with pytest.raises(ValueError, match="form"):
-            emulate(cart, z, fmt, form)
-    with pytest.raises(ValueError, match="got known inputs in the Hung"):
-        emulate(cart, z, fmt, Form.HUNG)
-    for sums, compensated in (
-        (Sums(fused=True), False),
-        (Sums(fmt=BINARY64), False),
-        (Sums(), True),
-        (Sums(order="pairwise"), False),
-    ):
-        with pytest.raises(ValueError, match="got sums or compensated with known inputs"):
-            emulate(cart, z, fmt, sums=sums, compensated=compensated)
-
-
-def test_a_run_is_not_longer_than_its_model():
-    cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=[[1]] * 5)
-    with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
-        required_precision(cart, np.zeros((6, 1)), 0.1)
-    with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
-        required_precision(cart, 6, 0.1)
-    short = LinearModel(**CART, steps=5)
-    for basis in ("emulation", "bound"):
-        with pytest.raises(ValueError, match="got 6 steps; needed at most 5"):
-            required_precision(short, np.zeros((6, 1)), 0.1, basis=basis)
-    with pytest.raises(ValueError, match="got a model of 5 steps"):
-        required_precision(short, 5, 0.1, basis="guarantee", within=limits(state=1, innovation=1))
 
 
 def test_random_rounding_stores_one_model_whose_covariances_are_symmetric():

@@ -1,8 +1,7 @@
-"""What a guarantee assumes is checked, and what it cannot cover is refused with a reason."""
+"""What a guarantee assumes of roundings, limits and inputs, beside runs that come near it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -10,15 +9,11 @@ import numpy as np
 import pytest
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, required_precision
-from gpbnb.bounds.gains import filter_schedule, schedule
+from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
-from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.units import largest_errors, stored_sizes
-from gpbnb.filters.forms import WITH_PROGRAM, Form
+from gpbnb.filters.forms import WITH_PROGRAM
 from gpbnb.filters.run import Run, reference_states
-
-FORMAT = FloatFormat(2, 11)
-Asked = Callable[[LinearModel, Any, FloatFormat], Any]
 
 
 def scalar(**changes: Any) -> LinearModel:
@@ -33,35 +28,7 @@ def two_states(**changes: Any) -> LinearModel:
     return LinearModel(**(given | changes))
 
 
-def _guarantee(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
-    return guarantee(model, fmt, within)
-
-
-def _from_schedule(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
-    return from_schedule(schedule(model, fmt, Form.INNOVATION), within)
-
-
-def _precision(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
-    return required_precision(model, 5, 0.01, rounding=fmt.rounding, basis="guarantee", within=within)
-
-
-def _probable(model: LinearModel, within: Any, fmt: FloatFormat) -> Any:
-    return required_precision(model, 5, 0.01, rounding=fmt.rounding, basis="probable", within=within)
-
-
-ASKED = [_guarantee, _from_schedule, _precision, _probable]
-
-
 # -- stochastic rounding ----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("asked", ASKED)
-def test_a_filter_that_computes_its_gain_must_not_round_at_random(asked: Asked) -> None:
-    """Bound "for ever" of 4.82, but an error of 5.217 at the third step: its covariance occurs again by chance."""
-    model = scalar(Phi=[[0]], R=[["0.4375"]])
-    fmt = FloatFormat(2, 5, Rounding.STOCHASTIC)
-    with pytest.raises(ValueError, match="got stochastic rounding for a Kalman filter; needed another"):
-        asked(model, limits(state=100, innovation=100, measurement=100), fmt)
 
 
 def test_fixed_coefficients_may_be_rounded_at_random() -> None:
@@ -87,46 +54,6 @@ def test_fixed_coefficients_may_be_rounded_at_random() -> None:
 
 
 # -- limits -----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("asked", ASKED)
-def test_a_first_estimate_beyond_its_limit_is_refused(asked: Asked) -> None:
-    model = two_states(x0=[1, -11])
-    within = limits(state=10, innovation=30)
-    with pytest.raises(ValueError, match=r"got a first estimate -11.0 of state 1, beyond its limit 10.0"):
-        asked(model, within, FORMAT)
-    asked(two_states(x0=[10, -10]), within, FORMAT)
-
-
-@pytest.mark.parametrize("asked", ASKED)
-@pytest.mark.parametrize(
-    ("within", "says"),
-    [
-        (limits(state=[10, 10, 10], innovation=30), "got 3 limits on the state; needed one, or 2"),
-        (limits(state=10, innovation=[30, 30]), "got 2 limits on the innovation; needed one, or 1"),
-        (
-            FilterLimits(np.ones(2), np.ones(1), np.ones(2)),
-            "got 2 limits on the measurement; needed one, or 1: this filter has 2 states and 1 measurement",
-        ),
-    ],
-)
-def test_limits_for_another_filter_are_refused(asked: Asked, within: Any, says: str) -> None:
-    with pytest.raises(ValueError, match=says):
-        asked(two_states(), within, FORMAT)
-
-
-@pytest.mark.parametrize("asked", ASKED)
-def test_limits_that_were_not_checked_are(asked: Asked) -> None:
-    with pytest.raises(ValueError, match="needed numbers that are not negative"):
-        asked(two_states(), FilterLimits(np.ones(2), -np.ones(1), np.ones(1)), FORMAT)
-    with pytest.raises(TypeError, match=r"needed the result of limits"):
-        asked(two_states(), (np.ones(2), np.ones(1), np.ones(1)), FORMAT)
-
-
-@pytest.mark.parametrize("size", [2.0**-451, 2.0**451])
-def test_limits_whose_squares_float64_cannot_store_are_refused(size: float) -> None:
-    with pytest.raises(ValueError, match=r"needed 0, infinity, or 2\*\*-450 to 2\*\*450"):
-        limits(state=[1, size], innovation=1)
 
 
 # -- nothing measured, nothing allowed --------------------------------------------------------------------------------
