@@ -14,68 +14,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from benchmarks.timing import Row, medians, rows
 from gpbnb.arithmetic import named
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.scalar import add, load, matmul, multiply, negative, quotient, store, subtract
+from gpbnb.arithmetic.loop import Loop
+from gpbnb.arithmetic.tape import Tape
+from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear_run import opened
 
 N, M = 10, 2
-STEPS = 20  # in one call of the compiled loop
+STEPS = 20  # in one call
 C_SOURCE = Path(__file__).parent / "kalman.c"
 
 
-@njit
-def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    for i in range(c.shape[0]):
-        for j in range(c.shape[1]):
-            store(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
-
-
-@njit
-def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    for i in range(c.shape[0]):
-        for j in range(c.shape[1]):
-            store(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
-
-
-@njit(cache=True, nogil=True)
-def compiled_steps(fmt: Any, model: Any, x0: Any, P0: Any, x: Any, P: Any, steps: int) -> None:
-    """Several times the same step, from x0 and P0 to x and P; the model and its transposes as arrays of the tag."""
-    Phi, PhiT, Q, H, HT, R, z, identity = model
-    T, V, W = np.empty_like(P0), np.empty_like(P0), np.empty_like(P0)
-    PHt, K, S, HP = np.empty_like(HT), np.empty_like(HT), np.empty_like(R), np.empty_like(R)
-    y, g, u = np.empty_like(z), np.empty_like(z), np.empty_like(x0)
-    for _ in range(steps):
-        matmul(fmt, Phi, P0, T)
-        matmul(fmt, T, PhiT, V)
-        matrix_sum(fmt, V, Q, V)
-        matmul(fmt, V, HT, PHt)
-        matmul(fmt, H, PHt, HP)
-        matrix_sum(fmt, HP, R, S)
-        a, b = load(fmt, S, (0, 0)), load(fmt, S, (0, 1))
-        c, d = load(fmt, S, (1, 0)), load(fmt, S, (1, 1))
-        determinant = subtract(fmt, multiply(fmt, a, d), multiply(fmt, b, c))
-        store(fmt, S, (0, 0), quotient(fmt, d, determinant))
-        store(fmt, S, (0, 1), negative(fmt, quotient(fmt, b, determinant)))
-        store(fmt, S, (1, 0), negative(fmt, quotient(fmt, c, determinant)))
-        store(fmt, S, (1, 1), quotient(fmt, a, determinant))
-        matmul(fmt, PHt, S, K)
-        matmul(fmt, Phi, x0, u)
-        matmul(fmt, H, u, y)
-        difference(fmt, z, y, g)
-        matmul(fmt, K, g, x)
-        matrix_sum(fmt, u, x, x)
-        matmul(fmt, K, H, T)
-        difference(fmt, identity, T, W)
-        matmul(fmt, W, V, P)
+def step(Phi: Any, PhiT: Any, Q: Any, H: Any, HT: Any, R: Any, z: Any, identity: Any, x0: Any, P0: Any) -> Any:
+    """The step on arrays of a format, which is recorded."""
+    V = Phi @ P0 @ PhiT + Q
+    PHt = V @ HT
+    (a, b), (c, d) = H @ PHt + R
+    determinant = a * d - b * c
+    first, second = np.stack([d / determinant, -(b / determinant)]), np.stack([-(c / determinant), a / determinant])
+    K = PHt @ np.stack([first, second])
+    u = Phi @ x0
+    return u + K @ (z - H @ u), (identity - K @ H) @ V
 
 
 def numpy_step(model: Any, x0: Any, P0: Any) -> tuple[Any, Any]:
@@ -91,7 +57,7 @@ def numpy_step(model: Any, x0: Any, P0: Any) -> tuple[Any, Any]:
 
 
 def plain_step(model: Any, x0: Any, P0: Any) -> tuple[Any, Any]:
-    """The same on nested lists of any numbers with operators, in the order of the compiled loop."""
+    """The same on nested lists of any numbers with operators, in the same order."""
     Phi, PhiT, Q, H, HT, R, z, identity = model
 
     def product(A: Any, B: Any) -> Any:
@@ -135,18 +101,26 @@ def model(n: int = N) -> tuple[Any, ...]:
 
 
 def compiled(fmt: FloatFormat) -> tuple[Callable[[int], Any], Any]:
-    """A call of the compiled loop in a format, and its operands as nested lists of Fractions."""
-    backend = fmt.backend
-    if not isinstance(backend, Compiled):
-        raise TypeError(f"got {fmt}; needed a format with compiled loops")
+    """A call that takes steps on the machine in a format, and the step's operands as nested lists of Fractions."""
     given, x0, P0 = model()
     arrays = [fmt.array(a) for a in (*given, x0, P0)]
-    packed = [backend.pack(a.components, backend.matrix_tag) for a in arrays]
-    x, P = np.empty_like(packed[-2]), np.empty_like(packed[-1])
+    ends = np.cumsum([1, *(a.size for a in arrays)])
+    places = [np.arange(begin, begin + a.size).reshape(a.shape) for a, begin in zip(arrays, ends, strict=False)]
+    tape = Tape(int(ends[-1]) - 1)
+    after = [each.components[0].ravel() for each in step(*map(TracedFormat(tape).made, places))]
+    rows, states = tape.instructions.astype(np.int64), np.concatenate([each.ravel() for each in places[-2:]])
+    loop = Loop([fmt], rows, np.zeros(len(rows), np.int64), tape.sizes, states, np.concatenate(after))
+    loop.hold_constants(tape.all_constants)
+    packed = [a.backend.pack(a.components) for a in arrays]
+    for each, numbers in zip(places, packed, strict=True):
+        loop.hold(each.ravel(), numbers.reshape(each.size, *numbers.shape[2:]))
+    start, nothing = loop.states, np.zeros(0, np.int64)
 
     def run(steps: int) -> Any:
-        compiled_steps(backend.matrix_tag, tuple(packed[:-2]), packed[-2], packed[-1], x, P, steps)
-        return tuple(FloatArray.from_components(backend, backend.unpack(p), fmt).to_fractions() for p in (x, P))
+        loop.states = start
+        loop.take(0, np.zeros((steps, 0, *loop.values.shape[1:]), loop.values.dtype), 0, nothing)
+        numbers = FloatArray.from_packed(loop.states.reshape(-1, *packed[0].shape[2:]), fmt).to_fractions()
+        return numbers[:N, np.newaxis], numbers[N:].reshape(N, N)
 
     return run, [a.to_fractions().tolist() for a in arrays]
 

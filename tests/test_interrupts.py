@@ -67,11 +67,11 @@ def test_limit_cycles_in_slices_are_the_same(monkeypatch):
 def test_an_interrupt_acts_before_a_long_product_ends(monkeypatch):
     calls = []
 
-    def interrupted(tag, a, b, c):
-        calls.append(len(a))
+    def interrupted(kind, formats, room, a, b, c, begin, end, count, columns):
+        calls.append(end - begin)
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("gpbnb.arithmetic.kernels.elementwise.product", interrupted)
+    monkeypatch.setattr("gpbnb.arithmetic.kernels.matrices.product", interrupted)
     x = FloatFormat(10, 12).array(np.ones((3000, 40)))
     # A shell ignores the signal for what runs in its background.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -2,7 +2,7 @@
 
 The order matters, because another order gives other digits. This module uses the order of hung1984, ch. II. All
 operands and results are FloatArrays of one format. If the backend of the operands has compiled loops, elimination runs
-in :mod:`gpbnb.arithmetic.kernels.elimination`; the loops here work for every format and exponent and give the same
+in :mod:`gpbnb.arithmetic.kernels.matrices`; the loops here work for every format and exponent and give the same
 digits.
 """
 
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -22,7 +21,6 @@ from gpbnb.arithmetic.kernels.backends import Looped
 from gpbnb.arithmetic.kernels.selection import check_order
 from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.arithmetic.rounding import Order, Rounding, digit_unit
-from gpbnb.interrupts import slices
 
 _MOST_PRODUCTS = 1_000_000  # that pairwise and blocked sums form at once
 
@@ -448,17 +446,12 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
     if not isinstance(backend, Looped):
         return None
     entries = a.components  # which derivatives do not have, and so are refused
-    if backend.early(len(a) ** 3):
+    if backend.early(len(a) ** 3) or (found := backend.factored(entries, pivot)) is None:
         return None
-    factors, order = backend.pack(entries, backend.matrix_tag), np.arange(len(a))
-    try:
-        for part in slices(len(a), a.size):
-            column = _loops().lu(backend.matrix_tag, factors, order, pivot, part.start, part.stop)
-            if column >= 0:
-                raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot, a.format.base))
-    except OverflowError:
-        return None
-    return type(a).from_packed(factors, a.format), order
+    factors, order, column = found
+    if column >= 0:
+        raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot, a.format.base))
+    return type(a).from_components(backend, factors, a.format), order
 
 
 def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
@@ -469,25 +462,9 @@ def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
     entries = b.components
     if backend.early(len(a) * entries[0].size) or (compiled := _factored(a, pivot)) is None:
         return None
-    tag, order = backend.matrix_tag, compiled[1]
-    factors, columns = backend.pack(compiled[0].components, tag), backend.pack(b[order].components, tag)
-    try:
-        for part in slices(b.shape[1], a.size):
-            some = np.ascontiguousarray(columns[:, part])
-            _loops().reduce(tag, factors, some)
-            _loops().substitute(tag, factors, some)
-            columns[:, part] = some
-    except OverflowError:
-        return None
-    return type(a).from_packed(columns, a.format)
-
-
-@lru_cache(maxsize=1)
-def _loops() -> Any:
-    # Imported here, because numba takes a second to import and exact arithmetic does not need it.
-    from gpbnb.arithmetic.kernels import elimination
-
-    return elimination
+    factors, order = compiled
+    found = backend.solved(factors.components, b[order].components)
+    return None if found is None else type(a).from_components(backend, found, a.format)
 
 
 def _joined(*components: FloatArray) -> FloatArray:

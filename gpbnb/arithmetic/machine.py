@@ -95,7 +95,7 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
     (kind,) = kinds
     made: Any = machine.Careful() if (whole[:, quick.HOW] == quick.NONE).any() else machine.Quick()
     if kind == "pairs":
-        made = machine.InPairs(bool(whole[:, _SHORT].all()))
+        made = machine.InShortPairs() if whole[:, _SHORT].all() else machine.InPairs()
     elif kind == "words":
         made = machine.InTwoWords()
     return made, Addresses(whole, numbers, random)
@@ -135,7 +135,9 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
     whole[:3], numbers[:] = (bits, precision, mode), limits
     low, high = max(low, quick.LEAST), min(high, 1 / quick.LEAST)
     least, most = np.array([low, high]).view(np.int64).tolist()
-    whole[3:14] = *_rounding(bits, precision, mode, fmt.rules), least, most - least, *_outward(precision, mode)
+    how, *rounding = _rounding(bits, precision, mode, fmt.rules)
+    evenly = how == quick.SHORT and mode == EVEN and precision <= tags.SAFE_TWICE and limits[0] >= quick.LEAST
+    whole[3:15] = how, *rounding, least, most - least, *_outward(precision, mode), evenly
     return "floats"
 
 

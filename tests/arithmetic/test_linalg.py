@@ -13,9 +13,8 @@ from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels import elimination
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.tags import Hardware64
+from gpbnb.arithmetic.named import BINARY64
 from gpbnb.arithmetic.rounding import Rounding
 from tests import oracles
 
@@ -214,15 +213,6 @@ def test_beyond_the_range_of_float64_the_exact_loop_goes_on(size: str, pivot: bo
     )
 
 
-def inverse(tag, a: np.ndarray, identity: np.ndarray) -> np.ndarray:
-    factors, order, x = a.copy(), np.arange(len(a)), identity.copy()
-    assert elimination.lu(tag, factors, order, True, 0, len(a)) == -1
-    x = x[order]
-    elimination.reduce(tag, factors, x)
-    elimination.substitute(tag, factors, x)
-    return x
-
-
 def test_plain_float64_in_the_same_order() -> None:
     a = np.random.default_rng(2).normal(size=(7, 7))
     rows = [[*row, *unit] for row, unit in zip(a.tolist(), np.eye(7).tolist(), strict=True)]
@@ -236,4 +226,4 @@ def test_plain_float64_in_the_same_order() -> None:
         for i in range(k + 1, 7):
             rows[k][7:] = [p - rows[k][i] * q for p, q in zip(rows[k][7:], rows[i][7:], strict=True)]
         rows[k][7:] = [p / rows[k][k] for p in rows[k][7:]]
-    assert inverse(Hardware64(), a, np.eye(7)).tolist() == [row[7:] for row in rows]
+    assert linalg.inv(BINARY64.array(a), pivot=True).to_float().tolist() == [row[7:] for row in rows]

@@ -7,9 +7,11 @@ returns None, and the exact backend computes the same digits instead. The compil
 
 from __future__ import annotations
 
+import contextlib
 import math
 from abc import ABC, abstractmethod
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import Any, cast
@@ -23,7 +25,6 @@ from gpbnb.arithmetic.kernels.tags import (
     FARTHEST,
     LEAST,
     LIMIT,
-    Free,
     Hardware32,
     Hardware64,
     Limited,
@@ -312,33 +313,64 @@ class Looped(Backend):
         return order.reshape(shape)
 
     def matmul(self, a: Components, b: Components) -> Components | None:
-        return self._product(self.tag, a, b)
+        """Multiply matrices, in the first kind of numbers that holds all results."""
+        (rows, count), columns = a[0].shape, b[0].shape[1]
+        for kind, (x, y) in self._attempts([a, b], rows * count * columns, copy=None):
+            c = np.empty((rows, columns, *x.shape[2:]), x.dtype)
+            given = kind, *self._of_loops, *map(_fixed, (x, y)), c.reshape(-1)
+            with contextlib.suppress(OverflowError):
+                parts = slices(rows, count * columns)
+                if not any(_matrices().product(*given, part.start, part.stop, count, columns) for part in parts):
+                    return self.unpack(c)
+        return None
 
-    def _product(self, tag: Tag, a: Components, b: Components) -> Components | None:
-        x, y = (self.pack(each, tag, copy=None) for each in (a, b))
-        c = np.empty((a[0].shape[0], b[0].shape[1], *x.shape[2:]), x.dtype)
-        x, y = _read_only(x), _read_only(y)
-        try:
-            for rows in slices(len(x), y.shape[0] * y.shape[1]):
-                _loops().product(tag, x[rows], y, c[rows])
-        except OverflowError:
-            return None
-        return self.unpack(c)
+    def factored(self, a: Components, pivot: bool) -> tuple[Components, NDArray[np.intp], int] | None:
+        """Factor a matrix; return both factors in one, the order of rows and the column of a zero pivot, or below 0."""
+        n, loops = len(a[0]), _matrices()
+        for kind, (x,) in self._attempts([a]):
+            order, column = np.arange(n), loops.NONE
+            with contextlib.suppress(OverflowError):
+                for part in slices(n, n * n):
+                    column = loops.factor(kind, *self._of_loops, x.reshape(-1), order, pivot, part.start, part.stop)
+                    if column != loops.NONE:
+                        break
+                if column != loops.GONE:
+                    return self.unpack(x), order, column
+        return None
+
+    def solved(self, factors: Components, b: Components) -> Components | None:
+        """Solve for right-hand sides (n, p), in the order of the factored matrix."""
+        n, p = b[0].shape
+        for kind, (x, y) in self._attempts([factors, b]):
+            gone, given = False, (kind, *self._of_loops, _fixed(x))
+            with contextlib.suppress(OverflowError):
+                for part in slices(p, n * n):
+                    some = np.ascontiguousarray(y[:, part])
+                    gone |= _matrices().solved(*given, some.reshape(-1), n, some.shape[1])
+                    y[:, part] = some
+                if not gone:
+                    return self.unpack(y)
+        return None
 
     @property
-    def matrix_tag(self) -> Tag:
-        """The tag for loops over matrices that look for lost results only at their end."""
-        return self.tag
+    def _of_loops(self) -> tuple[int, Array]:
+        """The address of the format, and room, as loops over matrices take them."""
+        return self._machine[1].address, np.empty(_matrices().ROOM)
 
-    def pack(self, components: Components, tag: Tag | None = None, copy: bool | None = True) -> Array:
-        """Pack components in the layout that compiled loops take and return, for this tag or ours.
+    def _attempts(
+        self, given: Sequence[Components], products: int = 0, copy: bool | None = True
+    ) -> Iterator[tuple[Any, list[Array]]]:
+        """Yield the kinds of numbers in which loops over matrices may run, the fastest first, and packed matrices."""
+        yield self._machine[0], [self.pack(each, copy=copy) for each in given]
+
+    def pack(self, components: Components, copy: bool | None = True, dtype: Any = None) -> Array:
+        """Pack components in the layout that compiled loops take and return.
 
         The array is new; without `copy`, only if the components do not have this layout.
         """
         if self.count > 1:
             return np.ascontiguousarray(np.stack(components, axis=-1))
-        single = isinstance(tag, Free) and isinstance(tag.tag, Hardware32)
-        return np.array(components[0], np.float32 if single else self.dtype, order="C", copy=copy)
+        return np.array(components[0], dtype or self.dtype, order="C", copy=copy)
 
     def unpack(self, array: Array) -> Components:
         """Unpack an array that :meth:`pack` made into components, as new arrays."""
@@ -451,43 +483,50 @@ class Floats(Compiled):
             gone |= bool(loops.accumulate(formats.address, code, rows, width, keep, flat, found))
         return not gone
 
-    @property
-    def matrix_tag(self) -> Tag:
-        return Free(self.tag) if isinstance(self.tag, Hardware32 | Hardware64) else self.tag
-
     def matmul(self, a: Components, b: Components) -> Components | None:
-        tag = self._product_tag(a[0], b[0])
-        if isinstance(tag, Free) and b[0].shape[1] < a[0].shape[0]:
+        if b[0].shape[1] < a[0].shape[0] and not self._random:
             # The inner loop runs over the columns, so the product of the transposes is faster. No digit changes.
-            c = self._product(tag, (b[0].T,), (a[0].T,))
+            c = super().matmul((b[0].T,), (a[0].T,))
             return None if c is None else (np.ascontiguousarray(c[0].T),)
-        return self._product(tag, a, b)
+        return super().matmul(a, b)
 
-    def _product_tag(self, a: Array, b: Array) -> Tag:
-        """Return the fastest tag for a matrix product: one without range checks if no result can leave the range."""
-        tag: Any = self.tag
-        n = a.shape[1]
-        if isinstance(tag, Hardware32 | Hardware64):
-            return Free(tag)
-        limited = isinstance(tag, Limited)
-        if a.shape[0] * n * b.shape[1] < _MANY or (limited and not isinstance(tag.mode, ShortEven | LongEven)):
-            return tag
-        if limited and isinstance(tag.mode, ShortEven) and a.shape[0] == b.shape[1] == 1:
-            return tag  # the range check of a single sum costs nothing
-        gradual, least, largest = (tag.gradual, tag.least, tag.largest) if limited else (0.0, LEAST, LIMIT)
-        low, high, smallest, biggest = self._extents(a, b)
-        low, high = extents_of_sums(n, self.base, self.precision, gradual, low, high)
-        if not high <= largest or not (gradual or low >= least):
-            return tag
+    def _attempts(
+        self, given: Sequence[Components], products: int = 0, copy: bool | None = True
+    ) -> Iterator[tuple[Any, list[Array]]]:
+        loops, (kind, _) = _matrices(), self._machine
+
+        def packed(dtype: Any = np.float64) -> list[Array]:
+            return [self.pack(each, copy, dtype) for each in given]
+
+        if isinstance(self.tag, Hardware32 | Hardware64):
+            single = isinstance(self.tag, Hardware32)
+            yield (loops.Single(), packed(np.float32)) if single else (loops.Double(), packed())
+            return
+        if isinstance(kind, _kinds().Quick):
+            first, second = (_flat(each[0], each[0].shape) for each in (*given, *given)[:2])
+            (low, high), (low_b, high_b) = loops.extents(first, second)
+            count, sizes = given[0][0].shape[1], ((low, low_b), (high, high_b))
+            if products >= _MANY and (proved := self._proved(count, *sizes)) is not None:
+                yield proved, packed(np.float32 if isinstance(proved, loops.Single) else np.float64)
+            elif min(sizes[0]) >= _quick().LEAST and max(sizes[1]) <= 1 / _quick().LEAST:
+                yield kind, packed()
+            kind = _kinds().Careful()
+        yield kind, packed()
+
+    def _proved(self, n: int, smallest: Sequence[float], largest: Sequence[float]) -> Any:
+        """Return the fastest kind of numbers if no sum of n products of numbers of these sizes can leave its range."""
+        tag, loops, limited = cast(Any, self.tag), _matrices(), isinstance(self.tag, Limited)
+        gradual, least, most = (tag.gradual, tag.least, tag.largest) if limited else (0.0, LEAST, LIMIT)
+        low, high = extents_of_sums(n, self.base, self.precision, gradual, math.prod(smallest), math.prod(largest))
+        if not high <= most or not (gradual or low >= least):
+            return None
         if limited and isinstance(tag.mode, LongEven):
-            return Free(Hardware64()) if low >= gradual else tag
-        single = low >= max(_LEAST_32, gradual) and smallest >= _LEAST_32 and max(high, biggest) <= _LARGEST_32
-        return Free(Hardware32() if limited and self.precision == 24 and single else tag)
-
-    def _extents(self, a: Array, b: Array) -> tuple[float, float, float, float]:
-        """Smallest and largest size of products of two entries other than zero, and of the entries themselves."""
-        (low, high), (low_b, high_b) = _loops().extents(_flat(a, a.shape), _flat(b, b.shape))
-        return low * low_b, high * high_b, min(low, low_b), max(high, high_b)
+            return loops.Double() if low >= gradual else None
+        short = limited and isinstance(tag.mode, ShortEven)
+        single = min(low, *smallest) >= max(_LEAST_32, gradual) and max(high, *largest) <= _LARGEST_32
+        if short and self.precision == 24 and single:
+            return loops.Single()
+        return loops.Proved() if low >= gradual or (short and gradual >= _quick().LEAST) else None
 
     def _has_opposites(self, x: Array) -> bool:
         """Whether the opposite of each number is in the format; that of the lowest fixed-point number is not."""
@@ -721,11 +760,11 @@ def _below(first: Components, lines: Components, rows: slice, width: int) -> Com
     return tuple(found)
 
 
-def _read_only(a: Array) -> Array:
-    """Return a read-only view, so that loops are compiled for only one kind of input."""
-    a = a.view()
-    a.flags.writeable = False
-    return a
+def _fixed(numbers: Array) -> Array:
+    """Return numbers flat and read-only, so that loops are compiled for only one kind of input."""
+    flat = numbers.reshape(-1).view()
+    flat.flags.writeable = False
+    return flat
 
 
 def _flat(part: Array, shape: tuple[int, ...]) -> Array:
@@ -762,6 +801,27 @@ def _machine() -> Any:
     from gpbnb.arithmetic import machine
 
     return machine
+
+
+@lru_cache(maxsize=1)
+def _matrices() -> Any:
+    from gpbnb.arithmetic.kernels import matrices
+
+    return matrices
+
+
+@lru_cache(maxsize=1)
+def _kinds() -> Any:
+    from gpbnb.arithmetic.kernels import machine
+
+    return machine
+
+
+@lru_cache(maxsize=1)
+def _quick() -> Any:
+    from gpbnb.arithmetic.kernels import quick
+
+    return quick
 
 
 @lru_cache(maxsize=1)

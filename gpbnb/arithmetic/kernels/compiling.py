@@ -59,6 +59,10 @@ class Compiler(CompilerBase):  # type: ignore[misc]
         return [found]
 
 
+INLINE = {"forceinline": True, "no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": Compiler}
+"""Options of numba's ``overload`` for what is compiled into its callers."""
+
+
 def compiled(function: Callable[..., Any]) -> Any:
     """Compile a function on its first call with given types, or load it from the cache.
 

@@ -1,4 +1,4 @@
-"""Compiled loops over whole arrays: entry by entry and folds of numbers that are not float64, and matrix products.
+"""Compiled loops over whole arrays: entry by entry and folds of numbers that are not float64.
 
 If a result leaves the range of its backend, a loop returns True or raises OverflowError, and its output is invalid.
 """
@@ -8,14 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from gpbnb.arithmetic.kernels import scalar
-from gpbnb.arithmetic.kernels.bits import bits, from_bits
-from gpbnb.arithmetic.kernels.compiling import compiled, inner
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import compare, load, lost, put
-
-_MOST = np.int64(2**63 - 1)
 
 
 def _two(operation: Any) -> Callable[..., bool]:
@@ -98,26 +93,3 @@ def compared(fmt: Any, n: int, a: Any, b: Any, c: Any) -> None:
     """c[i] = -1, 0 or 1 if a[i] is less than, equal to or greater than b[i]."""
     for i in range(n):
         c[i] = compare(fmt, load(fmt, a, i), load(fmt, b, i))
-
-
-@compiled
-def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """The matrix product c = a b; raises OverflowError like :func:`gpbnb.arithmetic.kernels.scalar.matmul`."""
-    scalar.matmul(fmt, a, b, c)
-
-
-@inner
-def _extent(x: Any) -> Any:
-    """The smallest size of a float64 other than zero, infinite if there is none, and the largest size."""
-    smallest, largest = bits(np.inf), np.int64(0)
-    for i in range(x.shape[0]):
-        size = bits(abs(x[i]))
-        smallest = min(smallest, size if size > 0 else _MOST)
-        largest = max(largest, size)
-    return from_bits(smallest), from_bits(largest)
-
-
-@compiled
-def extents(x: Any, y: Any) -> Any:
-    """The smallest and the largest size of the numbers other than zero of two arrays."""
-    return _extent(x), _extent(y)

@@ -1,7 +1,7 @@
 """Compiled loops over arrays of float64, in any format of bases 2 and 16: precision, rounding and range are data.
 
 A part of an array is computed in two passes: the float64 nearest to each result, with what is left; then each is
-rounded, quickly where the format and the numbers allow it. What leaves the quick range is rounded by :func:`_fitted`.
+rounded, quickly where the format and the numbers allow it. What leaves the quick range is rounded by :func:`fitted`.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from gpbnb.arithmetic.kernels.quick import (
     rule_of,
 )
 
-_TOGETHER = 512  # entries whose intermediate results stay in the processor's nearest memory
-_TINY = 2.0**-1022  # stands for a result that underflowed to zero, in formats which do not have it
+TOGETHER = 512  # entries whose intermediate results stay in the processor's nearest memory
+TINY = 2.0**-1022  # stands for a result that underflowed to zero, in formats which do not have it
 _ONE = np.int64(1)
 _BINARY, _BASE_16 = np.int64(0), np.int64(3)
 _ADD, _MULTIPLY, _DIVIDE, _ROOT = map(np.int64, (tags.ADD, tags.MULTIPLY, tags.DIVIDE, tags.ROOT))
@@ -55,14 +55,14 @@ def _computed(operation: Any, exact: Any, a: Any, b: Any, c: Any, p: Any, r: Any
             x, y = a[i], b[i]
             s = x * y
             r[i] = fma(x, y, -s)
-            p[i] = _TINY if (s == 0.0) & (x != 0.0) & (y != 0.0) else s
+            p[i] = TINY if (s == 0.0) & (x != 0.0) & (y != 0.0) else s
     elif operation == tags.DIVIDE:
         for i in range(count):
             x, y = a[i], b[i]
             s = x / y
             left = fma(-s, y, x)
             r[i] = -left if y < 0.0 else left
-            p[i] = _TINY if (s == 0.0) & (x != 0.0) else s
+            p[i] = TINY if (s == 0.0) & (x != 0.0) else s
     elif operation == tags.ROOT:
         for i in range(count):
             s = math.sqrt(a[i])
@@ -135,7 +135,7 @@ def _fit(fmt: Any, digits: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
 
 
 @borrowing
-def _fitted(fmt: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
+def fitted(fmt: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
     if fmt.bits == 1:
         return _fit(fmt, _BINARY, p, r, out, count)
     return _fit(fmt, _BASE_16, p, r, out, count)
@@ -182,7 +182,7 @@ def _along(formats: Any, operation: Any, a: Any, b: Any, c: Any, out: Any, room:
     together = (how == SHORT and operation <= tags.ROOT) or (how == LONG and operation == tags.ROOT)
     if together and not _at_once(operation, how, rule, np.int64(fmt.below != fmt.below), a, b, out, count):
         return np.int64(0)
-    p, r, exact = room, at(room, _TOGETHER), (how == SHORT) & (fmt.precision == 53)
+    p, r, exact = room, at(room, TOGETHER), (how == SHORT) & (fmt.precision == 53)
     if operation == tags.ROUND:
         p = a
         for i in range(count):
@@ -195,16 +195,16 @@ def _along(formats: Any, operation: Any, a: Any, b: Any, c: Any, out: Any, room:
     chosen = LONG if operation == tags.FUSED and how == SHORT and not exact else how
     if how != NONE and not _rounded(chosen, rule, p, r, out, count):
         return np.int64(0)
-    return np.int64(1) if fmt.precision == 53 or fmt.mode == tags.RANDOM else _fitted(fmt, p, r, out, count)
+    return np.int64(1) if fmt.precision == 53 or fmt.mode == tags.RANDOM else fitted(fmt, p, r, out, count)
 
 
 @compiled
 def along(formats: int, operation: int, n: int, a: Any, b: Any, c: Any, out: Any) -> Any:
     """out = the results of an operation, entry by entry; return whether :func:`carefully_along` has to compute them."""
-    table, any_gone, room = words(formats), np.int64(0), start(np.empty(2 * _TOGETHER))
-    for begin in range(0, n, _TOGETHER):
+    table, any_gone, room = words(formats), np.int64(0), start(np.empty(2 * TOGETHER))
+    for begin in range(0, n, TOGETHER):
         x, y, z, found = at(start(a), begin), at(start(b), begin), at(start(c), begin), at(start(out), begin)
-        any_gone |= _along(table, operation, x, y, z, found, room, min(n - begin, _TOGETHER))
+        any_gone |= _along(table, operation, x, y, z, found, room, min(n - begin, TOGETHER))
     return any_gone
 
 

@@ -2,8 +2,8 @@
 
 A row of a program has three operands and the place of its result. Rows stand in segments of one operation and one
 destination format, whose precision, rounding and range are data, so that one compiled loop serves all formats of a
-kind: :class:`Quick`, :class:`Careful`, :class:`InPairs`, :class:`InTwoWords` and :class:`DoubleDouble`. What
-:class:`Quick` cannot compute, :class:`Careful` does.
+kind: :class:`Quick`, :class:`Careful`, :class:`InPairs`, :class:`InShortPairs`, :class:`InTwoWords` and
+:class:`DoubleDouble`. What :class:`Quick` cannot compute, :class:`Careful` does.
 
 The functions of the kinds have one signature, and :func:`advance` takes the address of one of them, so that the loop
 over steps is compiled only once. numba compiles a function anew for a literal argument, such as True or a code, in each
@@ -67,7 +67,9 @@ class Careful(NamedTuple):
 class InPairs(NamedTuple):
     """Base 10 on pairs of int64."""
 
-    short: bool  # whether all formats have at most 8 digits, and no range
+
+class InShortPairs(NamedTuple):
+    """Base 10 on pairs of int64, with at most 8 digits and no range."""
 
 
 class InTwoWords(NamedTuple):
@@ -362,13 +364,32 @@ _run_pairs, _run_short = (_loop(kind, _operation(kind), 2) for kind in (decimal,
 _run_two_words, _run_double_doubles = _loop(wide, _operation(wide), 3), _loop(doubledouble, _double_double, 2)
 
 
+@borrowing(forceinline=True)
+def pair_format(columns: Any) -> Any:
+    """The format of base 10 of these columns."""
+    return LimitedDecimal(columns[1], columns[0], columns[2], columns[3], columns[4])
+
+
+@borrowing(forceinline=True)
+def short_format(columns: Any) -> Any:
+    """The short format of base 10 of these columns."""
+    return ShortDecimal(columns[0], columns[1] == AWAY)
+
+
+@borrowing(forceinline=True)
+def word_format(columns: Any) -> Any:
+    """The format with significands of two words of these columns."""
+    lowest, largest = (columns[7], columns[8], columns[9]), (columns[10], columns[11], columns[12])
+    bits, mode, precision, room, split = columns[0], columns[1], columns[2], columns[3], columns[4]
+    return Wide(bits, mode, precision, room, split, columns[5], columns[6], lowest, largest, columns[13] != 0)
+
+
 @addressed
 def _pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
         given, operation, end = _segment(formats, code, s)
-        fmt = LimitedDecimal(given[1], given[0], given[2], given[3], given[4])
-        o = _run_pairs(fmt, operation, code, o, end, values, truths, lanes)
+        o = _run_pairs(pair_format(given), operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
     return o
@@ -379,8 +400,7 @@ def _short_pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
         given, operation, end = _segment(formats, code, s)
-        fmt = ShortDecimal(given[0], given[1] == AWAY)
-        o = _run_short(fmt, operation, code, o, end, values, truths, lanes)
+        o = _run_short(short_format(given), operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
     return o
@@ -391,11 +411,7 @@ def _two_words(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
         given, operation, end = _segment(formats, code, s)
-        lowest, largest = (given[7], given[8], given[9]), (given[10], given[11], given[12])
-        fmt = Wide(
-            given[0], given[1], given[2], given[3], given[4], given[5], given[6], lowest, largest, given[13] != 0
-        )
-        o = _run_two_words(fmt, operation, code, o, end, values, truths, lanes)
+        o = _run_two_words(word_format(given), operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
     return o
@@ -414,11 +430,18 @@ def _double_doubles(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 
 def address(kind: Any, alone: bool) -> int:
     """Return the address of a kind's function, for one lane alone or for any number of them."""
-    if isinstance(kind, InPairs):
-        return _address(_short_pairs if kind.short else _pairs)
     if isinstance(kind, Quick):
         return _address(_quick_lane if alone else _quick_lanes)
-    return _address({Careful: _careful_lanes, InTwoWords: _two_words, DoubleDouble: _double_doubles}[type(kind)])
+    return _address(_FUNCTIONS[type(kind)])
+
+
+_FUNCTIONS = {
+    Careful: _careful_lanes,
+    InPairs: _pairs,
+    InShortPairs: _short_pairs,
+    InTwoWords: _two_words,
+    DoubleDouble: _double_doubles,
+}
 
 
 @cache

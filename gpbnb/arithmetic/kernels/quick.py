@@ -17,15 +17,19 @@ WHOLE, NUMBER, RANDOM = range(3)
 meaning depends on the kind of number; seed and count of random numbers."""
 COLUMNS, NUMBERS = 16, 7  # of each format
 # Columns of formats of float64, int64; the first three are those of :class:`gpbnb.arithmetic.kernels.careful.Masked`.
-BITS, PRECISION, MODE, HOW, CLEAR, SHIFT, HALF, EVEN, LOW, SPAN, BELOW_ZERO, ABOVE_ZERO, STICKY_BELOW, STICKY_ABOVE = (
-    range(14)
-)
-SHORT, LONG, TIED, DIRECTED, HEXADECIMAL, NONE = range(6)
+# fmt: off
+(
+    BITS, PRECISION, MODE, HOW, CLEAR, SHIFT, HALF, EVEN, LOW, SPAN, BELOW_ZERO, ABOVE_ZERO, STICKY_BELOW, STICKY_ABOVE,
+    EVENLY,
+) = range(15)
+# fmt: on
+SHORT, LONG, TIED, DIRECTED, HEXADECIMAL, NONE, GRADUAL = range(7)
 """How quick results are rounded: to nearest without a look at what is left, since rounding twice is correct; to nearest
 or toward zero; to nearest by the size of what is left, which tells ties away from zero in 53 bits; in another mode; in
-base 16; or not at all."""
+base 16; not at all; or, where the column EVENLY is set, like the first, also below the smallest normal number, whose
+spacing continues there."""
 _SIGN, _MAGNITUDE = np.int64(-(2**63)), np.int64(2**63 - 1)
-_EXPONENT, _HALF_ULP = np.int64(0x7FF << 52), np.int64(53 << 52)
+_EXPONENT, _HALF, _HALF_ULP = np.int64(0x7FF << 52), np.int64(1 << 51), np.int64(53 << 52)
 _SHIFT_OF_EXACT_PRODUCTS = 27  # products of numbers of at most 26 bits are exact
 _LONG = np.int64(LONG)
 
@@ -53,6 +57,11 @@ def rounded(how: Any, p: Any, r: Any, rule: Any) -> Any:
     u = bits(p)
     if how == SHORT:
         u = (u + half + ((u >> shift) & even)) & clear
+    elif how == GRADUAL:
+        # The float64 from 1.5 times a power of two on are as far apart as the numbers of the format around p, and the
+        # processor rounds ties to even: so adding that number and subtracting it again rounds p, of either sign.
+        spacing = from_bits(max(u & _EXPONENT, low) + (shift << 52) + _HALF)
+        u = bits((p + spacing) - spacing)
     elif how == TIED:
         tie = from_bits((u & _EXPONENT) - _HALF_ULP)
         u += np.int64(r == (tie if p > 0.0 else -tie))
@@ -68,7 +77,7 @@ def rounded(how: Any, p: Any, r: Any, rule: Any) -> Any:
             u = (u + select(u < 0, below, above) + (select(u < 0, sticky_below, sticky_above) & left)) & clear
     size = u & _MAGNITUDE
     # Rounded, a number below the range may be zero, but p is not.
-    gone = (np.uint64(size - low) > np.uint64(span)) & (p != 0.0)
+    gone = (np.uint64(size - low) > np.uint64(span)) & (p != 0.0) if how != GRADUAL else size > low + span
     return from_bits(u) + 0.0, np.int64(gone)
 
 

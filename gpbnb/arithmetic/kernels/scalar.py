@@ -28,7 +28,7 @@ from numba import types
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import binary, decimal, processor, shortdecimal, wide
-from gpbnb.arithmetic.kernels.compiling import Compiler, borrowing
+from gpbnb.arithmetic.kernels.compiling import INLINE
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
     PAIRS,
@@ -45,7 +45,6 @@ from gpbnb.arithmetic.kernels.tags import (
     Wide,
 )
 
-_INLINE = {"forceinline": True, "no_cfunc_wrapper": True, "_nrt": False, "pipeline_class": Compiler}
 _MODULES = {
     Decimal: decimal,
     ShortDecimal: shortdecimal,
@@ -184,14 +183,14 @@ def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     raise _only_compiled("fused")
 
 
-@overload(fused, strict=False, jit_options=_INLINE)
+@overload(fused, strict=False, jit_options=INLINE)
 def _overloaded_fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     function = _implementation(fmt, "fused")
     return None if function is None else lambda fmt, a, b, c: function(fmt, a, b, c)
 
 
 def _overload_two(stub: Callable[..., Any]) -> None:
-    @overload(stub, strict=False, jit_options=_INLINE)
+    @overload(stub, strict=False, jit_options=INLINE)
     def choose(fmt: Any, a: Any, b: Any) -> Any:
         function = _implementation(fmt, stub.__name__)
         if _tag(fmt) is Free:
@@ -200,7 +199,7 @@ def _overload_two(stub: Callable[..., Any]) -> None:
 
 
 def _overload_one(stub: Callable[..., Any]) -> None:
-    @overload(stub, strict=False, jit_options=_INLINE)
+    @overload(stub, strict=False, jit_options=INLINE)
     def choose(fmt: Any, x: Any) -> Any:
         function = _implementation(fmt, stub.__name__)
         if _tag(fmt) is Free:
@@ -214,7 +213,7 @@ _overload_one(root)
 _overload_one(round_)
 
 
-@overload(negative, strict=False, jit_options=_INLINE)
+@overload(negative, strict=False, jit_options=INLINE)
 def _negative(fmt: Any, a: Any) -> Any:
     if _tag(fmt) in PAIRS:
         return lambda fmt, a: (-a[0], a[1])
@@ -223,7 +222,7 @@ def _negative(fmt: Any, a: Any) -> Any:
     return lambda fmt, a: _beyond_largest(fmt, zero(fmt) - a)
 
 
-@overload(_beyond_largest, strict=False, jit_options=_INLINE)
+@overload(_beyond_largest, strict=False, jit_options=INLINE)
 def _overloaded_beyond_largest(fmt: Any, a: Any) -> Any:
     # A fixed-point format has one more negative number than positive ones.
     if _tag(fmt) is Limited:
@@ -231,7 +230,7 @@ def _overloaded_beyond_largest(fmt: Any, a: Any) -> Any:
     return lambda fmt, a: a
 
 
-@overload(compare, strict=False, jit_options=_INLINE)
+@overload(compare, strict=False, jit_options=INLINE)
 def _compare(fmt: Any, a: Any, b: Any) -> Any:
     if _tag(fmt) in FLOATS:
 
@@ -245,12 +244,12 @@ def _compare(fmt: Any, a: Any, b: Any) -> Any:
     return lambda fmt, a, b: function(fmt, a, b)
 
 
-@overload(less, strict=False, jit_options=_INLINE)
+@overload(less, strict=False, jit_options=INLINE)
 def _less(fmt: Any, a: Any, b: Any) -> Any:
     return lambda fmt, a, b: compare(fmt, a, b) < 0
 
 
-@overload(zero, strict=False, jit_options=_INLINE)
+@overload(zero, strict=False, jit_options=INLINE)
 def _zero(fmt: Any) -> Any:
     if _tag(fmt) in PAIRS:
         return lambda fmt: (np.int64(0), np.int64(0))
@@ -261,7 +260,7 @@ def _zero(fmt: Any) -> Any:
     return (lambda fmt: np.float32(0.0)) if _free_machine(fmt) is Hardware32 else lambda fmt: 0.0
 
 
-@overload(multiply_add, strict=False, jit_options=_INLINE)
+@overload(multiply_add, strict=False, jit_options=INLINE)
 def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     if _free_machine(fmt) is not None:
         return lambda fmt, a, b, c: c + a * b  # no negative zero, as c is none
@@ -270,7 +269,7 @@ def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return lambda fmt, a, b, c: add(fmt, c, multiply(fmt, a, b))
 
 
-@overload(add_product, strict=False, jit_options=_INLINE)
+@overload(add_product, strict=False, jit_options=INLINE)
 def _overloaded_add_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     if _tag(fmt) is not Limited or _tag(fmt.types[1]) is not ShortEven:
         return lambda fmt, a, b, c: multiply_add(fmt, a, b, c)
@@ -283,7 +282,7 @@ def _overloaded_add_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 # the same length.
 
 
-@overload(load, strict=False, jit_options=_INLINE)
+@overload(load, strict=False, jit_options=INLINE)
 def _load(fmt: Any, array: Any, index: Any) -> Any:
     if _tag(fmt) in FLOATS:
         return lambda fmt, array, index: array[index]
@@ -322,7 +321,7 @@ def _put_wide(array: Any, index: Any) -> Any:
     return at_integer if isinstance(index, types.Integer) else at_tuple
 
 
-@overload(put, strict=False, jit_options=_INLINE)
+@overload(put, strict=False, jit_options=INLINE)
 def _overloaded_put(fmt: Any, array: Any, index: Any, x: Any) -> Any:
     def of_floats(fmt: Any, array: Any, index: Any, x: Any) -> None:
         array[index] = x
@@ -348,7 +347,7 @@ def _overloaded_put(fmt: Any, array: Any, index: Any, x: Any) -> Any:
     return at_integer if isinstance(index, types.Integer) else at_tuple
 
 
-@overload(lost, strict=False, jit_options=_INLINE)
+@overload(lost, strict=False, jit_options=INLINE)
 def _lost(fmt: Any, x: Any) -> Any:
     if _tag(fmt) in (*PAIRS, Wide):
         return lambda fmt, x: False
@@ -359,7 +358,7 @@ def _lost(fmt: Any, x: Any) -> Any:
     return lambda fmt, x: x != x
 
 
-@overload(store, strict=False, jit_options=_INLINE)
+@overload(store, strict=False, jit_options=INLINE)
 def _store(fmt: Any, array: Any, index: Any, x: Any) -> Any:
     def checked(fmt: Any, array: Any, index: Any, x: Any) -> None:
         if lost(fmt, x):
@@ -367,56 +366,3 @@ def _store(fmt: Any, array: Any, index: Any, x: Any) -> Any:
         put(fmt, array, index, x)
 
     return checked
-
-
-# -- sums of products --------------------------------------------------------------------------------
-
-
-@borrowing
-def dot(fmt: Any, x: Any, y: Any) -> Any:
-    """Inner product from left to right; the first product is not added to zero."""
-    n = len(x)
-    if n == 0:
-        return zero(fmt)
-    s = multiply(fmt, load(fmt, x, 0), load(fmt, y, 0))
-    for k in range(1, n):
-        s = add_product(fmt, load(fmt, x, k), load(fmt, y, k), s)
-    return s
-
-
-@borrowing
-def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """c = a b, each entry the :func:`dot` of a row and a column; c must be neither a nor b.
-
-    The loops take one row of c at a time and add one product to each of its entries; within an entry, the order is that
-    of :func:`dot`.
-    """
-    if b.shape[1] == 1:
-        for i in range(a.shape[0]):
-            put(fmt, c, (i, 0), dot(fmt, a[i], b[:, 0]))
-        check(fmt, c)
-        return
-    for i in range(a.shape[0]):
-        if a.shape[1] == 0:
-            for j in range(b.shape[1]):
-                put(fmt, c, (i, j), zero(fmt))
-        else:
-            factor = load(fmt, a, (i, 0))
-            for j in range(b.shape[1]):
-                put(fmt, c, (i, j), multiply(fmt, factor, load(fmt, b, (0, j))))
-        for k in range(1, a.shape[1]):
-            factor = load(fmt, a, (i, k))
-            for j in range(b.shape[1]):
-                put(fmt, c, (i, j), multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
-    check(fmt, c)
-
-
-@borrowing
-def check(fmt: Any, c: Any) -> None:
-    """Raise OverflowError if an entry of the matrix c has left the range of its backend."""
-    gone = False
-    for i in range(c.shape[0]):
-        for j in range(c.shape[1]):
-            gone |= lost(fmt, load(fmt, c, (i, j)))
-    if gone:
-        raise OverflowError(BEYOND)

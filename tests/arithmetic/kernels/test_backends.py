@@ -19,7 +19,8 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import backends
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, TwoWords, backend
-from gpbnb.arithmetic.kernels.tags import Free, Hardware32, Hardware64, Limited
+from gpbnb.arithmetic.kernels.machine import Quick
+from gpbnb.arithmetic.kernels.matrices import Double, Proved, Single
 from gpbnb.arithmetic.rounding import Rounding, Rules
 
 OPERATIONS = [operator.add, operator.sub, operator.mul, operator.truediv]
@@ -209,22 +210,22 @@ PRODUCTS = {
 
 
 def chosen(name: str, scale: float) -> Any:
-    """The tag with which a product of two matrices is computed."""
+    """The kind of numbers in which a product of two matrices is computed."""
     a = PRODUCTS[name].array(scale * np.random.default_rng(1).uniform(0.5, 1, (30, 30)))
     assert isinstance(a.backend, Compiled)
-    return a.backend._product_tag(a.components[0], a.components[0])
+    return next(iter(a.backend._attempts([a.components, a.components], 27_000)))[0]
 
 
 def test_products_without_range_checks_are_those_that_cannot_leave_the_range() -> None:
-    assert isinstance(chosen("bfloat16", 1.0), Free)
-    assert isinstance(chosen("bfloat16", 2.0**61.5), Limited)
-    assert chosen("24 bits, even", 1.0) == Free(Hardware32())
-    assert isinstance(chosen("24 bits, even", 2.0**-60).tag, Limited)
-    assert isinstance(chosen("24 bits, even", 2.0**-475), Limited)
-    assert isinstance(chosen("24 bits, even, flushed", 2.0**-48), Limited)
-    assert isinstance(chosen("24 bits, even, small", 2.0**-10).tag, Limited)
-    assert chosen("53 bits, even", 1.0) == Free(Hardware64())
-    assert isinstance(chosen("53 bits, even, small", 2.0**-30), Limited)
+    assert chosen("bfloat16", 1.0) == Proved()
+    assert chosen("bfloat16", 2.0**61.5) == Quick()
+    assert chosen("24 bits, even", 1.0) == Single()
+    assert chosen("24 bits, even", 2.0**-60) == Proved()
+    assert chosen("24 bits, even", 2.0**-475) == Quick()
+    assert chosen("24 bits, even, flushed", 2.0**-48) == Quick()
+    assert chosen("24 bits, even, small", 2.0**-10) == Proved()
+    assert chosen("53 bits, even", 1.0) == Double()
+    assert chosen("53 bits, even, small", 2.0**-30) == Quick()
 
 
 def test_a_product_without_range_checks_has_the_digits_of_the_exact_backend() -> None:
@@ -237,10 +238,11 @@ def test_a_product_without_range_checks_has_the_digits_of_the_exact_backend() ->
 def test_the_first_operations_of_a_kind_are_exact_and_the_next_ones_compiled(
     fmt: FloatFormat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    loops, used = backends._loops(), []
+    loops, used = {name: getattr(backends, name)() for name in ("_loops", "_matrices")}, []
     monkeypatch.setattr(backends, "LOOPS_AFTER", 1000)
     monkeypatch.setattr(backends, "_DONE", Counter())
-    monkeypatch.setattr(backends, "_loops", lambda: used.append(1) or loops)
+    for name, module in loops.items():
+        monkeypatch.setattr(backends, name, lambda module=module: used.append(1) or module)
     x, y = fmt.array([1, 2, 3]) / 7, fmt.array([9, -5, 4]) / 11
 
     def results() -> list[FloatArray]:
