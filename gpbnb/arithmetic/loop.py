@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.interpreting import Numbers
+from gpbnb.arithmetic.kernels.tags import Quick
 from gpbnb.arithmetic.machine import Addresses, code_of, functions, is_far
 
 DECAYED = 2.0**-700
@@ -83,7 +84,7 @@ class Loop(Numbers):
 
     def _far(self, numbers: NDArray[Any]) -> bool:
         """Whether numbers may be too small or too large for quick computation."""
-        return isinstance(self.kind, self._machine.Quick) and is_far(numbers)
+        return isinstance(self.kind, Quick) and is_far(numbers)
 
     def compare_from(self, states: NDArray[Any], cycle: int) -> None:
         """Begin to look for states that repeat."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import selection, tags
 from gpbnb.arithmetic.kernels.tags import AWAY, EVEN, HALF_UP, ZERO
+from gpbnb.interrupts import slices
 
 # fmt: off
 CODES = {
@@ -76,7 +77,7 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
     ----------
     tag : the arithmetic of a run, from which all its parts draw random numbers.
     """
-    from gpbnb.arithmetic.kernels import machine, quick
+    from gpbnb.arithmetic.kernels import quick
 
     whole = np.zeros((len(formats), quick.COLUMNS), np.int64)
     numbers = np.zeros((len(formats), quick.NUMBERS))
@@ -93,11 +94,11 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
             raise ValueError("no loops")
         kinds.add(_row(fmt, found, whole[i], numbers[i]))
     (kind,) = kinds
-    made: Any = machine.Careful() if (whole[:, quick.HOW] == quick.NONE).any() else machine.Quick()
+    made: Any = tags.Careful() if (whole[:, quick.HOW] == quick.NONE).any() else tags.Quick()
     if kind == "pairs":
-        made = machine.InShortPairs() if whole[:, _SHORT].all() else machine.InPairs()
+        made = tags.InShortPairs() if whole[:, _SHORT].all() else tags.InPairs()
     elif kind == "words":
-        made = machine.InTwoWords()
+        made = tags.InTwoWords()
     return made, Addresses(whole, numbers, random)
 
 
@@ -117,26 +118,13 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
             mode = AWAY if tag.nearest else ZERO
             whole[:6] = tag.precision, mode, -(2**60), 2**60, tags.UNLIMITED, isinstance(tag, tags.ShortDecimal)
         return "pairs"
-    if isinstance(tag, tags.Hardware32):
-        tag = selection.fusing_tag(fmt.rules)
-    bits = 4 if fmt.base == 16 else 1
-    if isinstance(tag, tags.Hardware64):
-        largest = float(np.finfo(float).max)
-        mode, precision, limits = EVEN, 53, (0.0, 0.0, 0.0, -largest, largest, math.nan, math.nan)
-        low, high = 5e-324, largest
-    elif isinstance(tag, tags.Binary | tags.Hexadecimal):
-        mode, precision, largest = AWAY if tag.nearest else ZERO, tag.precision, math.nextafter(2.0**1023, 0.0)
-        limits = 0.0, 2.0**-960, math.nan, -largest, largest, math.nan, math.nan
-        low, high = 2.0**-960, largest
-    else:
-        mode, precision, limits = _code(tag.mode), tag.precision, tag[3:]
-        low, high = max(tag.gradual, tag.least), min(tag.largest, -tag.lowest)
-        low = low or 2.0**-960
+    bits, precision, mode, *limits, _ = tag
     whole[:3], numbers[:] = (bits, precision, mode), limits
-    low, high = max(low, quick.LEAST), min(high, 1 / quick.LEAST)
+    low, high = max(tag.gradual, tag.least), min(tag.largest, -tag.lowest)
+    low, high = max(low, tags.QUICK_LEAST), min(high, 1 / tags.QUICK_LEAST)
     least, most = np.array([low, high]).view(np.int64).tolist()
     how, *rounding = _rounding(bits, precision, mode, fmt.rules)
-    evenly = how == quick.SHORT and mode == EVEN and precision <= tags.SAFE_TWICE and limits[0] >= quick.LEAST
+    evenly = how == quick.SHORT and mode == EVEN and precision <= tags.SAFE_TWICE and limits[0] >= tags.QUICK_LEAST
     whole[3:15] = how, *rounding, least, most - least, *_outward(precision, mode), evenly
     return "floats"
 
@@ -164,12 +152,6 @@ def _outward(precision: int, mode: int) -> tuple[int, int, int, int]:
     unit, ties_up = 1 << (53 - precision), mode == HALF_UP
     half, down, up = ties_up * (unit >> 1), mode == tags.DOWN, mode == tags.UP
     return half - ties_up + down * (unit - 1), half + up * (unit - 1), ties_up or down, up
-
-
-def _code(mode: Any) -> int:
-    if isinstance(mode, tags.Random):
-        return tags.RANDOM
-    return mode.code if isinstance(mode, tags.Mode) else EVEN
 
 
 class Fault(NamedTuple):
@@ -315,10 +297,8 @@ class Memory:
 
 def is_far(numbers: NDArray[Any]) -> bool:
     """Whether some numbers are too small or too large for quick computation."""
-    from gpbnb.arithmetic.kernels import quick
-
     sizes = np.abs(numbers)
-    return bool((((sizes < quick.LEAST) & (sizes > 0)) | (sizes > 1 / quick.LEAST)).any())
+    return bool((((sizes < tags.QUICK_LEAST) & (sizes > 0)) | (sizes > 1 / tags.QUICK_LEAST)).any())
 
 
 def functions(kind: Any, far: bool, alone: bool) -> Iterator[int]:
@@ -331,11 +311,11 @@ def functions(kind: Any, far: bool, alone: bool) -> Iterator[int]:
     """
     from gpbnb.arithmetic.kernels import machine
 
-    quick = isinstance(kind, machine.Quick)
+    quick = isinstance(kind, tags.Quick)
     if not (quick and far):
         yield machine.address(kind, alone)
     if quick:
-        yield machine.address(machine.Careful(), alone)
+        yield machine.address(tags.Careful(), alone)
 
 
 def evaluate(kind: Any, formats: Any, code: Any, values: NDArray[Any], truths: NDArray[np.uint8]) -> int:
@@ -345,9 +325,7 @@ def evaluate(kind: Any, formats: Any, code: Any, values: NDArray[Any], truths: N
 
 def evaluate_in(memory: Memory, kind: Any, formats: Any, code: Any) -> int:
     """Run operations as :func:`evaluate` does, on numbers that stay where they are."""
-    from gpbnb.arithmetic.kernels import machine
-
-    return _once(kind, formats, code, memory, isinstance(kind, machine.Quick) and is_far(memory.values))
+    return _once(kind, formats, code, memory, isinstance(kind, tags.Quick) and is_far(memory.values))
 
 
 def _once(kind: Any, formats: Any, code: Any, memory: Memory, far: bool) -> int:
@@ -378,6 +356,18 @@ def rounded(kind: Any, formats: Any, numbers: NDArray[Any]) -> NDArray[Any] | No
             return None
         found.append(values[-count:])
     return found[0] if len(found) == 1 else np.concatenate(found)
+
+
+def accumulate(kind: Any, formats: Any, name: str, numbers: NDArray[Any]) -> bool:
+    """Combine packed rows, (count, width, ...), each with the result before it; return whether the format has all."""
+    code, none = np.array([CODES[name]]), np.zeros(1, np.int64)
+    memory = Memory(numbers, np.zeros((2, numbers.shape[1]), np.uint8))
+    for part in slices(len(numbers) - 1, memory.width):
+        at, count = np.arange(part.start, part.stop, dtype=np.uint32), part.stop - part.start
+        table = Addresses(at, at + 1, at, at + 1, np.array([0, count]), code, none, none, np.empty(0), 1, count)
+        if _once(kind, formats, Code(table, count), memory, False) < count:
+            return False
+    return True
 
 
 _AT_ONCE = 1 << 14  # numbers that stay in the processor's cache

@@ -14,8 +14,8 @@ import numpy as np
 from gpbnb.arithmetic.conversion import exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import ExactKernel, kernel
-from gpbnb.arithmetic.kernels.selection import Accumulator, check_accumulator, compiled_tag, run_tag
-from gpbnb.arithmetic.kernels.tags import Tag, random_state
+from gpbnb.arithmetic.kernels.selection import Accumulator, compiled_tag, run_tag
+from gpbnb.arithmetic.kernels.tags import Float, Tag, random_state
 from gpbnb.arithmetic.rounding import Order, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.text import at_entry
 from gpbnb.arithmetic.words import Layout, words
@@ -100,7 +100,13 @@ class NumberFormat(ABC, Generic[Made]):
         if sums is None:
             return run_tag(self.rules, fused, order, block)
         own, other = self.run_tag(), sums.run_tag(fused, order=order, block=block)
-        check_accumulator(own, other)
+        if not (isinstance(own, Float) and isinstance(other, Float)):
+            raise ValueError(f"got sums kept in {sums} with numbers in {self}; needed base 2 or 16 for both")
+        if other.precision < own.precision:
+            raise ValueError(
+                f"got sums of precision {other.precision} with numbers of precision {own.precision}; needed at least "
+                "as many digits for sums as for numbers"
+            )
         return other if random_state(own) is None else own
 
     def check_compiled(self) -> None:

@@ -19,18 +19,20 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic import machine
 from gpbnb.arithmetic.kernels.exact import kernel, one_per_format, size_text
-from gpbnb.arithmetic.kernels.selection import tag_of, wide_tag
+from gpbnb.arithmetic.kernels.selection import is_binary32, is_binary64, tag_of, wide_tag
 from gpbnb.arithmetic.kernels.tags import (
+    EVEN,
     FARTHEST,
-    LEAST,
-    LIMIT,
-    Hardware32,
-    Hardware64,
-    Limited,
-    LongEven,
-    Random,
-    ShortEven,
+    QUICK_LEAST,
+    SAFE_TWICE,
+    Careful,
+    Double,
+    Float,
+    Proved,
+    Quick,
+    Single,
     Tag,
     Wide,
     extents_of_sums,
@@ -202,7 +204,7 @@ class Looped(Backend):
         out = self._empty(size)
         flat = [tuple([_flat(part, shape) for part in components]) for components in operands]
         if name == "round_" and 0 < size <= _FEW:
-            found = _machine().rounded(*self._machine, self.pack(flat[0]))
+            found = machine.rounded(*self._machine, self.pack(flat[0]))
             return None if found is None else tuple(part.reshape(shape) for part in self.unpack(found))
         inputs = [self._seen(each) for each in flat]
         try:
@@ -212,9 +214,9 @@ class Looped(Backend):
         return None if gone else tuple(part.reshape(shape) for part in out)
 
     @cached_property
-    def _machine(self) -> Any:
+    def _machine(self) -> tuple[Any, Any]:
         """The kind and columns of the format on the machine."""
-        return _machine().tables([self], self.tag)
+        return machine.tables([self], self.tag)
 
     @property
     def fusing_tag(self) -> Tag | None:
@@ -228,20 +230,18 @@ class Looped(Backend):
         return None if found is None else self.from_two_words(found)
 
     def fold(self, name: str, components: Components) -> Components | None:
-        shape = components[0].shape
-        width, lines = math.prod(shape[1:]), tuple(_flat(part, shape) for part in components)
-        out = tuple(part[:width] for part in lines)
-        for rows in slices(shape[0] - 1, width):
-            found = self._empty(width)
-            given = _below(out, lines, rows, width)
-            try:
-                count = len(given[0]) // max(width, 1)
-                if _loops().FOLDS[name](self.tag, count, width, self._seen(given), self._seen(found)):
-                    return None
-            except OverflowError:
-                return None
-            out = found
-        return tuple(np.array(part).reshape(shape[1:]) for part in out)
+        numbers = self._accumulated(name, components)
+        return None if numbers is None else self.unpack(numbers[-1])
+
+    def scan(self, components: Components) -> Components | None:
+        numbers = self._accumulated("add", components)
+        return None if numbers is None else self.unpack(numbers)
+
+    def _accumulated(self, name: str, components: Components) -> Array | None:
+        """Combine rows from left to right; return each result, or None if the format does not have one."""
+        numbers = self.pack(components)
+        rows = numbers.reshape(len(numbers), -1, self.count)
+        return numbers if machine.accumulate(*self._machine, name, rows) else None
 
     def from_backend(self, other: Backend, components: Components) -> Components | None:
         """Round numbers of a backend with significands of one or two words."""
@@ -283,25 +283,6 @@ class Looped(Backend):
     @abstractmethod
     def from_two_words(self, components: Components) -> Components | None:
         """Return the components of numbers that :class:`TwoWords` holds, or None if they do not fit."""
-
-    def scan(self, components: Components) -> Components | None:
-        shape = components[0].shape
-        width, lines = math.prod(shape[1:]), tuple(_flat(part, shape) for part in components)
-        out = self._empty(math.prod(shape))
-        for part, first in zip(out, lines, strict=True):
-            part[:width] = first[:width]
-        for rows in slices(shape[0] - 1, width):
-            given = _below(tuple(part[rows.start * width :] for part in out), lines, rows, width)
-            found = self._empty(len(given[0]))
-            try:
-                count = len(given[0]) // max(width, 1)
-                if _loops().partial_sums(self.tag, count, width, self._seen(given), self._seen(found)):
-                    return None
-            except OverflowError:
-                return None
-            for part, each in zip(out, found, strict=True):
-                part[rows.start * width :][: len(each)] = each
-        return tuple(part.reshape(shape) for part in out)
 
     def compare(self, a: Components, b: Components) -> Array:
         shape = _shape(a, b)
@@ -401,13 +382,14 @@ class Floats(Compiled):
         super().__init__(rules, tag)
         self.bits = rules.base.bit_length() - 1
         self._random = random_state(tag) is not None
-        if isinstance(tag, Hardware64):
+        self._single, self._double = is_binary32(rules), is_binary64(rules)
+        if self._double:
             self.lowest_power, self.highest_power = -1074, 1024
 
     def restart(self) -> None:
         super().restart()
-        if isinstance(self.tag, Limited) and isinstance(self.tag.mode, Random):
-            self.tag.mode.state[1] = 0
+        if (state := random_state(self.tag)) is not None:
+            state[1] = 0
 
     def from_exact(self, m: Array, e: Array) -> Components | None:
         # base**(e + t - 1) <= |x| < base**(e + t)
@@ -455,9 +437,9 @@ class Floats(Compiled):
         shape = _shape(*operands)
         size, flat = math.prod(shape), [_flat(each[0], shape) for each in operands]
         if name == "round_" and 0 < size <= _FEW and not (_floats.cache_info().currsize or self._random):
-            found = _machine().rounded(*self._machine, flat[0])
+            found = machine.rounded(*self._machine, flat[0])
             return None if found is None else (found.reshape(shape),)
-        code, (_, formats), loops = _machine().CODES[_CODED.get(name, name)], self._machine, _floats()
+        code, (_, formats), loops = machine.CODES[_CODED.get(name, name)], self._machine, _floats()
         out, given, gone = np.empty(size), (*flat, flat[0], flat[0])[:3], False
         for part in slices(size):
             numbers = formats.address, code, part.stop - part.start, *(each[part] for each in given), out[part]
@@ -467,17 +449,17 @@ class Floats(Compiled):
     def fold(self, name: str, components: Components) -> Components | None:
         a = components[0]
         out = np.array(a[0], np.float64, order="C")
-        return (out,) if self._accumulated(name, a, out, 0) else None
+        return (out,) if self._accumulate(name, a, out, 0) else None
 
     def scan(self, components: Components) -> Components | None:
         out = np.empty(components[0].shape)
         out[:1] = components[0][:1]
-        return (out,) if self._accumulated("add", components[0], out, 1) else None
+        return (out,) if self._accumulate("add", components[0], out, 1) else None
 
-    def _accumulated(self, name: str, a: Array, out: Array, keep: int) -> bool:
+    def _accumulate(self, name: str, a: Array, out: Array, keep: int) -> bool:
         """Combine rows from left to right, in `out` or its rows; return whether the format has all results."""
         width, flat, found, gone = math.prod(a.shape[1:]), _flat(a, a.shape), out.reshape(-1), False
-        code, (_, formats), loops = _machine().CODES[name], self._machine, _floats()
+        code, (_, formats), loops = machine.CODES[name], self._machine, _floats()
         for part in slices(len(a) - 1, width):
             rows = part.start + 1, part.stop + 1
             gone |= bool(loops.accumulate(formats.address, code, rows, width, keep, flat, found))
@@ -498,35 +480,34 @@ class Floats(Compiled):
         def packed(dtype: Any = np.float64) -> list[Array]:
             return [self.pack(each, copy, dtype) for each in given]
 
-        if isinstance(self.tag, Hardware32 | Hardware64):
-            single = isinstance(self.tag, Hardware32)
-            yield (loops.Single(), packed(np.float32)) if single else (loops.Double(), packed())
+        if self._single or self._double:
+            yield (Single(), packed(np.float32)) if self._single else (Double(), packed())
             return
-        if isinstance(kind, _kinds().Quick):
+        if isinstance(kind, Quick):
             first, second = (_flat(each[0], each[0].shape) for each in (*given, *given)[:2])
             (low, high), (low_b, high_b) = loops.extents(first, second)
             count, sizes = given[0][0].shape[1], ((low, low_b), (high, high_b))
             if products >= _MANY and (proved := self._proved(count, *sizes)) is not None:
-                yield proved, packed(np.float32 if isinstance(proved, loops.Single) else np.float64)
-            elif min(sizes[0]) >= _quick().LEAST and max(sizes[1]) <= 1 / _quick().LEAST:
+                yield proved, packed(np.float32 if isinstance(proved, Single) else np.float64)
+            elif min(sizes[0]) >= QUICK_LEAST and max(sizes[1]) <= 1 / QUICK_LEAST:
                 yield kind, packed()
-            kind = _kinds().Careful()
+            kind = Careful()
         yield kind, packed()
 
     def _proved(self, n: int, smallest: Sequence[float], largest: Sequence[float]) -> Any:
         """Return the fastest kind of numbers if no sum of n products of numbers of these sizes can leave its range."""
-        tag, loops, limited = cast(Any, self.tag), _matrices(), isinstance(self.tag, Limited)
-        gradual, least, most = (tag.gradual, tag.least, tag.largest) if limited else (0.0, LEAST, LIMIT)
+        tag = cast(Float, self.tag)
+        gradual, even = tag.gradual, tag.mode == EVEN and self.base == 2
         low, high = extents_of_sums(n, self.base, self.precision, gradual, math.prod(smallest), math.prod(largest))
-        if not high <= most or not (gradual or low >= least):
+        if not high <= tag.largest or not (gradual or low >= tag.least):
             return None
-        if limited and isinstance(tag.mode, LongEven):
-            return loops.Double() if low >= gradual else None
-        short = limited and isinstance(tag.mode, ShortEven)
+        if even and self.precision == 53:
+            return Double() if low >= gradual else None
+        short = even and self.precision <= SAFE_TWICE
         single = min(low, *smallest) >= max(_LEAST_32, gradual) and max(high, *largest) <= _LARGEST_32
         if short and self.precision == 24 and single:
-            return loops.Single()
-        return loops.Proved() if low >= gradual or (short and gradual >= _quick().LEAST) else None
+            return Single()
+        return Proved() if low >= gradual or (short and gradual >= QUICK_LEAST) else None
 
     def _has_opposites(self, x: Array) -> bool:
         """Whether the opposite of each number is in the format; that of the lowest fixed-point number is not."""
@@ -749,17 +730,6 @@ def _cut(given: Any, part: slice) -> Any:
     return given[part] if isinstance(given, np.ndarray) else given
 
 
-def _below(first: Components, lines: Components, rows: slice, width: int) -> Components:
-    """Return a row, and below it those of lines after the first one that a slice counts."""
-    if rows.start == 0:  # the row is the first of the lines
-        return tuple(part[: (rows.stop + 1) * width] for part in lines)
-    found = []
-    for top, part in zip(first, lines, strict=True):
-        more = part[(rows.start + 1) * width : (rows.stop + 1) * width]
-        found.append(_flat(joined := np.concatenate([top[:width], more]), joined.shape))
-    return tuple(found)
-
-
 def _fixed(numbers: Array) -> Array:
     """Return numbers flat and read-only, so that loops are compiled for only one kind of input."""
     flat = numbers.reshape(-1).view()
@@ -797,31 +767,10 @@ def _loops() -> Any:
 
 
 @lru_cache(maxsize=1)
-def _machine() -> Any:
-    from gpbnb.arithmetic import machine
-
-    return machine
-
-
-@lru_cache(maxsize=1)
 def _matrices() -> Any:
     from gpbnb.arithmetic.kernels import matrices
 
     return matrices
-
-
-@lru_cache(maxsize=1)
-def _kinds() -> Any:
-    from gpbnb.arithmetic.kernels import machine
-
-    return machine
-
-
-@lru_cache(maxsize=1)
-def _quick() -> Any:
-    from gpbnb.arithmetic.kernels import quick
-
-    return quick
 
 
 @lru_cache(maxsize=1)

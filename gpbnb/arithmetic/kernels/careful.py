@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
 from gpbnb.arithmetic.kernels.compiling import borrowing, inner
-from gpbnb.arithmetic.kernels.processor import fused_sum
+from gpbnb.arithmetic.kernels.doubledouble import two_sum
 from gpbnb.arithmetic.kernels.tags import (
     ABSOLUTE,
     ADD,
@@ -18,6 +18,7 @@ from gpbnb.arithmetic.kernels.tags import (
     DOWN,
     EVEN,
     HALF_UP,
+    LEAST,
     MULTIPLY,
     NEGATIVE,
     ODD,
@@ -26,6 +27,7 @@ from gpbnb.arithmetic.kernels.tags import (
     ROUND,
     SUBTRACT,
     UP,
+    Float,
 )
 from gpbnb.arithmetic.rounding import DRAW_BITS
 
@@ -35,27 +37,12 @@ _GOLDEN, _FIRST, _SECOND = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1C
 _DRAWN = np.uint64(64 - DRAW_BITS)
 
 
-class Masked(NamedTuple):
-    """A format of bases 2 and 16; see :class:`gpbnb.arithmetic.kernels.tags.Limited`."""
-
-    bits: int  # of a digit
-    precision: int
-    mode: int
-    gradual: float
-    least: float
-    below: float
-    lowest: float
-    largest: float
-    under: float
-    over: float
-
-
 @borrowing
 def masked(whole: Any, numbers: Any) -> Any:
-    """The format of these columns, of which digits and rounding come first."""
-    return Masked(
-        whole[0], whole[1], whole[2], numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6]
-    )
+    """The format of these columns, of which digits and rounding come first; random numbers are drawn elsewhere."""
+    bits, precision, mode = whole[0], whole[1], whole[2]
+    gradual, least, below, lowest, largest = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]
+    return Float(bits, precision, mode, gradual, least, below, lowest, largest, numbers[5], numbers[6], 0)
 
 
 @borrowing
@@ -137,6 +124,24 @@ def _fit(fmt: Any, random: Any, p: Any, r: Any, exact_zero: Any) -> Any:
         k = np.int64(56) - np.int64(4) * fmt.precision - (((u >> 52) + 1) & 3)
     y = from_bits(_rounded_magnitude(fmt, random, u, k, rest != 0.0, negative)) - base
     return _within(fmt, 0.0 - y if negative else y, exact_zero)
+
+
+@inner(forceinline=True)
+def fused_sum(a: Any, b: Any, c: Any) -> Any:
+    """a * b + c as its nearest float64 w and a residual with the correct sign, and whether the sum is exactly zero.
+
+    The exact product is p + e, and p + c = s + r. The residuals e and r add up to v + lowest, and s and v to w + low.
+    If low is not zero, it is a multiple of the last bit of v and thus larger than lowest. If the residual of the
+    product is too small for float64, w is NaN.
+    """
+    p = a * b
+    e = fma(a, b, -p)
+    s, r = two_sum(p, c)
+    v, lowest = two_sum(r, e)
+    w, low = two_sum(s, v)
+    zero = (a == 0.0) | (b == 0.0)
+    w = w if zero | (abs(p) >= LEAST) else np.nan
+    return w, (low if low != 0.0 else lowest), (w == 0.0) & (zero | (c != 0.0))
 
 
 @borrowing(error_model="numpy")

@@ -1,4 +1,4 @@
-"""Compiled loops over whole arrays: entry by entry and folds of numbers that are not float64.
+"""Compiled loops over whole arrays: entry by entry, of numbers that are not float64.
 
 If a result leaves the range of its backend, a loop returns True or raises OverflowError, and its output is invalid.
 """
@@ -52,40 +52,9 @@ def _three(operation: Any) -> Callable[..., bool]:
     return loop
 
 
-def _fold(operation: Any) -> Callable[..., bool]:
-    @compiled
-    def loop(fmt: Any, n: int, width: int, a: Any, c: Any) -> Any:
-        gone = False
-        for j in range(width):
-            x = load(fmt, a, j)
-            for i in range(1, n):
-                x = operation(fmt, x, load(fmt, a, i * width + j))
-            gone |= lost(fmt, x)
-            put(fmt, c, j, x)
-        return gone
-
-    return loop
-
-
 ENTRIES = {name: _two(getattr(scalar, name)) for name in ("add", "subtract", "multiply")}
 ENTRIES |= {"divide": _two(scalar.quotient), "sqrt": _one(scalar.root), "round_": _one(scalar.round_)}
 ENTRIES["fused"] = _three(scalar.fused)
-FOLDS = {name: _fold(getattr(scalar, name)) for name in ("add", "multiply")}
-
-
-@compiled
-def partial_sums(fmt: Any, n: int, width: int, a: Any, c: Any) -> Any:
-    """c[i] = the sum of a[0] to a[i] from left to right, in each of `width` columns."""
-    gone = False
-    for j in range(width):
-        x = load(fmt, a, j)
-        gone |= lost(fmt, x)
-        put(fmt, c, j, x)
-        for i in range(1, n):
-            x = scalar.add(fmt, x, load(fmt, a, i * width + j))
-            gone |= lost(fmt, x)
-            put(fmt, c, i * width + j, x)
-    return gone
 
 
 @compiled

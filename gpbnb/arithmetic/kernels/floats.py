@@ -13,9 +13,8 @@ import numpy as np
 
 from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.kernels.bits import at, bits, entries, fma, from_bits, select, start, words
-from gpbnb.arithmetic.kernels.careful import carefully, masked
+from gpbnb.arithmetic.kernels.careful import carefully, fused_sum, masked
 from gpbnb.arithmetic.kernels.compiling import borrowing, compiled, inner
-from gpbnb.arithmetic.kernels.processor import fused_sum
 from gpbnb.arithmetic.kernels.quick import (
     DIRECTED,
     HEXADECIMAL,

@@ -1,9 +1,9 @@
 """The machine: it runs a program, a list of rounded operations, once for each lane, in any arithmetic with loops.
 
 A row of a program has three operands and the place of its result. Rows stand in segments of one operation and one
-destination format, whose precision, rounding and range are data, so that one compiled loop serves all formats of a
-kind: :class:`Quick`, :class:`Careful`, :class:`InPairs`, :class:`InShortPairs`, :class:`InTwoWords` and
-:class:`DoubleDouble`. What :class:`Quick` cannot compute, :class:`Careful` does.
+destination format, whose precision, rounding and range are data, so that one compiled loop serves all formats of a kind
+of :mod:`gpbnb.arithmetic.kernels.tags`. What :class:`~gpbnb.arithmetic.kernels.tags.Quick` cannot compute,
+:class:`~gpbnb.arithmetic.kernels.tags.Careful` does.
 
 The functions of the kinds have one signature, and :func:`advance` takes the address of one of them, so that the loop
 over steps is compiled only once. numba compiles a function anew for a literal argument, such as True or a code, in each
@@ -13,7 +13,7 @@ place where it differs.
 from __future__ import annotations
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import types
@@ -49,32 +49,16 @@ from gpbnb.arithmetic.kernels.tags import (
     ROUND,
     SKIP,
     SUBTRACT,
+    Careful,
     DoubleDouble,
+    InPairs,
+    InShortPairs,
+    InTwoWords,
     LimitedDecimal,
+    Quick,
     ShortDecimal,
     Wide,
 )
-
-
-class Quick(NamedTuple):
-    """Base 2 on float64, where no number is near the ends of its range."""
-
-
-class Careful(NamedTuple):
-    """Bases 2 and 16 on float64."""
-
-
-class InPairs(NamedTuple):
-    """Base 10 on pairs of int64."""
-
-
-class InShortPairs(NamedTuple):
-    """Base 10 on pairs of int64, with at most 8 digits and no range."""
-
-
-class InTwoWords(NamedTuple):
-    """Up to 113 bits or 34 digits, on three int64."""
-
 
 ONE_BY_ONE, GATHERED, NEIGHBOURS = range(3)
 """How rows of a segment run for one lane: one after the other, since one may take the result of another; together,

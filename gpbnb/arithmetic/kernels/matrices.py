@@ -20,16 +20,7 @@ from gpbnb.arithmetic.kernels.bits import at, bits, entries, fma, from_bits, sta
 from gpbnb.arithmetic.kernels.careful import carefully, masked
 from gpbnb.arithmetic.kernels.compiling import INLINE, borrowing, compiled, inner
 from gpbnb.arithmetic.kernels.floats import TINY, TOGETHER, fitted
-from gpbnb.arithmetic.kernels.machine import (
-    Careful,
-    InPairs,
-    InShortPairs,
-    InTwoWords,
-    Quick,
-    pair_format,
-    short_format,
-    word_format,
-)
+from gpbnb.arithmetic.kernels.machine import pair_format, short_format, word_format
 from gpbnb.arithmetic.kernels.quick import (
     DIRECTED,
     EVENLY,
@@ -44,21 +35,21 @@ from gpbnb.arithmetic.kernels.quick import (
     basic,
     rule_of,
 )
-from gpbnb.arithmetic.kernels.tags import ADD, DIVIDE, MULTIPLY, NEGATIVE
+from gpbnb.arithmetic.kernels.tags import (
+    ADD,
+    DIVIDE,
+    MULTIPLY,
+    NEGATIVE,
+    Careful,
+    Double,
+    InPairs,
+    InShortPairs,
+    InTwoWords,
+    Proved,
+    Quick,
+    Single,
+)
 from gpbnb.arithmetic.kernels.tags import RANDOM as RANDOM_MODE
-
-
-class Single(NamedTuple):
-    """float32, as the processor computes."""
-
-
-class Double(NamedTuple):
-    """float64, as the processor computes."""
-
-
-class Proved(NamedTuple):
-    """:class:`Quick`, where the sizes of the given numbers prove that no result leaves the quick range."""
-
 
 ROOM = 3 * TOGETHER
 _MOST = np.int64(2**63 - 1)

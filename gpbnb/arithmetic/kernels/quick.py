@@ -16,7 +16,7 @@ WHOLE, NUMBER, RANDOM = range(3)
 """Entries of a table of formats, which hold addresses of arrays: the columns of formats, int64 and float64, whose
 meaning depends on the kind of number; seed and count of random numbers."""
 COLUMNS, NUMBERS = 16, 7  # of each format
-# Columns of formats of float64, int64; the first three are those of :class:`gpbnb.arithmetic.kernels.careful.Masked`.
+# Columns of formats of float64, int64; the first three are those of :class:`gpbnb.arithmetic.kernels.tags.Float`.
 # fmt: off
 (
     BITS, PRECISION, MODE, HOW, CLEAR, SHIFT, HALF, EVEN, LOW, SPAN, BELOW_ZERO, ABOVE_ZERO, STICKY_BELOW, STICKY_ABOVE,
@@ -32,10 +32,6 @@ _SIGN, _MAGNITUDE = np.int64(-(2**63)), np.int64(2**63 - 1)
 _EXPONENT, _HALF, _HALF_ULP = np.int64(0x7FF << 52), np.int64(1 << 51), np.int64(53 << 52)
 _SHIFT_OF_EXACT_PRODUCTS = 27  # products of numbers of at most 26 bits are exact
 _LONG = np.int64(LONG)
-
-LEAST = 2.0**-480
-"""Least size of quick results, and the inverse of the largest: no product and no quotient of two of them leaves
-float64."""
 
 
 @borrowing

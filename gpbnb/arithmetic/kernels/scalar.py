@@ -13,8 +13,8 @@ Each operation rounds the exact result once and agrees digit for digit with
 :class:`gpbnb.arithmetic.kernels.exact.ExactKernel`. ``DoubleDouble`` is only
 loaded and stored. A number that
 leaves the range of its backend never passes unnoticed: an operation on integers, in base 10 or in ``Wide``, raises
-OverflowError; a float64 outside 2**-960 ... 2**1023 becomes NaN, later operations keep it, and ``store``, ``compare``
-and :func:`matmul` raise OverflowError. Callers must pass numbers of the format;
+OverflowError; a float64 outside 2**-960 ... 2**1023 becomes NaN, later operations keep it, and ``store`` and
+``compare`` raise OverflowError. Callers must pass numbers of the format;
 :mod:`gpbnb.arithmetic.kernels.backends` makes the arrays.
 """
 
@@ -27,21 +27,23 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
-from gpbnb.arithmetic.kernels import binary, decimal, processor, shortdecimal, wide
-from gpbnb.arithmetic.kernels.compiling import INLINE
+from gpbnb.arithmetic.kernels import decimal, shortdecimal, wide
+from gpbnb.arithmetic.kernels.bits import start
+from gpbnb.arithmetic.kernels.careful import carefully
+from gpbnb.arithmetic.kernels.compiling import INLINE, borrowing
 from gpbnb.arithmetic.kernels.tags import (
-    FLOATS,
+    ADD,
+    DIVIDE,
+    MULTIPLY,
+    NEGATIVE,
     PAIRS,
-    Binary,
+    ROUND,
+    SUBTRACT,
     Decimal,
     DoubleDouble,
-    Free,
-    Hardware32,
-    Hexadecimal,
-    Limited,
+    Float,
     LimitedDecimal,
     ShortDecimal,
-    ShortEven,
     Wide,
 )
 
@@ -58,12 +60,6 @@ BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1
 def _tag(fmt: Any) -> Any:
     """The class of a tag, from its numba type."""
     return getattr(fmt, "instance_class", None)
-
-
-def _free_machine(fmt: Any) -> Any:
-    """The machine's arithmetic that a tag leaves unchecked, or None."""
-    tag = _tag(fmt.types[0]) if _tag(fmt) is Free else None
-    return tag if tag in processor.MACHINE else None
 
 
 def _only_compiled(name: str) -> TypeError:
@@ -143,39 +139,26 @@ def lost(fmt: Any, x: Any) -> Any:
     raise _only_compiled("lost")
 
 
-def _beyond_largest(fmt: Any, a: Any) -> Any:
-    """Return a number, or what the format replaces it with if it is beyond the largest."""
-    raise _only_compiled("_beyond_largest")
+def _of_floats(code: int) -> Any:
+    """Return the function of an operation on float64."""
+
+    @borrowing(forceinline=True)
+    def operate(fmt: Any, a: Any, b: Any) -> Any:
+        return carefully(fmt, start(fmt.random), code, a, b, a)
+
+    return operate
 
 
-def multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    """fl(c + fl(a * b)).
-
-    A product out of range is reported only if it affects the sum.
-    """
-    raise _only_compiled("multiply_add")
-
-
-def add_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    """The same as :func:`multiply_add`, faster where c is the result of the one before."""
-    raise _only_compiled("add_product")
+_FLOATS = {
+    "add": _of_floats(ADD), "subtract": _of_floats(SUBTRACT), "multiply": _of_floats(MULTIPLY),
+    "quotient": _of_floats(DIVIDE), "round_": _of_floats(ROUND), "negative": _of_floats(NEGATIVE),
+}  # fmt: skip
 
 
 def _implementation(fmt: Any, name: str) -> Any:
-    tag, free = _tag(fmt), _tag(fmt) is Free
-    if free:
-        fmt = fmt.types[0]
-        tag = _tag(fmt)
-    if tag in (Binary, Hexadecimal):
-        return binary.OPERATIONS[tag, free].get(name)
-    if free:
-        return processor.FREE[_tag(fmt.types[1]) if tag is Limited else tag].get(name)
-    if tag in processor.MACHINE:
-        return processor.MACHINE[tag].get(name)
-    if tag is Limited:
-        digits, mode = (kind.instance_class for kind in fmt.types[:2])
-        return processor.operations(digits, mode)[name]
-    return getattr(_MODULES.get(tag), {"quotient": "divide", "root": "sqrt"}.get(name, name), None)
+    if _tag(fmt) is Float:
+        return _FLOATS.get(name)
+    return getattr(_MODULES.get(_tag(fmt)), {"quotient": "divide", "root": "sqrt"}.get(name, name), None)
 
 
 def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
@@ -193,8 +176,6 @@ def _overload_two(stub: Callable[..., Any]) -> None:
     @overload(stub, strict=False, jit_options=INLINE)
     def choose(fmt: Any, a: Any, b: Any) -> Any:
         function = _implementation(fmt, stub.__name__)
-        if _tag(fmt) is Free:
-            return lambda fmt, a, b: function(fmt.tag, a, b)
         return None if function is None else lambda fmt, a, b: function(fmt, a, b)
 
 
@@ -202,37 +183,20 @@ def _overload_one(stub: Callable[..., Any]) -> None:
     @overload(stub, strict=False, jit_options=INLINE)
     def choose(fmt: Any, x: Any) -> Any:
         function = _implementation(fmt, stub.__name__)
-        if _tag(fmt) is Free:
-            return lambda fmt, x: function(fmt.tag, x)
+        if _tag(fmt) is Float:
+            return lambda fmt, x: function(fmt, x, x)
         return None if function is None else lambda fmt, x: function(fmt, x)
 
 
 for _operation in (add, subtract, multiply, quotient):
     _overload_two(_operation)
-_overload_one(root)
-_overload_one(round_)
-
-
-@overload(negative, strict=False, jit_options=INLINE)
-def _negative(fmt: Any, a: Any) -> Any:
-    if _tag(fmt) in PAIRS:
-        return lambda fmt, a: (-a[0], a[1])
-    if _tag(fmt) is Wide:
-        return lambda fmt, a: wide.negative(fmt, a)
-    return lambda fmt, a: _beyond_largest(fmt, zero(fmt) - a)
-
-
-@overload(_beyond_largest, strict=False, jit_options=INLINE)
-def _overloaded_beyond_largest(fmt: Any, a: Any) -> Any:
-    # A fixed-point format has one more negative number than positive ones.
-    if _tag(fmt) is Limited:
-        return lambda fmt, a: fmt.over if a > fmt.largest else a
-    return lambda fmt, a: a
+for _stub in (root, round_, negative):
+    _overload_one(_stub)
 
 
 @overload(compare, strict=False, jit_options=INLINE)
 def _compare(fmt: Any, a: Any, b: Any) -> Any:
-    if _tag(fmt) in FLOATS:
+    if _tag(fmt) is Float:
 
         def of_floats(fmt: Any, a: Any, b: Any) -> Any:
             if a != a or b != b:
@@ -257,24 +221,7 @@ def _zero(fmt: Any) -> Any:
         return lambda fmt: (0.0, 0.0)
     if _tag(fmt) is Wide:
         return lambda fmt: wide.zero()
-    return (lambda fmt: np.float32(0.0)) if _free_machine(fmt) is Hardware32 else lambda fmt: 0.0
-
-
-@overload(multiply_add, strict=False, jit_options=INLINE)
-def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    if _free_machine(fmt) is not None:
-        return lambda fmt, a, b, c: c + a * b  # no negative zero, as c is none
-    if _tag(fmt) is ShortDecimal:
-        return lambda fmt, a, b, c: shortdecimal.multiply_add(fmt, a, b, c)
-    return lambda fmt, a, b, c: add(fmt, c, multiply(fmt, a, b))
-
-
-@overload(add_product, strict=False, jit_options=INLINE)
-def _overloaded_add_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    if _tag(fmt) is not Limited or _tag(fmt.types[1]) is not ShortEven:
-        return lambda fmt, a, b, c: multiply_add(fmt, a, b, c)
-    function = _implementation(fmt, "add_product")
-    return lambda fmt, a, b, c: function(fmt, a, b, c)
+    return lambda fmt: 0.0
 
 
 # -- arrays ------------------------------------------------------------------------------------------
@@ -284,7 +231,7 @@ def _overloaded_add_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 
 @overload(load, strict=False, jit_options=INLINE)
 def _load(fmt: Any, array: Any, index: Any) -> Any:
-    if _tag(fmt) in FLOATS:
+    if _tag(fmt) is Float:
         return lambda fmt, array, index: array[index]
     if _tag(fmt) is Wide:
         return _load_wide(array, index)
@@ -338,7 +285,7 @@ def _overloaded_put(fmt: Any, array: Any, index: Any, x: Any) -> Any:
         array[(*index, 0)] = x[0]
         array[(*index, 1)] = x[1]
 
-    if _tag(fmt) in FLOATS:
+    if _tag(fmt) is Float:
         return of_floats
     if _tag(fmt) is Wide:
         return _put_wide(array, index)
@@ -353,8 +300,6 @@ def _lost(fmt: Any, x: Any) -> Any:
         return lambda fmt, x: False
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, x: x[0] != x[0]
-    if _free_machine(fmt) is not None:
-        return lambda fmt, x: not abs(x) < np.inf
     return lambda fmt, x: x != x
 
 

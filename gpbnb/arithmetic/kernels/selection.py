@@ -24,8 +24,9 @@ _CODES = {
     Rounding.ODD: tags.ODD,
     Rounding.HALF_UP: tags.HALF_UP,
 }
+_FLOAT_CODES = {**_CODES, Rounding.STOCHASTIC: tags.RANDOM}
 _REACH = 320  # largest binary exponent for which products, quotients and their residuals are normal float64
-_HARDWARE = {(24, -126, 127): tags.Hardware32(), (53, -1022, 1023): tags.Hardware64()}
+_NO_RANDOM = np.zeros(2, np.uint64)
 _UNLIMITED = 2**60  # stands for an unlimited exponent in base 10
 _HALFWAY = 2**63  # of the random numbers of a seed
 
@@ -44,14 +45,12 @@ def tag_of(rules: Rules) -> Any:
     """
     if rules.precision > LARGEST_PRECISION.get(rules.base, 0):
         return None
+    if rules.base != 10:
+        return _float_tag(rules)
     if rules.limits is None and rules.rounding in Rounding.documented():
-        nearest = rules.rounding is Rounding.NEAREST
-        if rules.base == 10:
-            return (tags.ShortDecimal if rules.precision <= tags.LARGEST_SHORT else tags.Decimal)(
-                rules.precision, nearest
-            )
-        return (tags.Binary if rules.base == 2 else tags.Hexadecimal)(rules.precision, nearest)
-    return _decimal_tag(rules) if rules.base == 10 else _float_tag(rules)
+        kind = tags.ShortDecimal if rules.precision <= tags.LARGEST_SHORT else tags.Decimal
+        return kind(rules.precision, rules.rounding is Rounding.NEAREST)
+    return _decimal_tag(rules)
 
 
 def _decimal_tag(rules: Rules) -> tags.LimitedDecimal | None:
@@ -97,35 +96,37 @@ def _stored(rules: Rules, number: Fraction, split: int) -> tuple[int, int, int]:
     return (-high if m < 0 else high), low, e
 
 
-def _float_tag(rules: Rules, hardware: bool = True) -> Any:
-    """Return the tag for float64 storage, or None if float64 cannot hold the digits that decide a rounding."""
+def _float_tag(rules: Rules, fusing: bool = False) -> tags.Float | None:
+    """Return the tag for float64 storage, or None if float64 cannot hold the digits that decide a rounding.
+
+    Parameters
+    ----------
+    fusing : for fused multiply-add, too, which tells no ties in 53 bits.
+    """
     base, precision, rounding, limits, seed = rules
-    random = rounding is Rounding.STOCHASTIC
+    random, bits = rounding is Rounding.STOCHASTIC, base.bit_length() - 1
+    nan, mode = math.nan, _FLOAT_CODES[rounding]
+    state = np.array([seed & (2**64 - 1), 0], np.uint64) if random else _NO_RANDOM
+    if limits is None and rounding in Rounding.documented() and not fusing:
+        most = math.nextafter(tags.LIMIT, 0.0)
+        return tags.Float(bits, precision, mode, 0.0, tags.LEAST, nan, -most, most, nan, nan, state)
     longest = min(_longest(base, rounding, True), 53 - DRAW_BITS if random else 53)
     # A single binary digit is implicit in float64: no stored bit is even or odd.
     hidden = (base, precision) == (2, 1) and rounding in (Rounding.EVEN, Rounding.ODD)
-    digits = tags.Two() if base == 2 else tags.Sixteen()
     if limits is not None and limits.fixed:
         # Numbers up to twice the largest keep its spacing, so that none is rounded back into the range.
         precision += 1
-    mode = _mode(base, precision, rounding, seed)
+    if precision > longest or (random and base == 16) or hidden:
+        return None
     if limits is None:
-        nan, least, largest = math.nan, 2.0**-960, 2.0**960
-        return (
-            tags.Limited(digits, mode, precision, 0.0, least, nan, -largest, largest, nan, nan)
-            if precision <= longest and not (random and base == 16) and not hidden
-            else None
-        )
+        least, most = tags.LEAST, 2.0**960
+        return tags.Float(bits, precision, mode, 0.0, least, nan, -most, most, nan, nan, state)
+    if is_binary64(rules):  # the processor rounds its subnormal numbers, too
+        most = float(np.finfo(np.float64).max)
+        return tags.Float(bits, precision, mode, 0.0, 0.0, 0.0, -most, most, nan, nan, state)
     emin, emax = limits.emin + limits.fixed, _emax(rules)
-    plain = not limits.fixed and limits.subnormal and _ends_in_nines(rules) and limits.overflow == "raise"
-    if hardware and base == 2 and rounding is Rounding.EVEN and plain and (precision, limits.emin, emax) in _HARDWARE:
-        return _HARDWARE[precision, limits.emin, emax]
-    bits = base.bit_length() - 1
     if (
-        precision > longest
-        or hidden
-        or (precision == 1 and limits.subnormal)
-        or (random and base == 16)
+        (precision == 1 and limits.subnormal)
         or limits.overflow not in ("raise", "saturate")
         or bits * (emin - precision) < -_REACH
         or bits * (emax + 1) > _REACH
@@ -133,27 +134,27 @@ def _float_tag(rules: Rules, hardware: bool = True) -> Any:
         return None
     least = float(base) ** emin
     lowest, largest = float(limits.lowest), float(limits.largest)
-    beyond = (lowest, largest) if limits.overflow == "saturate" else (math.nan, math.nan)
-    return tags.Limited(
-        digits,
-        mode,
-        precision,
-        least if limits.subnormal else 0.0,
-        0.0 if limits.subnormal else least,
-        0.0,
-        lowest,
-        largest,
-        *beyond,
-    )
+    under, over = (lowest, largest) if limits.overflow == "saturate" else (nan, nan)
+    gradual, least = (least, 0.0) if limits.subnormal else (0.0, least)
+    return tags.Float(bits, precision, mode, gradual, least, 0.0, lowest, largest, under, over, state)
 
 
-def _mode(base: int, precision: int, rounding: Rounding, seed: int) -> Any:
-    if rounding is Rounding.STOCHASTIC:
-        return tags.Random(np.array([seed & (2**64 - 1), 0], np.uint64))
-    if rounding is Rounding.EVEN:
-        short = base == 2 and precision <= tags.SAFE_TWICE
-        return tags.ShortEven() if short else tags.LongEven() if (base, precision) == (2, 53) else tags.Even()
-    return tags.Mode(_CODES[rounding])
+def is_binary32(rules: Rules) -> bool:
+    """Whether the processor's float32 is this format."""
+    return _is_ieee(rules, 24, -126, 127)
+
+
+def is_binary64(rules: Rules) -> bool:
+    """Whether the processor's float64 is this format."""
+    return _is_ieee(rules, 53, -1022, 1023)
+
+
+def _is_ieee(rules: Rules, precision: int, emin: int, emax: int) -> bool:
+    limits = rules.limits
+    if limits is None or limits.fixed or not limits.subnormal or limits.overflow != "raise":
+        return False
+    shape = rules.base, rules.precision, rules.rounding, limits.emin
+    return shape == (2, precision, Rounding.EVEN, emin) and _emax(rules) == emax and _ends_in_nines(rules)
 
 
 def _emax(rules: Rules) -> int:
@@ -247,24 +248,6 @@ def run_tag(rules: Rules, fused: bool, order: Order = "left", block: int = 32) -
     return tag
 
 
-def fusing_tag(rules: Rules) -> tags.Limited | None:
+def fusing_tag(rules: Rules) -> tags.Float | None:
     """Return the tag for fused multiply-add, or sums in another order, of float64, if there is one."""
-    return cast(tags.Limited | None, _float_tag(rules, hardware=False) if rules.base in (2, 16) else None)
-
-
-def check_accumulator(stored: tags.Tag, sums: tags.Tag) -> None:
-    """Check the arithmetic of numbers and that in which their sums of products are accumulated."""
-    for tag in (stored, sums):
-        if not isinstance(tag, tags.FLOATS):
-            raise ValueError(f"got sums kept in {sums} with numbers in {stored}; needed base 2 or 16 for both")
-    if _digits(sums) < _digits(stored):
-        raise ValueError(
-            f"got sums of precision {_digits(sums)} with numbers of precision {_digits(stored)}; needed at least as "
-            "many digits for sums as for numbers"
-        )
-
-
-def _digits(tag: tags.Tag) -> int:
-    if isinstance(tag, tags.Hardware32):
-        return 24
-    return tag.precision if isinstance(tag, tags.Binary | tags.Hexadecimal | tags.Limited) else 53
+    return None if rules.base not in (2, 16) or is_binary64(rules) else _float_tag(rules, fusing=True)

@@ -30,7 +30,7 @@ from gpbnb.arithmetic.kernels.decimal import (
 )
 
 __all__ = [
-    "add", "compare", "divide", "load", "multiply", "multiply_add", "negative", "opposite", "put", "round_", "sqrt",
+    "add", "compare", "divide", "load", "multiply", "negative", "opposite", "put", "round_", "sqrt",
     "subtract",
 ]  # fmt: skip
 
@@ -118,10 +118,3 @@ def subtract(fmt: Any, a: Any, b: Any) -> Any:
 def multiply(fmt: Any, a: Any, b: Any) -> Any:
     m, e = _product(fmt, _rule(fmt, 2 * fmt.precision), a, b)
     return _checked(m, e)
-
-
-@inner(forceinline=True)
-def multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    """fl(c + fl(a * b)); checking the exponent of the sum also detects products out of range."""
-    product, total = _rule(fmt, 2 * fmt.precision), _rule(fmt, _DIGITS)
-    return _sum(fmt, total, c, _product(fmt, product, a, b))

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 LARGEST_SHORT = 8  # precision of ShortDecimal
 SAFE_TWICE = 25  # bits; results rounded to float64 first and then to nearest with this precision are correct
-LEAST, LIMIT = 2.0**-960, 2.0**1023  # magnitudes of Binary and Hexadecimal, from LEAST to below LIMIT
+LEAST, LIMIT = 2.0**-960, 2.0**1023  # magnitudes of Float without a range, from LEAST to below LIMIT
 # Codes of rounding modes. AWAY, EVEN and HALF_UP round to nearest, with ties away from zero, to the even last digit or
 # toward plus infinity. ZERO, UP and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to
 # neighbours with an odd last digit. RANDOM rounds stochastically.
@@ -34,18 +34,20 @@ format into that of the segment, FUSED adds its third operand to a product, NONZ
 and SKIP leaves out as many rows as its second operand says if its truth value is false."""
 
 
-class Binary(NamedTuple):
-    """Base 2, precision 1 to 53; a number is a float64, an array is float64 (...)."""
+class Float(NamedTuple):
+    """Bases 2 and 16 on float64: precision 1 to 53 or 13, any rounding mode and range; an array is float64 (...)."""
 
+    bits: int  # of a digit
     precision: int
-    nearest: bool
-
-
-class Hexadecimal(NamedTuple):
-    """Base 16, precision 1 to 13; a number is a float64, an array is float64 (...)."""
-
-    precision: int
-    nearest: bool
+    mode: int
+    gradual: float  # smaller numbers keep the spacing just above it; 0 without subnormal numbers
+    least: float  # smaller magnitudes, except an exact zero, become `below`
+    below: float
+    lowest: float  # results below it become `under`, results above `largest` become `over`; NaN marks overflow
+    largest: float
+    under: float
+    over: float
+    random: Any  # (2,) uint64: seed and count of random numbers drawn, which RANDOM updates
 
 
 class Decimal(NamedTuple):
@@ -67,70 +69,6 @@ class ShortDecimal(NamedTuple):
 
 class DoubleDouble(NamedTuple):
     """The reference: pairs ``(high, low)`` of float64, relative errors below 2**-102; an array is float64 (..., 2)."""
-
-
-class Two(NamedTuple):
-    """Digits of one bit."""
-
-
-class Sixteen(NamedTuple):
-    """Digits of four bits."""
-
-
-class Even(NamedTuple):
-    """To nearest, ties to the even last digit."""
-
-
-class ShortEven(NamedTuple):
-    """The same in base 2 with at most 25 digits, the mode of most processors, with the fastest loops."""
-
-
-class LongEven(NamedTuple):
-    """The same in base 2 with 53 bits, as the machine rounds float64."""
-
-
-class Mode(NamedTuple):
-    """Any other mode but the random one; the same compiled loop serves them all."""
-
-    code: int  # AWAY to HALF_UP
-
-
-class Random(NamedTuple):
-    """Stochastic rounding; the array holds the seed and the count of random numbers drawn."""
-
-    state: Any  # (2,) uint64
-
-
-class Limited(NamedTuple):
-    """Bases 2 and 16 with any rounding mode and a limited range; a number is a float64, an array is float64 (...)."""
-
-    digits: Any  # Two or Sixteen
-    mode: Any  # Even, ShortEven, LongEven, Mode or Random
-    precision: int
-    gradual: float  # smaller numbers keep the spacing just above it; 0 without subnormal numbers
-    least: float  # smaller magnitudes, except an exact zero, become `below`
-    below: float
-    lowest: float  # results below it become `under`, results above `largest` become `over`; NaN marks overflow
-    largest: float
-    under: float
-    over: float
-
-
-class Hardware32(NamedTuple):
-    """IEEE binary32 with its range and ties to even, computed by the machine; numbers are stored as float64."""
-
-
-class Hardware64(NamedTuple):
-    """IEEE binary64 with its range and ties to even, computed by the machine."""
-
-
-class Free(NamedTuple):
-    """Another arithmetic, for loops whose results do not leave its range, or are checked when the loop has ended.
-
-    Numbers of ``Hardware32`` are then float32, and so are its arrays.
-    """
-
-    tag: Any  # Binary, Hexadecimal, Limited with ShortEven, Hardware32 or Hardware64
 
 
 class LimitedDecimal(NamedTuple):
@@ -173,24 +111,51 @@ def extents_of_sums(n: int, base: int, precision: int, gradual: float, low: floa
     return low * unit / (4 * base), high * growth + n * gradual
 
 
+# -- kinds of numbers, each with compiled loops that take formats as data -------------------------------------------
+
+
+class Quick(NamedTuple):
+    """Bases 2 and 16 on float64, where no number is near the ends of its range."""
+
+
+class Careful(NamedTuple):
+    """Bases 2 and 16 on float64."""
+
+
+class InPairs(NamedTuple):
+    """Base 10 on pairs of int64."""
+
+
+class InShortPairs(NamedTuple):
+    """Base 10 on pairs of int64, with at most 8 digits and no range."""
+
+
+class InTwoWords(NamedTuple):
+    """Up to 113 bits or 34 digits, on three int64."""
+
+
+class Single(NamedTuple):
+    """float32, as the processor computes."""
+
+
+class Double(NamedTuple):
+    """float64, as the processor computes."""
+
+
+class Proved(NamedTuple):
+    """:class:`Quick`, where the sizes of the given numbers prove that no result leaves the quick range."""
+
+
+QUICK_LEAST = 2.0**-480
+"""Least size of numbers of :class:`Quick`, and the inverse of the largest: no product and no quotient of two of them
+leaves float64."""
+
+
 def random_state(tag: Any) -> Any:
     """Return the seed and the count of random numbers of an arithmetic, which its operations update; None if none."""
-    return tag.mode.state if isinstance(tag, Limited) and isinstance(tag.mode, Random) else None
+    return tag.random if isinstance(tag, Float) and tag.mode == RANDOM else None
 
 
-FLOATS = (Binary, Hexadecimal, Limited, Hardware32, Hardware64, Free)  # numbers are single float64
 PAIRS = (Decimal, ShortDecimal, LimitedDecimal)
 
-Tag = (
-    Binary
-    | Hexadecimal
-    | Decimal
-    | ShortDecimal
-    | DoubleDouble
-    | Limited
-    | Hardware32
-    | Hardware64
-    | LimitedDecimal
-    | Free
-    | Wide
-)
+Tag = Float | Decimal | ShortDecimal | DoubleDouble | LimitedDecimal | Wide

@@ -19,8 +19,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import backends
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, TwoWords, backend
-from gpbnb.arithmetic.kernels.machine import Quick
-from gpbnb.arithmetic.kernels.matrices import Double, Proved, Single
+from gpbnb.arithmetic.kernels.tags import Double, Proved, Quick, Single
 from gpbnb.arithmetic.rounding import Rounding, Rules
 
 OPERATIONS = [operator.add, operator.sub, operator.mul, operator.truediv]
