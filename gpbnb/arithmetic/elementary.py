@@ -134,6 +134,11 @@ def _by_float64(name: str, *arrays: Any) -> tuple[Any, Any] | None:
     if not all(isinstance(x.backend, Floats) for x in arrays):
         return None
     given = [x.components[0] for x in arrays]
+    if arrays[0].size == 1:
+        one = _one_by_float64(name, fmt, [x.item() for x in given])
+        if one is None:
+            return None
+        return arrays[0].from_components(fmt.backend, (np.full(given[0].shape, one),), fmt), np.False_
     with np.errstate(all="ignore"):
         y = np.asarray(getattr(np, name)(*given)) + 0.0  # no zero has a sign
         if name in _WHOLE and fmt.limits is None:  # each format has the whole numbers around its numbers
@@ -148,6 +153,24 @@ def _by_float64(name: str, *arrays: Any) -> tuple[Any, Any] | None:
         return None
     low, high = found[0][0], found[0][-1]
     return arrays[0].from_components(fmt.backend, (low,), fmt), (low != high) | unusual
+
+
+def _one_by_float64(name: str, fmt: Any, given: list[float]) -> float | None:
+    """Return the result for one number, or pair of numbers, as :func:`_by_float64` does; None if it is in doubt."""
+    with np.errstate(all="ignore"):
+        y = float(getattr(np, name)(*given)) + 0.0
+    if y == 0 and name in _EXACT:
+        return y
+    if not _FEWEST <= abs(y) <= 1 / _FEWEST:
+        return None
+    if name in _WHOLE and fmt.limits is None:
+        return y
+    try:
+        ends = (y,) if name in _EXACT else (y * _DOUBTED[0], y * _DOUBTED[1])
+        (m, e), *others = {fmt.kernel.from_ratio(*float(each).as_integer_ratio()) for each in ends}
+    except OverflowError:
+        return None
+    return None if others else math.ldexp(m, e * (fmt.base.bit_length() - 1))
 
 
 def _by_arb(name: str, arrays: Any, indices: Iterable[tuple[int, ...]]) -> Any:

@@ -229,12 +229,10 @@ def _run_exactly(
         if o < after:
             continue
         if code <= _DIVIDE or code == _NONZERO:
-            divisor = {_DIVIDE: b, _NONZERO: a}.get(code)
-            if divisor is not None and m[divisor] == 0:
+            if code >= _DIVIDE and m[b if code == _DIVIDE else a] == 0:
                 raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
-            if code == _NONZERO:
-                continue
-            m[out], e[out] = of_two[code](m[a], e[a], m[b], e[b])
+            if code <= _DIVIDE:
+                m[out], e[out] = of_two[code](m[a], e[a], m[b], e[b])
         elif code == _CHOOSE:
             chosen = b if truths[a] else c
             m[out], e[out] = m[chosen], e[chosen]
