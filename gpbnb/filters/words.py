@@ -13,6 +13,7 @@ output, is stored in the format of the data.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from types import FunctionType
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels import backends
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
@@ -47,6 +49,9 @@ _FITS = 62
 """Bits of a product, or of a number of the data, without its sign, up to which compiled loops run."""
 _LONGEST_SUM = 63
 """Bits of a sum without its sign up to which compiled loops run."""
+_FAST = 6
+"""Operations that Python does on its integers in the time of one operation of exact arithmetic on arrays."""
+_done = 0
 
 
 @dataclass(frozen=True)
@@ -321,18 +326,21 @@ def run_integers(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -> NDAr
     ----------
     u, x : (steps, m) and (n,), inputs and first state in units of the data.
     """
-    short = made.is_short and u.dtype != object and x.dtype != object
-    advance, dtype = (_advance, np.int64) if short else (_advance_in_python, object)
-    states, code, state = np.zeros((len(u), made.program.n), dtype), _code(made, dtype), x.astype(dtype)
-    for part in slices(len(u), len(code.operations)):
-        step, operation = advance(code, state, u[part].astype(dtype, copy=False), states[part])
-        if step >= 0:
+    short, count = made.is_short and u.dtype != object and x.dtype != object, len(made.program.operations)
+    advance, dtype = _way(short, len(u) * count)
+    code, states = _code(made, dtype), np.zeros((len(u) + 1, made.program.n), dtype)
+    states[0] = x.astype(dtype)
+    for part in slices(len(u), count):
+        stopped, after = np.full(part.stop - part.start, -1), slice(part.start + 1, part.stop + 1)
+        advance(code, states[part], u[part].astype(dtype, copy=False), states[after], stopped)
+        if (stopped >= 0).any():
+            step = int(np.argmax(stopped >= 0))
+            operation = int(stopped[step])
             kind = "a product" if code.operations[operation, 0] == MULTIPLY else "a sum"
             raise OverflowError(
-                f"overflow in {kind}, operation {operation + 1} of {len(code.operations)}, at step "
-                f"{part.start + step + 1}"
+                f"overflow in {kind}, operation {operation + 1} of {count}, at step {part.start + step + 1}"
             )
-    return states
+    return states[1:].astype(np.int64 if short else object, copy=False)
 
 
 def successors(
@@ -351,30 +359,26 @@ def successors(
     """
     if not made.is_short:
         raise ValueError(f"got words too long for compiled loops: {made.words}; needed products of up to {_FITS} bits")
-    found, code = np.empty(int(np.maximum(counts, 1).prod()), np.int64), _code(made)
-    for part in slices(len(found), len(code.operations)):
-        _follow(code, u.reshape(1, -1), low, counts, part.start, found[part])
+    shape, count = np.maximum(counts, 1), len(made.program.operations)
+    found = np.empty(int(shape.prod()), np.int64)
+    advance, dtype = _way(True, len(found) * count)
+    code, inputs = _code(made, dtype), u.reshape(1, -1).astype(dtype)
+    for part in slices(len(found), count):
+        before = np.stack(np.unravel_index(np.arange(part.start, part.stop), shape), axis=1) + low
+        after, stopped = np.empty(before.shape, dtype), np.full(len(before), -1)
+        advance(code, before.astype(dtype), inputs, after, stopped)
+        at = np.where(counts > 0, after.astype(np.int64) - low, 0)
+        inside = ((at >= 0) & (at < shape)).all(axis=1) & (stopped < 0)
+        at[~inside] = 0
+        found[part] = np.where(inside, np.ravel_multi_index(tuple(at.T), tuple(shape)), -1)
     return found
 
 
-@compiled
-def _follow(code: Any, u: Any, low: Any, counts: Any, first: int, found: Any) -> None:
-    n = low.shape[0]
-    x, states = np.empty(n, np.int64), np.empty((1, n), np.int64)
-    for number in range(found.shape[0]):
-        rest = first + number
-        for i in range(n - 1, -1, -1):
-            size = max(counts[i], 1)
-            x[i] = low[i] + rest % size
-            rest //= size
-        step, _ = _advance(code, x, u, states)
-        following = 0 if step < 0 else -1
-        for i in range(n):
-            at = states[0, i] - low[i] if counts[i] > 0 else 0
-            size = max(counts[i], 1)
-            if following >= 0:
-                following = following * size + at if 0 <= at < size else -1
-        found[number] = following
+def _way(short: bool, operations: int) -> tuple[Callable[..., None], Any]:
+    """Return what takes the next steps, and its type of numbers: Python, or the loop once it is worth its 0.9 s."""
+    global _done
+    _done += operations
+    return (_advance, np.int64) if short and _done > _FAST * backends.LOOPS_AFTER else (_advance_in_python, object)
 
 
 @inner
@@ -412,17 +416,23 @@ def _kept(n: int, over: int, store: Any) -> Any:
 
 
 @compiled
-def _advance(code: Any, x: Any, u: Any, states: Any) -> Any:
-    """Take a step with each row of u; return the step and the operation of an overflow, or -1 for each."""
+def _advance(code: Any, before: Any, u: Any, after: Any, stopped: Any) -> None:
+    """Compute the state after each of some others, which may be the same memory, one step later.
+
+    Parameters
+    ----------
+    before, after : (steps, n). u : (steps, m), or (1, m) for all of them.
+    stopped : (steps,), -1 where no operation overflows, else to be set to its number; the state then stays as it was.
+    """
     operations, factors, shifts, wide, outputs, data, sums, gap, accumulates = code
-    n, m, count = x.shape[0], u.shape[1], operations.shape[0]
-    values = np.zeros(n + m + count, x.dtype)
+    n, m, count = before.shape[1], u.shape[1], operations.shape[0]
+    values = np.zeros(n + m + count, before.dtype)
     bad = False
-    for k in range(u.shape[0]):
+    for k in range(after.shape[0]):
         for i in range(n):
-            values[i] = x[i]
+            values[i] = before[k, i]
         for i in range(m):
-            values[n + i] = u[k, i]
+            values[n + i] = u[k % u.shape[0], i]
         for o in range(count):
             kind, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
             right, over = values[b], 0
@@ -446,12 +456,11 @@ def _advance(code: Any, x: Any, u: Any, states: Any) -> Any:
             if accumulates and not bad and not wide[o]:
                 value, bad = _kept(_shifted(value, gap, data.mode), 0, data)
             if bad:
-                return k, o
+                stopped[k] = o
+                break
             values[n + m + o] = value
         for i in range(n):
-            x[i] = values[outputs[i]]
-            states[k, i] = x[i]
-    return -1, -1
+            after[k, i] = before[k, i] if stopped[k] >= 0 else values[outputs[i]]
 
 
 _IN_PYTHON = {**globals(), "_shifted": _shifted.py_func, "_kept": _kept.py_func}

@@ -57,6 +57,15 @@ def test_cycles_are_those_in_which_runs_from_every_state_end(mode, a1, a2):
     assert sorted(map(len, cycles)) == sorted(cycle.period for cycle in found.cycles)
 
 
+@pytest.mark.usefixtures("loops_at_once")
+def test_no_cycle_has_a_state_that_overflows():
+    """y = 10 + y/2 would rest at 20, beyond 5 bits, so that a run from every state ends with an overflow."""
+    system = LinearSystem.from_coefficients([1], [1, "-0.5"], "direct form I")
+    found = limit_cycles(system, WordFormats(FixedFormat(4, 0), FixedFormat(1, 8)), 10, everywhere=True)
+    assert found.cycles == ()
+    assert found.searched == 32
+
+
 @pytest.mark.parametrize(("a", "period"), [("-0.90625", 1), ("0.90625", 2)])
 def test_the_dead_band_of_a_filter_of_first_order(a, period):
     """|y| stays if the rounding of 0.90625 |y| is |y|: up to half a unit over 1 - 0.90625, which is 5.33."""

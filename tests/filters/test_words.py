@@ -9,10 +9,13 @@ import pytest
 from test_structures import random_filter
 
 from gpbnb import FixedFormat, LinearSystem
+from gpbnb.arithmetic.kernels import backends
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, integers_of, run_words
 from tests.oracles import fixed, limited
+
+pytestmark = pytest.mark.usefixtures("loops_at_once")
 
 MODES = ["nearest", "even", "chop", "up", "down", "odd", "half up"]
 
@@ -33,7 +36,9 @@ def test_a_smoother_in_integers_stops_three_below_its_step():
     assert found.states[-100:, 1].tolist() == [509] * 100
 
 
-def test_overflow_names_operation_and_step():
+@pytest.mark.parametrize("in_python", [False, True])
+def test_overflow_names_operation_and_step(in_python, monkeypatch):
+    monkeypatch.setattr(backends, "LOOPS_AFTER", 1e9 * in_python)
     system = LinearSystem.from_coefficients([1], [1, "-0.9"], "direct form I")
     words = WordFormats(FixedFormat(2, 5), FixedFormat(1, 8))
     with pytest.raises(OverflowError, match="overflow in a sum, operation 3 of 3, at step 2"):
