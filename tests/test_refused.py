@@ -29,6 +29,7 @@ from scipy import signal
 import gpbnb
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounds import gamma, gamma_probabilistic
+from gpbnb.arithmetic.derivatives import jacobian
 from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm, row_sum_norm
 from gpbnb.bounds import inverse
 from gpbnb.bounds.gains import schedule
@@ -36,7 +37,9 @@ from gpbnb.bounds.guarantee import from_schedule
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters import emulation
 from gpbnb.filters.blocks import BLOCKS
-from gpbnb.filters.run import Sums
+from gpbnb.filters.run import Run, Sums
+from gpbnb.filters.simulation import simulated_inputs
+from gpbnb.report.integration import precision, theory
 from gpbnb.wordlength import report
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_measurements
@@ -115,15 +118,18 @@ def stepped(step):
 NAMES = {name: getattr(gpbnb, name) for name in gpbnb.__all__} | {
     each.__name__: each
     for each in (
-        *(ask, blocks, command, driven, given, mapping, model, nonlinear, stepped, replace, Sums),
-        *(FloatArray, FilterLimits, from_schedule, schedule, judge, read_measurements, exact, Decimal, Fraction, date),
-        *(gamma, gamma_probabilistic, max_norm, column_sum_norm, row_sum_norm, arb, control, math, mpmath, operator),
+        *(ask, blocks, command, driven, given, mapping, model, nonlinear, stepped, replace, FloatArray, Run, Sums),
+        *(FilterLimits, from_schedule, schedule, judge, jacobian, simulated_inputs, read_measurements, exact),
+        *(gamma, gamma_probabilistic, max_norm, column_sum_norm, row_sum_norm, Decimal, Fraction, date),
+        *(arb, control, math, mpmath, operator),
     )
 }
 NAMES |= {
     "np": np,
     "emulation": emulation,
     "inverse": inverse,
+    "precision": precision,
+    "theory": theory,
     "signal": signal,
     "D4": (D4 := gpbnb.FloatFormat(10, 4)),
     "B8": (B8 := gpbnb.FloatFormat(2, 8)),

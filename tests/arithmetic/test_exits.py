@@ -288,12 +288,5 @@ def test_a_plant_in_another_format_is_not_rounded_with_its_controller():
     assert "operation by operation: it converts numbers to another format" in str(slowly)
 
 
-def test_numbers_without_a_format_have_nothing_to_convert():
-    with pytest.raises(TypeError, match=r"got a float; needed an array of a format; fmt\.array\(\.\.\.\)"):
-        convert(0.5, FMT)
-    with pytest.raises(TypeError, match="got the format 12; needed a FloatFormat, a FixedFormat, or a name such as"):
-        convert(FMT.array(0.5), 12)
+def test_a_number_is_converted_to_a_named_format():
     assert convert(BINARY64.array("0.1"), "Q3.12").to_fractions() == FixedFormat(3, 12).round("0.1")
-
-
-# -- questions -------------------------------------------------------------------------------------------------------

@@ -48,12 +48,6 @@ def test_operations_on_entries_are_rounded_and_masks_select():
     assert isinstance(FixedFormat(7, 8).array([1, 2]).at[0].set(3), type(FixedFormat(7, 8).array(1)))
     y = x.at[0].set(BINARY32.array("1e-45").on_exact_backend())  # of another backend
     assert y.to_float().tolist() == [float(np.float32(1e-45)), 10, 100]
-    with pytest.raises(ValueError, match=r"got the operand 0\.1; needed a number that"):
-        x.at[0].set(0.1)
-    with pytest.raises(IndexError):
-        x.at[3].set(1)
-    with pytest.raises(ValueError, match=r"shape mismatch|could not broadcast"):
-        x.at[:2].set([1, 2, 3])
 
 
 def matrices(fmt, n, seed):

@@ -145,31 +145,6 @@ class TestFormulas:
         assert bounds.higham(factors, x) == pytest.approx(float(weight) * (sizes @ g).sum(axis=0).max(), rel=1e-2)
 
 
-class TestNothingProved:
-    def test_ill_conditioned(self):
-        fmt = FloatFormat(10, 3)
-        a = fmt.array([["1", "1"], ["1", "1.01"]])
-        x = linalg.inv(a, pivot=True)
-        wrong = fmt.array([[1, 2], [3, 4]])
-        with pytest.raises(ValueError, match="must be below 1 to prove a bound"):
-            bounds.higham(linalg.lu(a), x)
-        with pytest.raises(ValueError, match=r"‖I - AX‖ must be below 1 to prove a bound; it may be as large as 11"):
-            bounds.a_posteriori(a, wrong)
-
-    def test_chopping_has_no_mean_zero(self):
-        fmt = FloatFormat(10, 8, CHOP)
-        a = fmt.array([[2, 1], [1, 3]])
-        with pytest.raises(ValueError, match="needs rounding to nearest"):
-            bounds.higham_probabilistic(linalg.lu(a), linalg.inv(a))
-
-    @pytest.mark.parametrize("preconditioned", [False, True])
-    def test_balls_that_hold_a_singular_matrix(self, preconditioned):
-        fmt = FloatFormat(10, 8)
-        a = fmt.array([[1, 2], [2, 4]])
-        with pytest.raises(ValueError, match="cannot distinguish from a singular one; use more bits"):
-            bounds.ball(a, a, preconditioned)
-
-
 @pytest.mark.parametrize("text", ["0.1", "1e-300", "3", "1e20", "0.3333333333333333333333"])
 def test_rounded_up_to_float64(text):
     flint.ctx.prec = 100

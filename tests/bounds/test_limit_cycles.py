@@ -93,11 +93,3 @@ def test_overflow_that_wraps_oscillates_at_full_size():
     found = limit_cycles(system, words, everywhere=True)
     assert found.largest > 16
     assert limit_cycles(system, words).largest <= limit_cycles(system, words).bound < 8
-
-
-def test_filters_without_rest_are_refused():
-    words = WordFormats(FixedFormat(9, 0), FixedFormat(2, 8))
-    with pytest.raises(ValueError, match="got a filter that is not stable as stored in data of 10 bits"):
-        limit_cycles(LinearSystem.from_coefficients([1], [1, -1]), words)
-    with pytest.raises(ValueError, match="which limits its values"):
-        limit_cycles(LinearSystem.pid(1, 1, limits=(-1, 1)), words)

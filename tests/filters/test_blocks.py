@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, FloatFormat, Form, LinearModel
+from gpbnb import FloatFormat, Form, LinearModel
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.emulation import emulate
-from gpbnb.filters.run import Run, Sums
+from gpbnb.filters.run import Run
 
 GIVEN = {
     "Phi": [["1", "0.1", "0"], ["0", "0.9", "0.3"], ["0", "0", "0.7"]],
@@ -37,12 +37,6 @@ def test_an_overflow_names_the_quantity_of_the_block_whose_range_it_leaves():
         run.take(np.full((3, 1), 9.0) if name == "state" else np.zeros((3, 1)))
         assert run.stopped is not None
         assert quantity in run.reason
-
-
-@pytest.mark.parametrize("options", [{"sums": Sums(fmt=BINARY32)}, {"compensated": True}, {"bounded": True}])
-def test_blocks_go_with_no_other_sums_and_no_bound(options):
-    with pytest.raises(ValueError, match="got formats of blocks with sums, compensated, bounded or many records"):
-        Run(MODEL, BlockFormats.uniform(BINARY32), Form.INNOVATION, [], **options)
 
 
 def test_errors_of_a_run_with_blocks_are_those_from_the_reference():

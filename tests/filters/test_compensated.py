@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 
-from gpbnb.arithmetic import named
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.run import Run
 
 
 def model(**changes: Any) -> LinearModel:
@@ -42,8 +39,3 @@ def test_compensation_keeps_what_a_step_rounds_away() -> None:
         np.abs(emulate(still, z, fmt, Form.INNOVATION, compensated=each).state[-1]).max() for each in (False, True)
     )
     assert kept < plain / 4
-
-
-def test_only_forms_that_add_to_the_estimate_are_compensated() -> None:
-    with pytest.raises(ValueError, match="needed the innovation form or Joseph's"):
-        Run(model(), named.BINARY32, Form.UD, (), compensated=True)

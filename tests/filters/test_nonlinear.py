@@ -149,15 +149,6 @@ def test_a_search_a_survey_and_records_answer_for_a_nonlinear_filter():
     assert blocks.alone == required_precision(linear(), RECORD[:20], 0.01, kind="blocks").alone
 
 
-@pytest.mark.parametrize("basis", ["bound", "guarantee", "probable"])
-def test_no_guarantee_is_claimed(basis):
-    why = "since a bound needs coefficients that do not depend on estimates or inputs"
-    with pytest.raises(ValueError, match=rf'a nonlinear filter, cannot .*, {why}; ask with basis="emulation"'):
-        required_precision(by_functions(), 5, 0.01, basis=basis)
-    with pytest.raises(ValueError, match="emulation"):
-        survey_records(by_functions(), [RECORD], 0.01, [FloatFormat(2, 24)], basis="bound")
-
-
 def test_exact_numbers_may_stand_in_lists():
     """A Jacobian of constants, or of constants beside functions of the state, is the one with arrays of the format."""
 

@@ -42,9 +42,3 @@ def test_eigenvalues_of_a_cascade_are_those_of_its_sections():
     assert eigenvalues(A).tolist() == [0.999] * 3
     turn = np.array([[0, -0.25], [1, 0]])
     assert sorted(eigenvalues(turn), key=lambda z: z.imag) == pytest.approx([-0.5j, 0.5j])
-
-
-@pytest.mark.parametrize("rows", [[[1, 2, 1, 0.5, -0.2]], [1, 2, 1, 0.5, -0.2, 1, 2, 1, 0.5, -0.2]])
-def test_rows_of_five_are_recognised_as_those_of_cmsis(rows):
-    with pytest.raises(ValueError, match="rows of CMSIS-DSP, b0, b1, b2, -a1, -a2, become b0, b1, b2, 1 and the last"):
-        LinearSystem.from_sections(rows)

@@ -11,15 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
 
-from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.integration import precision, theory
+from gpbnb.report.integration import theory
 
 FIRST = theory.first_order(1.7, 3.0)
 RINGING = theory.resonant(1.3, 3.0, 0.2)
-CHOP = Rounding.CHOP
-
-
 # -- the stable evaluation ------------------------------------------------------------------------
 
 MU = np.concatenate(
@@ -183,31 +178,3 @@ def test_folding_is_the_sum_of_the_spectrum(process):
     assert theory.walk_rate(process, 2.0) == pytest.approx(
         2 * float(np.sum(process.psd(2 * np.pi * k * 2.0))), rel=1e-4
     )
-
-
-# -- what is refused ------------------------------------------------------------------------------
-
-NAN = float("nan")
-BAD = [
-    (lambda: theory.langevin(0.0), "got x = 0.0; needed a positive, finite number"),
-    (lambda: theory.walk_factor([1.0, -2.0]), r"got mu = -2.0; needed a positive"),
-    (lambda: theory.walk_factor(NAN), "got mu = nan"),
-    (lambda: theory.integral_variance(-1.0), "got mu = -1.0"),
-    (lambda: theory.random_walk(-1.0, 1.0, 1.0), "got sigma_x = -1.0"),
-    (lambda: theory.random_walk(1.0, 0.0, 1.0), "got omega_bw = 0.0"),
-    (lambda: theory.required_rate(1.0, 1.0, -0.1), "got limit = -0.1"),
-    (lambda: theory.validity(0.0), "got excess = 0.0; needed 1e-9 to 1e3"),
-    (lambda: theory.settling_cycles(1.0, 0.0), "got share = 0.0"),
-    (lambda: theory.first_order(1.0, NAN), "got omega_bw = nan"),
-    (lambda: precision.two_errors(1.0, 1.0, 0.0, 1.5, FloatFormat(2, 24)), "got f_c = 0.0"),
-    (lambda: precision.two_errors(1.0, 1.0, 1.0, 1.5, FloatFormat(2, 24)), "got a duration of 1.5 cycles; needed"),
-    (lambda: precision.correlation_factor(0.0), "got change = 0.0"),
-    (lambda: precision.best_rate(628.0, 3600.0, FloatFormat(2, 16, CHOP)), "at some rate; use more bits"),
-    (lambda: precision.needed_precision(1.0, 1.0, 1e3, share=1e-200), "needed at most 400 bits; allow a larger share"),
-]
-
-
-@pytest.mark.parametrize(("call", "message"), BAD)
-def test_bad_input_is_refused_with_the_cure(call, message):
-    with pytest.raises(ValueError, match=message):
-        call()
