@@ -158,8 +158,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
                 return cls.from_pairs(m, e, fmt)
         random = fmt.rounding is Rounding.STOCHASTIC
         given = np.asarray(values) if type(values) in _PLAIN and not random else values
-        late = type(given) is np.ndarray and not fmt.backend.early(given.size)
-        if late and (components := fmt.backend.from_numbers(given, exactly)) is not None:
+        if type(given) is np.ndarray and (components := fmt.backend.from_numbers(given, exactly)) is not None:
             return cls.from_components(fmt.backend, components, fmt)
         with entering(fmt):
             given = entries(values)
@@ -186,7 +185,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
     @staticmethod
     def _converted(values: FloatArray, fmt: Any) -> Components | None:
         """Round the numbers of another format on the backend of this one; None if it cannot."""
-        if fmt.rounding is Rounding.STOCHASTIC or fmt.backend.early(values.size):
+        if fmt.rounding is Rounding.STOCHASTIC:
             return None
         with entering(fmt):
             check_exit(values, "to_pairs()")
@@ -281,8 +280,6 @@ class FloatArray(ComponentArray, NumPyProtocols):
                 f"got a division by zero{at}; needed a divisor other than zero; test x == 0 before dividing"
             )
         backend, (a, b) = _common((a, b))
-        if backend.early(max(a.size, b.size)):
-            return self._exactly(name, a, b)
         components = backend.apply(name, a.components, b.components)
         return (
             self._binary(name, a.on_exact_backend(), b)
@@ -290,20 +287,12 @@ class FloatArray(ComponentArray, NumPyProtocols):
             else self.from_components(backend, components, self.format)
         )
 
-    def _exactly(self, name: str, *operands: FloatArray) -> FloatArray:
-        """Apply an operation by the exact backend."""
-        pairs = [each.on_exact_backend().components for each in operands]
-        m, e = self.format.exact_backend.apply(name, *pairs)
-        return self.from_pairs(m, e, self.format)
-
     def multiply_add(self, factor: Any, addend: Any) -> FloatArray:
         """Return ``self * factor + addend``, rounded once for each entry, as a processor's fused multiply-add does."""
         arrays = [self, self.operand(factor), self.operand(addend)]
         broadcast("multiply_add", arrays[0].shape, arrays[1].shape)
         broadcast("multiply_add", np.broadcast_shapes(arrays[0].shape, arrays[1].shape), arrays[2].shape)
         backend, found = _common(arrays)
-        if backend.early(max(array.size for array in arrays)):
-            return self._exactly("fused", *found)
         components = backend.apply("fused", *(array.components for array in found))
         if components is None:
             backend, found = self.format.exact_backend, [array.on_exact_backend() for array in arrays]
@@ -316,8 +305,6 @@ class FloatArray(ComponentArray, NumPyProtocols):
             raise NegativeRootError(
                 f"got the square root of a negative number{at}; needed x >= 0; test x < 0 before, or take abs(x)"
             )
-        if name == "sqrt" and self.backend.early(self.size):
-            return self._exactly(name, self)
         components = self.backend.apply(name, self.components)
         return (
             self.on_exact_backend()._unary(name)
@@ -417,9 +404,6 @@ class FloatArray(ComponentArray, NumPyProtocols):
         given: FloatArray = lines(self, axis)
         if not len(given):
             return self._zeros(given.shape[1:]) + of_none
-        if self.backend.early(10 * given.size):
-            m, e = self.on_exact_backend()._reduce(name, axis, of_none).components
-            return self.from_pairs(m, e, self.format)
         if (components := self.backend.fold(name, given.components)) is not None:
             return self.from_components(self.backend, components, self.format)
         total = given[0]
@@ -575,8 +559,7 @@ def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:
         )
     broadcast("matmul", rows.shape[:-2], columns.shape[:-2])
     components = None
-    late = n and rows.backend is columns.backend and not rows.backend.early(2 * rows.size * columns.shape[-1])
-    if late and rows.ndim == columns.ndim == 2:
+    if n and rows.backend is columns.backend and rows.ndim == columns.ndim == 2:
         components = rows.backend.matmul(rows.components, columns.components)
     if n == 0:
         stack = np.broadcast_shapes(rows.shape[:-2], columns.shape[:-2])

@@ -310,7 +310,7 @@ def cumsum(x: Any, axis: int | None = None) -> Any:
     if not len(given):
         return x
     backend, entries = given.backend, given.components  # which derivatives do not have, and so are refused
-    if not backend.early(10 * given.size) and (components := backend.scan(entries)) is not None:
+    if (components := backend.scan(entries)) is not None:
         whole: Any = given.from_components(backend, components, given.format)
         return whole if axis is None else whole.moved(lambda a: np.moveaxis(a, 0, axis))
     sums = [given[0]]

@@ -446,7 +446,7 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
     if not isinstance(backend, Looped):
         return None
     entries = a.components  # which derivatives do not have, and so are refused
-    if backend.early(len(a) ** 3) or (found := backend.factored(entries, pivot)) is None:
+    if (found := backend.factored(entries, pivot)) is None:
         return None
     factors, order, column = found
     if column >= 0:
@@ -459,8 +459,7 @@ def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
     backend = a.backend
     if not isinstance(backend, Looped) or b.backend is not backend:
         return None
-    entries = b.components
-    if backend.early(len(a) * entries[0].size) or (compiled := _factored(a, pivot)) is None:
+    if (compiled := _factored(a, pivot)) is None:
         return None
     factors, order = compiled
     found = backend.solved(factors.components, b[order].components)

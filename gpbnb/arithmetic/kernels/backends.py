@@ -69,10 +69,6 @@ class Backend(ABC):
         """Restart the random numbers of stochastic rounding."""
         self.kernel.restart()
 
-    def early(self, operations: int) -> bool:
-        """Whether the exact backend has done these operations, the next of its kind, before their loop is compiled."""
-        return False
-
     @abstractmethod
     def from_exact(self, m: Array, e: Array) -> Components | None:
         """Convert normalized pairs of Python integers to components; None if they do not fit."""
@@ -190,23 +186,44 @@ class Looped(Backend):
     def __reduce__(self) -> tuple[Any, ...]:
         return backend, (self.rules,)
 
-    def early(self, operations: int) -> bool:
+    def _early(self, operations: int) -> bool:
+        """Whether these operations, the next of their kind, come so early that no loop is compiled for them."""
         kind = type(self.tag)
         _DONE[kind] += operations
         return _DONE[kind] <= LOOPS_AFTER and random_state(self.tag) is None
 
+    def from_numbers(self, values: Array, exactly: bool) -> Components | None:
+        return None if self._early(values.size) else self._from_numbers(values, exactly)
+
+    @abstractmethod
+    def _from_numbers(self, values: Array, exactly: bool) -> Components | None: ...
+
+    def from_backend(self, other: Backend, components: Components) -> Components | None:
+        return None if self._early(components[0].size) else self._from_backend(other, components)
+
     def apply(self, name: str, *operands: Components) -> Components | None:
+        if name in ("negative", "absolute"):
+            return self._signed(name, operands[0])
+        shape = _shape(*operands)
+        if name != "round_" and self._early(math.prod(shape)):
+            pairs = self.exact.apply(name, *map(self.to_exact, operands))
+            return self.from_exact(*(np.asarray(part, dtype=object) for part in pairs))
+        return self._applied(name, shape, [tuple([_flat(part, shape) for part in each]) for each in operands])
+
+    @abstractmethod
+    def _signed(self, name: str, components: Components) -> Components | None:
+        """Return opposites or absolute values, if the format has all of them."""
+
+    def _applied(self, name: str, shape: tuple[int, ...], flat: Sequence[Components]) -> Components | None:
         tag = self.fusing_tag if name == "fused" else self.tag
         if tag is None:
-            return self._fused_in_two_words(*operands)
-        shape = _shape(*operands)
+            fused = self._fused_in_two_words(*flat)
+            return None if fused is None else tuple(part.reshape(shape) for part in fused)
         size = math.prod(shape)
-        out = self._empty(size)
-        flat = [tuple([_flat(part, shape) for part in components]) for components in operands]
         if name == "round_" and 0 < size <= _FEW:
             found = machine.rounded(*self._machine, self.pack(flat[0]))
             return None if found is None else tuple(part.reshape(shape) for part in self.unpack(found))
-        inputs = [self._seen(each) for each in flat]
+        out, inputs = self._empty(size), [self._seen(each) for each in flat]
         try:
             gone = _along(_loops().ENTRIES[name], (tag,), size, *inputs, self._seen(out))
         except OverflowError:
@@ -230,20 +247,26 @@ class Looped(Backend):
         return None if found is None else self.from_two_words(found)
 
     def fold(self, name: str, components: Components) -> Components | None:
-        numbers = self._accumulated(name, components)
-        return None if numbers is None else self.unpack(numbers[-1])
+        found = self._accumulated(name, components)
+        return None if found is None else self.unpack(found[-1])
 
     def scan(self, components: Components) -> Components | None:
-        numbers = self._accumulated("add", components)
-        return None if numbers is None else self.unpack(numbers)
+        found = self._accumulated("add", components)
+        return None if found is None else self.unpack(found)
 
     def _accumulated(self, name: str, components: Components) -> Array | None:
         """Combine rows from left to right; return each result, or None if the format does not have one."""
+        if self._early(10 * components[0].size):
+            return None
         numbers = self.pack(components)
-        rows = numbers.reshape(len(numbers), -1, self.count)
-        return numbers if machine.accumulate(*self._machine, name, rows) else None
+        return numbers if self._accumulate(name, numbers) else None
 
-    def from_backend(self, other: Backend, components: Components) -> Components | None:
+    def _accumulate(self, name: str, numbers: Array) -> bool:
+        """Combine packed rows, each with the result before it; return whether the format has all of them."""
+        width = math.prod(numbers.shape[1 : numbers.ndim - (self.count > 1)])
+        return machine.accumulate(*self._machine, name, numbers.reshape(len(numbers), width, self.count))
+
+    def _from_backend(self, other: Backend, components: Components) -> Components | None:
         """Round numbers of a backend with significands of one or two words."""
         if self.wide is None or not isinstance(other, Pairs | TwoWords) or other.wide is None:
             return None
@@ -286,7 +309,7 @@ class Looped(Backend):
 
     def compare(self, a: Components, b: Components) -> Array:
         shape = _shape(a, b)
-        if self.early(math.prod(shape)):
+        if self._early(math.prod(shape)):
             return self.exact.compare(self.to_exact(a), self.to_exact(b))
         order = np.empty(math.prod(shape), np.int8)
         x, y = (tuple(_flat(part, shape) for part in components) for components in (a, b))
@@ -296,6 +319,8 @@ class Looped(Backend):
     def matmul(self, a: Components, b: Components) -> Components | None:
         """Multiply matrices, in the first kind of numbers that holds all results."""
         (rows, count), columns = a[0].shape, b[0].shape[1]
+        if self._early(2 * rows * count * columns):
+            return None
         for kind, (x, y) in self._attempts([a, b], rows * count * columns, copy=None):
             c = np.empty((rows, columns, *x.shape[2:]), x.dtype)
             given = kind, *self._of_loops, *map(_fixed, (x, y)), c.reshape(-1)
@@ -307,7 +332,10 @@ class Looped(Backend):
 
     def factored(self, a: Components, pivot: bool) -> tuple[Components, NDArray[np.intp], int] | None:
         """Factor a matrix; return both factors in one, the order of rows and the column of a zero pivot, or below 0."""
-        n, loops = len(a[0]), _matrices()
+        n = len(a[0])
+        if self._early(n**3):
+            return None
+        loops = _matrices()
         for kind, (x,) in self._attempts([a]):
             order, column = np.arange(n), loops.NONE
             with contextlib.suppress(OverflowError):
@@ -322,6 +350,8 @@ class Looped(Backend):
     def solved(self, factors: Components, b: Components) -> Components | None:
         """Solve for right-hand sides (n, p), in the order of the factored matrix."""
         n, p = b[0].shape
+        if self._early(n * n * p):
+            return None
         for kind, (x, y) in self._attempts([factors, b]):
             gone, given = False, (kind, *self._of_loops, _fixed(x))
             with contextlib.suppress(OverflowError):
@@ -409,7 +439,7 @@ class Floats(Compiled):
         e = np.where(x == 0, 0, e)
         return np.ldexp(x, -self.bits * e).astype(np.int64), np.zeros(x.shape, np.int64), e
 
-    def from_numbers(self, values: Array, exactly: bool) -> Components | None:
+    def _from_numbers(self, values: Array, exactly: bool) -> Components | None:
         kind, size = values.dtype.kind, values.dtype.itemsize
         if kind not in "fiu" or size > 8:
             return None
@@ -419,50 +449,37 @@ class Floats(Compiled):
         components = self.apply("round_", (x,))
         return None if components is None or (exactly and not np.array_equal(components[0], x)) else components
 
-    def from_backend(self, other: Backend, components: Components) -> Components | None:
+    def _from_backend(self, other: Backend, components: Components) -> Components | None:
         if isinstance(other, Floats):
             return self.apply("round_", components)
-        return super().from_backend(other, components)
+        return super()._from_backend(other, components)
 
     def from_two_words(self, components: Components) -> Components | None:
         return self.from_exact(components[0], components[2])  # with at most 53 bits, the lower word is empty
 
-    def apply(self, name: str, *operands: Components) -> Components | None:
-        if name in ("negative", "absolute") and not self._has_opposites(operands[0][0]):
+    def _signed(self, name: str, components: Components) -> Components | None:
+        x = components[0]
+        if not self._has_opposites(x):
             return None
-        if name == "negative":
-            return (np.asarray(0.0 - operands[0][0]),)
-        if name == "absolute":
-            return (np.asarray(np.abs(operands[0][0])),)
-        shape = _shape(*operands)
-        size, flat = math.prod(shape), [_flat(each[0], shape) for each in operands]
+        return (np.asarray(0.0 - x if name == "negative" else np.abs(x)),)
+
+    def _applied(self, name: str, shape: tuple[int, ...], flat: Sequence[Components]) -> Components | None:
+        size, numbers = math.prod(shape), [each[0] for each in flat]
         if name == "round_" and 0 < size <= _FEW and not (_floats.cache_info().currsize or self._random):
-            found = machine.rounded(*self._machine, flat[0])
+            found = machine.rounded(*self._machine, numbers[0])
             return None if found is None else (found.reshape(shape),)
         code, (_, formats), loops = machine.CODES[_CODED.get(name, name)], self._machine, _floats()
-        out, given, gone = np.empty(size), (*flat, flat[0], flat[0])[:3], False
+        out, given, gone = np.empty(size), (*numbers, numbers[0], numbers[0])[:3], False
         for part in slices(size):
-            numbers = formats.address, code, part.stop - part.start, *(each[part] for each in given), out[part]
-            gone |= bool((self._random or loops.along(*numbers)) and loops.carefully_along(*numbers))
+            here = formats.address, code, part.stop - part.start, *(each[part] for each in given), out[part]
+            gone |= bool((self._random or loops.along(*here)) and loops.carefully_along(*here))
         return None if gone else (out.reshape(shape),)
 
-    def fold(self, name: str, components: Components) -> Components | None:
-        a = components[0]
-        out = np.array(a[0], np.float64, order="C")
-        return (out,) if self._accumulate(name, a, out, 0) else None
-
-    def scan(self, components: Components) -> Components | None:
-        out = np.empty(components[0].shape)
-        out[:1] = components[0][:1]
-        return (out,) if self._accumulate("add", components[0], out, 1) else None
-
-    def _accumulate(self, name: str, a: Array, out: Array, keep: int) -> bool:
-        """Combine rows from left to right, in `out` or its rows; return whether the format has all results."""
-        width, flat, found, gone = math.prod(a.shape[1:]), _flat(a, a.shape), out.reshape(-1), False
+    def _accumulate(self, name: str, numbers: Array) -> bool:
+        width, flat, gone = math.prod(numbers.shape[1:]), numbers.reshape(-1), False
         code, (_, formats), loops = machine.CODES[name], self._machine, _floats()
-        for part in slices(len(a) - 1, width):
-            rows = part.start + 1, part.stop + 1
-            gone |= bool(loops.accumulate(formats.address, code, rows, width, keep, flat, found))
+        for part in slices(len(numbers) - 1, width):
+            gone |= bool(loops.accumulate(formats.address, code, (part.start + 1, part.stop + 1), width, flat))
         return not gone
 
     def matmul(self, a: Components, b: Components) -> Components | None:
@@ -538,7 +555,7 @@ class Pairs(Compiled):
     def to_exact(self, components: Components) -> Components:
         return components[0].astype(object), components[1].astype(object)
 
-    def from_numbers(self, values: Array, exactly: bool) -> Components | None:
+    def _from_numbers(self, values: Array, exactly: bool) -> Components | None:
         if values.dtype.kind == "f" and values.dtype.itemsize <= 8:
             return self._from_floats(values.astype(np.float64, copy=False), exactly)
         if values.dtype.kind not in "iu":
@@ -566,12 +583,12 @@ class Pairs(Compiled):
                 return None
         return tuple(part.reshape(x.shape) for part in out)
 
-    def from_backend(self, other: Backend, components: Components) -> Components | None:
+    def _from_backend(self, other: Backend, components: Components) -> Components | None:
         if isinstance(other, Pairs):
             return self.apply("round_", components)
         if isinstance(other, Floats):
-            return self.from_numbers(components[0], exactly=False)
-        return super().from_backend(other, components)
+            return self._from_numbers(components[0], exactly=False)
+        return super()._from_backend(other, components)
 
     def in_two_words(self, components: Components) -> Components:
         return components[0], np.zeros(components[0].shape, np.int64), components[1]
@@ -579,12 +596,9 @@ class Pairs(Compiled):
     def from_two_words(self, components: Components) -> Components:
         return components[0], components[2]  # with at most 18 digits, the lower word is empty
 
-    def apply(self, name: str, *operands: Components) -> Components | None:
-        if name == "negative":
-            return np.asarray(-operands[0][0]), operands[0][1]
-        if name == "absolute":
-            return np.asarray(np.abs(operands[0][0])), operands[0][1]
-        return super().apply(name, *operands)
+    def _signed(self, name: str, components: Components) -> Components:
+        m, e = components
+        return np.asarray(-m if name == "negative" else np.abs(m)), e
 
     def sort_keys(self, components: Components) -> Components:
         m, e = components
@@ -592,7 +606,7 @@ class Pairs(Compiled):
         return m, sign * e, sign
 
     def to_float(self, components: Components) -> Array:
-        if self.early(components[0].size):
+        if self._early(components[0].size):
             return self.exact.to_float(self.to_exact(components))
         m, e = (_flat(part, components[0].shape) for part in components)
         x, states = np.empty(m.size), np.empty(m.size, np.int8)
@@ -623,7 +637,7 @@ class TwoWords(Looped):
         size[...] = (abs(cast(Any, high)) << self.tag.split) | low  # NumPy makes a single entry a plain int
         return np.where(components[0] < 0, -size, size), e
 
-    def from_numbers(self, values: Array, exactly: bool) -> Components | None:
+    def _from_numbers(self, values: Array, exactly: bool) -> Components | None:
         kind, size = values.dtype.kind, values.dtype.itemsize
         if kind == "f" and size <= 8:
             m, e = np.frexp(values.astype(np.float64, copy=False))
@@ -645,10 +659,10 @@ class TwoWords(Looped):
         fractions = {int(i): Fraction(int(m.flat[i])) * Fraction(2) ** int(e.flat[i]) for i in hard}
         return tuple(part.reshape(m.shape) for part in out) if self._fill(out, fractions) else None
 
-    def from_backend(self, other: Backend, components: Components) -> Components | None:
+    def _from_backend(self, other: Backend, components: Components) -> Components | None:
         if isinstance(other, Floats):
-            return self.from_numbers(components[0], exactly=False)
-        return super().from_backend(other, components)
+            return self._from_numbers(components[0], exactly=False)
+        return super()._from_backend(other, components)
 
     def in_two_words(self, components: Components) -> Components:
         return components
@@ -660,10 +674,8 @@ class TwoWords(Looped):
     def from_two_words(self, components: Components) -> Components:
         return components
 
-    def apply(self, name: str, *operands: Components) -> Components | None:
-        if name not in ("negative", "absolute"):
-            return super().apply(name, *operands)
-        high, low, e = operands[0]
+    def _signed(self, name: str, components: Components) -> Components | None:
+        high, low, e = components
         limits = self.rules.limits
         if limits is not None and limits.fixed and np.any((high == self.tag.lowest[0]) & (e == self.tag.lowest[2])):
             return None  # the opposite of the lowest number is not in the format
@@ -676,7 +688,7 @@ class TwoWords(Looped):
 
     def to_float(self, components: Components) -> Array:
         shape = components[0].shape
-        if self.early(components[0].size):
+        if self._early(components[0].size):
             return self.exact.to_float(self.to_exact(components))
         x, states = np.empty(math.prod(shape)), np.empty(math.prod(shape), np.int8)
         parts = tuple(_flat(part, shape) for part in components)

@@ -221,22 +221,16 @@ def carefully_along(formats: int, operation: int, n: int, a: Any, b: Any, c: Any
 
 
 @compiled
-def accumulate(formats: int, operation: int, rows: Any, width: int, keep: int, a: Any, out: Any) -> Any:
-    """Combine rows from left to right; return whether the format does not have one of the results.
-
-    Parameters
-    ----------
-    rows : the first row to combine with the result of those before it, and the row at which to stop.
-    keep : 1 if `out` has a row for each result, 0 if it has one for the last.
-    """
+def accumulate(formats: int, operation: int, rows: Any, width: int, numbers: Any) -> Any:
+    """Combine each of some rows with the one before it; return whether the format does not have one of the results."""
     table, any_gone = words(formats), False
     fmt = masked(entries(table, WHOLE, np.int64), entries(table, NUMBER, np.float64))
-    random, given, found = entries(table, RANDOM, np.uint64), start(a), start(out)
+    random, found = entries(table, RANDOM, np.uint64), start(numbers)
     how, rule = rule_of(table, 0)
     for j in range(width):
-        x = found[keep * (rows[0] - 1) * width + j]
+        x = found[(rows[0] - 1) * width + j]
         for i in range(rows[0], rows[1]):
-            y = given[i * width + j]
+            y = found[i * width + j]
             z, gone = x, np.int64(1)
             if how != NONE:
                 z, gone = basic(operation, how, rule, x, y)
@@ -245,5 +239,5 @@ def accumulate(formats: int, operation: int, rows: Any, width: int, keep: int, a
                 z = carefully(fmt, random, operation, x, y, y)
                 any_gone |= z != z
             x = z
-            found[keep * i * width + j] = x
+            found[i * width + j] = x
     return any_gone
