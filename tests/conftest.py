@@ -1,6 +1,11 @@
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+
+# Read when numpy is first imported, here and by the kernels of the notebooks. Threads wait in loops for each other,
+# which takes more seconds than they save if there is a process of tests on every core.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import matplotlib
 import pytest
