@@ -9,11 +9,14 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gpbnb.arithmetic.interpreting import Call
 from gpbnb.arithmetic.machine import NAMES
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedTruth
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.program import (
     ADD,
     AT_LEAST,
@@ -56,26 +59,61 @@ def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
     -------
     program : its states are x (n), then the entries of P, or in the UD form the upper triangle of U.
     """
-    (m, n), upper = shapes["H"], form is Form.UD
+    m, n = shapes["H"]
     unknown = (Known(letter, shape, bytes([2]) * math.prod(shape)) for letter, shape in shapes.items())
     tape, places, found = whole_step(StepKind(form, n, m, tuple(unknown)))
-    kept = [(i, j) for i in range(n) for j in range(n) if not upper or i <= j]
-    states = [*places["x"].tolist(), *(int(places["P"][at]) for at in kept)]
-    inputs = [each for letter in ("z", "u") if letter in places for each in places[letter].tolist()]
-    matrices = [letter for letter in shapes if letter != "u"]
-    order = [*(at for letter in matrices for at in places[letter].ravel().tolist()), 0, tape.one]
+    del places["carried"]
+    return filter_program(form, tape, places, {}, (found.x, found.P), found.definite)
+
+
+def filter_program(
+    form: Form,
+    tape: Tape,
+    places: dict[str, NDArray[np.int64]],
+    others: dict[int, Any],
+    after: Sequence[Any],
+    definite: Any,
+    exact: bool = True,
+) -> Program:
+    """List the operations of a step of a filter whose states are those of :func:`program_states`.
+
+    Parameters
+    ----------
+    places : those of x, P and z, of the known inputs u if there are any, and of matrices by their letters. Coefficients
+        are the entries of the matrices in this order, then the others, 0 and 1.
+    others : values of other coefficients by their places; 0 if they may be zero.
+    after : x and P after the step.
+    exact : as for :class:`Listing`.
+    """
+    x, P, z = (places[letter] for letter in "xPz")
+    u = places.get("u", np.zeros(0, np.int64))
+    matrices = {letter: each for letter, each in places.items() if letter not in ("x", "P", "z", "u")}
+    order = [*(at for each in matrices.values() for at in each.ravel().tolist()), *others, 0, tape.one]
+    states = program_states(form, x[None], P[None])[0].tolist()
+    zeros = dict.fromkeys({*P.ravel().tolist()} - {*states}, len(order) - 2)
     listing = Listing(
         tape,
         states,
-        inputs,
-        {place: i for i, place in enumerate(order)},
-        {tape.one},
+        [*z.tolist(), *u.tolist()],
+        {at: i for i, at in enumerate(order)} | zeros,
+        {tape.one, *(at for at, value in others.items() if value)},
+        exact,
     )
-    P = found.P.components[0]
-    state_names = [*entries("x", n), *(f"{'U' if upper else 'P'}[{i}][{j}]" for i, j in kept)]
-    names = [each for letter in matrices for each in entries(letter, *shapes[letter])]
-    after = [*found.x.components[0].tolist(), *(int(P[at]) for at in kept)]
-    return listing.program(after, len(order), 0, state_names, [*names, "zero", "one"], found.definite)
+    names = [each for letter, at in matrices.items() for each in entries(letter, *at.shape)]
+    names += [*(f"c{i}" for i in range(len(others))), "zero", "one"]
+    letter = "U" if form is Form.UD else "S" if form in ROOTS else "P"
+    named = (np.array(entries(each, *at.shape)).reshape(1, *at.shape) for each, at in (("x", x), (letter, P)))
+    state_names, following = (
+        program_states(form, *pair)[0].tolist() for pair in (named, (each.components[0][None] for each in after))
+    )
+    return listing.program(following, len(order), 0, state_names, names, definite)
+
+
+def program_states(form: Form, x: Any, P: Any) -> Any:
+    """Return estimates (k, n), then the entries of P, (k, n, n), that are not always zero, as states of a program."""
+    n, upper = x.shape[1], form in (Form.UD, Form.CARLSON)
+    kept = [n * i + j for i in range(n) for j in range(n) if not upper or i <= j]
+    return np.concatenate([x, P.reshape(len(P), n * n)[:, kept]], axis=1)
 
 
 _OF_TWO = {"add": ADD, "subtract": SUBTRACT, "multiply": PRODUCT, "divide": DIVIDE}

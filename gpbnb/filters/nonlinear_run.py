@@ -18,11 +18,11 @@ from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints, Progress
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import ROOTS, Form
-from gpbnb.filters.listing import Listing
+from gpbnb.filters.listing import filter_program
 from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.opening import double_doubles_of
-from gpbnb.filters.program import Program, entries
+from gpbnb.filters.program import Program
 from gpbnb.filters.recording import block_algebra
 from gpbnb.filters.reference import PreciseSteps, agreed, joined
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
@@ -46,6 +46,9 @@ NONLINEAR_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD, Form.SYMMETRIZED, *ROO
 
 BLOCK_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms of an extended filter whose blocks may have formats of their own."""
+
+
+_WEIGHTS = ("scale", "means", "covariances")
 
 
 class _Ahead(NamedTuple):
@@ -97,7 +100,7 @@ class NonlinearRun(Progress):
         #: What a step is given of the model, in cycles, by names.
         self.given = {letter: given[letter] for letter in "QR"}
         if model.method == "unscented":
-            weights = zip(("scale", "means", "covariances"), model.weights(), strict=True)
+            weights = zip(_WEIGHTS, model.weights(), strict=True)
             self.given |= {name: of_state.array(np.array([each])) for name, each in weights}
         if model.u is not None:
             self.given["u"] = of_state.array(model.u)
@@ -165,21 +168,10 @@ class NonlinearRun(Progress):
 
     # -- one step ---------------------------------------------------------------------------------------
 
-    @property
-    def kept(self) -> list[tuple[int, int]]:
-        """The entries of the covariance, its factors or its root that are not always zero."""
-        upper = self.form in (Form.UD, Form.CARLSON)
-        return [(i, j) for i, j in np.ndindex(self.model.n, self.model.n) if not upper or i <= j]
-
-    def held(self, x: FloatArray, P: FloatArray) -> FloatArray:
-        """Return estimates (k, n) and covariances (k, n, n), or factors or roots, as states of a program, (k, ...)."""
-        at = [i * self.model.n + j for i, j in self.kept]
-        return cast(Any, np.concatenate)([x, P.reshape(len(P), -1)[:, at]], axis=1)
-
     def program(self, exact: bool = True) -> tuple[Program, list[NDArray[Any]]]:
         """Return the operations of a step, and its coefficients but 0 and 1, which are the last, each with its cycle.
 
-        States are x (n), then the entries of P that are kept; inputs are the measurements, then the known inputs.
+        Inputs are the measurements, then the known inputs.
 
         Parameters
         ----------
@@ -190,38 +182,13 @@ class NonlinearRun(Progress):
         ValueError : the step cannot be traced, or has a function that C lacks; the message says why.
         """
         found = self._step.recorded(self._step.given(self._stored(np.zeros(self.model.m))))
-        tape, (x, P, z, *places) = found.tape, found.places
-        cycles = {name: (cycle, at) for (name, cycle), at in zip(self.given.items(), places, strict=True)}
-        _, u = cycles.pop("u", (None, np.array([], int)))
-        members = [cycle.reshape(len(cycle), *cycle.shape[1:] or (1,)).to_fractions() for cycle, _ in cycles.values()]
-        known = [at for _, each in cycles.values() for at in each.ravel().tolist()]
+        tape, places = found.tape, dict(zip(("x", "P", "z", *self.given), found.places, strict=True))
+        weights = [at for name in _WEIGHTS if name in places for at in places.pop(name).ravel().tolist()]
         constants = {at: value for at, value in tape.constants_in(self.fmt).items() if at not in (0, tape.one)}
-        members.append(np.array([list(constants.values())], dtype=object))
-        order = [*known, *constants, 0, tape.one]
-        states = [*x.tolist(), *(int(P[at]) for at in self.kept)]
-        zeros = {*P.ravel().tolist()} - {*states}
-        coefficients = {at: i for i, at in enumerate(order)} | dict.fromkeys(zeros, len(order) - 2)
-        listing = Listing(
-            tape,
-            states,
-            [*z.tolist(), *u.tolist()],
-            coefficients,
-            {tape.one, *(at for at, value in constants.items() if value)},
-            exact,
-        )
-        after, covariance = (each.components[0] for each in found.taken.states)
-        letter = "U" if self.form is Form.UD else "S" if self.form in ROOTS else "P"
-        names = [each for one, cycle in zip("QR", members, strict=False) for each in entries(one, *cycle.shape[1:])]
-        names += [f"c{i}" for i in range(len(order) - len(names) - 2)]
-        program = listing.program(
-            [*after.tolist(), *(int(covariance[at]) for at in self.kept)],
-            len(order),
-            0,
-            [*entries("x", len(x)), *(f"{letter}[{i}][{j}]" for i, j in self.kept)],
-            [*names, "zero", "one"],
-            found.taken.definite,
-        )
-        return program, members
+        others, taken = dict.fromkeys(weights, 0) | constants, found.taken
+        program = filter_program(self.form, tape, places, others, taken.states, taken.definite, exact)
+        cycles = (each.reshape(len(each), -1).to_fractions() for name, each in self.given.items() if name != "u")
+        return program, [*cycles, np.array([list(constants.values())], dtype=object)]
 
     def _stepped(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
         blocks = block_algebra([formats[i] for i in self._blocks_at])
@@ -268,7 +235,7 @@ class NonlinearRun(Progress):
             lambda x: model.value("f", x, u),
             lambda x: model.value("h", x, u),
             lambda a, b: _seen(given, model.difference(a, b)),
-            *(given[name] for name in ("scale", "means", "covariances", "Q", "R")),
+            *(given[name] for name in (*_WEIGHTS, "Q", "R")),
         )
         found = unscented_step(blocks.state, step, x, P, given["z"])
         return StepTaken((found.x, found.P), (found.K,), found.definite)

@@ -30,7 +30,7 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.files import replace_file
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, Form, form_named, form_with_program, plain_name
-from gpbnb.filters.listing import kalman_program
+from gpbnb.filters.listing import kalman_program, program_states
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun, simulated
@@ -361,12 +361,14 @@ def _of_nonlinear_model(model: NonlinearModel, fmt: AnyFormat, form: Form, exact
     run = NonlinearRun(model, _one_format(fmt), form)  # type: ignore[arg-type]
     program, members = run.program(exact)
     stored = _coefficients(members)
-    step = CodeStep(without_exact(program, stored), stored, run.held(run.x[None], run.P[None])[0].to_fractions())
+    step = CodeStep(
+        without_exact(program, stored), stored, program_states(form, run.x[None], run.P[None])[0].to_fractions()
+    )
 
     def emulated(z: Any, fmt: Any) -> Vectors:
         run = NonlinearRun(model, fmt, form)
-        start = _stored(run.held(run.x[None], run.P[None])[0], fmt)
-        states = [_stored(run.held(*each.states), fmt) for each in run.blocks(z)]
+        start = _stored(program_states(form, run.x[None], run.P[None])[0], fmt)
+        states = [_stored(program_states(form, *each.states), fmt) for each in run.blocks(z)]
         inputs = fmt.array(z)
         if model.u is not None:
             inputs = np.concatenate([inputs, fmt.array(model.u[: len(z)])], axis=1)
@@ -418,7 +420,7 @@ def _of_model(model: LinearModel, fmt: AnyFormat, form: Form | str) -> Prepared:
     given = {letter: run.exactly(each) for letter, each in run.letters.items()}
     stored = _coefficients([each for letter, each in given.items() if letter != "u"])
     program = kalman_program(chosen, {letter: each.shape[1:] for letter, each in given.items()})
-    start = _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), chosen)[0]
+    start = program_states(chosen, run.exactly(run.x.T), run.exactly(run.P[None]))[0]
     step = CodeStep(without_exact(program, stored), stored, start)
 
     return Prepared(
@@ -441,13 +443,6 @@ def _coefficients(members: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return np.concatenate([np.array(rows, dtype=object), constants, constants + 1], axis=1)
 
 
-def _flat(x: NDArray[Any], P: NDArray[Any], form: Form) -> NDArray[Any]:
-    """Return estimates and covariances, or factors, as :func:`gpbnb.filters.listing.kalman_program` has its states."""
-    n = x.shape[1]
-    kept = [(i, j) for i in range(n) for j in range(n) if form is not Form.UD or i <= j]
-    return np.concatenate([x[..., 0], np.stack([P[:, i, j] for i, j in kept], axis=-1)], axis=-1)
-
-
 def _statuses(steps: int, indefinite: int | None) -> NDArray[np.int64]:
     """Return the status of each step, given the first step in which a variance is not positive."""
     status = np.zeros(steps, np.int64)
@@ -464,8 +459,8 @@ def _model_vectors(model: LinearModel, z: Any, fmt: FloatFormat | FixedFormat, f
         """Return numbers, exact in float64, as the code stores them."""
         return numbers if isinstance(fmt, FloatFormat) else np.ldexp(numbers, fmt.fraction_bits).astype(np.int64)
 
-    start = stored(_flat(run.x[None], run.P[None], form))
-    states = np.concatenate([start[:0], *(stored(_flat(x[1:], P[1:], form)) for x, P in run.blocks(z))])
+    start = stored(program_states(form, run.x.T, run.P[None]))
+    states = np.concatenate([start[:0], *(stored(program_states(form, x[1:, :, 0], P[1:])) for x, P in run.blocks(z))])
     inputs = fmt.array(z).to_float()
     if model.u is not None:
         u = np.broadcast_to(model.u, (len(z), model.u.shape[-1])) if model.u.ndim == 1 else model.u[: len(z)]
