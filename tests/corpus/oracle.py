@@ -66,14 +66,10 @@ class Fading(plain_filters.Filter):
 
 
 def filtered(model: Model, z: Any, fmt: Format, form: str, **options: Any) -> Steps:
-    numbers, each = Numbers.of(fmt), None
+    numbers, each = in_blocks(fmt, options.get("blocks"))
     if "sums" in options:
         order, fused, block, wider = options["sums"]
         numbers = Numbers.of(fmt, wider, order=order, fused=fused, block=block)
-    if "blocks" in options:
-        formats = {name: given for name, given in options["blocks"].items() if name != "sums"}
-        numbers = Numbers.of(max(formats.values(), key=lambda given: given.precision))
-        each = {name: Numbers.of(given, options["blocks"].get("sums")) for name, given in formats.items()}
     compensated = form == "compensated" or options.get("compensated", False)
     kind = plain_filters.Filter
     if isinstance(fmt, Float) and fmt.base != 10 and fmt.emin is None and each is None:
@@ -85,6 +81,15 @@ def filtered(model: Model, z: Any, fmt: Format, form: str, **options: Any) -> St
         except (OverflowError, ZeroDivisionError):
             return
         yield {"x": x, "P": _covariance(found.P, form)} | ({} if form in FACTORED else {"K": found.K})
+
+
+def in_blocks(fmt: Format, blocks: Any) -> tuple[Numbers, dict[str, Numbers] | None]:
+    """Numbers that store a model, those of the widest block if there are any, and the numbers of each block."""
+    if not blocks:
+        return Numbers.of(fmt), None
+    formats = {name: given for name, given in blocks.items() if name != "sums"}
+    each = {name: Numbers.of(given, blocks.get("sums")) for name, given in formats.items()}
+    return Numbers.of(max(formats.values(), key=lambda given: given.precision)), each
 
 
 FACTORED = ("UD", "Potter", "Carlson")
@@ -122,12 +127,11 @@ def as_functions(model: Model, z: Any, fmt: Format, form: str) -> Steps:
 
 
 def tracked(motion: str, given: Any, z: Any, u: Any, fmt: Format, form: str, **options: Any) -> Steps:
-    if options.get("blocks"):  # with blocks, the model is stored in the widest format first
-        raise NotImplementedError
     parts = getattr(plain_steps, motion.title())(), plain_steps.Ranges([Fraction(3, 10), Fraction(1, 5)])
     kind = plain_filters.Unscented if options.get("method") == "unscented" else plain_filters.Extended
     Q, R, x0, P0 = given
-    plain = kind(*parts, ([Q], [R], x0, P0), form, Numbers.of(fmt), iterations=options.get("iterations", 1))
+    numbers = in_blocks(fmt, options.get("blocks"))
+    plain = kind(*parts, ([Q], [R], x0, P0), form, *numbers, iterations=options.get("iterations", 1))
     yield from _followed(plain, z, u, form)
 
 

@@ -33,25 +33,13 @@ def test_a_bound_is_right_if_it_holds_and_is_attained():
     assert judged("x >= 0", {"x": Fraction(0)}).right
 
 
-def test_a_tight_instance_must_attain_the_first_bound():
-    near, far = {"x": Fraction(1), "y": Fraction(1)}, {"x": Fraction(1), "y": Fraction(3)}
-    assert judged("x <= y", near, far).right
-    assert not judged("x <= y", near, {**far, "tight": True}).right
-    assert judged("x <= y <= 3", {**near, "tight": True}, far).right  # the second bound is attained somewhere
-
-
 def test_a_statement_must_not_hold_where_the_domain_says_so():
     counter = {"x": Fraction(2), "holds": False}
     assert judged("x < 2", {"x": Fraction(1)}, counter, mode="exact").right
     assert not judged("x <= 2", {"x": Fraction(1)}, counter, mode="exact").right
     assert judged("x == 1; y < 2", {"x": 1, "y": 1}, {"y": 2, "part": 2, "holds": False}, mode="exact").right
-
-
-def test_one_instance_in_which_a_relation_fails_is_enough():
-    right, wrong = {"x": 1, "y": 1}, {"x": 1, "y": 2}
-    assert judged("x == y", right, right).right
-    for instances in ((wrong, right, right), (right, wrong, right), (right, right, wrong)):
-        assert judged("x == y", *instances).count == "holds in 2 of 3 instances"
+    attained_where_it_must_fail = {"x": Fraction(2), "y": Fraction(1), "holds": False}
+    assert not judged("x <= y", {"x": Fraction(1), "y": Fraction(3)}, attained_where_it_must_fail).right
 
 
 def test_nothing_is_right_without_an_instance_or_a_part():
@@ -84,12 +72,6 @@ def test_close_numbers_agree_to_the_printed_digits():
     assert not judged("x == 3.15", {"x": np.pi}, mode="close").right
     assert not judged("x == y", {"x": np.pi, "y": 3.14}, mode="close").right
     assert judged("x ≈ y", {"x": np.pi, "y": 3.14}, mode="close").right
-
-
-@pytest.mark.parametrize(("symbol", "right"), [("<=", True), ("<", False), (">=", True), (">", False), ("==", True)])
-def test_strict_and_weak_comparisons(symbol, right):
-    assert holds(Link(Fraction(1), symbol, Fraction(1))) is right
-    assert holds(Link(sp.sqrt(2) ** 2, symbol, sp.Integer(2))) is right
 
 
 def test_matrices_are_multiplied_and_compared_entry_by_entry():
