@@ -1,16 +1,17 @@
-"""A function of arrays that is recorded once, and then runs on many arrays together: each is a lane of the machine."""
+"""A function of arrays that is recorded once, and then runs on many arrays together, each a lane, or step by step."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.interpreting import Constants, Numbers
+from gpbnb.arithmetic.loop import Loop
 from gpbnb.arithmetic.machine import code_of, fault_of
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
@@ -97,11 +98,49 @@ class Lanes:
 @lru_cache(maxsize=128)
 def recorded(function: Callable[..., Any], *shapes: tuple[int, ...]) -> Lanes:
     """Record a function of arrays of some shapes, which returns an array, or arrays and truth values in a tuple."""
-    tape, places, at = Tape(sum(map(math.prod, shapes))), [], 1
+    step = repeatable(function, shapes)
+    return Lanes(step.rows, step.tape.sizes, step.tape.all_constants, step.given, step.found)
+
+
+class Repeatable(NamedTuple):
+    """A function of arrays as operations.
+
+    Parameters
+    ----------
+    given : places of the arrays that it takes.
+    found : places of the arrays that it returns, or truth values.
+    """
+
+    tape: Tape
+    rows: NDArray[np.int64]
+    given: list[NDArray[np.int64]]
+    found: list[Any]
+
+    def loop(self, fmt: Any) -> Loop:
+        """Return a loop whose state is the first array that the function takes, and then the first that it returns."""
+        states, after = self.given[0].ravel(), self.found[0].ravel()
+        loop = Loop([fmt], self.rows, self.tape.formats, self.tape.sizes, states, after)
+        loop.hold_constants(self.tape.all_constants)
+        return loop
+
+
+@lru_cache(maxsize=128)
+def repeatable(
+    function: Callable[..., Any], shapes: tuple[tuple[int, ...], ...], nonzero: tuple[bytes, ...] = ()
+) -> Repeatable:
+    """Record a function of arrays of some shapes, which returns arrays as :func:`recorded` has them.
+
+    Parameters
+    ----------
+    nonzero : for each array, which entries are ever other than zero, as the bytes of truth values; all by default.
+    """
+    tape, given, at = Tape(sum(map(math.prod, shapes))), [], 1
     for shape in shapes:
-        places.append(np.arange(at, at + math.prod(shape)).reshape(shape))
+        given.append(np.arange(at, at + math.prod(shape)).reshape(shape))
         at += math.prod(shape)
-    returned = function(*map(TracedFormat(tape).made, places))
+    masks = [np.frombuffer(each, np.bool_) for each in nonzero] or [each > 0 for each in given]
+    read = [np.where(mask.reshape(each.shape), each, 0) for mask, each in zip(masks, given, strict=True)]
+    returned = function(*map(TracedFormat(tape).made, read))
     results = returned if isinstance(returned, tuple) else (returned,)
     found = [each if isinstance(each, TracedTruth) else each.components[0] for each in results]
-    return Lanes(tape.instructions.astype(np.int64), tape.sizes, tape.all_constants, places, found)
+    return Repeatable(tape, tape.instructions.astype(np.int64), given, found)

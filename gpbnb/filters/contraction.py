@@ -30,17 +30,14 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterable
-from functools import lru_cache, reduce
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.lanes import recorded
-from gpbnb.arithmetic.loop import Loop
+from gpbnb.arithmetic.lanes import recorded, repeatable
 from gpbnb.arithmetic.named import BINARY64
-from gpbnb.arithmetic.tape import Tape
-from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.steps import StepModel
 
 Array = NDArray[np.float64]
@@ -390,35 +387,27 @@ def _propagated_weights(L: Array, A: Array, *added: Array) -> Array:
 
     The machine repeats :func:`_weights_after` in binary64. No bound depends on its roundings: all weights are valid.
     """
-    own = np.stack([A, *added], axis=1)
+    own, lower, n = np.stack([A, *added], axis=1), np.tril_indices(len(L)), len(L)
     usable = np.isfinite(own).all(axis=(1, 2, 3)) & np.isfinite(L).all()
-    own = own[: len(own) if usable.all() else int(np.argmin(usable))]
-    tape, places, after = _recorded_weights(len(L))
-    lower = np.tril_indices(len(L))
-    rows = tape.instructions.astype(np.int64)
-    loop = Loop([BINARY64], rows, tape.formats, tape.sizes, places[0][lower], after[lower])
-    loop.hold_constants(tape.all_constants)
+    most = len(own) if usable.all() else int(np.argmin(usable))
+    step = repeatable(_weights_after, (lower[0].shape, *((n, n),) * own.shape[1]))
+    loop = step.loop(BINARY64)
     loop.states = L[lower]
-    kept, _, _ = loop.take(0, own.reshape(len(own), places[1:].size), int(places[1, 0, 0]), after.ravel())
-    weights = np.concatenate([L[np.newaxis], kept.reshape(-1, *L.shape)])
-    return np.concatenate([weights, np.repeat(weights[-1:], len(A) - len(kept), axis=0)])
+    kept, _, _ = loop.take(0, own.reshape(len(own), -1)[:most], int(step.given[1][0, 0]), loop.after)
+    weights = np.zeros((1 + len(own), n, n))
+    weights[0] = L
+    weights[1 : 1 + len(kept), lower[0], lower[1]] = kept
+    weights[1 + len(kept) :] = weights[len(kept)]
+    return weights
 
 
-@lru_cache(maxsize=16)
-def _recorded_weights(n: int) -> tuple[Tape, NDArray[np.int64], NDArray[np.int64]]:
-    """Record :func:`_weights_after`; return its tape, the places of what it takes (4, n, n), and of what it gives."""
-    tape, places = Tape(4 * n * n), 1 + np.arange(4 * n * n).reshape(4, n, n)
-    places[0] = np.tril(places[0])
-    return tape, places, _weights_after(*map(TracedFormat(tape).made, places)).components[0]
-
-
-def _weights_after(L: Any, A: Any, *added: Any) -> Any:
-    """Return a factor of ALL'A' and the covariances that are added to it, the mean of their two halves."""
-    i, j = np.tril_indices(len(L))
-    AL = A @ L
+def _weights_after(lower: Any, A: Any, *added: Any) -> Any:
+    """Return the lower half of a factor of ALL'A' and the covariances that are added, the mean of their two halves."""
+    i, j = np.tril_indices(len(A))
+    AL = A @ (A * 0).at[i, j].set(lower)
     product = reduce(operator.add, (AL[i] * AL[j]).T)
     halves = (reduce(lambda total, each: total + each[at], added, product) for at in ((i, j), (j, i)))
-    return _weights((L * 0).at[i, j].set(sum(halves) * 0.5))
+    return _weights((A * 0).at[i, j].set(sum(halves) * 0.5))[i, j]
 
 
 def _weights(W: Any) -> Any:

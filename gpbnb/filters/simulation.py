@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.definiteness import factor
-from gpbnb.arithmetic.loop import Loop
+from gpbnb.arithmetic.lanes import repeatable
 from gpbnb.arithmetic.named import BINARY64
-from gpbnb.arithmetic.tape import Tape
-from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.model import LinearModel
 
 #: Steps for which one seeded generator draws the noise, so that a run can resume at any block.
@@ -112,34 +110,21 @@ def measured(
     first : number of steps before.
     x, z : (n,) and (steps, m), to be overwritten.
     """
-    n, (steps, m), groups = len(x), z.shape, []
-    places, rows, size, after, found = _recorded(n, m, tuple((each != 0).any(axis=0).tobytes() for each in matrices))
-    for each, at in zip(matrices, places, strict=True):
-        groups.append((at, each.reshape(len(each), -1)))
-    loop = Loop([BINARY64], rows, np.zeros(len(rows), np.int64), (size, 2), np.arange(1, 1 + n), after)
-    loop.feed(groups)
+    n, (steps, m) = len(x), z.shape
+    shapes = ((n,), (n,), (m,), *(each.shape[1:] for each in matrices))
+    drawn = (np.ones(count, np.bool_) for count in (n, n, m))
+    nonzero = (*drawn, *((each != 0).any(axis=0) for each in matrices))
+    step = repeatable(_measured, shapes, tuple(each.tobytes() for each in nonzero))
+    loop = step.loop(BINARY64)
+    loop.feed([(at.ravel(), each.reshape(len(each), -1)) for at, each in zip(step.given[3:], matrices, strict=True)])
     loop.states = x
-    kept, _, _ = loop.take(first, np.concatenate([w[:steps], v[:steps]], axis=1), 1 + n, found)
+    kept, _, _ = loop.take(first, np.concatenate([w[:steps], v[:steps]], axis=1), 1 + n, step.found[1])
     z[: len(kept)], z[len(kept) :], x[:] = kept, math.inf, loop.states if len(kept) == steps else math.inf
 
 
-@lru_cache(maxsize=16)
-def _recorded(n: int, m: int, nonzero: tuple[bytes, ...]) -> tuple[Any, ...]:
-    """Record a step of :func:`measured`; `nonzero` says which entries of the matrices are not zero in every step.
-
-    Returns places of the matrices, the operations, the number of places, and the places of the next state and of z.
-    """
-    shapes = [(n,), (n,), (m,), (n, n), (n, n), (m, n), (m, m)]
-    ends = 1 + np.cumsum([math.prod(shape) for shape in shapes])
-    places = [np.arange(end - math.prod(shape), end).reshape(shape) for end, shape in zip(ends, shapes, strict=True)]
-    tape = Tape(int(ends[-1]) - 1)
-    masks = (np.frombuffer(each, np.bool_) for each in nonzero)
-    known = [np.where(mask.reshape(at.shape), at, 0) for mask, at in zip(masks, places[3:], strict=True)]
-    x, w, v, Phi, of_Q, H, of_R = map(TracedFormat(tape).made, [*places[:3], *known])
-    after: Any = np.concatenate([Phi, of_Q], axis=1) @ np.concatenate([x, w])
-    found: Any = np.concatenate([H, of_R], axis=1) @ np.concatenate([after, v])
-    rows = tape.instructions.astype(np.int64)
-    return [at.ravel() for at in places[3:]], rows, tape.sizes[0], after.components[0], found.components[0]
+def _measured(x: Any, w: Any, v: Any, Phi: Any, of_Q: Any, H: Any, of_R: Any) -> tuple[Any, Any]:
+    after = np.concatenate([Phi, of_Q], axis=1) @ np.concatenate([x, w])
+    return after, np.concatenate([H, of_R], axis=1) @ np.concatenate([after, v])
 
 
 def fine_resolution(model: LinearModel) -> tuple[float, ...]:

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.loop import Loop
-from gpbnb.arithmetic.tape import Tape
-from gpbnb.arithmetic.traced import TracedFormat
+from gpbnb.arithmetic.lanes import repeatable
 from gpbnb.interrupts import slices
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
@@ -72,14 +70,12 @@ def recursion(
     backend = fmt.backend
     if not isinstance(backend, Compiled):
         raise ValueError(f"got {fmt}; needed base 2, 10 or 16 and at most 53 bits, 18 or 13 digits; take fewer")
-    tape, places = Tape(4), 1 + np.arange(4).reshape(2, 2)
-    (c, s), (a, b) = TracedFormat(tape).made(places)
-    after = np.stack([each.components[0] for each in (c * a - s * b, s * a + c * b)])
-    loop = Loop([fmt], tape.instructions.astype(np.int64), tape.formats, tape.sizes, places[0], after)
+    step = repeatable(_turned, ((2,), (2,)))
+    loop = step.loop(fmt)
     loop.states, angle = (
         backend.pack(fmt.array(x).components) for x in ([1, 0], list(_exact_turn(1, period, interval)))
     )
-    loop.hold(places[1], angle)
+    loop.hold(step.given[1], angle)
     nothing, found = np.zeros(0, np.int64), []
     for gap in np.diff(marks, prepend=0).tolist():
         for part in slices(gap, len(loop.rows)):
@@ -87,6 +83,11 @@ def recursion(
             loop.take(part.start, own, 0, nothing)
         found.append(loop.states.reshape(angle.shape))
     return _compared(period, interval, marks, FloatArray.from_packed(np.stack(found), fmt).to_fractions())
+
+
+def _turned(state: Any, angle: Any) -> Any:
+    (c, s), (a, b) = state, angle
+    return np.stack([c * a - s * b, s * a + c * b])
 
 
 def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: float = INTERVAL) -> Rotation:
