@@ -10,6 +10,7 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.contributions import contributions
 from gpbnb.bounds.guarantee import PARTS, guarantee, limits
+from gpbnb.bounds.probable import separate_roundings
 from gpbnb.filters.forms import Form
 from gpbnb.report.guarantees import published
 from gpbnb.wordlength.examples import cyclic, tracker
@@ -44,8 +45,8 @@ def found(request):
     return guarantee(model, fmt, within, form=form)
 
 
-def followed(found, operation, steps):
-    """Put an error of one into an operation of the last step of a period, and follow it, exactly for three steps."""
+def followed(found, operation, steps, first=-1):
+    """Put an error of one into an operation of a step, the last of a period, and follow it, exactly for three steps."""
     given, program = found.schedule, found.schedule.program
     seen = -1
 
@@ -56,7 +57,7 @@ def followed(found, operation, steps):
 
     x, period = [Fraction(0)] * program.n, given.steps - given.first
     for step in range(steps):
-        row = given.coefficients[given.first + (period - 1 + step) % period]
+        row = given.coefficients[given.first + (first + step) % period]
         exact = [Fraction(float(high)) + Fraction(float(low)) for high, low in row]
         exact = exact if step < 3 else list(map(float, exact))
         x = [*(x if step < 3 else map(float, x)), *[0] * program.m]
@@ -70,8 +71,14 @@ def test_each_share_is_the_error_followed_through_exact_steps(found):
     for operation, error in enumerate(given.errors):
         path = np.array(list(followed(found, operation, 2000 if period == 1 else 1)))
         assert given.effects[:, operation] == pytest.approx(path[0], rel=1e-12, abs=1e-15)
-        if period == 1:  # else the errors of other steps are others
+        if period == 1:
             assert given.sums[:, operation] == pytest.approx(error * np.abs(path).sum(axis=0), rel=1e-6, abs=1e-30)
+            continue
+        of_steps, total = separate_roundings(found)[2], np.zeros(found.schedule.program.n)
+        for back in range(60):  # each error decays by 0.6 a step or more
+            *_, end = followed(found, operation, back + 1, -1 - back)
+            total += of_steps[(-1 - back) % period, operation] * np.abs(end)
+        assert given.sums[:, operation] == pytest.approx(total, rel=1e-6, abs=1e-30)
 
 
 def test_the_shares_of_the_tracker_are_nearly_its_whole_bound():

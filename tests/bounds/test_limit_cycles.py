@@ -54,7 +54,8 @@ def test_cycles_are_those_in_which_runs_from_every_state_end(mode, a1, a2):
         assert {frozenset(map(tuple, cycle.states[:, :2].tolist())) for cycle in inner.cycles} == expected
         assert inner.searched < found.searched
     assert inner.largest <= inner.bound
-    assert sorted(map(len, cycles)) == sorted(cycle.period for cycle in found.cycles)
+    assert [cycle.period for cycle in found.cycles] == sorted(map(len, cycles), reverse=True)
+    assert found.largest == [max(abs(y) for cycle in expected for y, _ in cycle)]
 
 
 @pytest.mark.usefixtures("loops_at_once")

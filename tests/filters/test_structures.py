@@ -11,7 +11,7 @@ from scipy import linalg, signal
 
 from gpbnb import BINARY16, FloatFormat, LinearSystem, required_precision
 from gpbnb.arithmetic.rational import exact
-from gpbnb.filters.sections import _filtered
+from gpbnb.filters.sections import _filtered, scaled
 from gpbnb.filters.structures import STRUCTURES, companion, reflections, steady_covariance
 from gpbnb.wordlength.asked import Asked, Data
 from gpbnb.wordlength.judges import judge_for
@@ -90,6 +90,19 @@ def test_a_filter_of_zeros_and_poles_is_that_of_scipy_or_refused():
             b = np.concatenate([np.zeros(len(a) - len(b)), b])  # in powers of 1/z
             # the accuracy of lfilter itself, as above
             assert found == pytest.approx(signal.lfilter(b, a, impulse[:, 0]), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("form", ["direct form I", "direct form II"])
+def test_scaled_sections_hand_on_numbers_within_one_and_beyond_half_of_it(form):
+    sos, impulse = signal.butter(6, 0.1, output="sos"), np.eye(1, 3000)[0]
+    found = scaled([(exact(20 * row[:3]), exact(row[4:])) for row in sos], form)
+    rows = np.array([[*map(float, b), 1, *map(float, a)] for b, a in found])
+    for i in (1, 2):
+        reached = [signal.sosfilt(rows[:i], impulse)]
+        if form == "direct form II":  # the delayed values of the next section
+            reached.append(signal.sosfilt([[1, 0, 0, *rows[i, 3:]]], reached[0]))
+        assert 1 / 2 < max(np.abs(each).sum() for each in reached) <= 1
+    assert signal.sosfilt(rows, impulse) == pytest.approx(20**3 * signal.sosfilt(sos, impulse), rel=1e-9, abs=1e-9)
 
 
 def test_reflections_of_a_filter_of_second_order():

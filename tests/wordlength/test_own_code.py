@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 
 import numpy as np
 import pytest
@@ -58,7 +59,9 @@ def folder(tmp_path):
 
 
 def test_a_file_is_the_model_that_python_makes_of_its_functions(folder):
+    before = [*sys.path]
     found = {name: read_model(folder / f"{name}.toml") for name in ("step", "filter", "mean")}
+    assert sys.path == before
     assert isinstance(found["step"], NonlinearSystem)
     assert isinstance(found["filter"], NonlinearModel)
     again = NonlinearSystem(lambda fmt, x, u: (x + (u - x) * fmt.array("0.125"),) * 2, [0])

@@ -14,7 +14,7 @@ from gpbnb import (
     limits,
     required_precision,
 )
-from gpbnb.wordlength.answer import judgement
+from gpbnb.wordlength.answer import judgement, share_text
 
 WALK = LinearModel([["0.9"]], [[1]], [["0.01"]], [[1]], [0], [[1]])
 
@@ -26,6 +26,10 @@ def test_a_judgement_is_a_sentence():
         ("guarantee", math.inf, True, "nothing is proved for 10 bits, without a guarantee for 1 step: lost"),
     ]:
         assert str(judgement(FloatFormat(2, 10), basis, 1, ratio, "lost", ends)) == text
+
+
+def test_an_error_of_the_whole_tolerance_is_within_it():
+    assert (share_text(1.0), share_text(1.01)) == ("1 of the tolerance", "1.01 times the tolerance")
 
 
 @pytest.mark.parametrize(("z", "leaves"), [([0.5] * 9, ""), ([0.5, 7, 0.5], "step 2: innovation 0 is 6.")])

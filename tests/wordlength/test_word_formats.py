@@ -53,6 +53,7 @@ def test_the_smoother_needs_what_a_plain_loop_over_integers_needs():
         found = required_precision(system, z, tolerance, kind="words", rounding="floor")
         words = found.format
         assert words is not None
+        assert found.digits == words.data.fraction_bits
         assert isinstance(words.coefficients, int)
         assert largest_error(words.data.fraction_bits, MOST_COEFFICIENT_BITS) <= tolerance
         if words.data.fraction_bits:
