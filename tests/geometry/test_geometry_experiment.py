@@ -32,6 +32,12 @@ def third_order(case):
     return 30 * largest**3
 
 
+def test_the_spin_axis_is_turned_by_both_angles_at_once():
+    """Half a right angle each, the second about the axis that the first has left where it was."""
+    axis = experiment.spin_axis(Misalignments(drift=(np.pi / 4, np.pi / 4)), [0, 1])
+    assert axis == pytest.approx(np.array([[1, 0, 0], [0.5, -(0.5**0.5), 0.5]]))
+
+
 def ramp_leak(rate):
     """The error of the mean of a roll's five samples due to an offset in the spacecraft that grows at a rate."""
     k = np.arange(5)
