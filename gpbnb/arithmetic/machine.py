@@ -6,6 +6,7 @@ import contextlib
 import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,7 +39,13 @@ _TAKEN = [
 ]
 """For each code, which of the three operands are places of numbers, and which of truth values."""
 
-_NUMBERS = np.array([[i in numbers for i in range(3)] for numbers, _ in _TAKEN])
+OPERANDS = tuple(np.array([[i in taken[sort] for i in range(3)] for taken in _TAKEN]) for sort in (0, 1))
+"""The same as masks, (codes, 3), of numbers and of truth values."""
+
+_IS_COMBINED = np.arange(len(CODES))[:, np.newaxis] == CODES["combine"]
+_OWN = np.where(_IS_COMBINED, OPERANDS[1], OPERANDS[0])
+_OWN[CODES["compare"]] = False
+"""For each code, which operands may be results of the same operation."""
 
 
 def operands_of(code: int, *given: int) -> tuple[list[int], list[int]]:
@@ -49,7 +56,7 @@ def operands_of(code: int, *given: int) -> tuple[list[int], list[int]]:
 
 def takes_numbers(codes: NDArray[Any]) -> NDArray[np.bool_]:
     """Return which operands of each operation are places of numbers, (o, 3)."""
-    return np.asarray(_NUMBERS[codes])
+    return np.asarray(OPERANDS[0][codes])
 
 
 class Addresses:
@@ -232,40 +239,48 @@ def _together(rows: NDArray[Any]) -> NDArray[np.int64]:
     from gpbnb.arithmetic.kernels import machine
 
     found, number = np.zeros(len(rows), np.int64), 0
-    plain = rows[:, 0] <= CODES["multiply"]
-    listed = rows.tolist()
-    begin = 0
-    while begin < len(rows):
-        code, out = listed[begin][0], listed[begin][4]
-        end = begin
-        while end < len(rows):
-            other, a, b, _, result = listed[end]
-            if other != code or result != out + end - begin or out <= a < result or out <= b < result:
-                break
-            end += 1
-        if plain[begin] and end - begin >= _FEWEST:
-            for first, last, along in _divided(listed, begin, end):
+    for begin, end in independent(rows):
+        if end - begin >= _FEWEST and rows[begin, 0] <= CODES["multiply"]:
+            for first, last, along in _divided(rows[begin:end, 1:3], begin):
                 number += 1
                 found[first:last] = 4 * number + (machine.NEIGHBOURS if along else machine.GATHERED)
-        begin = max(end, begin + 1)
     return found
 
 
-def _divided(rows: list[list[int]], begin: int, end: int) -> Iterator[tuple[int, int, bool]]:
-    """Yield first, last and whether operands are neighbours, for parts of a run of rows."""
-    waiting, at = begin, begin
-    while at < end:
-        last = at + 1
-        while last < end and all(rows[last][i] == rows[at][i] + last - at for i in (1, 2)):
-            last += 1
-        if last - at >= _MANY or (at, last) == (begin, end):
-            if waiting < at:
-                yield waiting, at, False
-            yield at, last, True
-            waiting = last
-        at = last
-    if waiting < end:
-        yield waiting, end, False
+def independent(rows: NDArray[Any]) -> Iterator[tuple[int, int]]:
+    """Yield first and last of rows of one operation, with results in consecutive places, which they do not take."""
+    if not len(rows):
+        return
+    codes, places, results = rows[:, 0], rows[:, 1:4], rows[:, 4]
+    own = _OWN[codes] & (places < results[:, np.newaxis])
+    latest = np.where(own, places, -1).max(axis=1)  # place of the last operand that may be a result
+    edges = np.flatnonzero((np.diff(codes) != 0) | (np.diff(results) != 1)) + 1
+    for begin, end in pairwise([0, *edges.tolist(), len(rows)]):
+        while begin < end:
+            last, width = begin + 1, 8
+            while last < end:  # wider and wider, since most rows run alone or with many others
+                taken = np.flatnonzero(latest[last : min(last + width, end)] >= results[begin])
+                last = last + int(taken[0]) if len(taken) else min(last + width, end)
+                if len(taken):
+                    break
+                width *= 2
+            yield begin, last
+            begin = last
+
+
+def _divided(operands: NDArray[Any], begin: int) -> Iterator[tuple[int, int, bool]]:
+    """Yield first and last of parts of a run, and whether their operands are neighbours."""
+    edges = np.flatnonzero((np.diff(operands, axis=0) != 1).any(axis=1)) + 1
+    edges = np.array([0, *edges, len(operands)])
+    waiting = 0
+    for i in np.flatnonzero((np.diff(edges) >= _MANY) | (len(edges) == 2)):
+        first, last = edges[i], edges[i + 1]
+        if waiting < first:
+            yield begin + waiting, begin + first, False
+        yield begin + first, begin + last, True
+        waiting = last
+    if waiting < len(operands):
+        yield begin + waiting, begin + len(operands), False
 
 
 _SKIP = CODES["skip"]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
 from gpbnb.arithmetic.interpreting import Constants
-from gpbnb.arithmetic.machine import CODES, operands_of, packed_one, takes_numbers
+from gpbnb.arithmetic.machine import CODES, OPERANDS, independent, packed_one, takes_numbers
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
@@ -201,11 +201,13 @@ def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], f
     for letter in ("x", "z", "carried", "u", "b", "d", "B"):
         late[places.get(letter, [])] = True
     late_truths, later = np.zeros(truths, np.bool_), np.zeros(len(rows), np.bool_)
-    for o, (code, a, b, c, out) in enumerate(rows.tolist()):
-        of = operands_of(code, a, b, c)
-        if any(late[each] for each in of[0]) or any(late_truths[each] for each in of[1]):
-            later[o] = True
-            (late_truths if code in _TRUTHS else late)[out] = True
+    numbers, truth_values = (masks[rows[:, 0]] for masks in OPERANDS)
+    for begin, end in independent(rows):
+        part, given = slice(begin, end), rows[begin:end, 1:4]
+        depends = (late[np.where(numbers[part], given, 0)] & numbers[part]).any(axis=1)
+        depends |= (late_truths[np.where(truth_values[part], given, 0)] & truth_values[part]).any(axis=1)
+        later[part] = depends
+        (late_truths if rows[begin, 0] in _TRUTHS else late)[rows[part, 4][depends]] = True
     if kind.reference and kind.form not in FACTORED:
         first = np.zeros(values, np.bool_)
         first[np.concatenate([places["Phi"].ravel(), places["H"].ravel()])] = True

@@ -12,7 +12,18 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.lanes import recorded
-from gpbnb.arithmetic.machine import CODES, OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT, code_of, evaluate, fault_of, tables
+from gpbnb.arithmetic.machine import (
+    CODES,
+    OPERANDS,
+    OVERFLOW,
+    ZERO_DIVISOR,
+    ZERO_PIVOT,
+    code_of,
+    evaluate,
+    fault_of,
+    independent,
+    tables,
+)
 from tests.oracles import floating
 
 INPUTS, ROWS = 12, 150
@@ -252,3 +263,21 @@ def test_range_and_zero() -> None:
     assert computed("multiply", tiny, tiny) is None
     assert computed("multiply", huge, huge) is None
     assert computed("divide", tiny, huge) is None
+
+
+def test_rows_run_together_that_do_not_take_results_of_each_other():
+    rng = np.random.default_rng(1)
+    codes = np.repeat(rng.integers(0, len(CODES), 60), rng.integers(1, 30, 60))
+    rows = np.zeros((len(codes), 5), np.int64)
+    rows[:, 0], rows[:, 4] = codes, np.arange(50, 50 + len(codes))
+    rows[:, 1:4] = rows[:, 4:] - rng.integers(1, 50, (len(codes), 3))
+    found = list(independent(rows))
+    assert [begin for begin, _ in found] == [0, *(end for _, end in found[:-1])]
+    assert found[-1][1] == len(rows)
+    for begin, end in found:
+        for code, *places, result in rows[begin:end].tolist():
+            numbers, truths = (np.array(places)[each[code]].tolist() for each in OPERANDS)
+            own = truths if code == CODES["combine"] else [] if code == CODES["compare"] else numbers
+            assert code == rows[begin, 0]
+            assert not [each for each in own if rows[begin, 4] <= each < result]
+    assert max(end - begin for begin, end in found) > 5
