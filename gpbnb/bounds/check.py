@@ -450,25 +450,26 @@ def peaks(F: Any, columns: Any, rows: Any, sizes: Any, steps: int | None, back: 
     """Bound a vector, and rows times it, after at most some steps, each of which adds columns to F times it; see (6).
 
     The vector is 0 at first, and within `sizes` in all earlier steps. The bounds are shares, in units of 2**-PEAK, of
-    the sizes and of the rows' sizes, which are returned as well.
+    the sizes and of the rows' sizes, which are returned as well. Rows C_l of (2) start with the d unit rows C. A row r
+    of size 1 has the rows r C_l, and its R_l are r times those of C, so at most d units as well.
     """
     d, one, lags = len(F), 1 << PEAK, 1 << max(back - 1, 0).bit_length()
     wholes = [size(row, sizes) or Fraction(1) for row in rows]
     share = lambda row, by, whole: [int(x * y * one // whole) for x, y in zip(row, by, strict=True)]  # noqa: E731
     loop = turned([share(row, sizes, whole) for row, whole in zip(F, sizes, strict=True)])
     G = [[int(x * one // y) for x, y in zip(g, sizes, strict=True)] for g in columns if any(g)]
-    C = diagonal(d, one) + [share(row, sizes, whole) for row, whole in zip(rows, wholes, strict=True)]
-    sums, rest, most = [d] * len(C), 0 if steps is None else steps % lags, list[int]()
+    C, R = diagonal(d, one), [share(row, sizes, whole) for row, whole in zip(rows, wholes, strict=True)]
+    sums, rest, most = [d] * (d + len(R)), 0 if steps is None else steps % lags, list[int]()
     for lag in range(lags if steps is None else min(steps, lags)):
         most = sums[:d] if lag == rest else most
-        for i, c in enumerate(C):
-            if any(c):
-                added = sum([abs(sum(map(mul, c, g))) for g in G]) + (len(G) + d) * sum(map(abs, c))
-                sums[i] += (added >> PEAK) + d + 2
-                C[i] = [sum(map(mul, c, x)) >> PEAK for x in loop]
+        effects, lost = across(C, G), [(len(G) + d) * sum(map(abs, c)) for c in C]
+        effects += each(lambda x: x >> PEAK, across(R, turned(effects)))
+        lost += [(size(r, lost) >> PEAK) + len(G) + 1 for r in R]
+        sums = [x + (sum(map(abs, e)) + y >> PEAK) + d + 2 for x, e, y in zip(sums, effects, lost, strict=True)]
+        C = each(lambda x: x >> PEAK, across(C, loop))
     if steps is not None and steps <= lags:
         return sums, wholes
-    blocks, P, T = None if steps is None else steps // lags, C[:d], sums[:d]
+    blocks, P, T = None if steps is None else steps // lags, C, sums[:d]
     while True:  # |y_k - P y_(k-j)| <= T for all k, where j doubles
         norm = max(sum(map(abs, row)) for row in P)
         need(norm < one << 4 * PEAK, "errors grow without end")
@@ -483,7 +484,8 @@ def peaks(F: Any, columns: Any, rows: Any, sizes: Any, steps: int | None, back: 
                 break
         P, T = each(lambda x: x >> PEAK, across(P, turned(P))), [x + d for x in after(T)]
         need(blocks is not None or max(T) < one << 4 * PEAK, "errors do not decay")
-    return [x + (size(c, most) >> PEAK) + 1 for x, c in zip(sums, C, strict=True)], wholes
+    left = [size(c, most) for c in C] + [size(c, most) >> PEAK for c in across(R, turned(C))]
+    return [x + (y >> PEAK) + 1 for x, y in zip(sums, left, strict=True)], wholes
 
 
 class Linear:

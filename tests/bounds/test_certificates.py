@@ -228,6 +228,22 @@ def test_a_set_contains_all_sums_of_effects(case: str, keep: int) -> None:
         assert keep < 64 or claimed <= Fraction("1.05") * true
 
 
+@pytest.mark.parametrize(("steps", "back"), [(20, 20), (20, 8), (37, 1), (None, 64)])
+def test_a_recursion_is_bounded_by_the_sums_of_its_effects(steps: int | None, back: int) -> None:
+    """To the last units where every step is followed; a power of the loop stands for the others."""
+    F = [[Fraction(x, 64) for x in row] for row in ([50, 9, 0], [-9, 50, 3], [0, 1, -40])]
+    columns = [[Fraction(x, 7) for x in g] for g in ([1, -2, 0], [3, 1, -1])]
+    rows = [[Fraction(x, 3) for x in row] for row in ([1, -1, 0], [2, 1, -5], [0, 0, 0], [-4, 7, 1])]
+    last = steps or 2**8
+    every = [largest([F] * last, [columns] * last, row) for row in [*check.diagonal(3), *rows]]
+    sizes = [3 * x for x in every[:3]]
+    shares, wholes = check.peaks(F, columns, rows, sizes, steps, back)
+    for true, share, whole in zip(every, shares, sizes + wholes, strict=True):
+        claimed = share * whole / 2**check.PEAK
+        assert true <= claimed
+        assert steps is None or steps > back or claimed - true <= whole / 2**115
+
+
 def test_an_ellipsoid_contains_parallel_segments_and_hardly_more() -> None:
     found = check.ErrorSet([10**12] * 2, [], 64, "an error is larger")
     found.x, found.groups = [[3 * 10**9, 9 * 10**9, -6 * 10**8], [-(10**9), -3 * 10**9, 2 * 10**8]], [(3, 1)]
