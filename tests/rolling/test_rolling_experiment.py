@@ -154,3 +154,10 @@ def test_wandering_roll_rates_agree_with_theory():
         expected = theory.rate_walk_error(DRIFTS[0], material.WALK, reset=reset)
         assert size == pytest.approx(expected, rel=4 / math.sqrt(2 * errors.shape[1]))
     assert sizes[0] > 300 * sizes[1]
+
+
+def test_a_fitted_exponent_is_that_of_the_density_before_sampling():
+    """Samples of 1/f noise every 10 s have 1/f times x / sin x, x = 10 pi f; so many averages have no bias."""
+    f = np.geomspace(1e-3, 0.04, 20)
+    sampled = experiment.Spectrum(f, 1 / (f * np.sinc(10 * f)), np.full(20, 1e12))
+    assert experiment.fit_slope(sampled, 10.0).value == pytest.approx(-1, abs=1e-9)
