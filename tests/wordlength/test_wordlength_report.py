@@ -10,7 +10,6 @@ import pytest
 
 from gpbnb.filters.model import LinearModel
 from gpbnb.wordlength.models import FilterSource
-from gpbnb.wordlength.ranges import binary_ranges
 from gpbnb.wordlength.report import Question, page, study
 
 REPORT = {
@@ -137,10 +136,6 @@ def test_a_study_says_where_its_measurements_come_from(given, source):
         "UD, emulation",
     ]
     assert told[:2] == ["innovation, emulation …", f"innovation, emulation: {found.answer}"]
-
-
-def test_a_range_is_that_of_the_powers_of_two_just_below_the_numbers():
-    assert binary_ranges(MODEL, np.zeros((1, 1)))[0] == ("model", -7, 0)  # 0.01 and 1
 
 
 def test_the_state_with_the_largest_share_of_its_tolerance_limits():
