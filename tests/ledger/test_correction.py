@@ -41,6 +41,11 @@ def test_without_its_braces_the_formula_is_that_of_the_ledger(shown, marks, lett
     assert found == [*letters]
 
 
+def test_a_part_that_is_not_in_the_formula_cannot_be_marked():
+    with pytest.raises(ValueError, match=r"got the parts \['zeta'\]; needed parts of"):
+        correction.marked(statement(correction.RESULT).relation(), {"B": "b", "zeta": "a"})
+
+
 def test_the_digits_follow_from_counting_step_by_step():
     k, n, m = 3_153_600, 10, 2
     j = np.arange(1, k + 1, dtype=np.longdouble)

@@ -32,6 +32,11 @@ def test_a_witness_charges_the_scan(damaged, verdict):
     assert (found.recomputed, found.note, found.agrees) == ("1", "why", False)
 
 
+def test_without_a_witness_the_author_stays_charged(damaged):
+    author = compare(False, "1", Verdict.WRONG, "why")
+    assert charged("b", author) is author
+
+
 def test_a_statement_that_is_right_needs_nobody_to_charge(damaged):
     for right in (compare(True, "1"), Finding("", None, Verdict.GIVEN, "a definition")):
         assert charged("a", right) is right
