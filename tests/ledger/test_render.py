@@ -13,7 +13,7 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 from gpbnb.report.ledger import Row, load_statements, table
 from gpbnb.report.ledger.finding import Finding, Verdict, compare
-from gpbnb.report.ledger.render import to_csv, to_json
+from gpbnb.report.ledger.render import to_csv, to_json, to_text
 from gpbnb.report.ledger.statements import Statement
 
 ENTRY = Statement("hung1984.II.eq20", "hung1984", "II", "6", "eq (20)", "equation", r"$|\tilde Q/Q|\le(n+m+1)\beta$")
@@ -58,6 +58,12 @@ def test_json_says_the_same():
     }
     assert to_json(()) == "[]\n"
     assert to_json(ROWS).endswith("\n]\n")
+
+
+def test_text_has_a_line_for_each_row():
+    line = rf'misprint      {ENTRY.id}  $(n+m-1)\beta$  one "sign", as |(20)| of 1982'
+    assert to_text(ROWS).splitlines()[0] == line
+    assert len(to_text(ROWS).splitlines()) == len(ROWS)
 
 
 def cells(line):
