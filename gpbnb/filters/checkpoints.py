@@ -5,7 +5,8 @@ A run keeps numbers as its loops compute them. They become Fractions when these 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -38,13 +39,15 @@ class Packed(NamedTuple):
         return np.asarray(FloatArray.from_packed(self.numbers, self.fmt).to_fractions(), dtype=object)
 
 
-class Progress:
-    """How far a run has come, which of its steps are saved, and why it has ended.
+class Progress(ABC):
+    """A run of a filter: how far it has come, which of its steps are saved, and why it has ended.
 
     Parameters
     ----------
     checkpoint_steps : steps, 1 or more, whose results are saved, in ascending order.
     """
+
+    model: Any
 
     def __init__(self, checkpoint_steps: Sequence[int]) -> None:
         self.checkpoint_steps = _ascending(checkpoint_steps)
@@ -55,6 +58,25 @@ class Progress:
         #: The step that has no result and ended the run, and why.
         self.stopped: int | None = None
         self.reason = ""
+
+    @abstractmethod
+    def blocks(self, z: Any) -> Iterator[Any]:
+        """Continue by as many steps as there are measurements, (steps, m), and give their results some at a time."""
+
+    @staticmethod
+    @abstractmethod
+    def estimates(found: Any) -> NDArray[np.float64]:
+        """Return the estimates of some steps, (steps, n, 2), as double-double."""
+
+    def take(self, z: Any) -> None:
+        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
+        for _ in self.blocks(z):
+            pass
+
+    def states(self, z: Any) -> NDArray[np.float64]:
+        """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
+        none = np.zeros((0, self.model.n, 2))
+        return np.concatenate([none, *(self.estimates(each) for each in self.blocks(z))])
 
     def done(self, definite: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Count some steps, all definite or not, and return the rows of those to save."""

@@ -125,18 +125,13 @@ class NonlinearRun(Progress):
         """The covariance, its factors or its root, (n, n)."""
         return self._step.states[1]
 
-    def take(self, z: Any) -> None:
-        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
-        for _ in self.blocks(z):
-            pass
-
-    def states(self, z: Any) -> NDArray[np.float64]:
-        """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
-        found = [double_doubles_of(each.states[0]) for each in self.blocks(z)]
-        return np.concatenate([np.zeros((0, self.model.n, 2)), *found])
+    @staticmethod
+    def estimates(found: StepTaken) -> NDArray[np.float64]:
+        """Return the estimates of some steps, (steps, n, 2), as double-double."""
+        return double_doubles_of(found.states[0])
 
     def blocks(self, z: Any) -> Iterator[StepTaken]:
-        """Continue as :meth:`take` does, and give what the steps give, some at a time.
+        """Continue as a linear run does.
 
         The gain is (K,), or with factors or roots the gains of one measurement after the other, H, and factors of R.
         """

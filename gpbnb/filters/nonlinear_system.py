@@ -130,8 +130,12 @@ class NonlinearSystem:
         ValueError, TypeError : inputs of another shape; a step that does not return states (n,) and outputs (p,).
         OverflowError, ZeroDivisionError, NegativeRootError : an operation has no result in the format.
         """
-        rows = [(_in_one_format(each.states[0], each.gain.format), each.gain) for each in self._run_in(fmt, u)]
-        return cast(Any, np.concatenate)([np.concatenate(each, axis=1) for each in rows])
+        return cast(Any, np.concatenate)(list(self.blocks(fmt, u)))
+
+    def blocks(self, fmt: Any, u: Any) -> Iterator[FloatArray]:
+        """Give what :meth:`states` returns after some steps at a time."""
+        for each in self._run_in(fmt, u):
+            yield cast(Any, np.concatenate)([_in_one_format(each.states[0], each.gain.format), each.gain], axis=1)
 
     def _run_in(self, fmt: Any, u: Any) -> Iterator[StepTaken]:
         """Give outputs and states, in a list if they have formats of their own, after some steps at a time."""

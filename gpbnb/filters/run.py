@@ -39,9 +39,6 @@ from gpbnb.filters.steps import FACTORED, HUNG_FORMS, combined_gain
 LEAST_SHARE = 2.0**-60
 """Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""
 
-LONGEST_BLOCK, SHORTEST_BLOCK, NUMBERS = 4096, 256, 1 << 17
-"""Most and fewest steps whose results are kept at a time, and numbers of these results between the two."""
-
 
 class Sums(NamedTuple):
     """How a filter adds up the terms of its matrix products.
@@ -179,11 +176,6 @@ class Run(Progress):
         return start._replace(x0=x0, P0=as_packed(formats.covariance, P0))
 
     @property
-    def block(self) -> int:
-        """Number of steps whose results are kept at a time."""
-        return min(max(NUMBERS // (self.x.size + self.P.size), SHORTEST_BLOCK), LONGEST_BLOCK)
-
-    @property
     def bounded(self) -> bool:
         """Whether the run also computes its contraction bound."""
         return self._carried is not None
@@ -207,28 +199,32 @@ class Run(Progress):
             raise ValueError("got a run without its bound; needed bounded=True")
         return self._carried
 
-    def take(self, z: Any) -> None:
-        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
+    def blocks(self, z: Any) -> Iterator[Block]:
+        """Continue by as many steps as there are measurements, (steps, m), and give their results some at a time.
+
+        A run that has stopped does not continue.
+        """
         self.model.check_measurements(z, self.steps)
         if self.stopped is None:
             packed = self.pack_measurements(z)
-            for _ in self.advance(packed) if self._carried is None else self._advance_bounded(self._carried, packed):
-                pass
+            yield from self.advance(packed) if self._carried is None else self._advance_bounded(self._carried, packed)
 
-    def _advance_bounded(self, carried: CarriedBound, z: NDArray[Any]) -> Iterator[None]:
+    def _advance_bounded(self, carried: CarriedBound, z: NDArray[Any]) -> Iterator[Block]:
         """Take steps with packed measurements, and the bound over a block of them at a time."""
         exact_z = widened(z) if z.dtype == np.float64 else double_doubles(self.exactly(z))
-        for begin in range(0, len(z), self.block):
-            first = self.steps
-            x, K, P = self.take_block(z[begin : begin + self.block])
-            if done := len(x) - 1:
-                each = (widened(part) for part in (P, K[1:], self.letters["UR" if self.form in FACTORED else "R"]))
-                estimates, measured = widened_estimates(x), exact_z[begin : begin + done]
+        end, before = 0, (self.x[None].copy(), self.P[None].copy())
+        for found in self.advance(z):
+            begin, end = end, end + len(found.x)
+            if begin < end:
+                x, P = (np.concatenate(each) for each in zip(before, (found.x, found.P), strict=True))
+                each = (widened(part) for part in (P, found.K, self.letters["UR" if self.form in FACTORED else "R"]))
+                estimates, measured, first = widened_estimates(x), exact_z[begin:end], self.steps - len(found.x)
                 after = estimates[1:]
                 if self.model.has_inputs:
-                    after, measured = self._without_inputs(first, x[1:], z[begin : begin + done])
+                    after, measured = self._without_inputs(first, found.x, z[begin:end])
                 carried.take(first, Taken(measured, estimates[:-1], after, *each))
-            yield
+            before = self.x[None].copy(), self.P[None].copy()
+            yield found
 
     def _without_inputs(
         self, first: int, x: NDArray[Any], z: NDArray[Any]
@@ -260,16 +256,14 @@ class Run(Progress):
         """
         if np.ndim(z) != 3 or np.shape(z)[1:] != (self.model.m, self.records):
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m}, {self.records})")
-        out = np.full((len(z), states, self.records), np.nan)
-        for begin in range(0, len(z), self.block):
-            if self.stopped:
-                break
-            x = self.take_block(as_packed(self.fmt, z[begin : begin + self.block]))[0][1:, :states]
-            some = out[begin : begin + len(x)]
+        out, end = np.full((len(z), states, self.records), np.nan), 0
+        for found in self.advance(as_packed(self.fmt, z)):
+            x, begin = found.x[:, :states], end
+            end += len(x)
             if x.dtype == np.float64:
-                some[:] = x if x.ndim == 3 else x[..., 0]
+                out[begin:end] = x if x.ndim == 3 else x[..., 0]
             else:
-                _nearest_floats(x, some)
+                _nearest_floats(x, out[begin:end])
         return out
 
     def use_measurement_matrices(self, H: NDArray[np.float64], decimals: int | None = None) -> None:
@@ -295,41 +289,15 @@ class Run(Progress):
         if self._carried is not None:
             self._carried.checkpoint_steps = checkpoint_steps
 
-    def states(self, z: Any) -> NDArray[np.float64]:
-        """Continue by as many steps as there are measurements, (steps, m), and return all estimates.
-
-        Returns
-        -------
-        x : (steps done, n, 2), as double-double.
-        """
-        found = [np.zeros((0, self.model.n, 2))]
-        found += [widened_estimates(x)[1:, :, 0] for x, _ in self.blocks(z)]
-        return np.concatenate(found)
-
-    def blocks(self, z: Any) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
-        """Continue as :meth:`take` does, and give estimates and covariances, as :meth:`take_block`."""
-        self.model.check_measurements(z, self.steps)
-        packed = self.pack_measurements(z)
-        for begin in range(0, len(packed), self.block):
-            if not self.stopped:
-                x, _, P = self.take_block(packed[begin : begin + self.block])
-                yield x, P
+    @staticmethod
+    def estimates(found: Block) -> NDArray[np.float64]:
+        """Return the estimates of some steps, (steps, n, 2), as double-double."""
+        return widened_estimates(found.x)[:, :, 0]
 
     def pack_measurements(self, z: Any) -> NDArray[Any]:
         """Round measurements (steps, m) into the format, as :meth:`advance` expects them."""
         packed = as_packed(self.fmt if self.block_formats is None else self.block_formats.state, z)
         return packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
-
-    def take_block(self, z: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-        """Take some steps with packed measurements; return estimates, gains and covariances, or factors.
-
-        The first entry of each is the value before these steps (zeros for the gain), followed by one entry for each
-        step done.
-        """
-        before = self.x.copy(), np.zeros(self.G.shape[1:], self.G.dtype), self.P.copy()
-        parts = [(each.x, each.K, each.P) for each in self.advance(z)]
-        x, K, P = (np.concatenate([first[None], *rest]) for first, *rest in zip(before, *parts, strict=True))
-        return x, K, P
 
     def advance(self, z: NDArray[Any]) -> Iterator[Block]:
         """Take one step per packed measurement, (steps, m, columns of x), and give the results of a block at a time.
@@ -504,15 +472,16 @@ def _loses_digits(model: LinearModel, at: NDArray[np.int64], P: NDArray[np.float
 def reference_states(model: LinearModel, z: Any) -> NDArray[np.float64]:
     """Run the filter as :func:`reference` does, and return the estimates after every step, (steps, n, 2)."""
     run = Run(model, None, Form.INNOVATION, ())
-    found, done = [np.zeros((0, model.n, 2))], 0
-    for x, P in run.blocks(z):
-        if run.stopped or _loses_digits(model, np.arange(done, done + len(P)), P):
+    estimates, before = [np.zeros((0, model.n, 2))], run.P[None].copy()
+    for found in run.blocks(z):
+        P = np.concatenate([before, found.P])
+        if run.stopped or _loses_digits(model, run.steps - len(found.P) + np.arange(len(P)), P):
             try:
                 return double_doubles_of(precise_steps(model, z).x)
             except OverflowError as error:
                 raise OverflowError(
                     f"{model.name} without rounding: {error}; a model that is not stable takes fewer steps"
                 ) from None
-        found.append(x[1:, :, 0])
-        done += len(x) - 1
-    return np.concatenate(found)
+        estimates.append(found.x[:, :, 0])
+        before = P[-1:]
+    return np.concatenate(estimates)

@@ -32,10 +32,10 @@ def settled_gain(model: LinearModel) -> NDArray[Any]:
     zeros, before = np.zeros((1_000, model.m)), np.zeros((model.n, model.m))
     low = np.zeros_like(before)
     for _ in range(LONGEST // len(zeros)):
-        _, K, _ = run.take_block(run.pack_measurements(zeros))
+        K = np.concatenate([found.K for found in run.blocks(zeros)])
         if run.stopped:
             break
-        for high, rest in zip(K[1:, ..., 0], K[1:, ..., 1], strict=True):
+        for high, rest in zip(K[..., 0], K[..., 1], strict=True):
             if np.abs((high - before) + (rest - low)).max() <= SETTLED * np.abs(high).max():
                 exactly = [Fraction(a) + Fraction(b) for a, b in zip(high.flat, rest.flat, strict=True)]
                 return np.array(exactly, dtype=object).reshape(high.shape)

@@ -89,7 +89,7 @@ class Stepper:
         self._kept_at = np.concatenate([step.shared, step.K.ravel(), step.after["P"].ravel()])
         repeats = all(fmt is None or fmt.rounding is not Rounding.STOCHASTIC for fmt in formats)
         self._cycle = cycle if repeats else 0
-        most = max(min(_LONGEST_BLOCK, _NUMBERS // max(len(self._kept_at), 1)), 16)
+        most = max(min(_LONGEST_BLOCK, _NUMBERS // (len(self._kept_at) + len(step.after["x"]) * records)), 16)
         work = len(step.gain.rows) + records * len(rows)
         #: Most steps that are taken at once; random numbers are drawn step by step.
         self.longest = 1 if not repeats else next(slices(most, work)).stop

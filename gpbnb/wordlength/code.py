@@ -386,19 +386,14 @@ def _of_nonlinear_model(model: NonlinearModel, fmt: AnyFormat, form: Form, exact
 
 
 def _nonlinear_vectors(system: NonlinearSystem, u: Any, fmt: FloatFormat | FixedFormat, p: int) -> Vectors:
-    inputs, x = system.inputs_in(fmt, u), fmt.array(system.x0)
-    rows: list[Any] = []
-    try:
-        rows = list(system.states(fmt, inputs))
-    except STOPS:
-        with suppress(*STOPS):
-            for each in inputs:
-                rows.append(system.advance(fmt, x, each))
-                x = rows[-1][: system.n]
+    inputs = system.inputs_in(fmt, u)
     given = _stored(inputs, fmt)
     start = np.append(_stored(fmt.array(system.x0), fmt), np.zeros(p, given.dtype))
-    states = np.array([_stored(each, fmt) for each in rows], given.dtype).reshape(-1, len(start))
-    return _ended(given, start, states, np.zeros(len(rows), np.int64))
+    rows = [start[None][:0]]
+    with suppress(*STOPS):
+        rows += (_stored(each, fmt) for each in system.blocks(fmt, inputs))
+    states = np.concatenate(rows)
+    return _ended(given, start, states, np.zeros(len(states), np.int64))
 
 
 # -- Kalman filters ---------------------------------------------------------------------------------------------------
@@ -460,7 +455,9 @@ def _model_vectors(model: LinearModel, z: Any, fmt: FloatFormat | FixedFormat, f
         return numbers if isinstance(fmt, FloatFormat) else np.ldexp(numbers, fmt.fraction_bits).astype(np.int64)
 
     start = stored(program_states(form, run.x.T, run.P[None]))
-    states = np.concatenate([start[:0], *(stored(program_states(form, x[1:, :, 0], P[1:])) for x, P in run.blocks(z))])
+    states = np.concatenate(
+        [start[:0], *(stored(program_states(form, each.x[:, :, 0], each.P)) for each in run.blocks(z))]
+    )
     inputs = fmt.array(z).to_float()
     if model.u is not None:
         u = np.broadcast_to(model.u, (len(z), model.u.shape[-1])) if model.u.ndim == 1 else model.u[: len(z)]
