@@ -112,6 +112,15 @@ def test_errors_of_the_evaluation_enter():
     assert after.zeta == pytest.approx(1e-9 / 0.5, rel=1e-6, abs=0)
 
 
+def test_what_a_singular_innovation_covariance_does_not_reach_has_no_error():
+    one, H, nothing = np.eye(2), np.array([[1.0, 0.0]]), np.zeros((1, 1))
+    model = StepModel(one, H, one, nothing)
+    off = contraction.evaluation_errors(model, np.ones(2), one, np.ones(1), H.T, nothing, UNIT)
+    assert off.gain.tolist() == [[np.inf], [0.0]]
+    assert off.q[0] == np.inf
+    assert 0 < off.q[1] < 1e-20
+
+
 @pytest.mark.parametrize("change", [{"q": np.nan}, {"T": np.inf}, {"d": np.nan}, {"R": -1.0}, {"P": np.nan}], ids=str)
 def test_nothing_known_is_infinite_and_stays_so(change):
     start = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.zeros((1, 1)))
