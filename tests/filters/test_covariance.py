@@ -1,4 +1,4 @@
-"""gpbnb.filters.covariance: roundings of textbook covariances are undone and reported; other faults are refused."""
+"""gpbnb.filters.covariance: roundings of textbook covariances are undone and reported."""
 
 from __future__ import annotations
 

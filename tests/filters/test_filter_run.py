@@ -1,4 +1,4 @@
-"""Filter runs, their errors and bounds: the exact filter, what ends a run, and what it refuses."""
+"""Filter runs, their errors and bounds: the exact filter, and what ends a run."""
 
 from __future__ import annotations
 

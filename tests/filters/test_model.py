@@ -1,4 +1,4 @@
-"""gpbnb.filters.model: what is refused, and the model of Gravity Probe B against its geometry."""
+"""gpbnb.filters.model: how entries are read, and the model of Gravity Probe B against its geometry."""
 
 from __future__ import annotations
 

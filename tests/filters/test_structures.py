@@ -1,4 +1,4 @@
-"""Structures of digital filters: runs against their bounds, responses against SciPy, and refusals."""
+"""Structures of digital filters: runs against their bounds, and responses against SciPy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""gpbnb.filters.system: linear filters against rounded Fractions, their bounds, and what is refused."""
+"""gpbnb.filters.system: linear filters against rounded Fractions, and their bounds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""gpbnb.report.rolling.experiment: simulations against closed forms, within their standard errors; refusals."""
+"""gpbnb.report.rolling.experiment: simulations against closed forms, within their standard errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files as spreadsheets and editors write them are read, or refused with the file, the line and the cure."""
+"""Files as spreadsheets and editors write them are read."""
 
 from __future__ import annotations
 

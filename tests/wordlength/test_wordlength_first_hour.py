@@ -1,4 +1,4 @@
-"""Mistakes of a first hour: each is refused in a line that says what came and what to do, or is no mistake at all."""
+"""What a user takes for granted in a first hour; tests/refused.txt has the mistakes."""
 
 from __future__ import annotations
 

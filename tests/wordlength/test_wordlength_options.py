@@ -1,4 +1,4 @@
-"""gpbnb.wordlength.options and running: what is refused before anything is computed, and what happens to files."""
+"""gpbnb.wordlength.options and running: what is taken as it is written, and what happens to files."""
 
 from __future__ import annotations
 
