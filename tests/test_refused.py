@@ -54,6 +54,10 @@ FILES = {
     "data.json": "1\n2\n3\n",
     "own.json": "{}",
     "notes.html": "{}",
+    "own.py": "def step(fmt, x, u):\n    return x, u\n\n\ndef mean(fmt, z):\n    return z[0]\n\n\nrate = 3\n",
+    "syntax.py": "def f(x):\n    retrn x\n",
+    "lacks.py": "import nowhere_at_all\n",
+    "leaves.py": "raise SystemExit(3)\n",
 }
 TWO = {
     "Phi": [["0.9", "0.1"], [0, "0.8"]],

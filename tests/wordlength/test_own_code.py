@@ -101,32 +101,6 @@ def test_a_function_without_data_takes_its_number_of_steps(folder, capsys):
 
 
 @pytest.mark.parametrize(
-    ("entry", "message"),
-    [
-        ("own.py", 'needed a function of a Python file, such as step = "model.py:step"'),
-        ("none.py:step", "there is no file .*none.py; needed a Python file, named from "),
-        ("own.py:stp", "needed a function of own.py, which has step, moved, seen, mean, powers"),
-        ("own.py:rate", "which is a int; needed a function"),
-        ("own.py:mean", "a step with other arguments: .*; needed step"),
-        ("text.txt:step", "needed a file whose name ends in .py"),
-        ("syntax.py:step", "line 2 of syntax.py raised SyntaxError: .*; needed a file that runs"),
-        ("lacks.py:step", "line 1 of lacks.py raised ModuleNotFoundError: No module named 'nowhere_at_all'; needed"),
-        ("leaves.py:step", "line 1 of leaves.py raised SystemExit: 3; needed a file that runs"),
-    ],
-)
-def test_a_wrong_entry_is_refused_in_one_line(folder, capsys, entry, message):
-    wrong = {"text.txt": "", "syntax.py": "def f(x):\n    retrn x\n", "lacks.py": "import nowhere_at_all\n"}
-    for name, text in (wrong | {"leaves.py": "raise SystemExit(3)\n"}).items():
-        (folder / "code" / name).write_text(text)
-    path = folder / "step.toml"
-    path.write_text(STEP.replace("own.py:step", entry))
-    with pytest.raises(ValueError, match=rf"^step.toml: got .*{message}"):
-        read_model(path)
-    assert main([str(path), "--tolerance", "1", "--simulate", "step"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
-@pytest.mark.parametrize(
     ("line", "message"),
     [
         ("return x + gain * u, x", "line 3 of wrong.py raised NameError: name 'gain' is not defined"),
