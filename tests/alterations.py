@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache, lru_cache
 
 from gpbnb.report.ledger.formula import Number, Part, Relation, Words
 from gpbnb.report.ledger.statements import Statement
@@ -22,8 +22,13 @@ def altered(statement: Statement) -> Iterator[tuple[str, Statement]]:
     """Name every alteration of a statement, and make it."""
     forms = [part.text for part in statement.parts]
     for i, part in enumerate(statement.parts):
-        for name, text in _of_part(part):
+        for name, text in _every(part):
             yield f"{i + 1} {name}", replace(statement, form="; ".join([*forms[:i], text, *forms[i + 1 :]]))
+
+
+@cache
+def _every(part: Part) -> tuple[tuple[str, str], ...]:
+    return tuple(_of_part(part))
 
 
 def _of_part(part: Part) -> Iterator[tuple[str, str]]:

@@ -112,12 +112,16 @@ HELD, JUDGE = judge._held, judge.judge
 
 
 @pytest.fixture(scope="module")
-def fewer_trials():
-    """Survey a third of the trials from here on: fewer trials make it harder to reject a statement."""
+def verdicts_alone():
+    """Leave notes as they are stored from here on, and survey a third of the trials.
+
+    Fewer trials make it harder to reject a statement.
+    """
     survey = experiment.survey.__wrapped__
     with pytest.MonkeyPatch.context() as patch:
         forget()
         patch.setattr(judge, "judge", until_violated)
+        patch.setattr(judge, "_filled", lambda text, names: text)
         patch.setattr(experiment, "survey", cache(lambda trial: survey(trial, repeats=3)))
         yield
     forget()
@@ -241,7 +245,7 @@ def negations(statement):
             yield part.label, [replace(statement, form="; ".join([*forms[:i], t, *forms[i + 1 :]])) for t in texts]
 
 
-@pytest.mark.usefixtures("fewer_trials")
+@pytest.mark.usefixtures("verdicts_alone")
 @pytest.mark.parametrize("topic", TOPICS)
 def test_no_altered_statement_is_judged_right(topic):
     for statement in of_topic(TAKEN, topic):
@@ -254,7 +258,7 @@ def test_no_altered_statement_is_judged_right(topic):
                 assert Verdict.VERIFIED not in {judged(other).verdict for other in others}, (statement.id, label)
 
 
-@pytest.mark.usefixtures("fewer_trials")
+@pytest.mark.usefixtures("verdicts_alone")
 @pytest.mark.parametrize("topic", TOPICS)
 def test_a_corrected_statement_is_judged_right_and_its_alterations_are_not(topic):
     for statement in of_topic(CORRECTED, topic):
