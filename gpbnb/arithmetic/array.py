@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
 from functools import cache
 from typing import Any, Self
 
@@ -468,9 +469,12 @@ class FloatArray(ComponentArray, NumPyProtocols):
         OverflowError : an entry is too long to write out.
         """
         check_exit(self, "to_fractions()")
-        to_fraction = self.format.kernel.to_fraction
-        convert = np.frompyfunc(cache(to_fraction) if self.size > MANY else to_fraction, 2, 1)
-        return np.asarray(convert(*self.on_exact_backend().components), dtype=object)[()]
+        convert: Callable[..., Fraction] = Fraction  # of float64, exactly
+        components = self.components
+        if self.backend.dtype != np.float64:
+            convert, components = self.format.kernel.to_fraction, self.on_exact_backend().components
+        whole = np.frompyfunc(cache(convert) if self.size > MANY else convert, len(components), 1)
+        return np.asarray(whole(*components), dtype=object)[()]
 
     def to_bits(self) -> Any:
         """Return the words in which a processor stores the entries, as unsigned integers, or as an int for one number.

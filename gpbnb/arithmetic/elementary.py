@@ -129,7 +129,9 @@ def _by_float64(name: str, *arrays: Any) -> tuple[Any, Any] | None:
     """
     fmt = arrays[0].format
     digits = fmt.precision * (fmt.base.bit_length() - 1)
-    if name not in _BY_FLOAT64 or fmt.rounding is Rounding.STOCHASTIC or digits > _MOST_DIGITS:
+    if name not in _BY_FLOAT64 or fmt.rounding is Rounding.STOCHASTIC:
+        return None
+    if digits > _MOST_DIGITS and name not in _EXACT:
         return None
     if not all(isinstance(x.backend, Floats) for x in arrays):
         return None

@@ -290,7 +290,7 @@ def opened(
 def true_states(model: AnyModel, z: Any) -> NDArray[np.float64]:
     """Return the estimates after every step without rounding, (steps, n, 2), as double-double.
 
-    Those of a nonlinear filter are computed in bits that agree with twice as many.
+    Those of a nonlinear filter are computed as :func:`nonlinear_reference` does.
     """
     if not isinstance(model, NonlinearModel):
         return reference_states(model, z)
