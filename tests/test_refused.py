@@ -35,6 +35,7 @@ from gpbnb.bounds import inverse
 from gpbnb.bounds.gains import schedule
 from gpbnb.bounds.guarantee import from_schedule
 from gpbnb.bounds.guess import FilterLimits
+from gpbnb.bounds.system import output_errors
 from gpbnb.filters import emulation
 from gpbnb.filters.blocks import BLOCKS
 from gpbnb.filters.run import Run, Sums
@@ -123,8 +124,18 @@ NAMES = {name: getattr(gpbnb, name) for name in gpbnb.__all__} | {
     each.__name__: each
     for each in (
         *(ask, blocks, command, driven, given, mapping, model, nonlinear, stepped, replace, FloatArray, Run, Sums),
-        *(FilterLimits, from_schedule, schedule, judge, jacobian, simulated_inputs, read_measurements, exact),
-        *(gamma, gamma_probabilistic, max_norm, column_sum_norm, row_sum_norm, Decimal, Fraction, date),
+        *(
+            FilterLimits,
+            from_schedule,
+            schedule,
+            judge,
+            jacobian,
+            output_errors,
+            simulated_inputs,
+            read_measurements,
+            exact,
+        ),
+        *(gamma, gamma_probabilistic, max_norm, column_sum_norm, row_sum_norm, exact, Decimal, Fraction, date),
         *(arb, control, math, mpmath, operator),
     )
 }
@@ -183,7 +194,9 @@ def answer(call):
 
 
 def agrees(found, message):
-    """Of a message that ends in …, only what comes before it is compared."""
+    """Of a message that ends in …, only what comes before it is compared; no call is stored as accepted."""
+    if found == "accepted":
+        return False
     return found.startswith(message[:-1]) if message.endswith("…") else found == message
 
 

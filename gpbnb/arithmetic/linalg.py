@@ -459,10 +459,11 @@ def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
     backend = a.backend
     if not isinstance(backend, Looped) or b.backend is not backend:
         return None
+    entries = b.components  # which derivatives do not have, and so are refused
     if (compiled := _factored(a, pivot)) is None:
         return None
     factors, order = compiled
-    found = backend.solved(factors.components, b[order].components)
+    found = backend.solved(factors.components, tuple(each[order] for each in entries))
     return None if found is None else type(a).from_components(backend, found, a.format)
 
 

@@ -72,6 +72,7 @@ def test_words_of_other_machines():
     assert BINARY128.array([1]).to_bits().dtype == object
     assert BINARY64.array(["0.1"]).to_bits().tolist() == list(struct.unpack("<Q", struct.pack("<d", 0.1)))
     assert Q15.array(["-1", "0.5", "-0.25"]).to_bits().tolist() == [0x8000, 0x4000, 0xE000]
+    assert (Q15.smallest, Q15.largest, Q15.lowest) == (Fraction(1, 2**15), 1 - Fraction(1, 2**15), -1)
     assert Q15.from_bits([0x8000, 0x4000, 0xE000]).to_float().tolist() == [-1, 0.5, -0.25]
 
 

@@ -8,6 +8,7 @@ import pytest
 from gpbnb import FixedFormat, FloatFormat, LinearSystem, required_precision
 from gpbnb.bounds.guarantee import limits
 from gpbnb.bounds.limited import limited_errors
+from gpbnb.bounds.system import output_errors
 
 LEAKING = [
     {"Kd": "0.7", "leak": "0.99", "limits": (-1, 1)},
@@ -28,6 +29,14 @@ def test_no_run_is_beyond_its_bound(given):
             e = np.clip(np.sign(np.sin(np.arange(600) / swing)) + rng.uniform(-0.2, 0.2, 600), -1, 1)[:, None]
             shares.append(np.abs((system.outputs(e, fmt) - system.outputs(e)).sum(axis=-1)).max() / bound)
     assert 1 / 20 < max(shares) <= 1
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 9), FloatFormat(2, 12, "chop"), FloatFormat(10, 4)], ids=str)
+def test_limits_that_are_never_reached_leave_the_bound_of_the_linear_system(fmt):
+    given = {"Kp": "0.8", "Ki": "0.1", "leak": "0.9"}
+    (linear,) = output_errors(LinearSystem.pid(**given), fmt, 1.0)
+    (limited,) = limited_errors(LinearSystem.pid(**given, limits=(-100, 100)), fmt, np.ones(1))
+    assert 1 - 2.0**-19 < limited / linear < 1.1  # a claim of the linear bound is larger by 2**-20
 
 
 def test_two_numbers_between_limits_differ_by_their_distance():

@@ -66,6 +66,14 @@ def not_quite(n):
     return next(Q for Q in TEXTBOOK if len(Q) == n and model(Q).repairs)
 
 
+def test_half_the_digits_of_the_type_are_repaired():
+    """1e-5 is more than half of the digits of float64, 1.5e-8, and less than half of those of float32, 3.5e-4."""
+    Q = np.array([[1, 0.5], [0.5 + 1e-5, 1]])
+    assert model(Q.astype(np.float32)).repairs
+    with pytest.raises(ValueError, match="needed a symmetric matrix"):
+        model(Q)
+
+
 def test_a_repair_is_off_for_exact_input_and_on_demand():
     Q = not_quite(2)
     as_fractions = exact(Q)

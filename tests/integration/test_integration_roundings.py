@@ -89,3 +89,10 @@ def test_the_stall_rate_is_where_increments_are_half_a_spacing():
     fmt, omega, duration = FloatFormat(2, 16), 64.0, 50.0
     spacing = math.sqrt(12 * precision.mean_square_rounding(fmt) * 2 * duration / omega)
     assert 1 / precision.stall_rate(omega, duration, fmt) == pytest.approx(spacing / 2)
+
+
+def test_both_errors_are_equal_at_the_best_rate_with_chopping():
+    """In closed form, for rates far above the bandwidth and a leak far below one."""
+    fmt = FloatFormat(2, 40, CHOP)
+    found = precision.two_errors(1.0, 1.0, precision.independent_best_rate(1.0, 1e4, fmt), 1e4, fmt)
+    assert found.discretization == pytest.approx(found.rounding, rel=1e-3)

@@ -34,6 +34,7 @@ def test_what_is_written_is_read(file):
     }
     assert table.records(seed="3") == [{"kind": "a", "seed": "3", "error": "0.428571", "note": "", "limit": "inf"}]
     assert len(table.records(kind="a")) == 22
+    assert table.records(kind="a", seed="4") == []  # all values count
 
 
 def test_every_lost_end_is_found(file):

@@ -59,6 +59,12 @@ def test_no_other_integer_bits_give_a_shorter_word(seed, basis):
         assert not other.met or other.digits >= found.digits
 
 
+def test_numbers_far_below_one_need_a_word_that_begins_after_the_point():
+    found = required_precision(LinearSystem([["0.5"]], [["0.5"]]), [2.0**-10] * 9, 1, kind="fixed")
+    assert found.met
+    assert found.format.data.integer_bits < 0 < found.format.data.precision
+
+
 def test_limits_that_a_run_never_reaches_need_integer_bits_too():
     controller = LinearSystem.pid("0.8", "0.05", limits=(-1, 1))
     u = 0.05 * np.sin(0.3 * np.arange(60))[:, None]

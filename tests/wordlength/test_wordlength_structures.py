@@ -95,6 +95,15 @@ def test_sections_are_paired_and_ordered_as_stated():
         assert each == pytest.approx(outputs[0], abs=1e-13)
 
 
+@pytest.mark.parametrize("scale", [False, True])
+def test_a_design_passes_on_what_it_is_asked_for(scale):
+    cascade = "cascade of direct form II transposed"
+    found = FilterDesign(sos=SOS, scale=scale, output_names=["y (V)"]).system(cascade)
+    expected = LinearSystem.from_sections(SOS, cascade, scale=scale)
+    assert found.made.coefficients.tolist() == expected.made.coefficients.tolist()
+    assert (found.input_names, found.output_names) == ((), ("y (V)",))
+
+
 # -- fraction bits ----------------------------------------------------------------------------------------------------
 
 
