@@ -12,9 +12,19 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.interpreting import Numbers
 from gpbnb.arithmetic.kernels.tags import Quick
 from gpbnb.arithmetic.machine import Addresses, code_of, functions, is_far
+from gpbnb.interrupts import slices
 
 DECAYED = 2.0**-700
 """Size below which an entry of a state becomes zero where a step would leave the range of float64."""
+
+
+LONGEST_BLOCK, KEPT_NUMBERS = 4096, 1 << 17
+"""Most steps that are taken at once, and numbers that they keep."""
+
+
+def steps_at_once(kept: int, work: int) -> int:
+    """Return the most steps that are taken at once, of which each keeps some numbers and takes some operations."""
+    return next(slices(max(min(LONGEST_BLOCK, KEPT_NUMBERS // kept), 16), work)).stop
 
 
 def drop_decayed(states: NDArray[Any], *carried: NDArray[Any]) -> bool:

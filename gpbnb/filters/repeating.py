@@ -17,14 +17,10 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.exits import unseen
 from gpbnb.arithmetic.interpreting import Numbers, OnIntegers
 from gpbnb.arithmetic.kernels.backends import Looped
-from gpbnb.arithmetic.loop import Loop
+from gpbnb.arithmetic.loop import Loop, steps_at_once
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.tape import FEW_OPERATIONS, Tape
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
-from gpbnb.interrupts import slices
-
-_LONGEST_BLOCK, _NUMBERS = 1024, 1 << 17
-"""Most steps that are taken at once, and numbers that they keep."""
 
 
 class StepTaken(NamedTuple):
@@ -200,8 +196,7 @@ class _Inside:
             self._numbers.feed(self._changing)
         self._each = self._numbers.ready(each)
         #: Most steps that are taken at once.
-        most = max(min(_LONGEST_BLOCK, _NUMBERS // len(self._kept_at)), 16)
-        self.longest = next(slices(most, len(tape.instructions))).stop
+        self.longest = steps_at_once(len(self._kept_at), len(tape.instructions))
 
     def take(self, first: int, states: tuple[Any, ...], own: Sequence[FloatArray]) -> StepTaken | None:
         """Take steps from some states as far as they have results; None if the first has none.

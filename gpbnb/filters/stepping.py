@@ -8,14 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.loop import Loop
+from gpbnb.arithmetic.loop import Loop, steps_at_once
 from gpbnb.arithmetic.machine import Fault, fault_of, takes_numbers
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.recording import ProgramPart, RecordedStep
-from gpbnb.interrupts import slices
-
-_LONGEST_BLOCK, _NUMBERS = 4096, 1 << 17
-"""Most steps of a block, and numbers that it keeps."""
 
 LARGEST_KEPT = 1 << 18
 """Most numbers of covariances that repeat."""
@@ -89,10 +85,9 @@ class Stepper:
         self._kept_at = np.concatenate([step.shared, step.K.ravel(), step.after["P"].ravel()])
         repeats = all(fmt is None or fmt.rounding is not Rounding.STOCHASTIC for fmt in formats)
         self._cycle = cycle if repeats else 0
-        most = max(min(_LONGEST_BLOCK, _NUMBERS // (len(self._kept_at) + len(step.after["x"]) * records)), 16)
-        work = len(step.gain.rows) + records * len(rows)
+        kept, work = len(self._kept_at) + len(step.after["x"]) * records, len(step.gain.rows) + records * len(rows)
         #: Most steps that are taken at once; random numbers are drawn step by step.
-        self.longest = 1 if not repeats else next(slices(most, work)).stop
+        self.longest = steps_at_once(kept, work) if repeats else 1
         self._repeated: tuple[int, NDArray[Any], NDArray[np.bool_]] | None = None
         self._last: NDArray[Any] | None = None
         self._gain.feed(self._groups(model, self._gain))
