@@ -450,8 +450,9 @@ def peaks(F: Any, columns: Any, rows: Any, sizes: Any, steps: int | None, back: 
     """Bound a vector, and rows times it, after at most some steps, each of which adds columns to F times it; see (6).
 
     The vector is 0 at first, and within `sizes` in all earlier steps. The bounds are shares, in units of 2**-PEAK, of
-    the sizes and of the rows' sizes, which are returned as well. Rows C_l of (2) start with the d unit rows C. A row r
-    of size 1 has the rows r C_l, and its R_l are r times those of C, so at most d units as well.
+    the sizes and of the rows' sizes, which are returned as well. Rows C_l of (2) start with the d unit rows C, and are
+    rounded towards zero, so that they end. A row r of size 1 has the rows r C_l, and its R_l are r times those of C, so
+    at most d units as well.
     """
     d, one, lags = len(F), 1 << PEAK, 1 << max(back - 1, 0).bit_length()
     wholes = [size(row, sizes) or Fraction(1) for row in rows]
@@ -462,11 +463,13 @@ def peaks(F: Any, columns: Any, rows: Any, sizes: Any, steps: int | None, back: 
     sums, rest, most = [d] * (d + len(R)), 0 if steps is None else steps % lags, list[int]()
     for lag in range(lags if steps is None else min(steps, lags)):
         most = sums[:d] if lag == rest else most
-        effects, lost = across(C, G), [(len(G) + d) * sum(map(abs, c)) for c in C]
-        effects += each(lambda x: x >> PEAK, across(R, turned(effects)))
-        lost += [(size(r, lost) >> PEAK) + len(G) + 1 for r in R]
-        sums = [x + (sum(map(abs, e)) + y >> PEAK) + d + 2 for x, e, y in zip(sums, effects, lost, strict=True)]
-        C = each(lambda x: x >> PEAK, across(C, loop))
+        if any(map(any, C)):
+            effects, lost = across(C, G), [(len(G) + d) * sum(map(abs, c)) for c in C]
+            if R:
+                effects += each(lambda x: x >> PEAK, across(R, turned(effects)))
+                lost += [(size(r, lost) >> PEAK) + len(G) + 1 for r in R]
+            sums = [x + (sum(map(abs, e)) + y >> PEAK) + d + 2 for x, e, y in zip(sums, effects, lost, strict=True)]
+            C = [[x >> PEAK if x > 0 else -(-x >> PEAK) for x in c] for c in across(C, loop)]
     if steps is not None and steps <= lags:
         return sums, wholes
     blocks, P, T = None if steps is None else steps // lags, C, sums[:d]
