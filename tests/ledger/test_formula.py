@@ -81,6 +81,12 @@ def test_numbers_keep_their_printed_digits():
     assert isinstance(link.right, Fraction)
 
 
+def test_sums_and_products_may_end_at_a_symbol():
+    n = sp.Symbol("n")
+    assert sp.expand(Relation("Sum(j,(j,1,n))").value() - n * (n + 1) / 2) == 0
+    assert sp.simplify(Relation("Prod(2*j,(j,1,n))").value() - 2**n * sp.factorial(n)) == 0
+
+
 def test_the_sides_of_a_chain():
     assert [side.text for side in Relation("a == .50e1 ≈ c + d").sides] == ["a", ".50e1", "c + d"]
     assert [side.text for side in Relation("a + b").sides] == ["a + b"]
