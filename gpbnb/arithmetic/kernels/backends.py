@@ -492,7 +492,7 @@ class Floats(Compiled):
     def _attempts(
         self, given: Sequence[Components], products: int = 0, copy: bool | None = True
     ) -> Iterator[tuple[Any, list[Array]]]:
-        loops, (kind, _) = _matrices(), self._machine
+        kind, _ = self._machine
 
         def packed(dtype: Any = np.float64) -> list[Array]:
             return [self.pack(each, copy, dtype) for each in given]
@@ -501,18 +501,15 @@ class Floats(Compiled):
             yield (Single(), packed(np.float32)) if self._single else (Double(), packed())
             return
         if isinstance(kind, Quick):
-            first, second = (_flat(each[0], each[0].shape) for each in (*given, *given)[:2])
-            (low, high), (low_b, high_b) = loops.extents(first, second)
-            count, sizes = given[0][0].shape[1], ((low, low_b), (high, high_b))
-            if products >= _MANY and (proved := self._proved(count, *sizes)) is not None:
-                yield proved, packed(np.float32 if isinstance(proved, Single) else np.float64)
-            elif min(sizes[0]) >= QUICK_LEAST and max(sizes[1]) <= 1 / QUICK_LEAST:
-                yield kind, packed()
+            proved = self._proved(*given) if products >= _MANY else None
+            yield kind if proved is None else proved, packed(np.float32 if isinstance(proved, Single) else np.float64)
             kind = Careful()
         yield kind, packed()
 
-    def _proved(self, n: int, smallest: Sequence[float], largest: Sequence[float]) -> Any:
-        """Return the fastest kind of numbers if no sum of n products of numbers of these sizes can leave its range."""
+    def _proved(self, a: Components, b: Components) -> Any:
+        """Return the fastest kind of numbers if the sizes of two matrices prove that their product is in its range."""
+        (low, high), (low_b, high_b) = _matrices().extents(*(_flat(each[0], each[0].shape) for each in (a, b)))
+        n, smallest, largest = a[0].shape[1], (low, low_b), (high, high_b)
         tag = cast(Float, self.tag)
         gradual, even = tag.gradual, tag.mode == EVEN and self.base == 2
         low, high = extents_of_sums(n, self.base, self.precision, gradual, math.prod(smallest), math.prod(largest))

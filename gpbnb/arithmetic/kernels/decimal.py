@@ -132,6 +132,8 @@ def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, neg
         return np.uint64(up & fmt.nearest)
 
     def by_mode(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+        if fmt.mode == AWAY:  # a branch that processors predict
+            return np.uint64(up)
         at = (m & _U1) | (np.uint64(up) << 1) | (np.uint64(tie) << 2)
         at |= (np.uint64(inexact) << 3) | (np.uint64(negative) << 4)
         return (_INCREMENTS[np.uint64(fmt.mode)] >> at) & _U1

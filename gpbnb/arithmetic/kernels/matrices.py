@@ -40,6 +40,7 @@ from gpbnb.arithmetic.kernels.tags import (
     DIVIDE,
     MULTIPLY,
     NEGATIVE,
+    QUICK_LEAST,
     Careful,
     Double,
     InPairs,
@@ -76,10 +77,16 @@ class _Kind(NamedTuple):
     add: Any  # (format, sign, factor, row, at, out, to, count) -> gone; adds a multiple of a row, or subtracts it
     dot: Any  # (format, row, at, column, count) -> sum of products, gone
     lost: Any  # (numbers, begin, end) -> whether one of them tells that it is beyond the range
+    far: Any  # (numbers, count) -> whether one of them is too small or too large for the kind
 
 
 @borrowing(forceinline=True)
 def _nothing_lost(values: Any, begin: Any, end: Any) -> Any:
+    return False
+
+
+@borrowing(forceinline=True)
+def _nothing_far(values: Any, count: Any) -> Any:
     return False
 
 
@@ -154,7 +161,16 @@ def _plain(dtype: Any) -> _Kind:
             gone |= not abs(values[i]) < np.inf
         return gone
 
-    return _Kind(format_of=format_of, divide=divide, scale=scale, add=add, dot=dot, lost=lost, **_floats(dtype))
+    return _Kind(
+        format_of=format_of,
+        divide=divide,
+        scale=scale,
+        add=add,
+        dot=dot,
+        lost=lost,
+        far=_nothing_far,
+        **_floats(dtype),
+    )
 
 
 # -- float64 with masks
@@ -169,6 +185,15 @@ def _quick_format(formats: Any, room: Any) -> Any:
 @inner(forceinline=True)
 def _quick_divide(fmt: Any, x: Any, y: Any) -> Any:
     return basic(_DIVIDE, fmt[0], fmt[1], x, y)
+
+
+@borrowing
+def _quick_far(values: Any, count: Any) -> Any:
+    any_far = False
+    for i in range(count):
+        size = abs(values[i])
+        any_far |= ((size < QUICK_LEAST) & (size > 0.0)) | (size > 1.0 / QUICK_LEAST)
+    return any_far
 
 
 def _quick(checked: bool) -> _Kind:
@@ -242,6 +267,7 @@ def _quick(checked: bool) -> _Kind:
         add=add,
         dot=dot,
         lost=_nothing_lost,
+        far=_quick_far if checked else _nothing_far,
         **_floats(np.float64),
     )
 
@@ -379,7 +405,19 @@ def _of_integers(kind: Any, parts: int, format_of: Any) -> _Kind:
         return s, False
 
     return _Kind(
-        format_in, sign, load, put, opposite, kind.negative, kind.compare, divide, scale, add, dot, _nothing_lost
+        format_in,
+        sign,
+        load,
+        put,
+        opposite,
+        kind.negative,
+        kind.compare,
+        divide,
+        scale,
+        add,
+        dot,
+        _nothing_lost,
+        _nothing_far,
     )
 
 
@@ -395,6 +433,7 @@ _KINDS = {
         add=_careful_add,
         dot=_careful_dot,
         lost=_nothing_lost,
+        far=_nothing_far,
         **{**_floats(np.float64), "negative": _careful_negative},
     ),
     InPairs: _of_integers(decimal, 2, pair_format),
@@ -417,7 +456,8 @@ def _of_kind(name: str) -> Callable[..., Any]:
     return stub
 
 
-_format_of, _sign, _load, _put, _lost = map(_of_kind, ("format_of", "sign", "load", "put", "lost"))
+_format_of, _sign, _load, _put = map(_of_kind, ("format_of", "sign", "load", "put"))
+_lost, _far = map(_of_kind, ("lost", "far"))
 _opposite, _negative, _compare, _divide = map(_of_kind, ("opposite", "negative", "compare", "divide"))
 _scale, _add, _dot = map(_of_kind, ("scale", "add", "dot"))
 
@@ -431,6 +471,8 @@ def product(
 ) -> Any:
     """Rows of C = A B from `begin` on; each entry sums `count` products, at least one, from left to right."""
     fmt, gone, a, b, c = _format_of(kind, words(formats), start(room)), False, start(a), start(b), start(c)
+    if _far(kind, a, end * count) or _far(kind, b, count * columns):
+        return True
     for i in range(begin, end):
         if columns == 1:
             found, beyond = _dot(kind, fmt, a, i * count, b, count)
@@ -465,6 +507,8 @@ def factor(kind: Any, formats: int, room: Any, a: Any, order: Any, pivot: bool, 
     them. Returns the column of the first zero pivot, NONE if there is none, or GONE.
     """
     fmt, gone, n, a = _format_of(kind, words(formats), start(room)), False, len(order), start(a)
+    if _far(kind, a, n * n):
+        return GONE
     for k in range(begin, end):
         if pivot:
             largest = k
@@ -493,6 +537,8 @@ def factor(kind: Any, formats: int, room: Any, a: Any, order: Any, pivot: bool, 
 def solved(kind: Any, formats: int, room: Any, a: Any, b: Any, n: int, columns: int) -> Any:
     """Overwrite right-hand sides B (n, columns), whose rows have the order of :func:`factor`, by the solutions."""
     fmt, gone, a, b = _format_of(kind, words(formats), start(room)), False, start(a), start(b)
+    if _far(kind, a, n * n) or _far(kind, b, n * columns):
+        return True
     for k in range(n):
         for i in range(k + 1, n):
             m = _negative(kind, fmt, _load(kind, fmt, a, i * n + k))
