@@ -119,11 +119,11 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
         whole[:14] = (*tag[:7], *tag.lowest, *tag.largest, tag.saturates)
         return "words"
     if isinstance(tag, tags.PAIRS):
-        if isinstance(tag, tags.LimitedDecimal):
+        if isinstance(tag, tags.Decimal):
             whole[:6] = tag.precision, tag.mode, tag.least, tag.largest, tag.small, 0
         else:
             mode = AWAY if tag.nearest else ZERO
-            whole[:6] = tag.precision, mode, -(2**60), 2**60, tags.UNLIMITED, isinstance(tag, tags.ShortDecimal)
+            whole[:6] = tag.precision, mode, -tags.FARTHEST, tags.FARTHEST, tags.UNLIMITED, 1
         return "pairs"
     bits, precision, mode, *limits, _ = tag
     whole[:3], numbers[:] = (bits, precision, mode), limits

@@ -25,7 +25,7 @@ from gpbnb.arithmetic.kernels.tags import (
     HALF_UP,
     ODD,
     UP,
-    LimitedDecimal,
+    Decimal,
     Wide,
 )
 
@@ -138,7 +138,7 @@ def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, neg
         at |= (np.uint64(inexact) << 3) | (np.uint64(negative) << 4)
         return (_INCREMENTS[np.uint64(fmt.mode)] >> at) & _U1
 
-    return by_mode if getattr(fmt, "instance_class", None) in (LimitedDecimal, Wide) else to_nearest_or_chopped
+    return by_mode if getattr(fmt, "instance_class", None) in (Decimal, Wide) else to_nearest_or_chopped
 
 
 @inner(forceinline=True)
@@ -190,7 +190,7 @@ def _overloaded_number(fmt: Any, m: Any, e: Any, up: Any, tie: Any, inexact: Any
             raise OverflowError("got a result beyond the largest number of the format; needed one within")
         return (-m if negative else m, e) if e >= fmt.least else (np.int64(0), np.int64(0))
 
-    return within if getattr(fmt, "instance_class", None) is LimitedDecimal else anywhere
+    return within if getattr(fmt, "instance_class", None) is Decimal else anywhere
 
 
 @inner(forceinline=True)

@@ -50,11 +50,11 @@ from gpbnb.arithmetic.kernels.tags import (
     SKIP,
     SUBTRACT,
     Careful,
+    Decimal,
     DoubleDouble,
     InPairs,
     InShortPairs,
     InTwoWords,
-    LimitedDecimal,
     Quick,
     ShortDecimal,
     Wide,
@@ -351,7 +351,7 @@ _run_two_words, _run_double_doubles = _loop(wide, _operation(wide), 3), _loop(do
 @borrowing(forceinline=True)
 def pair_format(columns: Any) -> Any:
     """The format of base 10 of these columns."""
-    return LimitedDecimal(columns[1], columns[0], columns[2], columns[3], columns[4])
+    return Decimal(columns[1], columns[0], columns[2], columns[3], columns[4])
 
 
 @borrowing(forceinline=True)

@@ -42,7 +42,6 @@ from gpbnb.arithmetic.kernels.tags import (
     Decimal,
     DoubleDouble,
     Float,
-    LimitedDecimal,
     ShortDecimal,
     Wide,
 )
@@ -50,7 +49,6 @@ from gpbnb.arithmetic.kernels.tags import (
 _MODULES = {
     Decimal: decimal,
     ShortDecimal: shortdecimal,
-    LimitedDecimal: decimal,
     Wide: wide,
 }
 

@@ -47,23 +47,22 @@ def tag_of(rules: Rules) -> Any:
         return None
     if rules.base != 10:
         return _float_tag(rules)
-    if rules.limits is None and rules.rounding in Rounding.documented():
-        kind = tags.ShortDecimal if rules.precision <= tags.LARGEST_SHORT else tags.Decimal
-        return kind(rules.precision, rules.rounding is Rounding.NEAREST)
+    if rules.limits is None and rules.rounding in Rounding.documented() and rules.precision <= tags.LARGEST_SHORT:
+        return tags.ShortDecimal(rules.precision, rules.rounding is Rounding.NEAREST)
     return _decimal_tag(rules)
 
 
-def _decimal_tag(rules: Rules) -> tags.LimitedDecimal | None:
+def _decimal_tag(rules: Rules) -> tags.Decimal | None:
     """Return the tag for pairs of int64, or None if they cannot hold the digits that decide a rounding."""
     limits, last = rules.limits, rules.precision - 1
     if rules.rounding not in _CODES:
         return None
     if limits is None:
-        return tags.LimitedDecimal(_CODES[rules.rounding], rules.precision, -_UNLIMITED, _UNLIMITED, tags.UNLIMITED)
+        return tags.Decimal(_CODES[rules.rounding], rules.precision, -_UNLIMITED, _UNLIMITED, tags.UNLIMITED)
     if limits.fixed or not _ends_in_nines(rules) or limits.overflow != "raise":
         return None
     small = tags.GRADUAL if limits.subnormal else tags.ABRUPT
-    return tags.LimitedDecimal(_CODES[rules.rounding], rules.precision, limits.emin - last, _emax(rules) - last, small)
+    return tags.Decimal(_CODES[rules.rounding], rules.precision, limits.emin - last, _emax(rules) - last, small)
 
 
 def wide_tag(rules: Rules) -> tags.Wide | None:

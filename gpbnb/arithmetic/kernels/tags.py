@@ -15,7 +15,7 @@ LEAST, LIMIT = 2.0**-960, 2.0**1023  # magnitudes of Float without a range, from
 # toward plus infinity. ZERO, UP and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to
 # neighbours with an odd last digit. RANDOM rounds stochastically.
 AWAY, EVEN, ZERO, UP, DOWN, ODD, HALF_UP, RANDOM = range(8)
-# What happens below the smallest normal number of a Wide or LimitedDecimal format: there is none; its spacing is kept;
+# What happens below the smallest normal number of a Wide or Decimal format: there is none; its spacing is kept;
 # numbers become zero; or all numbers have one spacing.
 UNLIMITED, GRADUAL, ABRUPT, FIXED = range(4)
 FARTHEST = 2**60  # exponent of a Wide number
@@ -51,13 +51,16 @@ class Float(NamedTuple):
 
 
 class Decimal(NamedTuple):
-    """Base 10, precision 1 to 18; a number is ``(significand, exponent)``, an array is int64 (..., 2).
+    """Base 10, precision 1 to 18, any rounding mode except random, and any range.
 
-    ``LimitedDecimal`` computes the same; sums and products of arrays take it 1.2 times as long.
+    A number is ``(significand, exponent)``, an array is int64 (..., 2).
     """
 
+    mode: int  # its code
     precision: int
-    nearest: bool
+    least: int  # exponent of the last digit of the smallest normal number
+    largest: int  # exponent of the last digit of the largest number
+    small: int  # UNLIMITED, GRADUAL or ABRUPT
 
 
 class ShortDecimal(NamedTuple):
@@ -69,16 +72,6 @@ class ShortDecimal(NamedTuple):
 
 class DoubleDouble(NamedTuple):
     """The reference: pairs ``(high, low)`` of float64, relative errors below 2**-102; an array is float64 (..., 2)."""
-
-
-class LimitedDecimal(NamedTuple):
-    """Base 10, precision 1 to 18, any rounding mode except random, and a limited range; numbers as in ``Decimal``."""
-
-    mode: int  # its code
-    precision: int
-    least: int  # exponent of the last digit of the smallest normal number
-    largest: int  # exponent of the last digit of the largest number
-    small: int  # UNLIMITED, GRADUAL or ABRUPT
 
 
 class Wide(NamedTuple):
@@ -156,6 +149,6 @@ def random_state(tag: Any) -> Any:
     return tag.random if isinstance(tag, Float) and tag.mode == RANDOM else None
 
 
-PAIRS = (Decimal, ShortDecimal, LimitedDecimal)
+PAIRS = (Decimal, ShortDecimal)
 
-Tag = Float | Decimal | ShortDecimal | DoubleDouble | LimitedDecimal | Wide
+Tag = Float | Decimal | ShortDecimal | DoubleDouble | Wide

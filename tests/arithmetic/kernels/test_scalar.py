@@ -17,7 +17,7 @@ from gpbnb.arithmetic.kernels.scalar import (
     multiply,
     store,
 )
-from gpbnb.arithmetic.kernels.tags import Decimal
+from gpbnb.arithmetic.kernels.tags import ShortDecimal
 
 
 @njit
@@ -50,9 +50,9 @@ def test_float64_out_of_range_raises(fmt: FloatFormat, factor: float) -> None:
 def test_a_decimal_exponent_beyond_int64_raises() -> None:
     big = np.array([[10, 2**58]])
     with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
-        powers(Decimal(2, True), big, np.zeros((20, 2), np.int64))
+        powers(ShortDecimal(2, True), big, np.zeros((20, 2), np.int64))
     with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
-        powers(Decimal(2, True), big * [1, -1], np.zeros((20, 2), np.int64))
+        powers(ShortDecimal(2, True), big * [1, -1], np.zeros((20, 2), np.int64))
 
 
 def test_importing_gpbnb_is_light() -> None:
