@@ -180,12 +180,15 @@ def _overloaded_number(fmt: Any, m: Any, e: Any, up: Any, tie: Any, inexact: Any
         return -m if negative else m, e
 
     def within(fmt: Any, m: Any, e: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
-        if e < fmt.least and fmt.small == GRADUAL:
+        normal = e >= fmt.least
+        if not normal and fmt.small == GRADUAL:
             return _shortened(fmt, m, e, up, tie, inexact, negative)
         m += increment(fmt, m, up, tie, inexact, negative)
         carried = m == _power(fmt.precision)
         m = np.int64(_power(fmt.precision - 1) if carried else m)
         e += np.int64(carried)
+        if normal and e <= fmt.largest:  # as for most numbers
+            return -m if negative else m, e
         if e > fmt.largest or (e < fmt.least and fmt.small != ABRUPT):
             raise OverflowError("got a result beyond the largest number of the format; needed one within")
         return (-m if negative else m, e) if e >= fmt.least else (np.int64(0), np.int64(0))
