@@ -45,6 +45,7 @@ from gpbnb.wordlength import report
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_measurements
 from gpbnb.wordlength.required import judge
+from tests.filters.test_model import GOOD as TWO
 
 STORED = Path(__file__).with_name("refused.txt")
 FILES = {
@@ -59,14 +60,6 @@ FILES = {
     "syntax.py": "def f(x):\n    retrn x\n",
     "lacks.py": "import nowhere_at_all\n",
     "leaves.py": "raise SystemExit(3)\n",
-}
-TWO = {
-    "Phi": [["0.9", "0.1"], [0, "0.8"]],
-    "H": [[1, 0]],
-    "Q": [["0.01", 0], [0, "0.02"]],
-    "R": [["0.5"]],
-    "x0": [1, 2],
-    "P0": [[1, "0.5"], ["0.5", 1]],
 }
 
 

@@ -214,7 +214,7 @@ def _rounded(name: str, values: Sequence[Fraction], fmt: Any, place: str) -> Pai
                 # In a format that wraps around, ends that are a whole range apart round to the same number, too.
                 if low == high and (modulus is None or bool(4 * ball.rad() < modulus)):
                     return low
-            # No ball separates a rational value from a tie.
+            # If a rational value is a tie, every ball around it contains a tie.
             if bits == first and (whole := _rational(name, values)) is not None:
                 kernel.count = drawn
                 return kernel.from_ratio(*whole.as_integer_ratio())

@@ -383,9 +383,9 @@ def _are_positive(mu: Array, B: Array) -> NDArray[np.bool_]:
 
 
 def _propagated_weights(L: Array, A: Array, *added: Array) -> Array:
-    """Return weights (steps + 1, n, n): those before the first step, and after each step; they stay after an overflow.
+    """Return the weights before the first step and after each, (steps + 1, n, n). An overflow leaves them as they are.
 
-    The machine repeats :func:`_weights_after` in binary64. No bound depends on its roundings: all weights are valid.
+    The machine repeats :func:`_weights_after` in binary64. Its roundings affect no bound: any weights are valid.
     """
     own, lower, n = np.stack([A, *added], axis=1), np.tril_indices(len(L)), len(L)
     usable = np.isfinite(own).all(axis=(1, 2, 3)) & np.isfinite(L).all()
@@ -411,7 +411,7 @@ def _weights_after(lower: Any, A: Any, *added: Any) -> Any:
 
 
 def _weights(W: Any) -> Any:
-    """Return a nonsingular lower factor of about W, of which only the lower half is read.
+    """Return a nonsingular lower factor of a matrix close to W. Only the lower half of W is read.
 
     Any such factor is valid, so lost pivots are replaced by small ones.
     """

@@ -195,11 +195,11 @@ class _Inside:
         if isinstance(self._numbers, Loop):
             self._numbers.feed(self._changing)
         self._each = self._numbers.ready(each)
-        #: Most steps that are taken at once.
+        #: The largest number of steps taken at once.
         self.longest = steps_at_once(len(self._kept_at), len(tape.instructions))
 
     def take(self, first: int, states: tuple[Any, ...], own: Sequence[FloatArray]) -> StepTaken | None:
-        """Take steps from some states as far as they have results; None if the first has none.
+        """Take steps from given states until one has no result; return None if the first has none.
 
         Parameters
         ----------

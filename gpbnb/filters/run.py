@@ -400,7 +400,8 @@ def _nearest_floats(pairs: NDArray[np.int64], out: NDArray[np.float64]) -> None:
 def widened(packed: NDArray[Any]) -> NDArray[np.float64]:
     """Convert results of compiled loops in any format, (k, n, m) or (k, n, m, 2), to double-double.
 
-    In base 10, this is faster than :func:`gpbnb.filters.opening.widened_array`, but rounds for each 22 powers of ten.
+    In base 10, this is faster than :func:`gpbnb.filters.opening.widened_array`, but it rounds once for every 22 powers
+    of ten.
     """
     if packed.ndim == 3:
         return widened_array(packed)

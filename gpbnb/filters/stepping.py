@@ -86,7 +86,7 @@ class Stepper:
         repeats = all(fmt is None or fmt.rounding is not Rounding.STOCHASTIC for fmt in formats)
         self._cycle = cycle if repeats else 0
         kept, work = len(self._kept_at) + len(step.after["x"]) * records, len(step.gain.rows) + records * len(rows)
-        #: Most steps that are taken at once; random numbers are drawn step by step.
+        #: The largest number of steps taken at once; random numbers are drawn step by step.
         self.longest = steps_at_once(kept, work) if repeats else 1
         self._repeated: tuple[int, NDArray[Any], NDArray[np.bool_]] | None = None
         self._last: NDArray[Any] | None = None

@@ -17,7 +17,7 @@ def test_each_22_powers_of_ten_round_once(largest):
     near, roundings = double_doubles_near(np.stack([m, e], axis=-1)), 1 + largest // 22
     for (high, low), m_of, e_of in zip(near.tolist(), m.tolist(), e.tolist(), strict=True):
         true = m_of * Fraction(10) ** e_of
-        # Of one float64, a product or a quotient is within 2**-104: u**2 for each of 2 or 4 products of parts.
+        # With a second operand of one float64, a product or quotient has a relative error of at most 4 u**2 = 2**-104.
         assert abs(Fraction(high) + Fraction(low) - true) <= abs(true) * roundings * Fraction(2) ** -103
 
 

@@ -113,7 +113,7 @@ HELD, JUDGE = judge._held, judge.judge
 
 @pytest.fixture(scope="module")
 def verdicts_alone():
-    """Leave notes as they are stored from here on, and survey a third of the trials.
+    """From here on, leave notes as they are stored, and run a third of the trials of a survey.
 
     Fewer trials make it harder to reject a statement.
     """

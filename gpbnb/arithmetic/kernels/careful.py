@@ -128,7 +128,7 @@ def _fit(fmt: Any, random: Any, p: Any, r: Any, exact_zero: Any) -> Any:
 
 @inner(forceinline=True)
 def fused_sum(a: Any, b: Any, c: Any) -> Any:
-    """a * b + c as its nearest float64 w and a residual with the correct sign, and whether the sum is exactly zero.
+    """The float64 w nearest to a * b + c, a residual with the correct sign, and whether the sum is exactly zero.
 
     The exact product is p + e, and p + c = s + r. The residuals e and r add up to v + lowest, and s and v to w + low.
     If low is not zero, it is a multiple of the last bit of v and thus larger than lowest. If the residual of the
