@@ -43,6 +43,7 @@ from gpbnb.filters.simulation import simulated_inputs
 from gpbnb.report.integration import precision, theory
 from gpbnb.wordlength import report
 from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.code import prepared
 from gpbnb.wordlength.models import read_measurements
 from gpbnb.wordlength.required import judge
 from tests.filters.test_model import GOOD as TWO
@@ -110,7 +111,7 @@ def blocks(**changes):
 
 
 def stepped(step):
-    return gpbnb.NonlinearSystem(step, [1]).program(gpbnb.BINARY32)
+    return prepared(gpbnb.NonlinearSystem(step, [1]), gpbnb.BINARY32, None)
 
 
 NAMES = {name: getattr(gpbnb, name) for name in gpbnb.__all__} | {

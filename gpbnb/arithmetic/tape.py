@@ -48,6 +48,22 @@ def _combined(a: Places, b: Places, table: int) -> Places:
     return found
 
 
+def known_truth(name: str, a: Places, b: Places, table: Any) -> Places:
+    """Return the places of truth values that a comparison or combination gives without a run, and -1 for others."""
+    return np.where(a == b, table >> 1 & 1, -1) if name == "compare" else _combined(a, b, table)
+
+
+def exact_result(name: str, a: int, b: int, one: int) -> int:
+    """Return the place of the number that an exact operation gives back, or -1; place 0 is zero, `one` is 1."""
+    if name == "divide":
+        return 0 if a == 0 else a if b == one else -1
+    if name == "multiply":
+        return 0 if a == 0 or b == 0 else b if a == one else a if b == one else -1
+    if name in ("add", "subtract"):
+        return a if b == 0 else b if a == 0 and name == "add" else -1
+    return -1
+
+
 class Tape:
     """Operations in the order in which they ran. Place 0 is the number zero; truth values 0 and 1 are false and true.
 
@@ -128,7 +144,7 @@ class Tape:
             return found
         if name in ("compare", "combine"):
             a, b, table = operands
-            found = np.where(a == b, table >> 1 & 1, -1) if name == "compare" else _combined(a, b, table)
+            found = known_truth(name, a, b, table)
             left = found < 0
             if left.any():
                 found[left] = self._append(name, (a[left], b[left], table), fmt)
@@ -137,7 +153,9 @@ class Tape:
             return self._append(name, operands, fmt)
         a, b = operands
         if a.size == 1:
-            same = self._same(name, a.item(), b.item())
+            if name == "divide" and a == 0:
+                self.check(b.item())
+            same = exact_result(name, a.item(), b.item(), self.one)
             return self._append(name, operands, fmt) if same < 0 else np.full(a.shape, same)
         found = np.full(a.shape, -1)
         if name == "divide":
@@ -157,16 +175,6 @@ class Tape:
             return self._append(name, operands, fmt)
         found[left] = self._append(name, (a[left], b[left]), fmt)
         return found
-
-    def _same(self, name: str, a: int, b: int) -> int:
-        """Return the place of the number that an exact operation gives back, or -1."""
-        if name == "divide":
-            if a == 0:
-                self.check(b)
-            return 0 if a == 0 else a if b == self.one else -1
-        if name == "multiply":
-            return 0 if a == 0 or b == 0 else b if a == self.one else a if b == self.one else -1
-        return a if b == 0 else b if a == 0 and name == "add" else -1
 
     def check(self, place: int) -> None:
         """Stop each run in which a number is zero that will be a divisor."""

@@ -8,13 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.loop import Loop, drop_decayed
-from gpbnb.arithmetic.machine import CODES
+from gpbnb.arithmetic.machine import CODES, operands_of, takes_numbers
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT, Program, values_of
+from gpbnb.filters.program import Program
 from gpbnb.interrupts import slices
-
-_LESS = 1  # the order in which a comparison holds
-_NAMES = {MULTIPLY: "multiply", ADD: "add", SUBTRACT: "subtract"}
 
 
 class LinearSteps:
@@ -30,32 +27,23 @@ class LinearSteps:
     """
 
     def __init__(self, program: Program, fmt: Any, tag: Any, coefficients: NDArray[Any], x: NDArray[Any]) -> None:
-        n, first, count = program.n, program.n + program.m, len(program.operations)
-        random = fmt is not None and fmt.rounding is Rounding.STOCHASTIC
-        order = np.arange(count) if random else _grouped(program)
-        place = np.arange(first + count)
-        place[first + order] = first + np.arange(count)
-        operations, at, truths = program.operations.tolist(), first + count, 2
-        rows, numbers = list[tuple[int, ...]](), list[int]()
-        for o, (code, a, b) in enumerate(operations):
-            b, out, limit = place[b], place[first + o], at + a
-            if code in _NAMES:
-                rows.append((CODES[_NAMES[code]], limit if code == MULTIPLY else place[a], b, 0, out))
-            else:
-                lesser = (b, limit) if code == AT_LEAST else (limit, b)
-                rows += [(CODES["compare"], *lesser, _LESS, truths), (CODES["choose"], truths, limit, b, out)]
-                truths += 1
-            numbers += [o] * (len(rows) - len(numbers))
-        #: The rows in the order of the program, and the operation of each.
-        self._rows, self._operations, self._m = np.array(rows, np.int64).reshape(-1, 5), np.array(numbers), program.m
-        self._outputs, self._places = program.outputs - first, place
-        moved = np.argsort(place[first + self._operations], kind="stable") if rows else np.zeros(0, np.int64)
-        self._formats = np.zeros(len(rows), np.int64)
-        self._loop = Loop(
-            [fmt], self._rows[moved], self._formats, (at + len(coefficients), truths), np.arange(n),
-            place[program.outputs], tag=tag,
-        )  # fmt: skip
-        self._loop.hold(slice(at, None), coefficients)
+        rows, random = program.rows.copy(), fmt is not None and fmt.rounding is Rounding.STOCHASTIC
+        order = np.arange(len(rows)) if random else _grouped(program)
+        place = np.arange(program.sizes[0])
+        results = rows[order, 4][rows[order, 0] != CODES["compare"]]
+        place[results] = np.sort(results)
+        takes = takes_numbers(rows[:, 0])
+        rows[:, 1:4][takes] = place[rows[:, 1:4][takes]]
+        given = rows[:, 0] != CODES["compare"]
+        rows[given, 4] = place[rows[given, 4]]
+        #: The rows in the order of the program, and the number of the row that computes each output.
+        self._rows, self._formats, self._inputs = rows, np.zeros(len(rows), np.int64), program.inputs
+        self._after = place[program.after]
+        self._outputs = np.array([np.flatnonzero(given & (rows[:, 4] == each)).max(initial=-1) for each in self._after])
+        #: The place of each value.
+        self._places = place[program.places]
+        self._loop = Loop([fmt], rows[order], self._formats, program.sizes, program.states, self._after, tag=tag)
+        self._loop.hold(program.coefficients, coefficients)
         self._loop.states = x
 
     def take(self, z: NDArray[Any]) -> tuple[NDArray[Any], int]:
@@ -68,19 +56,20 @@ class LinearSteps:
         states : (steps, n, ...), of the steps that have results.
         output : number of the first output that the next step cannot compute; -1 if all steps have results.
         """
-        loop, n = self._loop, len(self._outputs)
-        out, done = np.empty((len(z), n, *z.shape[2:]), z.dtype), 0
+        loop, m, at = self._loop, len(self._inputs), len(self._after) + 1
+        out, done = np.empty((len(z), len(self._after), *z.shape[2:]), z.dtype), 0
         most = next(slices(len(z), len(self._rows)), slice(0)).stop
         while done < len(z):
             some = z[done : done + most]
-            found, _, row = loop.take(done, some.reshape(len(some), self._m, *loop.values.shape[1:]), n, loop.after)
+            found, _, row = loop.take(done, some.reshape(len(some), m, *loop.values.shape[1:]), at, loop.after)
             out[done : done + len(found)] = found.reshape(len(found), *out.shape[1:])
             done += len(found)
             if row >= 0:
                 states = loop.states
                 if not drop_decayed(states):
-                    operation = self._operations[loop.first_without_result(self._rows, self._formats)]
-                    return out[:done], int(np.argmax(self._outputs >= operation))
+                    return out[:done], int(
+                        np.argmax(self._outputs >= loop.first_without_result(self._rows, self._formats))
+                    )
                 loop.states = states
         return out, -1
 
@@ -91,21 +80,21 @@ class LinearSteps:
         ------
         OverflowError : a step has no result.
         """
-        loop, sizes = self._loop, np.zeros(len(self._places))
+        loop, sizes, n = self._loop, np.zeros(len(self._places)), len(self._after)
         for part in slices(len(z), len(self._rows)):
-            kept, _, row = loop.take(part.start, z[part], len(self._outputs), self._places)
+            kept, _, row = loop.take(part.start, z[part], n + 1, self._places)
             if row >= 0:
                 raise OverflowError(f"got no result of step {part.start + len(kept) + 1}")
             np.maximum(sizes, np.abs(kept).max(axis=0), out=sizes)
-        states = sizes[: len(self._outputs)]
-        np.maximum(states, np.abs(loop.states), out=states)
+        np.maximum(sizes[:n], np.abs(loop.states), out=sizes[:n])
         return sizes
 
 
 def _grouped(program: Program) -> NDArray[np.int64]:
-    """Return an order of operations in which each follows those that it needs, and equal codes stand together."""
-    first = program.n + program.m
-    level = [0] * (first + len(program.operations))
-    for o, (code, a, b) in enumerate(program.operations.tolist()):
-        level[first + o] = 1 + max(level[each] for each in values_of(code, a, b))
-    return np.lexsort((program.operations[:, 0], np.array(level[first:], np.int64)))
+    """Return an order of rows in which each follows those that it needs, and equal codes stand together."""
+    numbers, truths, level = [0] * program.sizes[0], [0] * program.sizes[1], list[int]()
+    for code, *given, out in program.rows.tolist():
+        taken = zip((numbers, truths), operands_of(code, *given), strict=True)
+        level.append(1 + max(levels[place] for levels, places in taken for place in places))
+        (truths if code == CODES["compare"] else numbers)[out] = level[-1]
+    return np.lexsort((program.rows[:, 0], np.array(level, np.int64)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 from functools import partial
 from typing import Any, NamedTuple, cast
 
@@ -18,12 +19,11 @@ from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints, Progress
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import ROOTS, Form
-from gpbnb.filters.listing import filter_program
 from gpbnb.filters.model import identity_in
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.opening import double_doubles_of
 from gpbnb.filters.program import Program
-from gpbnb.filters.recording import block_algebra
+from gpbnb.filters.recording import block_algebra, filter_program, program_states
 from gpbnb.filters.reference import PreciseSteps, agreed, joined
 from gpbnb.filters.repeating import RepeatedStep, StepTaken
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, reference_states
@@ -163,25 +163,22 @@ class NonlinearRun(Progress):
 
     # -- one step ---------------------------------------------------------------------------------------
 
-    def program(self, exact: bool = True) -> tuple[Program, list[NDArray[Any]]]:
-        """Return the operations of a step, and its coefficients but 0 and 1, which are the last, each with its cycle.
+    def program(self) -> tuple[Program, list[NDArray[Any]]]:
+        """Return the operations of a step, and its coefficients but 1, which is the last, each with its cycle.
 
         Inputs are the measurements, then the known inputs.
 
-        Parameters
-        ----------
-        exact : as for :class:`~gpbnb.filters.listing.Listing`.
-
         Raises
         ------
-        ValueError : the step cannot be traced, or has a function that C lacks; the message says why.
+        ValueError : the step cannot be traced; the message says why.
         """
         found = self._step.recorded(self._step.given(self._stored(np.zeros(self.model.m))))
         tape, places = found.tape, dict(zip(("x", "P", "z", *self.given), found.places, strict=True))
-        weights = [at for name in _WEIGHTS if name in places for at in places.pop(name).ravel().tolist()]
         constants = {at: value for at, value in tape.constants_in(self.fmt).items() if at not in (0, tape.one)}
-        others, taken = dict.fromkeys(weights, 0) | constants, found.taken
-        program = filter_program(self.form, tape, places, others, taken.states, taken.definite, exact)
+        states = program_states(self.form, places["x"][None], places["P"][None])[0]
+        constants |= dict.fromkeys({*places["P"].ravel().tolist()} - {*states.tolist()}, Fraction(0))
+        taken = found.taken
+        program = filter_program(self.form, tape, places, [*constants], taken.states, taken.definite)
         cycles = (each.reshape(len(each), -1).to_fractions() for name, each in self.given.items() if name != "u")
         return program, [*cycles, np.array([list(constants.values())], dtype=object)]
 

@@ -1,7 +1,7 @@
 """A system whose step is a function of your own, and the operations of this step as a program for C code.
 
 The step is recorded once, see :mod:`gpbnb.arithmetic.traced`. Runs repeat it, see :mod:`gpbnb.filters.repeating`, and
-:meth:`NonlinearSystem.program` lists the same operations with the codes of :mod:`gpbnb.filters.program`.
+:meth:`NonlinearSystem.program` returns the same operations with the places of states, inputs and constants.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.second_format import convert
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.blocks import BlockFormats
-from gpbnb.filters.listing import Listing
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, sized, whole_number
 from gpbnb.filters.program import Program, entries, without_exact
@@ -160,34 +159,34 @@ class NonlinearSystem:
         found: FloatArray = fmt.array(rows)
         return found
 
-    def program(self, fmt: FloatFormat | FixedFormat, exact: bool = True) -> tuple[Program, NDArray[Any]]:
+    def program(self, fmt: FloatFormat | FixedFormat) -> tuple[Program, NDArray[Any]]:
         """Return the operations of a step, and the coefficients as a format stores them, (1, c).
 
-        The last p states of the program are the outputs. `exact` is that of :class:`~gpbnb.filters.listing.Listing`.
+        The last p states of the program are the outputs.
 
         Raises
         ------
-        ValueError : the step cannot be traced, or uses a function that has no exact counterpart in C.
+        ValueError : the step cannot be traced.
         OverflowError : a constant is beyond the range of the format.
         """
         tape, returned = self._one_step.recorded((self.n,), (self.m,))
-        constants = tape.constants_in(fmt)
-        distinct = list(dict.fromkeys(constants.values()))  # the first is zero
-        numbers = {value: i for i, value in enumerate(distinct)}
-        after, n = returned.components[0].tolist(), self.n
+        constants = {place: value for place, value in tape.constants_in(fmt).items() if place}
+        after, n = returned.components[0], self.n
         p = len(after) - n
-        listing = Listing(
-            tape,
-            [*range(1, 1 + n), *[-1] * p],
-            range(1 + n, 1 + n + self.m),
-            {place: numbers[value] for place, value in constants.items()},
-            {place for place, value in constants.items() if value},
-            exact,
+        program = Program(
+            tape.instructions.astype(np.int64),
+            tape.sizes,
+            np.append(np.arange(1, 1 + n), [-1] * p),
+            np.arange(1 + n, 1 + n + self.m),
+            np.array([*constants], dtype=np.int64),
+            after,
+            p,
+            (*entries("x", n), *entries("y", p)),
+            tuple(f"c{i}" for i in range(1, 1 + len(constants))),
+            calls=tape.calls,
         )
-        names = ["zero", *(f"c{i}" for i in range(1, len(distinct)))]
-        found = listing.program(after, len(distinct), p, [*entries("x", n), *entries("y", p)], names)
-        coefficients = np.array([distinct], dtype=object)
-        return without_exact(found, coefficients), coefficients
+        coefficients = np.array([[*constants.values()]], dtype=object)
+        return without_exact(program, coefficients), coefficients
 
     @cached_property
     def _one_step(self) -> TracedFunction:

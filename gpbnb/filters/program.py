@@ -1,131 +1,184 @@
-r"""One step of a linear filter as a list of rounded operations, in the order of the compiled kernels.
+r"""One step of a filter as a program: rounded operations in the order in which they run.
+
+A step is written for arrays of any kind, as in :mod:`gpbnb.filters.steps` and :mod:`gpbnb.filters.structures`, and
+recorded once. The same rows serve several purposes, so that they cannot disagree:
+
+* :mod:`gpbnb.filters.linear_steps` and :mod:`gpbnb.filters.recording` run them in any format;
+* :mod:`gpbnb.bounds` follows the effect of a rounding error in each operation on the result of the step;
+* :func:`matrices` computes the linear function of (x, z) that the step approximates;
+* :mod:`gpbnb.filters.words` runs them on integers, with formats of their own for coefficients, data and sums;
+* :mod:`gpbnb.wordlength.code` prints them as C.
 
 Covariance and gain of a Kalman filter do not depend on the measurements. Once they are known, the estimate needs only
 products with known coefficients, sums and differences: a *linear program*. A filter given by its transfer function has
-constant coefficients from the start, and each of its structures is another program. The same list of operations serves
-several purposes, so that they cannot disagree:
-
-* :mod:`gpbnb.filters.linear_steps` runs it in any format, digit for digit like the filter itself;
-* :mod:`gpbnb.bounds.adversary` follows the effect of a rounding error in each operation on the result of the step;
-* :func:`matrices` computes the linear function of (x, z) that the step approximates;
-* :mod:`gpbnb.filters.words` runs it on integers, with formats of their own for coefficients, data and sums;
-* :mod:`gpbnb.wordlength.code` prints it as C.
-
-A step that also computes the covariance is not linear: it multiplies and divides values. :mod:`gpbnb.filters.listing`
-lists its recorded operations with the same codes, and those of a step of your own, for C code.
-
-The coefficients are arguments and not part of the program, because they may change from step to step. A product with a
-zero coefficient is exact, and so is a sum with this product; the compiled kernels omit both.
+constant coefficients from the start, and each of its structures is another program.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-# fmt: off
-(
-    MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST, PRODUCT, DIVIDE, CONSTANT, CHOOSE, LESS, EQUAL, MODULO, ROOT, FLOOR,
-    CEILING, TRUNCATE, NEAREST,
-) = range(17)
-# fmt: on
-"""Codes of operations. AT_LEAST and AT_MOST limit a value by a coefficient, as a controller limits its output. PRODUCT
-and DIVIDE take two values, CONSTANT is a coefficient. CHOOSE is its first value if the guard of the operation is not
-zero, else its second. LESS and EQUAL are one if they hold for two values, else zero. MODULO is the exact rest of a
-division that truncates its quotient, ROOT a square root, and the last four are the nearest whole number below, above,
-toward zero, and on either side, ties to even."""
+from gpbnb.arithmetic.interpreting import Call
+from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of
+from gpbnb.arithmetic.tape import Tape, exact_result, known_truth
+from gpbnb.arithmetic.traced import TracedFormat
 
-_NAMES = (
-    "arctan2", "hypot", "float_power", "exp", "expm1", "exp2", "log", "log1p", "log2", "log10", "cbrt", "sin", "cos",
-    "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh",
-)  # fmt: skip
-FUNCTIONS = {name: NEAREST + 1 + i for i, name in enumerate(_NAMES)}
-"""Codes of functions that C has, by their names in NumPy; the first three take two values."""
+MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST = range(5)
+"""Codes of operations of a linear program; AT_LEAST and AT_MOST limit a value by a coefficient, as a controller limits
+its output."""
 
 LINEAR = (MULTIPLY, ADD, SUBTRACT)
 """Codes of operations that are linear functions of their values."""
 
-_ON_TWO_VALUES = (ADD, SUBTRACT, PRODUCT, DIVIDE, CHOOSE, LESS, EQUAL, MODULO, *list(FUNCTIONS.values())[:3])
-
-DIVISOR, POSITIVE, NOT_NEGATIVE, RADICAND, IN_RANGE = range(5)
-"""Kinds of checks. A divisor of zero and a radicand below zero end a run; a value that should be positive, or not
-negative, and is not, is the sign of a covariance that is no longer definite. IN_RANGE marks a value that nothing uses,
-whose overflow ends the run nevertheless."""
-
-
-NEVER_OVERFLOW = frozenset((AT_LEAST, AT_MOST, CONSTANT, CHOOSE, LESS, EQUAL, MODULO))
-"""Codes of operations whose result is in range if their values are."""
-
-
-def values_of(code: int, a: int, b: int) -> tuple[int, ...]:
-    """Return the values among the two operands of an operation; the others are coefficients."""
-    if code in _ON_TWO_VALUES:
-        return a, b
-    return () if code == CONSTANT else (b,)
-
-
-class Operations(NamedTuple):
-    """Operations of a step as the compiled loops of the bounds take them; fields of :class:`Program`."""
-
-    operations: NDArray[np.int64]
-    outputs: NDArray[np.int64]
-    groups: NDArray[np.int64]
-    roots: NDArray[np.int64]
+_LIMITS = {1: AT_MOST, 4: AT_LEAST}
+"""The limit that a choice makes, by the order in which its comparison of value and limit holds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Program:
     """Operations of one step.
 
-    Values are numbered: the n states, the m inputs, then the result of each operation. After the operations of a step,
-    state i takes the value ``outputs[i]``, all at once. Every state is stored in the format of the data.
-
     Parameters
     ----------
-    n, m : number of states and of inputs.
-    operations : (o, 3), code and two operands. MULTIPLY, AT_LEAST and AT_MOST take a coefficient and a value, CONSTANT
-        a coefficient; ROOT and the codes after it take a value as second operand, or two values; all others take two.
-    outputs : (n,), the values that become the states.
-    coefficients : number of coefficients.
-    groups : (o,), operations whose rounding errors have the same effect on the result share a number.
-    roots : for each group, an operation in it.
-    wide : (o,), whether a result stays in the accumulator, if the processor has one: a result that only sums and
-        differences use, unless it is the output of a section. Any other result is stored in the format of the data,
-        with one rounding.
-    p : number of outputs of the system. The last p states hold them, and no operation reads these.
-    state_names, coefficient_names : (n,) and (coefficients,), names for generated code.
-    guards : (o,), for each operation a value that must not be zero for it to run, or -1; empty if all run always.
-    checks : values and what they should be, such as :data:`POSITIVE`.
+    rows : (o, 5), operations of the machine: a code, three operands and the place of the result.
+    sizes : numbers of places, and of truth values.
+    states, inputs, coefficients : (n,), (m,) and (c,), their places; -1 for an output of the step before.
+    after : (n,), places of the next states. The last p are the outputs of the system, and no operation reads these.
+    p : number of outputs of the system.
+    state_names, coefficient_names : (n,) and (c,), names for generated code.
+    stored : places of results that are stored even if only sums use them: the outputs of sections.
+    calls : functions that are called between operations.
+    definite : the truth value that holds while a covariance is definite.
     """
 
-    n: int
-    m: int
-    operations: NDArray[np.int64]
-    outputs: NDArray[np.int64]
-    coefficients: int
-    groups: NDArray[np.int64]
-    roots: NDArray[np.int64]
-    wide: NDArray[np.bool_]
+    rows: NDArray[np.int64]
+    sizes: tuple[int, int]
+    states: NDArray[np.int64]
+    inputs: NDArray[np.int64]
+    coefficients: NDArray[np.int64]
+    after: NDArray[np.int64]
     p: int = 0
     state_names: tuple[str, ...] = ()
     coefficient_names: tuple[str, ...] = ()
-    guards: tuple[int, ...] = ()
-    checks: tuple[tuple[int, int], ...] = ()
+    stored: frozenset[int] = frozenset()
+    calls: Sequence[Call] = ()
+    definite: int = 1
 
     @property
-    def compiled(self) -> Operations:
-        """The operations as the compiled loops of the bounds take them."""
-        return Operations(self.operations, self.outputs, self.groups, self.roots)
+    def n(self) -> int:
+        """Number of states, with the outputs."""
+        return len(self.states)
+
+    @property
+    def m(self) -> int:
+        """Number of inputs."""
+        return len(self.inputs)
+
+    # -- a linear program -----------------------------------------------------------------------------------
+    # Its values are numbered: the n states, the m inputs, then the result of each operation.
+
+    @cached_property
+    def places(self) -> NDArray[np.int64]:
+        """The place of each value."""
+        results = self.rows[self.rows[:, 0] != CODES["compare"], 4]
+        return np.concatenate([self.states, self.inputs, results])
+
+    @cached_property
+    def _values(self) -> NDArray[np.int64]:
+        """The number of the value at each place; -1 for a coefficient."""
+        found = np.full(self.sizes[0], -1)
+        found[self.places] = np.arange(len(self.places))
+        return found
+
+    @cached_property
+    def operations(self) -> NDArray[np.int64]:
+        """Code and two operands of each operation, (o, 3).
+
+        MULTIPLY, AT_LEAST and AT_MOST take a coefficient and a value, ADD and SUBTRACT two values.
+
+        Raises
+        ------
+        ValueError : the program is not linear and has more than limits.
+        """
+        number = np.full(self.sizes[0], -1)
+        number[self.coefficients] = np.arange(len(self.coefficients))
+        value, found, compared = self._values, list[tuple[int, int, int]](), dict[int, tuple[int, int, int]]()
+        for code, a, b, c, out in self.rows.tolist():
+            name = NAMES[code]
+            if name == "compare":
+                compared[out] = a, b, c
+            elif name == "multiply" and number[a] >= 0 and value[b] >= 0:
+                found.append((MULTIPLY, number[a], value[b]))
+            elif name in ("add", "subtract") and min(value[a], value[b]) >= 0:
+                found.append((ADD if name == "add" else SUBTRACT, value[a], value[b]))
+            elif name == "choose" and compared[a] in ((b, c, 1), (b, c, 4)) and number[c] >= 0:
+                found.append((_LIMITS[compared[a][2]], number[c], value[b]))
+            else:
+                raise ValueError(f"got a step with {name}; needed sums, products with coefficients, and limits")
+        return np.array(found, dtype=np.int64).reshape(-1, 3)
+
+    @cached_property
+    def outputs(self) -> NDArray[np.int64]:
+        """The values that become the states, all at once, (n,)."""
+        return self._values[self.after]
+
+    @cached_property
+    def _users(self) -> list[list[int]]:
+        """The operations that use the result of each operation."""
+        first, users = self.n + self.m, [list[int]() for _ in self.operations]
+        for o, (code, a, b) in enumerate(self.operations.tolist()):
+            for value in values_of(code, a, b):
+                if value >= first:
+                    users[value - first].append(o)
+        return users
+
+    @cached_property
+    def _effects(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Numbers of effects; an operation used once, as a term of a sum, has that of the sum, up to its sign."""
+        users, outputs, first = self._users, set(self.outputs.tolist()), self.n + self.m
+        groups, roots = [-1] * len(users), list[int]()
+        for o in range(len(users) - 1, -1, -1):
+            used = users[o]
+            if len(used) == 1 and self.operations[used[0], 0] in (ADD, SUBTRACT) and first + o not in outputs:
+                groups[o] = groups[used[0]]
+            else:
+                groups[o] = len(roots)
+                roots.append(o)
+        return np.array(groups, dtype=np.int64), np.array(roots, dtype=np.int64)
+
+    @property
+    def groups(self) -> NDArray[np.int64]:
+        """Operations whose rounding errors have the same effect on the result share a number, (o,)."""
+        return self._effects[0]
+
+    @property
+    def roots(self) -> NDArray[np.int64]:
+        """For each group, an operation in it."""
+        return self._effects[1]
 
     @property
     def roundings(self) -> NDArray[np.int64]:
         """Number of operations that share each effect, (groups,)."""
         return np.bincount(self.groups, minlength=len(self.roots))
+
+    @cached_property
+    def wide(self) -> NDArray[np.bool_]:
+        """Whether a result stays in the accumulator, if the processor has one, (o,).
+
+        That is a result that only sums and differences use, unless it is the output of a section. Any other result is
+        stored in the format of the data, with one rounding.
+        """
+        sums = [bool(used) and all(self.operations[o, 0] in (ADD, SUBTRACT) for o in used) for used in self._users]
+        kept = {*self.outputs.tolist(), *self._values[list(self.stored)].tolist()}
+        first = self.n + self.m
+        return np.array([each and first + o not in kept for o, each in enumerate(sums)], dtype=np.bool_)
 
     @property
     def is_linear(self) -> bool:
@@ -133,143 +186,80 @@ class Program:
         return bool(np.isin(self.operations[:, 0], LINEAR).all())
 
 
-class Builder:
-    """Build a :class:`Program`, one operation at a time; values are plain ints."""
-
-    def __init__(self, n: int, m: int) -> None:
-        self.n, self.m = n, m
-        self._operations: list[tuple[int, int, int]] = []
-        self._guards: list[int] = []
-        self._stored = set[int]()
-        #: The value that must not be zero for the following operations to run; -1 for none.
-        self.guard = -1
-        #: Values and what they should be.
-        self.checks: list[tuple[int, int]] = []
-
-    @property
-    def states(self) -> list[int]:
-        return list(range(self.n))
-
-    @property
-    def inputs(self) -> list[int]:
-        return list(range(self.n, self.n + self.m))
-
-    def multiply(self, coefficient: int, value: int) -> int:
-        return self._append(MULTIPLY, coefficient, value)
-
-    def add(self, a: int, b: int) -> int:
-        return self._append(ADD, a, b)
-
-    def subtract(self, a: int, b: int) -> int:
-        return self._append(SUBTRACT, a, b)
-
-    def row(self, coefficients: Sequence[int], values: Sequence[int]) -> int:
-        """Add a sum of products, from left to right; the first product is not added to zero."""
-        total = self.multiply(coefficients[0], values[0])
-        for c, v in zip(coefficients[1:], values[1:], strict=True):
-            total = self.add(total, self.multiply(c, v))
-        return total
-
-    def product(self, matrix: NDArray[np.int64], values: Sequence[int]) -> list[int]:
-        """Add the product of a matrix of coefficients and a column; see :meth:`row` for each entry."""
-        return [self.row([int(c) for c in row], values) for row in matrix]
-
-    def at_least(self, coefficient: int, value: int) -> int:
-        return self._append(AT_LEAST, coefficient, value)
-
-    def at_most(self, coefficient: int, value: int) -> int:
-        return self._append(AT_MOST, coefficient, value)
-
-    def append(self, code: int, a: int, b: int = 0) -> int:
-        """Add an operation by its code."""
-        return self._append(code, a, b)
-
-    def listed(self) -> list[tuple[int, tuple[int, int, int], int]]:
-        """Return the value, the code with its operands, and the guard of each operation."""
-        values = range(self.n + self.m, self.n + self.m + len(self._operations))
-        return list(zip(values, self._operations, self._guards, strict=True))
-
-    def stored(self, value: int) -> int:
-        """Store a value in the format of the data even if only sums use it."""
-        self._stored.add(value)
-        return value
-
-    def finish(
-        self,
-        outputs: Sequence[int],
-        coefficients: int,
-        p: int = 0,
-        state_names: Sequence[str] = (),
-        coefficient_names: Sequence[str] = (),
-    ) -> Program:
-        operations = np.array(self._operations, dtype=np.int64).reshape(-1, 3)
-        users = _users(operations, self.n + self.m)
-        groups, roots = _grouped(operations, users, list(outputs), self.n + self.m)
-        sums = [bool(used) and all(operations[o][0] in (ADD, SUBTRACT) for o in used) for used in users]
-        stored = self._stored | set(outputs)
-        wide = [each and self.n + self.m + o not in stored for o, each in enumerate(sums)]
-        return Program(
-            self.n,
-            self.m,
-            operations,
-            np.array(outputs, dtype=np.int64),
-            coefficients,
-            np.array(groups, dtype=np.int64),
-            np.array(roots, dtype=np.int64),
-            np.array(wide, dtype=np.bool_),
-            p,
-            tuple(state_names),
-            tuple(coefficient_names),
-            tuple(self._guards) if max(self._guards, default=-1) >= 0 else (),
-            tuple(self.checks),
-        )
-
-    def _append(self, code: int, a: int, b: int) -> int:
-        self._operations.append((code, a, b))
-        self._guards.append(self.guard)
-        return self.n + self.m + len(self._operations) - 1
+def values_of(code: int, a: int, b: int) -> tuple[int, ...]:
+    """Return the values among the two operands of an operation of a linear program; the others are coefficients."""
+    return (a, b) if code in (ADD, SUBTRACT) else (b,)
 
 
-def _users(operations: NDArray[np.int64], first: int) -> list[list[int]]:
-    """List the operations that use the result of each operation."""
-    users: list[list[int]] = [[] for _ in operations]
-    for o, (code, a, b) in enumerate(operations.tolist()):
-        for value in values_of(code, a, b):
-            if value >= first:
-                users[value - first].append(o)
-    return users
+Step = Callable[[Any, Any, Any], Sequence[Any]]
+"""A function of the coefficients (c,), states (n,) and inputs (m,) of a step that returns the next states."""
 
 
-def _grouped(
-    operations: NDArray[np.int64], users: list[list[int]], outputs: list[int], first: int
-) -> tuple[list[int], list[int]]:
-    """Number the effects: an operation used once, as a term of a sum, has the effect of that sum, up to its sign."""
-    groups, roots = [-1] * len(operations), list[int]()
-    for o in range(len(operations) - 1, -1, -1):
-        used = users[o]
-        if len(used) == 1 and operations[used[0]][0] in (ADD, SUBTRACT) and first + o not in outputs:
-            groups[o] = groups[used[0]]
-        else:
-            groups[o] = len(roots)
-            roots.append(o)
-    return groups, roots
+def recorded(
+    step: Step,
+    n: int,
+    m: int,
+    coefficients: int,
+    p: int = 0,
+    state_names: Sequence[str] = (),
+    coefficient_names: Sequence[str] = (),
+    stored: Sequence[Any] = (),
+) -> Program:
+    """Record a step of a filter with n states, m inputs, and a number of coefficients.
+
+    Parameters
+    ----------
+    stored : results of the step that are stored even if only sums use them; it may be filled by the step.
+    """
+    tape = Tape(n + m + coefficients)
+    x, u, c = np.split(np.arange(1, 1 + tape.inputs), [n, n + m])
+    after = step(*map(TracedFormat(tape).made, (c, x, u)))
+    return Program(
+        tape.instructions.astype(np.int64),
+        tape.sizes,
+        x,
+        u,
+        c,
+        np.array([_place(each) for each in after], dtype=np.int64),
+        p,
+        tuple(state_names),
+        tuple(coefficient_names),
+        frozenset(map(_place, stored)),
+    )
 
 
-def coefficient_matrices(*shapes: tuple[int, int]) -> tuple[list[NDArray[np.int64]], int]:
-    """Number the entries of some matrices consecutively; return their numbers and the total."""
-    at, numbered = 0, list[NDArray[np.int64]]()
-    for rows, columns in shapes:
-        numbered.append(np.arange(at, at + rows * columns, dtype=np.int64).reshape(rows, columns))
-        at += rows * columns
-    return numbered, at
+def _place(number: Any) -> int:
+    return int(number.components[0])
+
+
+def matrices_of(c: Any, *shapes: tuple[int, int]) -> list[Any]:
+    """Return consecutive coefficients as matrices."""
+    ends = np.cumsum([rows * columns for rows, columns in shapes])
+    parts = zip(ends, shapes, strict=True)
+    return [c[end - rows * columns : end].reshape(rows, columns) for end, (rows, columns) in parts]
+
+
+def dot(coefficients: Any, values: Any) -> Any:
+    """Return a sum of products, from left to right; the first product is not added to zero."""
+    total = coefficients[0] * values[0]
+    for c, v in zip(coefficients[1:], values[1:], strict=True):
+        total = total + c * v
+    return total
+
+
+def product(matrix: Any, values: Any) -> list[Any]:
+    """Return the product of a matrix of coefficients and a column; see :func:`dot` for each entry."""
+    return [dot(each, values) for each in matrix]
 
 
 def loop_program(n: int, m: int) -> Program:
     r"""Program of Hung's form (1984), (111): :math:`\hat F x + \hat K z`; coefficients F (n, n), K (n, m)."""
-    (F, K), count = coefficient_matrices((n, n), (n, m))
-    build = Builder(n, m)
-    u, v = build.product(F, build.states), build.product(K, build.inputs)
-    return build.finish([build.add(a, b) for a, b in zip(u, v, strict=True)], count)
+
+    def step(c: Any, x: Any, z: Any) -> list[Any]:
+        F, K = matrices_of(c, (n, n), (n, m))
+        return [a + b for a, b in zip(product(F, x), product(K, z), strict=True)]
+
+    return recorded(step, n, m, n * (n + m))
 
 
 def innovation_program(n: int, m: int, p: int = 0) -> Program:
@@ -277,15 +267,16 @@ def innovation_program(n: int, m: int, p: int = 0) -> Program:
 
     The first p states are outputs as well.
     """
-    (Phi, H, K), count = coefficient_matrices((n, n), (m, n), (n, m))
-    build = Builder(n + p, m)
-    u = build.product(Phi, build.states[:n])
-    y = build.product(H, u)
-    g = [build.subtract(z, a) for z, a in zip(build.inputs, y, strict=True)]
-    v = build.product(K, g)
-    x = [build.add(a, b) for a, b in zip(u, v, strict=True)]
+
+    def step(c: Any, x: Any, z: Any) -> list[Any]:
+        Phi, H, K = matrices_of(c, (n, n), (m, n), (n, m))
+        u = product(Phi, x[:n])
+        g = [a - b for a, b in zip(z, product(H, u), strict=True)]
+        after = [a + b for a, b in zip(u, product(K, g), strict=True)]
+        return [*after, *after[:p]]
+
     names = entries("Phi", n, n) + entries("H", m, n) + entries("K", n, m)
-    return build.finish([*x, *x[:p]], count, p, [*entries("x", n), *entries("y", p)], names)
+    return recorded(step, n + p, m, n * (n + 2 * m), p, [*entries("x", n), *entries("y", p)], names)
 
 
 def entries(letter: str, *shape: int) -> list[str]:
@@ -299,124 +290,88 @@ def sequential_program(n: int, m: int) -> Program:
     Coefficients Φ (n, n), the decorrelating factor U (m, m, its strict upper part), decorrelated H (m, n), and the gain
     of each measurement, K (n, m).
     """
-    (Phi, U, H, K), count = coefficient_matrices((n, n), (m, m), (m, n), (n, m))
-    build = Builder(n, m)
-    x = build.product(Phi, build.states)
-    seen = build.inputs
-    for i in range(m - 1, -1, -1):
-        for k in range(i + 1, m):
-            seen[i] = build.subtract(seen[i], build.multiply(int(U[i, k]), seen[k]))
-    for i in range(m):
-        y = seen[i]
-        for j in range(n):
-            y = build.subtract(y, build.multiply(int(H[i, j]), x[j]))
-        x = [build.add(x[j], build.multiply(int(K[j, i]), y)) for j in range(n)]
-    return build.finish(x, count)
+
+    def step(c: Any, x: Any, z: Any) -> list[Any]:
+        Phi, U, H, K = matrices_of(c, (n, n), (m, m), (m, n), (n, m))
+        x, seen = product(Phi, x), [*z]
+        for i in range(m - 1, -1, -1):
+            for k in range(i + 1, m):
+                seen[i] = seen[i] - U[i, k] * seen[k]
+        for i in range(m):
+            y = seen[i]
+            for j in range(n):
+                y = y - H[i, j] * x[j]
+            x = [x[j] + K[j, i] * y for j in range(n)]
+        return x
+
+    return recorded(step, n, m, n * n + m * m + 2 * n * m)
 
 
 def without_exact(program: Program, coefficients: NDArray[Any]) -> Program:
     """Leave out operations that are exact and change nothing: a product with zero or one, and a sum with zero.
 
-    No digit changes. A value that nothing uses any more remains, and is noted as one that must stay in range: its
-    overflow ends a run of the step.
+    No digit changes. Place 0 is the number zero. A result that nothing uses any more remains if it may leave the range,
+    since its overflow ends a run of the step.
 
     Parameters
     ----------
     coefficients : (p, c), exact stored coefficients of each step of a cycle.
     """
-    return _Shortening(program, coefficients).finish()
+    zeros, ones = (program.coefficients[np.all(coefficients == each, axis=0)] for each in (0, 1))
+    one = int(ones[0]) if len(ones) else -1
+    same, truth = np.arange(program.sizes[0]), np.arange(program.sizes[1])
+    same[zeros], same[ones] = 0, one
+    rows = program.rows.copy()
+    kept, o = np.ones(len(rows), np.bool_), 0
+    while o < len(rows):
+        name, out = NAMES[int(rows[o, 0])], rows[o, 4]
+        for places, masks in zip((same, truth), OPERANDS, strict=True):
+            at = 1 + np.flatnonzero(masks[rows[o, 0]])
+            rows[o, at] = places[rows[o, at]]
+        a, b, c = rows[o, 1:4].tolist()
+        if name == "skip" and a < 2:
+            last = o + (0 if a else b)
+            kept[o : last + 1] = False
+            o = last
+        elif name in ("compare", "combine"):
+            known = int(known_truth(name, rows[o, 1:2], rows[o, 2:3], c)[0])
+            if known >= 0:
+                truth[out], kept[o] = known, False
+        elif name == "choose" and (a < 2 or b == c):
+            same[out], kept[o] = (b if a else c), False
+        elif (found := exact_result(name, a, b, one)) >= 0:
+            same[out], kept[o] = found, False
+            if name == "divide" and a == 0:
+                rows[o], kept[o] = (CODES["nonzero"], b, 0, 0, 0), True
+        o += 1
+    calls = [each._replace(operands=[same[places] for places in each.operands]) for each in program.calls]
+    after, definite = same[program.after], int(truth[program.definite])
+    used = [after, *(places for each in calls for places in each.operands)]
+    kept = _needed(rows, kept, used, definite, program.sizes)
+    before = np.concatenate([[0], np.cumsum(kept)])
+    skips = np.flatnonzero(rows[:, 0] == CODES["skip"])
+    rows[skips, 2] = before[skips + 1 + rows[skips, 2]] - before[skips + 1]
+    calls = [each._replace(at=int(before[each.at])) for each in calls]
+    return replace(program, rows=rows[kept], after=after, definite=definite, calls=calls)
 
 
-class _Shortening:
-    """A program whose values are replaced by others that equal them, where an operation changes nothing."""
+def _needed(rows: Any, kept: Any, used: Sequence[Any], definite: int, sizes: tuple[int, int]) -> NDArray[np.bool_]:
+    """Return which operations remain without those that choose or compare and whose result nothing uses."""
+    numbers, truths = (np.zeros(size, np.bool_) for size in sizes)
+    numbers[np.concatenate(used)], truths[definite] = True, True
+    kept = kept.copy()
+    for o in np.flatnonzero(kept)[::-1].tolist():
+        code, *given, out = rows[o].tolist()
+        chosen = _CHOICES.get(NAMES[code])
+        kept[o] = chosen is None or (numbers, truths)[chosen][out]
+        if kept[o]:
+            for marks, places in zip((numbers, truths), operands_of(code, *given), strict=True):
+                marks[places] = True
+    return kept
 
-    def __init__(self, program: Program, coefficients: NDArray[Any]) -> None:
-        self.program, self.first = program, program.n + program.m
-        self.zeros, self.ones = (np.all(coefficients == each, axis=0) for each in (0, 1))
-        self.operations: list[tuple[int, int, int]] = program.operations.tolist()
-        self.guards = list(program.guards or (-1,) * len(self.operations))
-        self.same = list(range(self.first))
-        for o in range(len(self.operations)):
-            self._replace(o)
 
-    def _constant(self, value: int, found: NDArray[np.bool_]) -> bool:
-        if value < self.first:
-            return False
-        code, a, _ = self.operations[value - self.first]
-        return code == CONSTANT and bool(found[a])
-
-    def _replace(self, o: int) -> None:
-        """Find the value that operation o equals, with operands already replaced."""
-        code, a, b = self.operations[o]
-        if len(values_of(code, a, b)) == 2:
-            a = self.same[a]
-        b = self.same[b] if code != CONSTANT else b
-        guard = self.same[self.guards[o]] if self.guards[o] >= 0 else -1
-        self.operations[o], self.guards[o] = (code, a, b), guard
-        self.same.append(self._equal(self.first + o, code, a, b, guard))
-
-    def _equal(self, itself: int, code: int, a: int, b: int, guard: int) -> int:
-        def zero(value: int) -> bool:
-            return self._constant(value, self.zeros)
-
-        def one(value: int) -> bool:
-            return self._constant(value, self.ones)
-
-        if code == CHOOSE:
-            return a if a == b or (zero(a) and zero(b)) else b if zero(guard) else itself
-        if code == MULTIPLY and (self.zeros[a] or zero(b)):
-            self.operations[itself - self.first] = (CONSTANT, a if self.zeros[a] else self._coefficient(b), 0)
-            self.guards[itself - self.first] = -1
-        elif code == MULTIPLY and self.ones[a]:
-            return b
-        elif code in (ADD, SUBTRACT) and zero(b):
-            return a
-        elif code == ADD and zero(a):
-            return b
-        elif code == PRODUCT and (zero(a) or one(b)):
-            return a
-        elif code == PRODUCT and (zero(b) or one(a)):
-            return b
-        elif code == DIVIDE and (zero(a) or one(b)):
-            return a
-        return itself
-
-    def _coefficient(self, value: int) -> int:
-        return self.operations[value - self.first][1]
-
-    def _may_overflow(self, o: int) -> bool:
-        runs = self.guards[o] < 0 or not self._constant(self.guards[o], self.zeros)
-        return runs and self.same[self.first + o] == self.first + o and self.operations[o][0] not in NEVER_OVERFLOW
-
-    def finish(self) -> Program:
-        """Return the program; its states, inputs and coefficients keep their numbers."""
-        program, first = self.program, self.first
-        outputs = [self.same[each] for each in program.outputs.tolist()]
-        checks = [(self.same[value], kind) for value, kind in program.checks]
-        used = {*outputs, *(value for value, _ in checks)}
-        for o in range(len(self.operations) - 1, -1, -1):
-            if first + o not in used and self._may_overflow(o):
-                checks.append((first + o, IN_RANGE))
-                used.add(first + o)
-            if first + o in used:
-                used |= {*values_of(*self.operations[o])} | ({self.guards[o]} - {-1})
-        kept = [o for o in range(len(self.operations)) if first + o in used]
-        at = {value: value for value in range(first)} | {first + o: first + i for i, o in enumerate(kept)} | {-1: -1}
-        operations = []
-        for o in kept:
-            code, a, b = self.operations[o]
-            values = values_of(code, a, b)
-            operations.append((code, at[a] if len(values) == 2 else a, at[b] if values else 0))
-        guards = tuple(at[self.guards[o]] for o in kept)
-        return replace(
-            program,
-            operations=np.array(operations, dtype=np.int64).reshape(-1, 3),
-            outputs=np.array([at[each] for each in outputs], dtype=np.int64),
-            guards=guards if max(guards, default=-1) >= 0 else (),
-            checks=tuple((at[value], kind) for value, kind in dict.fromkeys(checks)),
-            groups=program.groups[kept],
-            wide=program.wide[kept],
-        )
+_CHOICES = {"choose": 0, "compare": 1, "combine": 1}
+"""Operations whose result is in range if their operands are, and whether it is a truth value."""
 
 
 # -- linear functions -------------------------------------------------------------------------------------------------

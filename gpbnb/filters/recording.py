@@ -7,6 +7,7 @@ program of its own, which runs once for all records and whose results may repeat
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
@@ -21,7 +22,8 @@ from gpbnb.arithmetic.machine import CODES, OPERANDS, independent, packed_one, t
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import ROOTS, Form
+from gpbnb.filters.program import Program, entries
 from gpbnb.filters.steps import FACTORED, BlockAlgebra, BlockStorage, LinearStep, LinearTaken
 
 _TRUTHS = (CODES["compare"], CODES["combine"])
@@ -167,6 +169,70 @@ def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], Line
         raise ValueError(
             f"got a filter with n = {n} and m = {m}; needed a step of at most {tape.most} operations: about 100 states"
         ) from None
+
+
+def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
+    """Return a whole step of a Kalman filter, with its covariance.
+
+    Parameters
+    ----------
+    shapes : shapes of the matrices of the model by their letters, and of the known inputs u, which follow the
+        measurements. Coefficients are the entries of the matrices in this order, then 1.
+
+    Returns
+    -------
+    program : its states are x (n), then the entries of P, or in the UD form the upper triangle of U.
+    """
+    m, n = shapes["H"]
+    unknown = (Known(letter, shape, bytes([2]) * math.prod(shape)) for letter, shape in shapes.items())
+    tape, places, found = whole_step(StepKind(form, n, m, tuple(unknown)))
+    del places["carried"]
+    return filter_program(form, tape, places, [], (found.x, found.P), found.definite)
+
+
+def filter_program(
+    form: Form,
+    tape: Tape,
+    places: dict[str, NDArray[np.int64]],
+    others: Sequence[int],
+    after: Sequence[Any],
+    definite: Any,
+) -> Program:
+    """Return a recorded step of a filter as a program whose states are those of :func:`program_states`.
+
+    Parameters
+    ----------
+    places : those of x, P and z, of the known inputs u if there are any, and of matrices by their letters. Coefficients
+        are the entries of the matrices in this order, then the others, and 1.
+    others : places of other coefficients.
+    after : x and P after the step.
+    """
+    x, P, z = (places[letter] for letter in "xPz")
+    matrices = {letter: each for letter, each in places.items() if letter not in ("x", "P", "z", "u")}
+    names = [each for letter, at in matrices.items() for each in entries(letter, *at.shape)]
+    letter = "U" if form is Form.UD else "S" if form in ROOTS else "P"
+    named = (np.array(entries(each, *at.shape)).reshape(1, *at.shape) for each, at in (("x", x), (letter, P)))
+    ends = (each.components[0][None] for each in after)
+    return Program(
+        tape.instructions.astype(np.int64),
+        tape.sizes,
+        program_states(form, x[None], P[None])[0],
+        np.concatenate([z, places.get("u", np.zeros(0, np.int64))]),
+        np.array([*(at for each in matrices.values() for at in each.ravel().tolist()), *others, tape.one]),
+        program_states(form, *ends)[0],
+        0,
+        tuple(program_states(form, *named)[0].tolist()),
+        (*names, *(f"c{i}" for i in range(len(others))), "one"),
+        calls=tape.calls,
+        definite=int(definite.components[0]) if isinstance(definite, TracedTruth) else 1,
+    )
+
+
+def program_states(form: Form, x: Any, P: Any) -> Any:
+    """Return estimates (k, n), then the entries of P, (k, n, n), that are not always zero, as states of a program."""
+    n, upper = x.shape[1], form in (Form.UD, Form.CARLSON)
+    kept = [n * i + j for i in range(n) for j in range(n) if not upper or i <= j]
+    return np.concatenate([x, P.reshape(len(P), n * n)[:, kept]], axis=1)
 
 
 def block_algebra(

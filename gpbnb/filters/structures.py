@@ -44,7 +44,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.program import Builder, Program, coefficient_matrices
+from gpbnb.filters.program import Program, dot, matrices_of, recorded
 
 DESIGN = FloatFormat(2, 256, Rounding.EVEN)
 """Format of computed coefficients that would be too long as fractions."""
@@ -87,75 +87,69 @@ class Structure(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A section under construction: numbers of its coefficients and of its states.
+    """A section under construction: its coefficients b0 … bM and a1 … aN, and its states."""
 
-    Parameters
-    ----------
-    b, a : numbers of the coefficients b0 … bM and a1 … aN.
-    x : numbers of the states.
-    """
-
-    b: Sequence[int]
-    a: Sequence[int]
-    x: Sequence[int]
+    b: Sequence[Any]
+    a: Sequence[Any]
+    x: Sequence[Any]
 
 
-Writer = Callable[[Builder, Section, int], tuple[int, list[int]]]
+Writer = Callable[[Section, Any], tuple[Any, list[Any]]]
 """A function that writes a section for an input; it returns the output, and the next values of the states."""
 
 
 # -- direct forms -----------------------------------------------------------------------------------------------------
 
 
-def _direct_1(build: Builder, section: Section, u: int) -> tuple[int, list[int]]:
+def _direct_1(section: Section, u: Any) -> tuple[Any, list[Any]]:
     b, a, x = section
     inputs, outputs = x[: len(b) - 1], x[len(b) - 1 :]
-    y = build.row(b, [u, *inputs])
+    y = dot(b, [u, *inputs])
     for coefficient, value in zip(a, outputs, strict=True):
-        y = build.subtract(y, build.multiply(coefficient, value))
+        y = y - coefficient * value
     return y, [*[u, *inputs][: len(inputs)], *[y, *outputs][: len(outputs)]]
 
 
-def _direct_2(build: Builder, section: Section, u: int) -> tuple[int, list[int]]:
+def _direct_2(section: Section, u: Any) -> tuple[Any, list[Any]]:
     b, a, x = section
     w = u
     for coefficient, value in zip(a, x, strict=False):
-        w = build.subtract(w, build.multiply(coefficient, value))
+        w = w - coefficient * value
     delayed = [w, *x]
-    return build.row(b, delayed[: len(b)]), delayed[: len(x)]
+    return dot(b, delayed[: len(b)]), delayed[: len(x)]
 
 
-def _transposed_1(build: Builder, section: Section, u: int) -> tuple[int, list[int]]:
+def _transposed_1(section: Section, u: Any) -> tuple[Any, list[Any]]:
     b, a, x = section
     t, s = [*x[: len(a)]], [*x[len(a) :]]
-    v = build.subtract(u, t[0]) if t else u
-    y = build.multiply(b[0], v)
+    v = u - t[0] if t else u
+    y = b[0] * v
     if s:
-        y = build.add(y, s[0])
-    return y, [*_shifted(build, t, a, v), *_shifted(build, s, b[1:], v)]
+        y = y + s[0]
+    return y, [*_shifted(t, a, v), *_shifted(s, b[1:], v)]
 
 
-def _shifted(build: Builder, states: list[int], coefficients: Sequence[int], v: int) -> list[int]:
+def _shifted(states: list[Any], coefficients: Sequence[Any], v: Any) -> list[Any]:
     """Move a chain of states by one, and add the product of a value to each."""
     moved = []
     for i, coefficient in enumerate(coefficients):
-        term = build.multiply(coefficient, v)
-        moved.append(build.add(states[i + 1], term) if i + 1 < len(states) else term)
+        term = coefficient * v
+        moved.append(states[i + 1] + term if i + 1 < len(states) else term)
     return moved
 
 
-def _transposed_2(build: Builder, section: Section, u: int) -> tuple[int, list[int]]:
+def _transposed_2(section: Section, u: Any) -> tuple[Any, list[Any]]:
     b, a, x = section
-    y = build.multiply(b[0], u)
+    y = b[0] * u
     if x:
-        y = build.add(y, x[0])
+        y = y + x[0]
     moved = []
     for i, coefficient in enumerate(b[1:]):
-        s = build.multiply(coefficient, u)
+        s = coefficient * u
         if i + 1 < len(x):
-            s = build.add(s, x[i + 1])
+            s = s + x[i + 1]
         if i < len(a):
-            s = build.subtract(s, build.multiply(a[i], y))
+            s = s - a[i] * y
         moved.append(s)
     return y, moved
 
@@ -315,39 +309,46 @@ def cascade(sections: Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]], n
     form = DIRECT[name]
     padded = [([*b, *[Fraction(0)] * (len(a) + 1 - len(b))] if form.pads else [*b], [*a]) for b, a in sections]
     names = [form.states(len(b) - 1, len(a)) for b, a in padded]
-    build = Builder(sum(map(len, names)) + 1, 1)
-    value, at, first, moved = build.inputs[0], 0, 0, list[int]()
-    coefficients, labels, states = list[Fraction](), list[str](), list[str]()
-    for i, ((b, a), own) in enumerate(zip(padded, names, strict=True)):
-        end = f"_{i + 1}" if len(padded) > 1 else ""
-        numbers = range(first, first + len(b) + len(a))
-        section = Section(numbers[: len(b)], numbers[len(b) :], build.states[at : at + len(own)])
-        value, following = form.write(build, section, value)
-        build.stored(value)
-        moved += following
-        coefficients += [*b, *a]
-        labels += [f"b{j}{end}" for j in range(len(b))] + [f"a{j + 1}{end}" for j in range(len(a))]
-        states += [each + end for each in own]
-        at, first = at + len(own), first + len(numbers)
-    program = build.finish([*moved, value], len(coefficients), 1, [*states, "y"], labels)
+    ends = [f"_{i + 1}" if len(padded) > 1 else "" for i in range(len(padded))]
+    labels = [
+        f"{letter}{j}{end}"
+        for (b, a), end in zip(padded, ends, strict=True)
+        for letter, j in [*(("b", j) for j in range(len(b))), *(("a", j + 1) for j in range(len(a)))]
+    ]
+    states = [each + end for own, end in zip(names, ends, strict=True) for each in own]
+    outputs = list[Any]()
+
+    def step(c: Any, x: Any, u: Any) -> list[Any]:
+        value, given, kept, moved = u[0], iter(c), iter(x), list[Any]()
+        for (b, a), own in zip(padded, names, strict=True):
+            parts = ([*islice(each, count)] for each, count in ((given, len(b)), (given, len(a)), (kept, len(own))))
+            value, following = form.write(Section(*parts), value)
+            outputs.append(value)
+            moved += following
+        return [*moved, value]
+
+    program = recorded(step, len(states) + 1, 1, len(labels), 1, [*states, "y"], labels, outputs)
     lengths = tuple((len(b), len(a)) for b, a in padded)
-    return Structure(program, exact(coefficients), Cascade(name, lengths) if len(padded) > 1 else None)
+    coefficients = exact([each for b, a in padded for each in (*b, *a)])
+    return Structure(program, coefficients, Cascade(name, lengths) if len(padded) > 1 else None)
 
 
 def lattice(b: Sequence[Fraction], a: Sequence[Fraction]) -> Structure:
     """Return the lattice and ladder of a filter, with two products for each reflection coefficient."""
     K = max(len(b) - 1, len(a))
     k, v = reflections([*b, *[Fraction(0)] * (K + 1 - len(b))], [Fraction(1), *a, *[Fraction(0)] * (K - len(a))])
-    build = Builder(K + 1, 1)
-    f, delayed, backward = build.inputs[0], build.states[:K], [0] * (K + 1)
-    for i in range(K, 0, -1):
-        f = build.subtract(f, build.multiply(i - 1, delayed[i - 1]))
-        backward[i] = build.add(delayed[i - 1], build.multiply(i - 1, f))
-    backward[0] = f
-    y = build.row(range(K, 2 * K + 1), backward)
+
+    def step(c: Any, x: Any, u: Any) -> list[Any]:
+        f, backward = u[0], [u[0]] * (K + 1)
+        for i in range(K, 0, -1):
+            f = f - c[i - 1] * x[i - 1]
+            backward[i] = x[i - 1] + c[i - 1] * f
+        backward[0] = f
+        return [*backward[:K], dot(c[K:], backward)]
+
     names = [f"k{i + 1}" for i in range(K)] + [f"v{i}" for i in range(K + 1)]
     states = [*(f"g{i}" for i in range(K)), "y"]
-    return Structure(build.finish([*backward[:K], y], 2 * K + 1, 1, states, names), exact([*k, *v]))
+    return Structure(recorded(step, K + 1, 1, 2 * K + 1, 1, states, names), exact([*k, *v]))
 
 
 def reflections(b: Sequence[Fraction], a: Sequence[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
@@ -435,19 +436,20 @@ def state_space_structure(A: Any, B: Any, C: Any = None, D: Any = None) -> Struc
     """Return a filter from its exact matrices; with C (p, n) and D (p, m), its last p states are the outputs."""
     n, m = B.shape
     p = 0 if C is None else len(C)
-    (a, b, c, d), count = coefficient_matrices((n, n), (n, m), (p, n), (p, m))
-    build = Builder(n + p, m)
-    values = [*build.states[:n], *build.inputs]
-    results = build.product(np.block([[a, b], [c, d]]), values)
-    given = [A, B, *([] if C is None else [C, D])]
     names = [
         f"{letter}{i + 1}_{j + 1}"
-        for letter, each in zip("ABCD", given, strict=False)
-        for i, j in np.ndindex(each.shape)
+        for letter, each in zip("ABCD", (A, B, C, D), strict=True)
+        for i, j in np.ndindex(each.shape if each is not None else (0, 0))
     ]
+
+    def step(coefficients: Any, x: Any, u: Any) -> list[Any]:
+        a, b, c, d = matrices_of(coefficients, (n, n), (n, m), (p, n), (p, m))
+        values = [*x[:n], *u]
+        return [dot([*left, *right], values) for left, right in [*zip(a, b, strict=True), *zip(c, d, strict=True)]]
+
     states = [*_numbered("x", n), *(["y"] if p == 1 else _numbered("y", p))]
-    coefficients = np.concatenate([np.asarray(each).reshape(-1) for each in given])
-    return Structure(build.finish(results, count, p, states, names), coefficients)
+    coefficients = np.concatenate([np.asarray(each).reshape(-1) for each in (A, B, C, D) if each is not None])
+    return Structure(recorded(step, n + p, m, len(coefficients), p, states, names), coefficients)
 
 
 # -- sums, smoothing and control --------------------------------------------------------------------------------------
@@ -462,36 +464,39 @@ def sum_structure(count: int, order: str, block: int, running: bool) -> Structur
 
     The states are the sum, and the sum again as output.
     """
-    build = Builder(2, count)
-    total = _SUMMED[order](build, build.inputs, block)
-    if running:
-        total = build.add(build.states[0], total)
-    return Structure(build.finish([total, total], 0, 1, ["sum", "y"]), exact(np.zeros(0, dtype=int)))
+
+    def step(c: Any, x: Any, u: Any) -> list[Any]:
+        total = _SUMMED[order](u, block)
+        if running:
+            total = x[0] + total
+        return [total, total]
+
+    return Structure(recorded(step, 2, count, 0, 1, ["sum", "y"]), exact(np.zeros(0, dtype=int)))
 
 
-def _in_a_row(build: Builder, values: Sequence[int], block: int) -> int:
+def _in_a_row(values: Any, block: int) -> Any:
     total = values[0]
     for each in values[1:]:
-        total = build.add(total, each)
+        total = total + each
     return total
 
 
-def _by_halves(build: Builder, values: Sequence[int], block: int) -> int:
+def _by_halves(values: Any, block: int) -> Any:
     if len(values) == 1:
         return values[0]
     half = len(values) // 2
-    return build.add(_by_halves(build, values[:half], block), _by_halves(build, values[half:], block))
+    return _by_halves(values[:half], block) + _by_halves(values[half:], block)
 
 
-def _by_levels(build: Builder, values: Sequence[int], block: int) -> int:
+def _by_levels(values: Any, block: int) -> Any:
     while len(values) > 1:
-        pairs = [build.add(a, b) for a, b in zip(values[::2], values[1::2], strict=False)]
-        values = pairs + ([values[-1]] if len(values) % 2 else [])
+        pairs = len(values) // 2 * 2
+        values = np.concatenate([values[:pairs:2] + values[1:pairs:2], values[pairs:]])
     return values[0]
 
 
-def _by_blocks(build: Builder, values: Sequence[int], block: int) -> int:
-    return _in_a_row(build, [_in_a_row(build, values[i : i + block], 0) for i in range(0, len(values), block)], 0)
+def _by_blocks(values: Any, block: int) -> Any:
+    return _in_a_row([_in_a_row(values[i : i + block], 0) for i in range(0, len(values), block)], 0)
 
 
 _SUMMED = dict(zip(SUMS, (_in_a_row, _by_halves, _by_blocks, _by_levels), strict=True))
@@ -499,10 +504,12 @@ _SUMMED = dict(zip(SUMS, (_in_a_row, _by_halves, _by_blocks, _by_levels), strict
 
 def smoother(alpha: Fraction) -> Structure:
     """Return exponential smoothing :math:`y + α(u - y)`; the states are y, and y again as output."""
-    build = Builder(2, 1)
-    y, u = build.states[0], build.inputs[0]
-    y = build.add(y, build.multiply(0, build.subtract(u, y)))
-    return Structure(build.finish([y, y], 1, 1, ["y1", "y"], ["alpha"]), exact([alpha]))
+
+    def step(c: Any, x: Any, u: Any) -> list[Any]:
+        y = x[0] + c[0] * (u[0] - x[0])
+        return [y, y]
+
+    return Structure(recorded(step, 2, 1, 1, 1, ["y1", "y"], ["alpha"]), exact([alpha]))
 
 
 class Controller(NamedTuple):
@@ -539,25 +546,26 @@ def controller_structure(given: Controller) -> Structure:
             numbers[f"low{end}"], numbers[f"high{end}"] = pair
     if given.back is not None:
         numbers["Kb"] = given.back
-    at = {name: i for i, name in enumerate(numbers)}
-    states = ["integral", *(["last"] if "Kd" in at else []), *(["excess"] if "Kb" in at else []), "y"]
-    build = Builder(len(states), 1)
-    state = dict(zip(states, build.states, strict=True))
-    error = build.inputs[0]
-    integral = build.add(build.multiply(at["leak"], state["integral"]), build.multiply(at["Ki"], error))
-    if "Kb" in at:
-        integral = build.add(integral, build.multiply(at["Kb"], state["excess"]))
-    if "low_integral" in at:
-        integral = build.at_most(at["high_integral"], build.at_least(at["low_integral"], integral))
-    steep = build.multiply(at["Kd"], build.subtract(error, state["last"])) if "Kd" in at else None
-    output = build.add(build.multiply(at["Kp"], error), integral)
-    if steep is not None:
-        output = build.add(output, steep)
-    limited = output
-    if "low" in at:
-        limited = build.at_most(at["high"], build.at_least(at["low"], output))
-    following = {"integral": integral, "last": error, "y": limited}
-    if "Kb" in at:
-        following["excess"] = build.subtract(limited, output)
-    program = build.finish([following[each] for each in states], len(numbers), 1, states, list(numbers))
+    states = ["integral", *(["last"] if "Kd" in numbers else []), *(["excess"] if "Kb" in numbers else []), "y"]
+
+    def step(c: Any, x: Any, u: Any) -> list[Any]:
+        given, state, error = dict(zip(numbers, c, strict=True)), dict(zip(states, x, strict=True)), u[0]
+        integral = given["leak"] * state["integral"] + given["Ki"] * error
+        if "Kb" in given:
+            integral = integral + given["Kb"] * state["excess"]
+        if "low_integral" in given:
+            integral = np.minimum(np.maximum(integral, given["low_integral"]), given["high_integral"])
+        steep = given["Kd"] * (error - state["last"]) if "Kd" in given else None
+        output = given["Kp"] * error + integral
+        if steep is not None:
+            output = output + steep
+        limited = output
+        if "low" in given:
+            limited = np.minimum(np.maximum(output, given["low"]), given["high"])
+        following = {"integral": integral, "last": error, "y": limited}
+        if "Kb" in given:
+            following["excess"] = limited - output
+        return [following[each] for each in states]
+
+    program = recorded(step, len(states), 1, len(numbers), 1, states, list(numbers))
     return Structure(program, exact(list(numbers.values())))

@@ -29,7 +29,7 @@ from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
 from gpbnb.filters.opening import as_packed, packed_array, stored_start, widened_array
-from gpbnb.filters.program import AT_LEAST, AT_MOST, Program, matrices
+from gpbnb.filters.program import AT_LEAST, Program, matrices
 from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
 from gpbnb.filters.structures import (
     CASCADES,
@@ -83,11 +83,10 @@ class LinearFilter:
 
     def __post_init__(self) -> None:
         checked_name(self.name)
-        if (self.program.operations[:, 0] > AT_MOST).any():
-            raise ValueError(
-                f"got {self.name} with products or quotients of values; needed sums, products with "
-                "coefficients, and limits"
-            )
+        try:
+            self.program.operations  # noqa: B018
+        except ValueError as error:
+            raise ValueError(f"{self.name}: {error}") from None
 
     def stored(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
         """Return the coefficients as a run in a format stores them, exact, (c,).

@@ -174,6 +174,7 @@ class Integers:
             f"static {V} modulo({V} a, {V} b)",
             ["return b == 0 || b == -1 ? 0 : a % b;"],
         )
+        found["modulus"] = modulus(V, "modulo(x, y)")
         found["root"] = self._root(overflow, passed)
         for name, rounding in _WHOLE.items():
             found[f"whole_{name}"] = self._whole(name, rounding, overflow, passed)
@@ -273,6 +274,17 @@ class Integers:
         found = f"rounded_{rounding.name.lower()}(a, {point}) * (({self.wide})1 << {point})"
         comment = f"/* a whole number, {_describe(rounding)} */"
         return _function(comment, f"static {V} whole_{name}({V} a{overflow})", [f"return in_data({found}{passed});"])
+
+
+def modulus(value: str, rest: str) -> str:
+    """Return the function in C for ``np.remainder``, from what a division toward zero leaves."""
+    return f"""/* x - y floor(x / y) */
+static {value} modulus({value} x, {value} y)
+{{
+    const {value} rest = {rest};
+    return (rest < 0 && y > 0) || (rest > 0 && y < 0) ? rest + y : rest;
+}}
+"""
 
 
 def _function(comment: str, head: str, lines: list[str]) -> str:

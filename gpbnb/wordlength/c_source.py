@@ -3,43 +3,22 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
+from itertools import takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.filters.program import (
-    ADD,
-    AT_LEAST,
-    AT_MOST,
-    CEILING,
-    CHOOSE,
-    CONSTANT,
-    DIVIDE,
-    DIVISOR,
-    EQUAL,
-    FLOOR,
-    FUNCTIONS,
-    IN_RANGE,
-    LESS,
-    MODULO,
-    MULTIPLY,
-    NEAREST,
-    NOT_NEGATIVE,
-    POSITIVE,
-    PRODUCT,
-    RADICAND,
-    ROOT,
-    SUBTRACT,
-    TRUNCATE,
-    Program,
-    values_of,
-)
+from gpbnb.arithmetic.machine import CODES, NAMES, operands_of
+from gpbnb.filters.program import Program
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.c_integers import LONGEST_SHIFT, Integers, Needs, radicand_bits, word_bits
+from gpbnb.wordlength.c_integers import LONGEST_SHIFT, Integers, Needs, modulus, radicand_bits, word_bits
 
 _WORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
@@ -50,34 +29,99 @@ _KEYWORDS = frozenset(_WORDS.split())
 """Words of C and of the generated code, which are no names of coefficients or states."""
 
 _NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)((?:\[\d+\])*)")
-_WHOLE = {FLOOR: "floor", CEILING: "ceil", TRUNCATE: "trunc", NEAREST: "rint"}
-_EITHER = {
-    CONSTANT: "{c}", LESS: "{a} < {b}", EQUAL: "{a} == {b}", AT_LEAST: "{b} < {c} ? {c} : {b}",
-    AT_MOST: "{b} > {c} ? {c} : {b}",
-}  # fmt: skip
-_FLOATING = _EITHER | {
-    ADD: "{a} + {b}", SUBTRACT: "{a} - {b}", PRODUCT: "{a} * {b}", DIVIDE: "{a} / {b}", MULTIPLY: "{c} * {b}",
-    ROOT: "sqrt{f}({b})", MODULO: "fmod{f}({a}, {b})", **{code: name + "{f}({b})" for code, name in _WHOLE.items()},
-}  # fmt: skip
+_WHOLE = {"floor": "floor", "ceil": "ceil", "trunc": "trunc", "rint": "rint"}
+_ON_TWO = ("arctan2", "hypot", "float_power")
+_ON_ONE = (
+    "exp", "expm1", "exp2", "log", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "arcsin", "arccos", "arctan",
+    "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh",
+)  # fmt: skip
+LIBRARY = dict.fromkeys(_ON_TWO, 2) | dict.fromkeys(_ON_ONE, 1)
+"""Functions that C's library has, with other last digits than the emulation, and how many numbers they take."""
 _IN_C = {"arctan2": "atan2", "float_power": "pow"}
-for _name, _code in FUNCTIONS.items():
-    # An emulated zero has no sign; the sum takes it from that of C.
-    _operands = "{a} + 0, {b} + 0" if len(values_of(_code, 0, 0)) > 1 else "{b}"
-    _FLOATING[_code] = _IN_C.get(_name, _name.replace("arc", "a")) + "{f}(" + _operands + ")"
-_INTEGER = _EITHER | {
-    ADD: "add({left}, {right}{o})", SUBTRACT: "subtract({left}, {right}{o})", PRODUCT: "multiply({a}, {b}, {shift}{o})",
-    DIVIDE: "divide({a}, {b}{o})", MULTIPLY: "multiply({c}, {b}, {shift}{o})", ROOT: "root({b}{o})",
-    MODULO: "modulo({a}, {b})", **{code: f"whole_{name}({{b}}{{o}})" for code, name in _WHOLE.items()},
+_ORDERS = ("0", "{} < {}", "{} == {}", "{} <= {}", "{} > {}", "{} != {}", "{} >= {}", "1")
+"""How two numbers are compared, by the orders that hold: 1 less, 2 equal, 4 greater."""
+_AND, _OR, _NOT = 8, 14, 1
+_FLOATING = {
+    "add": "{0} + {1}", "subtract": "{0} - {1}", "multiply": "{0} * {1}", "divide": "{0} / {1}", "sqrt": "sqrt{f}({0})",
+    "negative": "0 - {0}", "absolute": "{0} < 0 ? 0 - {0} : {0}", "choose": "{0} ? {1} : {2}",
+    "fmod": "fmod{f}({0}, {1})", "remainder": "modulus({0}, {1})",
+    **{name: name + "{f}({0})" for name in _WHOLE},
 }  # fmt: skip
-"""How each operation is written, for any number, in floating point, and by the functions for integers."""
+for _name, _values in LIBRARY.items():
+    # An emulated zero has no sign; the sum takes it from that of C.
+    _operands = "{0} + 0, {1} + 0" if _values == 2 else "{0}"
+    _FLOATING[_name] = _IN_C.get(_name, _name.replace("arc", "a")) + "{f}(" + _operands + ")"
+_INTEGER = {
+    "add": "add({left}, {right}{o})", "subtract": "subtract({left}, {right}{o})", "divide": "divide({0}, {1}{o})",
+    "multiply": "multiply({0}, {1}, {shift}{o})", "sqrt": "root({0}{o})", "negative": "subtract(0, {0}{o})",
+    "absolute": "{0} < 0 ? subtract(0, {0}{o}) : {0}", "choose": "{0} ? {1} : {2}",
+    "fmod": "modulo({0}, {1})", "remainder": "modulus({0}, {1})",
+    **{name: f"whole_{name}({{0}}{{o}})" for name in _WHOLE},
+}  # fmt: skip
+"""How each operation is written in floating point, and by the functions for integers."""
 
-_SUMMED = (MULTIPLY, PRODUCT, ADD, SUBTRACT)
+_SUMMED = ("multiply", "add", "subtract")
 """Operations whose results are in the format of the sums."""
 
+DIVISOR, RADICAND = range(2)
 _STOPS = {DIVISOR: ("== 0", "a divisor is zero"), RADICAND: ("< 0", "a square root has a negative argument")}
 
 
-class CodeStep(NamedTuple):
+class Operation(NamedTuple):
+    """An operation of a step.
+
+    Parameters
+    ----------
+    name : as the machine or NumPy names it; "if" and "end" are around those that run only if a truth value holds.
+    given : places that it takes.
+    out : the place of its result.
+    depth : number of conditions around it.
+    """
+
+    name: str
+    given: tuple[int, ...]
+    out: int
+    depth: int
+
+    @property
+    def is_statement(self) -> bool:
+        """Whether its result is a number."""
+        return self.name not in ("compare", "combine", "nonzero", "if", "end")
+
+    @property
+    def takes(self) -> tuple[Sequence[int], Sequence[int]]:
+        """The numbers and the truth values that it takes."""
+        code = CODES.get({"if": "skip"}.get(self.name, self.name))
+        return (self.given, ()) if code is None else operands_of(code, *self.given)
+
+
+def listed(program: Program) -> list[Operation]:
+    """Return the operations of a program, and its calls of functions, in their order.
+
+    Raises
+    ------
+    ValueError : a call of a function that C lacks.
+    """
+    found, ends, calls = list[Operation](), list[int](), list(program.calls)
+    for o, (code, *given, out) in enumerate([*program.rows.tolist(), [-1, 0]]):
+        while ends and ends[-1] == o:
+            ends.pop()
+            found.append(Operation("end", (), 0, len(ends)))
+        while calls and calls[0].at == o:
+            call = calls.pop(0)
+            for *taken, result in zip(*(each.tolist() for each in (*call.operands, call.results)), strict=True):
+                found.append(Operation(call.name, tuple(taken), result, len(ends)))
+        if code < 0:
+            break
+        name = {"skip": "if"}.get(NAMES[code], NAMES[code])
+        found.append(Operation(name, tuple(given), out, len(ends)))
+        if name == "if":
+            ends.append(o + 1 + given[1])
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class CodeStep:
     """A step as it is written in C.
 
     Parameters
@@ -96,20 +140,80 @@ class CodeStep(NamedTuple):
         """Number of states that are kept from step to step."""
         return self.program.n - self.program.p
 
-    @property
-    def may_stop(self) -> bool:
-        """Whether a divisor may be zero, or the argument of a square root negative."""
-        return any(kind in _STOPS for _, kind in self.program.checks)
+    @cached_property
+    def operations(self) -> list[Operation]:
+        """The operations of the step."""
+        return listed(self.program)
+
+    @cached_property
+    def coefficient_at(self) -> dict[int, int]:
+        """The number of the coefficient at each of their places."""
+        return {place: i for i, place in enumerate(self.program.coefficients.tolist())}
+
+    @cached_property
+    def variables(self) -> dict[int, str]:
+        """Names of all other places: states, inputs, results."""
+        results = [each.out for each in self.operations if each.is_statement]
+        places = [*self.program.states.tolist(), *self.program.inputs.tolist(), *results]
+        return {place: f"r{i}" for i, place in enumerate(places)}
+
+    @cached_property
+    def used(self) -> Counter[int]:
+        """How often each number is used."""
+        taken = (place for each in self.operations for place in each.takes[0])
+        return Counter([*taken, *self.program.after.tolist()])
+
+    @cached_property
+    def truths_used(self) -> Counter[int]:
+        """How often each truth value is used."""
+        taken = (place for each in self.operations for place in {*each.takes[1]})
+        return Counter([*taken, self.program.definite])
+
+    @cached_property
+    def checks(self) -> list[tuple[int, int]]:
+        """Places of numbers that must not be zero, or not be negative; conditions guard operations inside them."""
+        found = list[tuple[int, int]]()
+        for each in self.operations:
+            if each.depth:
+                continue
+            if each.name == "sqrt":
+                found.append((each.given[0], RADICAND))
+            elif each.name in _DIVISIONS and self._may_be_zero(divisor := each.given[_DIVISIONS[each.name]]):
+                found.append((divisor, DIVISOR))
+        return list(dict.fromkeys(found))
+
+    def _may_be_zero(self, place: int) -> bool:
+        i = self.coefficient_at.get(place)
+        return i is None or bool((self.coefficients[:, i] == 0).any())
 
     @property
     def is_exact(self) -> bool:
         """Whether it calls no function whose digits C's library does not guarantee."""
-        return not np.isin(self.program.operations[:, 0], list(FUNCTIONS.values())).any()
+        return not any(each.name in LIBRARY for each in self.operations)
 
     @property
     def may_be_indefinite(self) -> bool:
         """Whether the step notes a covariance that is not definite."""
-        return any(kind in (POSITIVE, NOT_NEGATIVE) for _, kind in self.program.checks)
+        return self.program.definite != 1
+
+    def refuse_functions(self, exact: bool) -> None:
+        """Refuse functions that C lacks, or whose digits its library does not guarantee if they must be exact."""
+        for each in self.operations:
+            inexact = each.name in LIBRARY
+            if each.name in CODES or each.name in ("if", "end") or each.name in _EXACT or (inexact and not exact):
+                continue
+            raise ValueError(
+                f"got np.{each.name} in the step, for which C has no function with the digits of the emulation; needed "
+                "+ - * /, comparisons, choices, np.sqrt, np.fmod, np.remainder, np.floor, np.ceil, np.trunc, np.rint; "
+                + ("ask with exact=False, or " if inexact else "")
+                + "write a polynomial or a table in its place"
+            )
+
+
+_DIVISIONS = {"nonzero": 0, "divide": 1, "fmod": 1, "remainder": 1}
+"""Operations with a divisor, and which operand it is."""
+_EXACT = ("fmod", "remainder", *_WHOLE)
+"""Functions that C has with the digits of the emulation."""
 
 
 @dataclass(frozen=True)
@@ -140,31 +244,25 @@ class CodeFloats:
         tail = tail.rstrip("0")
         return f"{head}{'.' + tail if tail else ''}p{power}"
 
-    def operation(self, step: CodeStep, o: int, coefficient: str) -> str:
-        """Return the expression for an operation."""
-        code, a, b = step.program.operations[o].tolist()
-        single = "f" if self.number == "float" else ""
-        return _FLOATING[code].format(a=f"r{a}", b=f"r{b}", c=coefficient, f=single)
+    def operation(self, step: CodeStep, each: Operation, texts: Sequence[str]) -> str:
+        """Return the expression for an operation on operands with some texts."""
+        return _FLOATING[each.name].format(*texts, f="f" if self.number == "float" else "")
 
     def helpers(self, body: str) -> str:
-        """Return nothing: C has these operations."""
-        return ""
+        """Return the only function that C lacks, if it is used."""
+        single = "f" if self.number == "float" else ""
+        return modulus(self.number, f"fmod{single}(x, y)") if re.search(r"\bmodulus\b", body) else ""
 
-    def finite(self, step: CodeStep) -> list[str]:
-        """Return conditions under which no result is infinite: no operation and no state hides an infinity."""
-        program, first = step.program, step.program.n + step.program.m
-        found = dict.fromkeys(program.outputs.tolist())
-        found |= dict.fromkeys(value for value, kind in program.checks if kind == IN_RANGE)
-        found |= dict.fromkeys(each for each in program.guards if each >= 0)
-        for code, a, b in program.operations.tolist():
-            if code in (DIVIDE, MODULO, AT_LEAST, AT_MOST):
-                found[b] = None
-            elif code in FUNCTIONS.values():
-                found |= dict.fromkeys(values_of(code, a, b))
-            elif code in (LESS, EQUAL, CHOOSE):
-                found |= {a: None, b: None}
-        always = (CONSTANT, LESS, EQUAL)
-        return [f"isfinite(r{i})" for i in found if i < first or program.operations[i - first, 0] not in always]
+    def finite(self, step: CodeStep) -> list[int]:
+        """Return places that must be finite: no operation and no state hides an infinity."""
+        found = dict.fromkeys(step.program.after.tolist())
+        found |= dict.fromkeys(each.out for each in step.operations if each.is_statement and not step.used[each.out])
+        for each in step.operations:
+            if each.name in ("divide", "fmod", "remainder"):
+                found[each.given[1]] = None
+            elif each.name in ("compare", "choose") or each.name in LIBRARY:
+                found |= dict.fromkeys(each.takes[0])
+        return [place for place in found if place in step.variables]
 
 
 @dataclass(frozen=True)
@@ -203,31 +301,28 @@ class CodeWords:
         """Return an integer in units of the data as ``fscanf`` reads it."""
         return str(value)
 
-    def operation(self, step: CodeStep, o: int, coefficient: str) -> str:
-        """Return the expression for an operation."""
-        program, words = step.program, self.words
-        code, a, b = program.operations[o].tolist()
+    def operation(self, step: CodeStep, each: Operation, texts: Sequence[str]) -> str:
+        """Return the expression for an operation on operands with some texts."""
+        words, left, right = self.words, "", ""
         overflow = ", &overflow" if self.may_overflow else ""
-        left, right = (self._term(program, a), self._term(program, b)) if code in (ADD, SUBTRACT) else ("", "")
-        shift = _shift(step, o, words) if code in (MULTIPLY, PRODUCT) else 0
-        found = _INTEGER[code].format(
-            a=f"r{a}", b=f"r{b}", c=coefficient, left=left, right=right, shift=shift, o=overflow
-        )
-        is_stored = code in _SUMMED and words.sums is not None and not program.wide[o]
+        if each.name in ("add", "subtract"):
+            left, right = (self._term(step, *given) for given in zip(each.given[:2], texts, strict=True))
+        shift = _shift(step, each, words) if each.name == "multiply" else 0
+        found = _INTEGER[each.name].format(*texts, left=left, right=right, shift=shift, o=overflow)
+        is_stored = each.name in _SUMMED and words.sums is not None and not _is_wide(step, each.out)
         return f"store({found}{overflow})" if is_stored else found
 
-    def _term(self, program: Program, value: int) -> str:
+    def _term(self, step: CodeStep, place: int, text: str) -> str:
         """Return a term of a sum in units of the accumulator."""
-        o = value - program.n - program.m
-        is_sum = self.words.sums is None or (o >= 0 and bool(program.wide[o]))
-        return f"r{value}" if is_sum or self.words.gap == 0 else f"lifted(r{value})"
+        is_sum = self.words.sums is None or _is_wide(step, place)
+        return text if is_sum or self.words.gap == 0 else f"lifted({text})"
 
     def helpers(self, body: str) -> str:
         """Return the functions that the statements use."""
         return self.integers.text(body)
 
-    def finite(self, step: CodeStep) -> list[str]:
-        """Return no conditions: each operation notes its overflow."""
+    def finite(self, step: CodeStep) -> list[int]:
+        """Return no places: each operation notes its overflow."""
         return []
 
 
@@ -235,26 +330,39 @@ CodeNumbers = CodeFloats | CodeWords
 """How the operations of a program are written for a type of number."""
 
 
-def _limits_of(program: Program) -> set[int]:
-    return {a for code, a, _ in program.operations.tolist() if code in (AT_LEAST, AT_MOST, CONSTANT)}
+def _is_wide(step: CodeStep, place: int) -> bool:
+    """Whether a number stays in the accumulator."""
+    program = step.program
+    o = np.flatnonzero(program.places == place) - program.n - program.m
+    return bool(len(o) and o[0] >= 0 and program.wide[o[0]])
+
+
+def _is_data(step: CodeStep, coefficient: int) -> bool:
+    """Whether a coefficient is a number of the data, as what it is compared with or added to."""
+    place = step.program.coefficients[coefficient]
+    return any(place in each.takes[0] for each in step.operations if each.name != "multiply")
 
 
 def _integer(step: CodeStep, coefficient: int, words: WordFormats, member: int = 0) -> tuple[int, int]:
     """Return the integer of a coefficient and its fraction bits."""
     value = step.coefficients[member, coefficient]
-    if isinstance(words.coefficients, int) and coefficient not in _limits_of(step.program):
+    is_data = _is_data(step, coefficient)
+    if isinstance(words.coefficients, int) and not is_data:
         point = int(value.denominator).bit_length() - 1
         return int(value * 2**point), point
-    fmt = words.coefficients if isinstance(words.coefficients, FixedFormat) else words.data
-    if coefficient in _limits_of(step.program):
-        fmt = words.data
+    fmt = words.coefficients if isinstance(words.coefficients, FixedFormat) and not is_data else words.data
     return int(value / fmt.unit), fmt.fraction_bits
 
 
-def _shift(step: CodeStep, o: int, words: WordFormats) -> int:
+def _factor(step: CodeStep, each: Operation) -> int | None:
+    """Return the coefficient by which an operation multiplies, if any."""
+    return next((step.coefficient_at[place] for place in each.given[:2] if place in step.coefficient_at), None)
+
+
+def _shift(step: CodeStep, each: Operation, words: WordFormats) -> int:
     """Return the fraction bits that a product loses on its way to the accumulator."""
-    code, a, _ = step.program.operations[o].tolist()
-    point = words.data.fraction_bits if code == PRODUCT else _integer(step, a, words)[1]
+    factor = _factor(step, each)
+    point = words.data.fraction_bits if factor is None else _integer(step, factor, words)[1]
     return point + words.data.fraction_bits - words.accumulator.fraction_bits
 
 
@@ -267,23 +375,22 @@ def word_arithmetic(step: CodeStep, words: WordFormats) -> CodeWords:
             )
     data, gap = words.data.precision, words.gap
     most, shift = max(data + gap, words.accumulator.precision) + 1, 0
-    for o, (code, a, _) in enumerate(step.program.operations.tolist()):
-        if code in (MULTIPLY, PRODUCT):
-            moved = _shift(step, o, words)
-            longest = data
-            if code == MULTIPLY:
-                sizes = [_integer(step, a, words, member)[0] for member in range(len(step.coefficients))]
-                longest = max(abs(each).bit_length() for each in sizes)
+    for each in step.operations:
+        if each.name == "multiply":
+            moved, longest, factor = _shift(step, each, words), data, _factor(step, each)
+            if factor is not None:
+                sizes = [_integer(step, factor, words, member)[0] for member in range(len(step.coefficients))]
+                longest = max(abs(size).bit_length() for size in sizes)
             if longest > 63:
                 raise ValueError(f"got a coefficient of {longest} bits; needed at most 63 for a type of C99")
             most, shift = max(most, longest + data + max(-moved, 0)), max(shift, moved)
-        elif code == DIVIDE:
+        elif each.name == "divide":
             most = max(most, data + abs(words.data.fraction_bits))
             if (longest := data - words.data.fraction_bits) > 63 and words.data.fraction_bits < 0:
                 raise ValueError(f"got divisors of {longest} bits in units of 1; needed at most 63 for a type of C99")
-        elif code in _WHOLE:
+        elif each.name in _WHOLE:
             most, shift = max(most, words.data.fraction_bits + 1), max(shift, words.data.fraction_bits)
-        elif code == ROOT:
+        elif each.name == "sqrt":
             most = max(most, (radicand_bits(words.data) + 3) // 2)
     if max(most, shift) > LONGEST_SHIFT:
         raise ValueError(
@@ -313,7 +420,7 @@ def places(names: tuple[str, ...], count: int, letter: str) -> list[Place]:
     fits = len(names) == count and all(found) and len(set(names)) == count
     kinds = {match[1]: len(match[2]) > 0 for match in found if match}
     mixed = any(match and kinds[match[1]] != (len(match[2]) > 0) for match in found)
-    if not fits or mixed or any(each in _KEYWORDS or re.fullmatch(r"[rR]\d+", each) for each in used):
+    if not fits or mixed or any(each in _KEYWORDS or re.fullmatch(r"[rR]\d+|holds\d+", each) for each in used):
         return [Place(letter, (i,)) for i in range(count)]
     return [Place(match[1], tuple(int(i) for i in re.findall(r"\d+", match[2]))) for match in found if match]
 
@@ -364,23 +471,26 @@ class CodeSource:
         self.step, self.arithmetic, self.name = step, arithmetic, name
         program = step.program
         self.states = places(program.state_names[: step.stored], step.stored, "x")
-        self.coefficients = places(program.coefficient_names, program.coefficients, "c")
+        self.coefficients = places(program.coefficient_names, len(program.coefficients), "c")
         self.period = len(step.coefficients)
         self._members: dict[str, list[int]] = {}
         for i, each in enumerate(self.coefficients):
             self._members.setdefault(each.name, []).append(i)
+        self._truths = {each.out: each for each in step.operations if each.name in ("compare", "combine")}
+        #: Numbers of the coefficients that are used.
+        self._used = set[int]()
         changes = np.any(step.coefficients != step.coefficients[0], axis=0)
         self._cycling = {each for each, members in self._members.items() if changes[members].any()}
 
     @property
     def statuses(self) -> list[Status]:
         """What a step may return."""
-        name, step, checks = self.name.upper(), self.step, self.step.program.checks
+        name, step, kinds = self.name.upper(), self.step, {kind for _, kind in self.step.checks}
         found = [Status(f"{name}_OK", 0, "the step is done")]
         if step.may_be_indefinite:
             found.append(Status(f"{name}_INDEFINITE", 1, "the step is done, but a variance is not positive"))
-        if step.may_stop:
-            reasons = [reason for kind, (_, reason) in _STOPS.items() if any(kind == each for _, each in checks)]
+        if kinds:
+            reasons = [reason for kind, (_, reason) in _STOPS.items() if kind in kinds]
             found.append(Status(f"{name}_STOPPED", 2, f"{', or '.join(reasons)}; the state stays as it was"))
         if self.arithmetic.may_overflow:
             found.append(Status(f"{name}_OVERFLOW", 3, "a number is beyond the range; the state stays as it was"))
@@ -428,104 +538,131 @@ class CodeSource:
         phase = "[state->phase]" if place.name in self._cycling else ""
         return place.name + phase + "".join(f"[{j}]" for j in place.at)
 
-    def body(self) -> tuple[str, set[int]]:
-        """Return the statements of a step, and the coefficients that they use."""
-        program, value = self.step.program, self.arithmetic.value
-        first, lines, used = program.n + program.m, list[str](), set[int]()
-        needed = {*program.outputs.tolist(), *(value for value, kind in program.checks if kind != IN_RANGE)}
-        for code, a, b in program.operations.tolist():
-            needed |= {*values_of(code, a, b)}
-        needed |= {*program.guards} - {-1}
-        needed |= {int(each) for each in re.findall(r"\d+", " ".join(self.arithmetic.finite(self.step)))}
-        for i in range(self.step.stored):
-            if i in needed:
-                lines.append(f"const {value} r{i} = state->{self.states[i]};")
-        for i in range(program.m):
-            if program.n + i in needed:
-                lines.append(f"const {value} r{program.n + i} = input[{i}];")
-        if not any(program.n + i in needed for i in range(program.m)):
-            lines.append("(void)input;")
-        guards = program.guards or (-1,) * len(program.operations)
-        inside = -1
-        for o, (code, a, b) in enumerate(program.operations.tolist()):
-            guard = guards[o] if code != CHOOSE else -1
-            if guard != inside:
-                if inside >= 0:
-                    lines.append("}")
-                if guard >= 0:
-                    block = self._block(o, guard)
-                    lines += [f"{value} {', '.join(f'r{first + each} = 0' for each in block)};"] if block else []
-                    lines.append(f"if (r{guard} != 0) {{")
-                inside = guard
-            if code == CHOOSE:
-                expression = f"r{guards[o]} != 0 ? r{a} : r{b}"
-            else:
-                coefficient = ""
-                if code in (MULTIPLY, AT_LEAST, AT_MOST, CONSTANT):
-                    used.add(a)
-                    coefficient = self._coefficient(a)
-                expression = self.arithmetic.operation(self.step, o, coefficient)
-            declaration = "    " if guard >= 0 else f"const {value} "
-            lines.append(f"{declaration}r{first + o} = {expression};")
-            if first + o not in needed:
-                lines.append(f"(void)r{first + o};")
-        if inside >= 0:
-            lines.append("}")
-        return "\n".join(f"    {line}" for line in lines), used
+    # -- expressions ----------------------------------------------------------------------------------------
 
-    def _block(self, o: int, guard: int) -> list[int]:
-        """Return the operations from o on that run under the same guard, without a gap."""
-        program, found = self.step.program, []
-        while o < len(program.operations) and program.guards[o] == guard and program.operations[o, 0] != CHOOSE:
-            found.append(o)
-            o += 1
-        return found
+    def _number(self, place: int) -> str:
+        """Return the text of a number: a variable, a coefficient, or zero."""
+        if place in self.step.variables:
+            return self.step.variables[place]
+        if place not in self.step.coefficient_at:
+            return "0"
+        i = self.step.coefficient_at[place]
+        self._used.add(i)
+        return self._coefficient(i)
+
+    def _is_named(self, truth: int) -> bool:
+        """Whether a truth value has a variable: it is used more than once, or a step may leave it out."""
+        return self.step.truths_used[truth] > 1 or self._truths[truth].depth > 0
+
+    def _truth(self, truth: int, negated: bool = False) -> str:
+        """Return a truth value, or its opposite, as a variable or an expression."""
+        if truth < 2:
+            return str(int(truth != negated))
+        if self._is_named(truth):
+            return f"{'!' * negated}holds{truth}"
+        return self._compared(truth, negated)
+
+    def _compared(self, truth: int, negated: bool = False) -> str:
+        """Return the expression for a truth value, or its opposite."""
+        each = self._truths[truth]
+        a, b, table = each.given
+        if each.name == "compare":
+            return _ORDERS[7 - table if negated else table].format(self._number(a), self._number(b))
+        if (a == b, table) == (True, _NOT):
+            return self._truth(a, not negated)
+        left, right = self._truth(a), self._truth(b)
+        joint = {_AND: "&&", _OR: "||"}.get(table)
+        found = f"({left}) {joint} ({right})" if joint else f"{table} >> (2 * ({left}) + ({right})) & 1"
+        return f"!({found})" if negated else found
+
+    def _parts(self, truth: int) -> list[int]:
+        """Return the truth values that must all hold for one to hold."""
+        each = self._truths.get(truth)
+        if each is None or self._is_named(truth) or (each.name, each.given[2]) != ("combine", _AND):
+            return [truth]
+        return [*self._parts(each.given[0]), *self._parts(each.given[1])]
+
+    # -- statements -----------------------------------------------------------------------------------------
+
+    def body(self) -> str:
+        """Return the statements of a step."""
+        program, step, value = self.step.program, self.step, self.arithmetic.value
+        lines = list[str]()
+        for place, state in zip(program.states.tolist(), self.states, strict=False):
+            if step.used[place]:
+                lines.append(f"const {value} {step.variables[place]} = state->{state};")
+        taken = [(i, place) for i, place in enumerate(program.inputs.tolist()) if step.used[place]]
+        lines += [f"const {value} {step.variables[place]} = input[{i}];" for i, place in taken]
+        if not taken:
+            lines.append("(void)input;")
+        for o, each in enumerate(step.operations):
+            lines += self._statements(each, o)
+        return "\n".join(f"    {line}" for line in lines)
+
+    def _statements(self, each: Operation, o: int) -> list[str]:
+        """Return the lines of an operation."""
+        inside = "    " * each.depth
+        if each.name == "if":
+            return [*(self._declared(o) if not each.depth else []), f"{inside}if ({self._truth(each.given[0])}) {{"]
+        if each.name == "end":
+            return [f"{inside}}}"]
+        if each.name == "nonzero":
+            return []
+        if each.out in self._truths and not each.is_statement:
+            named = self._is_named(each.out) and self.step.truths_used[each.out]
+            kind = "" if each.depth else "const int "
+            return [f"{inside}{kind}holds{each.out} = {self._compared(each.out)};"] if named else []
+        numbers, truths = each.takes
+        texts = [*map(self._truth, truths), *map(self._number, numbers)]
+        name, kind = self.step.variables[each.out], "" if each.depth else f"const {self.arithmetic.value} "
+        unused = [] if self.step.used[each.out] else [f"(void){name};"]
+        return [f"{inside}{kind}{name} = {self.arithmetic.operation(self.step, each, texts)};", *unused]
+
+    def _declared(self, o: int) -> list[str]:
+        """Return declarations of all that a condition, and those in it, may leave out."""
+        inside = list(takewhile(lambda each: each.depth, self.step.operations[o + 1 :]))
+        numbers = [f"{self.step.variables[each.out]} = 0" for each in inside if each.is_statement]
+        named = [each.out for each in inside if each.name in ("compare", "combine") and self.step.truths_used[each.out]]
+        truths = [f"holds{truth} = 0" for truth in named]
+        found = ((self.arithmetic.value, numbers), ("int", truths))
+        return [f"{kind} {', '.join(names)};" for kind, names in found if names]
 
     def _conditions(self) -> list[str]:
         """Return the statements that find the status of a step."""
-        program, name = self.step.program, self.name.upper()
-        lines = []
-        if self.step.may_stop:
-            stops = [f"r{value} {_STOPS[kind][0]}" for value, kind in program.checks if kind in _STOPS]
-            lines += _when(stops, f"return {name}_STOPPED;")
-        if conditions := self.arithmetic.finite(self.step):
-            lines += _when([f"!{each}" for each in conditions], f"return {name}_OVERFLOW;")
+        step, name = self.step, self.name.upper()
+        stops = [f"{self._number(place)} {_STOPS[kind][0]}" for place, kind in step.checks]
+        lines = _when(stops, f"return {name}_STOPPED;") if stops else []
+        if finite := self.arithmetic.finite(step):
+            lines += _when([f"!isfinite({self._number(each)})" for each in finite], f"return {name}_OVERFLOW;")
         elif self.arithmetic.may_overflow:
             lines += ["if (overflow)", f"    return {name}_OVERFLOW;"]
-        if self.step.may_be_indefinite:
-            signs = [
-                f"!(r{value} {'>' if kind == POSITIVE else '>='} 0)"
-                for value, kind in program.checks
-                if kind in (POSITIVE, NOT_NEGATIVE)
-            ]
+        if step.may_be_indefinite:
+            signs = [self._truth(each, negated=True) for each in self._parts(step.program.definite)]
             lines += _when(list(dict.fromkeys(signs)), f"status = {name}_INDEFINITE;")
         return lines
 
     def function(self) -> tuple[str, set[int]]:
         """Return the function that takes a step, and the coefficients that it uses."""
-        program = self.step.program
-        body, used = self.body()
+        after, body = self.step.program.after.tolist(), self.body()
         head = []
         if self.step.may_be_indefinite:
             head.append(f"int status = {self.name.upper()}_OK;")
         if self.arithmetic.may_overflow and not self.arithmetic.finite(self.step):
             head.append("int overflow = 0;")
-        ends = [
-            f"state->{place} = {self._stored(value)};"
-            for place, value in zip(self.states, program.outputs.tolist(), strict=False)
-        ]
-        ends += [f"output[{i}] = {self._stored(value)};" for i, value in enumerate(program.outputs[self.step.stored :])]
+        ends = [f"state->{place} = {self._stored(at)};" for place, at in zip(self.states, after, strict=False)]
+        ends += [f"output[{i}] = {self._stored(at)};" for i, at in enumerate(after[self.step.stored :])]
         if self.period > 1:
             ends.append(f"state->phase = (state->phase + 1) % {self.period};")
         last = "status" if self.step.may_be_indefinite else f"{self.name.upper()}_OK"
         lines = [*(f"    {each}" for each in head), body, *(f"    {each}" for each in self._conditions())]
         lines += [*(f"    {each}" for each in ends), f"    return {last};"]
-        return "\n".join([self.prototype, "{", *lines, "}", ""]), used
+        return "\n".join([self.prototype, "{", *lines, "}", ""]), self._used
 
-    def _stored(self, value: int) -> str:
-        """Return a value as it is stored; a negative zero becomes zero, since the emulation has no other."""
+    def _stored(self, place: int) -> str:
+        """Return a number as it is stored; a negative zero becomes zero, since the emulation has no other."""
         zero = {"float": " + 0.0f", "double": " + 0.0"}.get(self.arithmetic.number)
-        return f"r{value}{zero}" if zero else f"({self.name}_number)r{value}"
+        text = self._number(place)
+        return f"{text}{zero}" if zero else f"({self.name}_number){text}"
 
     def start(self) -> str:
         """Return the function that sets the first state."""

@@ -1,7 +1,7 @@
 """C99 code of a filter that agrees with the emulation digit for digit: source, test vectors and a Makefile.
 
-The statements are those of the list of operations that is emulated and bounded, see :mod:`gpbnb.filters.program` and
-:mod:`gpbnb.filters.listing`: one for each operation, in the same order. So what is computed about a filter holds for
+The statements are those of the list of operations that is emulated and bounded, see :mod:`gpbnb.filters.program`:
+one for each operation, in the same order. So what is computed about a filter holds for
 the code, if the compiler keeps the order and rounds each operation, as C99 demands.
 """
 
@@ -30,13 +30,13 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.files import replace_file
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import CONSTANT_GAIN, Form, form_named, form_with_program, plain_name
-from gpbnb.filters.listing import kalman_program, program_states
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun, simulated
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.program import without_exact
+from gpbnb.filters.recording import kalman_program, program_states
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.simulation import simulated_measurements
@@ -336,8 +336,9 @@ def _ended(inputs: NDArray[Any], start: NDArray[Any], states: NDArray[Any], stat
 
 
 def _of_nonlinear(system: NonlinearSystem, fmt: AnyFormat, exact: bool) -> Prepared:
-    program, coefficients = system.program(_one_format(fmt), exact)
+    program, coefficients = system.program(_one_format(fmt))
     step = CodeStep(program, coefficients, _start(fmt, system.x0))
+    step.refuse_functions(exact)
     return Prepared(
         step,
         _arithmetic(step, fmt),
@@ -359,11 +360,12 @@ def _one_format(fmt: AnyFormat) -> FloatFormat | FixedFormat:
 
 def _of_nonlinear_model(model: NonlinearModel, fmt: AnyFormat, form: Form, exact: bool) -> Prepared:
     run = NonlinearRun(model, _one_format(fmt), form)  # type: ignore[arg-type]
-    program, members = run.program(exact)
+    program, members = run.program()
     stored = _coefficients(members)
     step = CodeStep(
         without_exact(program, stored), stored, program_states(form, run.x[None], run.P[None])[0].to_fractions()
     )
+    step.refuse_functions(exact)
 
     def emulated(z: Any, fmt: Any) -> Vectors:
         run = NonlinearRun(model, fmt, form)
@@ -434,8 +436,7 @@ def _coefficients(members: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """Return the coefficients of each step of a cycle, (p, c), from matrices that each have a cycle of their own."""
     period = lcm(*(len(each) for each in members))
     rows = [np.concatenate([each[k % len(each)].ravel() for each in members]) for k in range(period)]
-    constants = np.full((period, 1), Fraction(0), dtype=object)
-    return np.concatenate([np.array(rows, dtype=object), constants, constants + 1], axis=1)
+    return np.concatenate([np.array(rows, dtype=object), np.full((period, 1), Fraction(1), dtype=object)], axis=1)
 
 
 def _statuses(steps: int, indefinite: int | None) -> NDArray[np.int64]:

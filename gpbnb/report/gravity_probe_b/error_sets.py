@@ -28,9 +28,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.machine import CODES
 from gpbnb.bounds.gains import Schedule
 from gpbnb.bounds.guess import FilterLimits, Steps, columns, linear_steps, rounding_errors, value_sizes
-from gpbnb.filters.program import ADD, SUBTRACT
 
 Array = NDArray[np.float64]
 
@@ -67,9 +67,9 @@ class Disturbances(NamedTuple):
 
 def functions(given: Schedule) -> tuple[Steps, Steps]:
     """Return steps as linear functions, and the same with all signs made positive."""
-    program, at, signs = given.program, np.arange(given.steps), ([SUBTRACT, -1, -1], [ADD, -1, -1])
-    operations = np.where(program.operations == signs[0], signs[1], program.operations)
-    positive = replace(given, program=replace(program, operations=operations), coefficients=np.abs(given.coefficients))
+    rows, at = given.program.rows.copy(), np.arange(given.steps)
+    rows[rows[:, 0] == CODES["subtract"], 0] = CODES["add"]
+    positive = replace(given, program=replace(given.program, rows=rows), coefficients=np.abs(given.coefficients))
     return linear_steps(given, at), linear_steps(positive, at)
 
 

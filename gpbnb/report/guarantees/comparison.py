@@ -10,7 +10,7 @@ import csv
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.linear import error_coefficients, peak_gain
 from gpbnb.bounds.system import output_errors
-from gpbnb.filters.program import Builder
+from gpbnb.filters.program import recorded
 from gpbnb.filters.system import LinearFilter, LinearSystem
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.guarantees.published import fixif_longitudinal
@@ -49,12 +49,13 @@ def lead_lag() -> LinearSystem:
 
     The operations have the order of the program: inner parentheses first, and xc1 uses the new xc0.
     """
-    build = Builder(3, 1)
-    xc0, xc1, _ = build.states
-    (yc,) = build.inputs
-    first = build.add(build.multiply(0, xc0), build.add(build.multiply(1, xc1), build.multiply(2, yc)))
-    second = build.add(build.multiply(3, first), build.add(build.multiply(4, xc1), build.multiply(5, yc)))
-    program = build.finish([first, second, second], 6, 1, ["xc0", "xc1", "y"])
+
+    def step(c: Any, x: Any, u: Any) -> list[Any]:
+        first = c[0] * x[0] + (c[1] * x[1] + c[2] * u[0])
+        second = c[3] * first + (c[4] * x[1] + c[5] * u[0])
+        return [first, second, second]
+
+    program = recorded(step, 3, 1, 6, 1, ["xc0", "xc1", "y"])
     return LinearSystem.from_filter(LinearFilter(program, exact(["0.499", "-0.05", 1, "0.010", 1, 0]), "lead-lag"))
 
 
