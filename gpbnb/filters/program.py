@@ -26,11 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.interpreting import Call
+from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of
 from gpbnb.arithmetic.tape import Tape, exact_result, known_truth
 from gpbnb.arithmetic.traced import TracedFormat
 
-MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST = range(5)
+MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST = tags.MULTIPLY, tags.ADD, tags.SUBTRACT, tags.AT_LEAST, tags.AT_MOST
 """Codes of operations of a linear program; AT_LEAST and AT_MOST limit a value by a coefficient, as a controller limits
 its output."""
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,26 +24,16 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import backends
-from gpbnb.arithmetic.kernels.compiling import compiled, inner
+from gpbnb.arithmetic.kernels.integer_steps import WordCode, WordStore, advance, advance_in_python
+from gpbnb.arithmetic.kernels.selection import MODES
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT, Program
+from gpbnb.filters.program import AT_LEAST, MULTIPLY, Program
 from gpbnb.filters.system import LinearFilter, LinearSystem, system_inputs
 from gpbnb.interrupts import slices
 
-_MODES = {
-    Rounding.NEAREST: 0,
-    Rounding.EVEN: 1,
-    Rounding.CHOP: 2,
-    Rounding.UP: 3,
-    Rounding.DOWN: 4,
-    Rounding.ODD: 5,
-    Rounding.HALF_UP: 6,
-}
-_NEAREST, _EVEN, _CHOP, _UP, _DOWN, _ODD, _HALF_UP = range(7)
 _POLICIES = ("raise", "saturate", "wrap")
-_RAISE, _SATURATE, _WRAP = range(3)
 _FITS = 62
 """Bits of a product, or of a number of the data, without its sign, up to which compiled loops run."""
 _LONGEST_SUM = 63
@@ -155,7 +144,7 @@ class IntegerProgram(NamedTuple):
 
 
 def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
-    """Store the coefficients of a filter in words; a coefficient of 1 or -1 is exact, as nothing is multiplied."""
+    """WordStore the coefficients of a filter in words; a coefficient of 1 or -1 is exact, as nothing is multiplied."""
     program, limits = made.program, made.limits_in(words.data)
     stored = np.empty(len(made.coefficients), dtype=object)
     for i, value in enumerate(made.coefficients):
@@ -272,41 +261,17 @@ def _rounded_up(low: NDArray[np.float64], rest: NDArray[np.float64], rounding: R
 # -- the loops --------------------------------------------------------------------------------------------------------
 
 
-class _Store(NamedTuple):
-    """How a format stores an integer; `mask` has the bits of its word."""
-
-    mode: int
-    policy: int
-    low: int
-    high: int
-    mask: int
-
-
-def _store(fmt: FixedFormat, dtype: Any) -> _Store:
+def _store(fmt: FixedFormat, dtype: Any) -> WordStore:
     low, high = int(fmt.lowest / fmt.unit), int(fmt.largest / fmt.unit)
     mask = (2 << fmt.precision) - 1
     if dtype is not object and mask >> 63:
         mask = -1  # all 64 bits
-    return _Store(_MODES[fmt.rounding], _POLICIES.index(fmt.overflow), low, high, mask)
+    return WordStore(MODES[fmt.rounding], _POLICIES.index(fmt.overflow), low, high, mask)
 
 
-class _Code(NamedTuple):
-    """A program on integers, of 64 bits in compiled loops."""
-
-    operations: NDArray[np.int64]
-    factors: NDArray[Any]
-    shifts: NDArray[Any]
-    wide: NDArray[np.bool_]
-    outputs: NDArray[np.int64]
-    data: _Store
-    sums: _Store
-    gap: int
-    accumulates: bool
-
-
-def _code(made: IntegerProgram, dtype: Any = np.int64) -> _Code:
+def _code(made: IntegerProgram, dtype: Any = np.int64) -> WordCode:
     program, words = made.program, made.words
-    return _Code(
+    return WordCode(
         program.operations,
         np.array(made.factors, dtype),
         np.array(made.shifts, dtype),
@@ -378,91 +343,4 @@ def _way(short: bool, operations: int) -> tuple[Callable[..., None], Any]:
     """Return what takes the next steps, and its type of numbers: Python, or the loop once it is worth its 0.9 s."""
     global _done
     _done += operations
-    return (_advance, np.int64) if short and _done > _FAST * backends.LOOPS_AFTER else (_advance_in_python, object)
-
-
-@inner
-def _shifted(n: int, shift: int, mode: int) -> int:
-    """Return n / 2**shift, rounded."""
-    if shift <= 0:
-        return n << -shift
-    m = n >> shift
-    rest, unit = n - (m << shift), 1 << shift
-    if rest == 0 or mode == _DOWN:
-        return m
-    if mode == _NEAREST:
-        up = 2 * rest > unit or (2 * rest == unit and n > 0)
-    elif mode == _EVEN:
-        up = 2 * rest > unit or (2 * rest == unit and m % 2 == 1)
-    elif mode == _HALF_UP:
-        up = 2 * rest >= unit
-    elif mode == _ODD:
-        up = m % 2 == 0
-    else:
-        up = mode == _UP or n < 0
-    return m + 1 if up else m
-
-
-@inner
-def _kept(n: int, over: int, store: Any) -> Any:
-    """Return an integer as a format keeps it, and whether it must not; `over` is the sign of a lost 64-bit overflow."""
-    if over == 0 and store.low <= n <= store.high:
-        return n, False
-    if store.policy == _SATURATE:
-        return (store.high if over > 0 or (over == 0 and n > 0) else store.low), False
-    if store.policy == _WRAP:
-        return ((n - store.low) & store.mask) + store.low, False
-    return n, True
-
-
-@compiled
-def _advance(code: Any, before: Any, u: Any, after: Any, stopped: Any) -> None:
-    """Compute the state after each of some others, which may be the same memory, one step later.
-
-    Parameters
-    ----------
-    before, after : (steps, n). u : (steps, m), or (1, m) for all of them.
-    stopped : (steps,), -1 where no operation overflows, else to be set to its number; the state then stays as it was.
-    """
-    operations, factors, shifts, wide, outputs, data, sums, gap, accumulates = code
-    n, m, count = before.shape[1], u.shape[1], operations.shape[0]
-    values = np.zeros(n + m + count, before.dtype)
-    bad = False
-    for k in range(after.shape[0]):
-        for i in range(n):
-            values[i] = before[k, i]
-        for i in range(m):
-            values[n + i] = u[k % u.shape[0], i]
-        for o in range(count):
-            kind, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
-            right, over = values[b], 0
-            if kind == MULTIPLY:
-                value = _shifted(factors[o] * right, shifts[o], sums.mode)
-            elif kind in (ADD, SUBTRACT):
-                left = values[a]
-                if a < n + m or not wide[a - n - m]:
-                    left <<= gap
-                if b < n + m or not wide[b - n - m]:
-                    right <<= gap
-                value = left + right if kind == ADD else left - right
-                same = (left ^ right) >= 0 if kind == ADD else (left ^ right) < 0
-                if same and (value ^ left) < 0:
-                    over = 1 if left >= 0 else -1
-            else:
-                beyond = right < factors[o] if kind == AT_LEAST else right > factors[o]
-                values[n + m + o] = factors[o] if beyond else right
-                continue
-            value, bad = _kept(value, over, sums)
-            if accumulates and not bad and not wide[o]:
-                value, bad = _kept(_shifted(value, gap, data.mode), 0, data)
-            if bad:
-                stopped[k] = o
-                break
-            values[n + m + o] = value
-        for i in range(n):
-            after[k, i] = before[k, i] if stopped[k] >= 0 else values[outputs[i]]
-
-
-_IN_PYTHON = {**globals(), "_shifted": _shifted.py_func, "_kept": _kept.py_func}
-_advance_in_python: Any = FunctionType(_advance.py_func.__code__, _IN_PYTHON)
-"""The same on Python's integers, of any length, none of which is lost."""
+    return (advance, np.int64) if short and _done > _FAST * backends.LOOPS_AFTER else (advance_in_python, object)

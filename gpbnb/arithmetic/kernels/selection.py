@@ -15,7 +15,7 @@ from gpbnb.arithmetic.rounding import DRAW_BITS, Order, Rounding, Rules, digits_
 LARGEST_PRECISION = {2: 53, 10: 18, 16: 13}  # with compiled loops for filters
 _WIDEST = {2: 113, 10: 34, 16: 28}  # digits of Wide
 _UPPER = 61  # bits of the upper part of a significand of Wide
-_CODES = {
+MODES = {
     Rounding.NEAREST: tags.AWAY,
     Rounding.EVEN: tags.EVEN,
     Rounding.CHOP: tags.ZERO,
@@ -24,7 +24,7 @@ _CODES = {
     Rounding.ODD: tags.ODD,
     Rounding.HALF_UP: tags.HALF_UP,
 }
-_FLOAT_CODES = {**_CODES, Rounding.STOCHASTIC: tags.RANDOM}
+_FLOAT_CODES = {**MODES, Rounding.STOCHASTIC: tags.RANDOM}
 _REACH = 320  # largest binary exponent for which products, quotients and their residuals are normal float64
 _NO_RANDOM = np.zeros(2, np.uint64)
 _UNLIMITED = 2**60  # stands for an unlimited exponent in base 10
@@ -55,20 +55,20 @@ def tag_of(rules: Rules) -> Any:
 def _decimal_tag(rules: Rules) -> tags.Decimal | None:
     """Return the tag for pairs of int64, or None if they cannot hold the digits that decide a rounding."""
     limits, last = rules.limits, rules.precision - 1
-    if rules.rounding not in _CODES:
+    if rules.rounding not in MODES:
         return None
     if limits is None:
-        return tags.Decimal(_CODES[rules.rounding], rules.precision, -_UNLIMITED, _UNLIMITED, tags.UNLIMITED)
+        return tags.Decimal(MODES[rules.rounding], rules.precision, -_UNLIMITED, _UNLIMITED, tags.UNLIMITED)
     if limits.fixed or not _ends_in_nines(rules) or limits.overflow != "raise":
         return None
     small = tags.GRADUAL if limits.subnormal else tags.ABRUPT
-    return tags.Decimal(_CODES[rules.rounding], rules.precision, limits.emin - last, _emax(rules) - last, small)
+    return tags.Decimal(MODES[rules.rounding], rules.precision, limits.emin - last, _emax(rules) - last, small)
 
 
 def wide_tag(rules: Rules) -> tags.Wide | None:
     """Return the tag for significands of two words, or None if they cannot hold the format."""
     base, precision, rounding, limits, _ = rules
-    if base not in _WIDEST or precision > _WIDEST[base] or rounding not in _CODES:
+    if base not in _WIDEST or precision > _WIDEST[base] or rounding not in MODES:
         return None
     if limits is not None and limits.overflow not in ("raise", "saturate"):
         return None
@@ -84,7 +84,7 @@ def wide_tag(rules: Rules) -> tags.Wide | None:
             return None
     room = 37 if base == 10 else 126 // bits
     saturates = limits is not None and limits.overflow == "saturate"
-    return tags.Wide(bits, _CODES[rounding], precision, room, split, small, quantum, lowest, largest, saturates)
+    return tags.Wide(bits, MODES[rounding], precision, room, split, small, quantum, lowest, largest, saturates)
 
 
 def _stored(rules: Rules, number: Fraction, split: int) -> tuple[int, int, int]:

@@ -33,6 +33,9 @@ greater. COMBINE combines two truth values by a table, the bits of its third ope
 format into that of the segment, FUSED adds its third operand to a product, NONZERO stops where a number is zero,
 and SKIP leaves out as many rows as its second operand says if its truth value is false."""
 
+AT_LEAST, AT_MOST = range(14, 16)
+"""Codes of the limits of a linear program, which the machine has as a comparison and a choice."""
+
 
 class Float(NamedTuple):
     """Bases 2 and 16 on float64: precision 1 to 53 or 13, any rounding mode and range; an array is float64 (...)."""
