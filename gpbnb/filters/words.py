@@ -144,7 +144,7 @@ class IntegerProgram(NamedTuple):
 
 
 def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
-    """WordStore the coefficients of a filter in words; a coefficient of 1 or -1 is exact, as nothing is multiplied."""
+    """Store the coefficients of a filter in words; a coefficient of 1 or -1 is exact, as nothing is multiplied."""
     program, limits = made.program, made.limits_in(words.data)
     stored = np.empty(len(made.coefficients), dtype=object)
     for i, value in enumerate(made.coefficients):
