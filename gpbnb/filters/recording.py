@@ -261,7 +261,7 @@ def _algebra(fmt: Any, fused: bool, order: Order, block: int, sums: Any) -> Alge
 
 def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], found: LinearTaken) -> RecordedStep:
     """Divide the operations of a step into those of the gain and those of the estimate."""
-    rows, formats = tape.instructions.astype(np.int64), tape.formats
+    rows, formats = tape.instructions.copy(), tape.formats
     values, truths = tape.sizes
     late = np.zeros(values, np.bool_)
     for letter in ("x", "z", "carried", "u", "b", "d", "B"):

@@ -570,9 +570,9 @@ class CodeSource:
             return _ORDERS[7 - table if negated else table].format(self._number(a), self._number(b))
         if (a == b, table) == (True, _NOT):
             return self._truth(a, not negated)
-        left, right = self._truth(a), self._truth(b)
+        left, right = (f"({text})" if " " in text else text for text in (self._truth(a), self._truth(b)))
         joint = {_AND: "&&", _OR: "||"}.get(table)
-        found = f"({left}) {joint} ({right})" if joint else f"{table} >> (2 * ({left}) + ({right})) & 1"
+        found = f"{left} {joint} {right}" if joint else f"{table} >> (2 * {left} + {right}) & 1"
         return f"!({found})" if negated else found
 
     def _parts(self, truth: int) -> list[int]:
