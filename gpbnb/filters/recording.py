@@ -94,7 +94,7 @@ def step_kind(
 class ProgramPart(NamedTuple):
     """One of the two programs of a step: its rows (o, 5), their formats (o,), and their numbers in the whole step."""
 
-    rows: NDArray[np.int64]
+    rows: NDArray[Any]
     formats: NDArray[np.int64]
     at: NDArray[np.int64]
 
