@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.interpreting import Call, Constants, Numbers, OnIntegers, Segment
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.machine import CODES, NAMES, operands_of
+from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, independent
 
 Places = NDArray[np.int64]
 """Numbers or truth values of a tape, of any shape."""
@@ -28,6 +28,9 @@ MOST_OPERATIONS = 1 << 22
 
 FEW_OPERATIONS = 5_000
 """Shortest tape that runs in compiled code; for fewer operations, integers of Python are fast and need no loading."""
+
+TRUTHS = ("compare", "combine")
+"""Operations whose results are truth values."""
 
 _SHORTENED = ("add", "subtract", "multiply", "divide")
 _WHOLE = (int, np.int64)
@@ -62,6 +65,30 @@ def exact_result(name: str, a: int, b: int, one: int) -> int:
     if name in ("add", "subtract"):
         return a if b == 0 else b if a == 0 and name == "add" else -1
     return -1
+
+
+def depending(rows: NDArray[Any], numbers: NDArray[np.bool_], truths: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which operations depend on marked numbers or truth values, and mark their results.
+
+    Operations that a run may leave out depend on them together.
+    """
+    marks, given = (numbers, truths), rows[:, 1:4]
+    skips = np.flatnonzero(rows[:, 0] == CODES["skip"])
+    regions = [slice(o, o + 1 + rows[o, 2]) for o in skips.tolist()]
+    found, before = np.zeros(len(rows), np.bool_), -1
+    while int(np.count_nonzero(found)) != before:
+        before = int(np.count_nonzero(found))
+        for begin, end in independent(rows):
+            part, code = slice(begin, end), rows[begin, 0]
+            for mark, taken in zip(marks, OPERANDS, strict=True):
+                found[part] |= mark[given[part, taken[code]]].any(axis=1)
+            if NAMES[code] not in ("nonzero", "skip"):
+                marks[NAMES[code] in TRUTHS][rows[part, 4][found[part]]] = True
+        if not regions:
+            break
+        for region in regions:
+            found[region] |= found[region].any()
+    return found
 
 
 class Tape:
@@ -142,7 +169,7 @@ class Tape:
             if left.any():
                 found[left] = self._append(name, (a[left],), fmt)
             return found
-        if name in ("compare", "combine"):
+        if name in TRUTHS:
             a, b, table = operands
             found = known_truth(name, a, b, table)
             left = found < 0
@@ -203,7 +230,7 @@ class Tape:
     def _append(self, name: str, operands: Sequence[Any], fmt: int) -> Places:
         first = operands[0]
         code = CODES[name]
-        truth = name in ("compare", "combine")
+        truth = name in TRUTHS
         size, begin = first.size, self._truths if truth else self._values
         if len(self._instructions) + 5 * size > 5 * self.most:
             self.refuse(f"it takes more than {self.most} operations")
@@ -308,22 +335,15 @@ class Tape:
 
     def divided(self, varying: Places) -> tuple[list[Segment], list[Segment]]:
         """Return the operations and calls that depend on no number at some places, and the others."""
-        varies, chosen = np.zeros(self._values, np.bool_), np.zeros(self._truths, np.bool_)
-        varies[varying] = True
+        marks = np.zeros(self._values, np.bool_), np.zeros(self._truths, np.bool_)
+        marks[0][varying] = True
         once, each = list[Segment](), list[Segment]()
         waiting: list[Segment] = []
         for rows, formats, call in self.segments:
-            late, guarded = np.zeros(len(rows), np.bool_), 0
-            for o, (code, a, b, c, out) in enumerate(rows.tolist()):
-                name = NAMES[code]
-                numbers, truths = operands_of(code, a, b, c)
-                late[o] = guarded > 0 or name == "skip" or any(varies[numbers]) or any(chosen[truths])
-                guarded = b if name == "skip" else guarded - 1
-                if name not in ("nonzero", "skip"):
-                    (chosen if name in ("compare", "combine") else varies)[out] = late[o]
-            changes = call is not None and any(varies[places].any() for places in call.operands)
+            late = depending(rows, *marks)
+            changes = call is not None and any(marks[0][places].any() for places in call.operands)
             if call is not None:
-                varies[call.results] = changes
+                marks[0][call.results] = changes
             once.append(Segment(rows[~late], formats[~late], None if changes else call))
             waiting.append(Segment(rows[late], formats[late], None))
             if changes or call is None:

@@ -18,15 +18,13 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
 from gpbnb.arithmetic.interpreting import Constants
-from gpbnb.arithmetic.machine import CODES, OPERANDS, independent, packed_one, takes_numbers
+from gpbnb.arithmetic.machine import CODES, packed_one, takes_numbers
 from gpbnb.arithmetic.rounding import Order
-from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
+from gpbnb.arithmetic.tape import MOST_OPERATIONS, TRUTHS, Tape, UntraceableError, depending
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.program import Program, entries
 from gpbnb.filters.steps import FACTORED, BlockAlgebra, BlockStorage, LinearStep, LinearTaken
-
-_TRUTHS = (CODES["compare"], CODES["combine"])
 
 
 class Known(NamedTuple):
@@ -266,14 +264,7 @@ def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], f
     late = np.zeros(values, np.bool_)
     for letter in ("x", "z", "carried", "u", "b", "d", "B"):
         late[places.get(letter, [])] = True
-    late_truths, later = np.zeros(truths, np.bool_), np.zeros(len(rows), np.bool_)
-    numbers, truth_values = (masks[rows[:, 0]] for masks in OPERANDS)
-    for begin, end in independent(rows):
-        part, given = slice(begin, end), rows[begin:end, 1:4]
-        depends = (late[np.where(numbers[part], given, 0)] & numbers[part]).any(axis=1)
-        depends |= (late_truths[np.where(truth_values[part], given, 0)] & truth_values[part]).any(axis=1)
-        later[part] = depends
-        (late_truths if rows[begin, 0] in _TRUTHS else late)[rows[part, 4][depends]] = True
+    later = depending(rows, late, np.zeros(truths, np.bool_))
     if kind.reference and kind.form not in FACTORED:
         first = np.zeros(values, np.bool_)
         first[np.concatenate([places["Phi"].ravel(), places["H"].ravel()])] = True
@@ -284,7 +275,7 @@ def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], f
     x, carried, P, K = (each.components[0] for each in (found.x, found.carried, found.P, found.K))
     S = np.zeros((0, kind.m), np.int64) if found.S is None else found.S.components[0]
     made = np.zeros(values, np.bool_)  # by operations of the gain's program
-    mine = ~later & ~np.isin(rows[:, 0], (*_TRUTHS, CODES["nonzero"], CODES["skip"]))
+    mine = ~later & ~np.isin(rows[:, 0], [CODES[name] for name in (*TRUTHS, "nonzero", "skip")])
     made[rows[mine, 4]] = True
     used = np.zeros(values, np.bool_)
     used[rows[later, 1:4][takes_numbers(rows[later, 0])]] = True
