@@ -308,7 +308,7 @@ def cumsum(x: Any, axis: int | None = None) -> Any:
     """Return partial sums from left to right; each adds one entry to the sum before."""
     given = lines(x, axis)
     if not len(given):
-        return x
+        return x if axis is not None else given
     backend, entries = given.backend, given.components  # which derivatives do not have, and so are refused
     if (components := backend.scan(entries)) is not None:
         whole: Any = given.from_components(backend, components, given.format)

@@ -54,7 +54,7 @@ def test_operations_and_functions_of_two_numbers():
                 np.where(x[0] > x[1], x[0] * x[2], x[1]),
                 np.maximum(x[0], x[1]) * np.minimum(x[0], x[2]),
                 np.prod(x) + np.square(x[0]),
-                (x[1] + 5) % 2 * x[2],
+                (x[1] + 5) % 2 * x[2] + np.remainder(x[1], 2),
                 -x[0],
             ]
         )
@@ -74,7 +74,7 @@ def test_operations_and_functions_of_two_numbers():
             a * c,
             a * a,
             a * b * c + a**2,
-            (b + 1) * c,  # 4.3 - 2 * 2 = 0.3 = b + 1
+            (b + 1) * c + b,  # 4.3 - 2 * 2 = 0.3 = b + 1
             -a,
         ],
     )
@@ -94,6 +94,12 @@ def test_products_of_matrices():
         function,
         [*product, product[0] + 2 * product[2], 3 * product[0] + 5 * product[2], SYMBOLS[0] + 4],
     )
+
+
+def test_what_does_not_depend_on_the_variables_has_no_slope():
+    value, slopes = jacobian(lambda x: FMT.array([1, "0.3"]) if x[0] else x, FMT.array(X))
+    assert value.tolist() == FMT.array([1, "0.3"]).tolist()
+    assert slopes.tolist() == [[0] * 3] * 2
 
 
 def test_derivatives_round_in_the_order_that_is_stated():

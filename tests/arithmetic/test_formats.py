@@ -196,8 +196,15 @@ class TestFormat:
         assert fmt == FloatFormat(base=10, precision=4, rounding=NEAREST)
         assert len({fmt, FloatFormat(10, 4), FloatFormat(10, 4, CHOP)}) == 2
         assert type(fmt.base) is int
-        assert eval(repr(FloatFormat(10, 4, CHOP))) == FloatFormat(10, 4, CHOP)
         assert pickle.loads(pickle.dumps(fmt)) == fmt
+        limits = {"emin": np.int64(-14), "emax": np.int64(15), "overflow": "saturate", "subnormal": False}
+        for each in (
+            FloatFormat(10, 4, CHOP),
+            FloatFormat(2, 11, "stochastic", seed=3, **limits),
+            FixedFormat(np.int64(2), np.int64(5), "stochastic", "wrap", seed=7),
+        ):
+            assert eval(repr(each)) == each
+            assert "int64" not in repr(each)
         with pytest.raises(AttributeError):
             fmt.base = 2  # type: ignore[misc]
 

@@ -118,6 +118,25 @@ def test_reductions_keep_dimensions(fmt):
                 assert np.array_equal(getattr(x, name)(axis), flat), axis
 
 
+def test_norms_sum_sizes_or_squares_from_left_to_right(fmt):
+    x = drawn(fmt, 3, 4)
+    rows = x.to_fractions()
+    lines = {None: [rows.ravel()], 0: rows.T, 1: rows}
+    sums = {axis: [from_left(fmt, abs(line)) for line in each] for axis, each in lines.items()}
+    assert np.linalg.norm(x, 1).item() == max(sums[0])
+    assert np.linalg.norm(x, np.inf).item() == max(sums[1])
+    for axis, each in lines.items():
+        squares = [from_left(fmt, [fmt.round(value**2) for value in line]) for line in each]
+        assert np.ravel(np.linalg.norm(x, axis=axis)).tolist() == np.sqrt(fmt.array(squares)).tolist()
+        if axis is not None:
+            assert np.linalg.norm(x, 1, axis).tolist() == sums[axis]
+            assert np.linalg.norm(x, np.inf, axis).tolist() == abs(rows).max(axis).tolist()
+    assert np.cumsum(x[:0]).shape == (0,)
+    assert np.cumsum(x[:0], axis=1).shape == (0, 4)
+    assert x[:0].sum(0).tolist() == [0] * 4
+    assert x[:0].prod(0).tolist() == [1] * 4
+
+
 def test_finding_and_comparing_rounds_nothing(fmt):
     x = fmt.array(np.random.default_rng(3).integers(-3, 4, (4, 6)) / 2)  # with ties and zeros
     rows = x.to_float()

@@ -71,6 +71,9 @@ class TestDigitForDigit:
             assert exact(found.upper) == upper
             assert found.permutation.tolist() == order
             if pivot:
+                diagonal = [upper[k][k] for k in range(n)]
+                swapped = round(np.linalg.det(np.eye(n)[order]))
+                assert linalg.det(a) == swapped * a.format.array(diagonal).prod()
                 assert np.all(abs(found.lower) <= 1)
             compared += 1
         assert compared >= 15
@@ -133,6 +136,7 @@ class TestSingular:
                 call(a, pivot)
         with pytest.raises(np.linalg.LinAlgError, match="zero pivot"):
             linalg.solve(a, self.FMT.array([1] * len(matrix)), pivot)
+        assert linalg.det(a) == 0
 
     def test_what_needs_pivoting_is_told_so(self) -> None:
         a = self.FMT.array([[0, 2], [3, 1]])

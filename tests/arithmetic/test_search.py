@@ -71,6 +71,31 @@ def test_above_an_answer_that_is_refuted_every_precision_is_tried(missed, answer
     assert not found.undecided
 
 
+@pytest.mark.parametrize(("above", "answer", "undecided"), [(math.inf, 6, (16,)), (2.0, 17, ())])
+def test_where_there_is_no_bound_above_an_answer_it_stays_and_a_missed_one_refutes_it(above, answer, undecided):
+    """In base 10: 5 digits and fewer miss the tolerance, 16 have no bound or miss it, too."""
+
+    def error(fmt):
+        return Outcome(above if fmt.precision == 16 else 1 + (fmt.precision < 6))
+
+    found = Search(error, FloatFormat(10, 5), (7, 16), bounds=True)
+    assert (found.fmt, found.undecided) == (FloatFormat(10, answer), undecided)
+
+
+def test_what_is_found_must_also_be_proved():
+    """5 digits are found, 8 proved; the proof that fails counts as missed."""
+    proved: list[int] = []
+
+    def proof(fmt):
+        proved.append(fmt.precision)
+        return Outcome(0.5) if fmt.precision >= 8 else Outcome(3.0, "not proved")
+
+    found = Search(lambda fmt: Outcome(1 + (fmt.precision < 5)), FloatFormat(10, 5), (), proof=proof)
+    assert found.fmt == FloatFormat(10, 8)
+    assert dict(found.tried)[proved[0]] == 3.0
+    assert found.why.endswith("not proved")
+
+
 @pytest.mark.parametrize("base", [2, 3, 10, 16])
 @pytest.mark.parametrize("power", [1, 7, 40, 300])
 def test_without_a_largest_the_range_grows(base, power):
