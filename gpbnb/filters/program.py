@@ -30,6 +30,7 @@ from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of
 from gpbnb.arithmetic.tape import Tape, exact_result, known_truth
 from gpbnb.arithmetic.traced import TracedFormat
+from gpbnb.filters.steps import decorrelated, innovation_of_one
 
 MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST = tags.MULTIPLY, tags.ADD, tags.SUBTRACT, tags.AT_LEAST, tags.AT_MOST
 """Codes of operations of a linear program; AT_LEAST and AT_MOST limit a value by a coefficient, as a controller limits
@@ -248,17 +249,12 @@ def dot(coefficients: Any, values: Any) -> Any:
     return total
 
 
-def product(matrix: Any, values: Any) -> list[Any]:
-    """Return the product of a matrix of coefficients and a column; see :func:`dot` for each entry."""
-    return [dot(each, values) for each in matrix]
-
-
 def loop_program(n: int, m: int) -> Program:
     r"""Program of Hung's form (1984), (111): :math:`\hat F x + \hat K z`; coefficients F (n, n), K (n, m)."""
 
-    def step(c: Any, x: Any, z: Any) -> list[Any]:
+    def step(c: Any, x: Any, z: Any) -> Any:
         F, K = matrices_of(c, (n, n), (n, m))
-        return [a + b for a, b in zip(product(F, x), product(K, z), strict=True)]
+        return F @ x + K @ z
 
     return recorded(step, n, m, n * (n + m))
 
@@ -271,9 +267,8 @@ def innovation_program(n: int, m: int, p: int = 0) -> Program:
 
     def step(c: Any, x: Any, z: Any) -> list[Any]:
         Phi, H, K = matrices_of(c, (n, n), (m, n), (n, m))
-        u = product(Phi, x[:n])
-        g = [a - b for a, b in zip(z, product(H, u), strict=True)]
-        after = [a + b for a, b in zip(u, product(K, g), strict=True)]
+        u = Phi @ x[:n]
+        after = u + K @ (z - H @ u)
         return [*after, *after[:p]]
 
     names = entries("Phi", n, n) + entries("H", m, n) + entries("K", n, m)
@@ -292,17 +287,11 @@ def sequential_program(n: int, m: int) -> Program:
     of each measurement, K (n, m).
     """
 
-    def step(c: Any, x: Any, z: Any) -> list[Any]:
+    def step(c: Any, x: Any, z: Any) -> Any:
         Phi, U, H, K = matrices_of(c, (n, n), (m, m), (m, n), (n, m))
-        x, seen = product(Phi, x), [*z]
-        for i in range(m - 1, -1, -1):
-            for k in range(i + 1, m):
-                seen[i] = seen[i] - U[i, k] * seen[k]
-        for i in range(m):
-            y = seen[i]
-            for j in range(n):
-                y = y - H[i, j] * x[j]
-            x = [x[j] + K[j, i] * y for j in range(n)]
+        x = Phi @ x
+        for h, k, measured in zip(H, K.T, decorrelated(U, z), strict=True):
+            x = x + k * innovation_of_one(h, measured, x)
         return x
 
     return recorded(step, n, m, n * n + m * m + 2 * n * m)

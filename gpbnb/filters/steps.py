@@ -231,6 +231,13 @@ def check_nonzero(a: Any) -> None:
         raise ZeroDivisionError("a zero pivot in the innovation covariance")
 
 
+def innovation_of_one(h: Matrix, z: Matrix, x: Matrix) -> Matrix:
+    """Return one measurement z minus h'x, term by term."""
+    for each in h * x:
+        z = z - each
+    return z
+
+
 def observe_ud(
     h: Matrix, z: Matrix, r: Matrix, x: Matrix, U: Matrix, stored: BlockStorage = ONE_FORMAT
 ) -> tuple[Matrix, Matrix, Matrix, Any]:
@@ -246,9 +253,7 @@ def observe_ud(
     x, U, gain : values after the update.
     definite : whether variances stay positive.
     """
-    y = z
-    for each in stored.state(h) * x:
-        y = y - each
+    y = innovation_of_one(stored.state(h), z, x)
     seen = stored.innovation(U)
     f = _unit(seen).T @ h
     g = np.diagonal(seen) * f
