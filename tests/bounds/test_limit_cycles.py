@@ -85,6 +85,9 @@ def test_a_smoother_with_floor_rests_up_to_three_units_below_its_input():
     assert sorted(int(cycle.outputs[0, 0]) for cycle in found.cycles) == [509, 510, 511, 512]
     assert found.largest == [3]
     assert found.rest == [512]
+    few = limit_cycles(LinearSystem.smoother("1097/4096"), words, 512, most=3)
+    assert (few.cycles, few.searched, few.largest) == (None, 0, found.bound)
+    assert str(few) == "outputs stay within 3.73382 units of rest; too many states to try each"
 
 
 def test_overflow_that_wraps_oscillates_at_full_size():

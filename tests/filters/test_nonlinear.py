@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gpbnb import (
+    BINARY32,
     FixedFormat,
     FloatFormat,
     Form,
@@ -121,6 +122,26 @@ def test_a_missing_measurement_changes_nothing(options):
     run.take(filled)
     assert run.checkpoints().K[0][:, 0].all()
     assert not run.checkpoints().K[0][:, 1].any()
+
+
+@pytest.mark.parametrize(
+    ("part", "reason"),
+    [
+        (lambda x: x[0] * 0 + np.sqrt(-1 - x[0] * x[0]), "the square root of a negative number"),
+        (lambda x: np.log(x[0] * 0 - 1), "an argument outside the domain of a function"),
+        (lambda x: x[0] / (x[0] - x[0]), "a division by zero"),
+        (lambda x: (x[0] * x[0] + 2) ** 1000 * (x[0] * x[0] + 2) ** 1000, "overflow"),
+    ],
+)
+def test_a_run_that_ends_says_why(part, reason):
+    for fmt in (BINARY32, FloatFormat(10, 7, emin=-30, emax=30)):
+        model = NonlinearModel(
+            lambda x: np.stack([part(x), x[1]]), lambda x: [[1, 0], [0, 1]], lambda x: x, None, **NOISE
+        )
+        run = NonlinearRun(model, fmt)
+        run.take(RECORD)
+        assert (run.stopped, run.steps) == (1, 0)
+        assert reason in run.reason
 
 
 def test_new_estimates_are_normalized():

@@ -59,6 +59,7 @@ def test_known_inputs_follow_the_measurements(fmt, tmp_path):
     z = np.random.default_rng(2).uniform(-1, 1, (40, 1))
     for form in ("innovation", "joseph", "ud"):
         assert disagreement(driven(), fmt, form, z) == ""
+    assert disagreement(replace(driven(), u=["0.3", -1]), fmt, "innovation", z) == ""
     path, *_ = write_code(driven(), fmt, tmp_path)
     assert "whose input holds the measurements, then the known inputs" in header(path)
     assert "const filter_number input[3]" in path.read_text()

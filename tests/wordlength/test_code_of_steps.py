@@ -32,9 +32,9 @@ def short_words():
 def one_of_each(fmt, x, u):
     """Operations that fixed point has beyond sums, products and quotients."""
     a, b = u
-    root, rest = np.sqrt(abs(a)), np.fmod(a, np.where(b == 0, fmt.array("0.3"), b))
+    divisor = np.where(b == 0, fmt.array("0.3"), b)
     whole = [np.floor(a), np.ceil(a), np.trunc(b), np.rint(b)]
-    return np.stack([rest]), np.stack([root, abs(b), -a, *whole])
+    return np.stack([np.fmod(a, divisor)]), np.stack([np.sqrt(abs(a)), abs(b), -a, a % divisor, *whole])
 
 
 @pytest.mark.skipif(not shutil.which("gcc"), reason="no gcc")

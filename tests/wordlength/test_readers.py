@@ -69,3 +69,20 @@ def test_the_command_writes_a_run_and_keeps_quiet(tmp_path, monkeypatch, capsys)
         in capsys.readouterr().err
     )
     assert (tmp_path / "run.csv").read_text() == "1\n"
+
+
+def test_a_filter_of_opencv_begins_with_its_last_estimate():
+    given = type("KalmanFilter", (), {"__module__": "cv2"})()
+    matrices = {
+        "transitionMatrix": [[1, 0.5], [0, 1]], "measurementMatrix": [[1, 0]], "processNoiseCov": [[0.1, 0], [0, 0.2]],
+        "measurementNoiseCov": [[0.3]], "errorCovPost": [[4, 1], [1, 5]], "statePost": [[1], [2]],
+        "errorCovPre": [[9, 0], [0, 9]], "statePre": [[8], [8]], "controlMatrix": None,
+    }  # fmt: skip
+    vars(given).update({name: entries and np.array(entries) for name, entries in matrices.items()})
+    found = read_model(given)
+    entries = (each.astype(float).tolist() for each in (found.Phi[0], found.H[0], found.Q[0], found.R[0], found.P0))
+    assert list(entries) == list(matrices.values())[:5]
+    assert found.x0.tolist() == [1, 2]
+    given.controlMatrix = np.ones((2, 1))
+    with pytest.raises(ValueError, match="with a controlMatrix; needed none"):
+        read_model(given)

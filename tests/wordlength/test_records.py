@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, Rounding
+from gpbnb import FixedFormat, FloatFormat, Rounding
 from gpbnb.wordlength import examples
 from gpbnb.wordlength.records import RecordSurvey, survey_records
 from tests.surveying import survey
@@ -52,5 +52,8 @@ def test_shares_and_what_is_enough():
     found = RecordSurvey(formats, ratios, (("",) * 4,) * 2)
     assert found.shares == (0.5, 0.5, 1.0, 1.0)
     assert found.enough() == (formats[2],)
+    fixed = tuple(FixedFormat(i, f) for i in (1, 2) for f in (8, 9, 10))
+    kinds = RecordSurvey(fixed, np.array([[2, 0.5, 0.5, 0.5, 0.5, 0.5]]), (("",) * 6,))
+    assert kinds.enough() == (fixed[1], fixed[3])
     irregular = RecordSurvey(formats, np.array([[0.5, 0.5, 0.5, np.inf]]), (("",) * 4,))
     assert irregular.enough() == ()

@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 from markup import Elements
 
-from gpbnb import required_precision
+from gpbnb import FloatFormat, required_precision
 from gpbnb.bounds.check import prove
 from gpbnb.bounds.guarantee import limits
+from gpbnb.filters.settled import settled_filter
+from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.wordlength import running as command
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_filter, read_model
+from gpbnb.wordlength.required import judge
 
 MODEL = """
 name = "tracker <1>"
@@ -75,8 +78,42 @@ def test_the_command_answers_and_writes_page_and_json(files, capsys):
 
 
 def test_no_answer_has_an_exit_status_of_its_own(files, capsys):
-    assert ask("model.toml --tolerance 1e-30 --steps 20 --basis emulation") == 1
-    assert "no precision up to 53 bits" in capsys.readouterr().out
+    assert ask("model.toml --tolerance 1e-30 --steps 20 --basis emulation --code code --csv run.csv") == 1
+    shown = capsys.readouterr()
+    assert "no precision up to 53 bits" in shown.out
+    assert shown.err.endswith("gpbnb.wordlength: no code, since no format is known to meet the tolerance\n")
+    assert not (files[0] / "code").exists()
+    assert not (files[0] / "run.csv").exists()
+
+
+def test_what_cannot_be_written_is_named(files, capsys, monkeypatch):
+    def full(*_):
+        raise OSError("no space")
+
+    monkeypatch.setattr(command, "replace_file", full)
+    assert ask("model.toml --tolerance 1 --steps 20 --basis emulation --csv run.csv --quiet") == 2
+    expected = "python -m gpbnb.wordlength: got --csv run.csv, which could not be written: no space\n"
+    assert capsys.readouterr().err == expected
+
+
+def test_one_format_is_written_as_digits_base_and_rounding(files, capsys):
+    given = "model.toml --measurements z.csv --tolerance 0.01 --basis emulation --quiet --digits 6"
+    for options, fmt in (
+        ("", FloatFormat(2, 6)),
+        ("--base 10 --rounding chop --emin -9 --emax 9", FloatFormat(10, 6, "chop", emin=-9, emax=9)),
+    ):
+        expected = judge(read_model("model.toml"), fmt, files[1], 0.01)
+        assert ask(f"{given} {options}") == 1 - expected.met
+        assert capsys.readouterr().out.strip() == str(expected)
+
+
+def test_a_constant_gain_makes_a_system_whose_inputs_the_filter_simulates(files, capsys):
+    (files[0] / "model.toml").write_text(SETTLED, encoding="utf-8")
+    given = ["model.toml", "--tolerance", "0.01,0.1", "--basis", "emulation", "--quiet", "--form", "constant gain"]
+    assert main([*given, "--steps", "40", "--seed", "5"]) == 0
+    model = read_model("model.toml")
+    expected = required_precision(settled_filter(model), simulated_measurements(model, 40, 5), (0.01, 0.1))
+    assert capsys.readouterr().out.strip() == str(expected)
 
 
 def test_a_guarantee_takes_limits_shows_them_and_comes_with_a_certificate(files, capsys):

@@ -8,8 +8,10 @@ import re
 import numpy as np
 import pytest
 
+from gpbnb import FixedFormat
 from gpbnb.filters.model import LinearModel
-from gpbnb.wordlength.models import FilterSource
+from gpbnb.filters.poles import stored_response
+from gpbnb.wordlength.models import FilterSource, read_filter
 from gpbnb.wordlength.report import Question, page, study
 
 REPORT = {
@@ -136,6 +138,23 @@ def test_a_study_says_where_its_measurements_come_from(given, source):
         "UD, emulation",
     ]
     assert told[:2] == ["innovation, emulation …", f"innovation, emulation: {found.answer}"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "stored"),
+    [
+        ({}, "{} bits"),
+        ({"kind": "fixed"}, "15 significant bits"),
+        ({"kind": "fixed", "fmt": FixedFormat(2, 12)}, "15-bit fixed point (12 fraction bits)"),
+        ({"kind": "words"}, "9 significant bits"),
+    ],
+)
+def test_what_storing_does_to_a_filter_is_told_with_the_format_of_its_coefficients(asked, stored):
+    source = read_filter({"b": ["0.1", "0.2", "0.1"], "a": [1, "-1.2", "0.5"], "structure": "direct form I"})
+    question = Question(source, "0.01", z=np.sin(np.arange(60) / 3)[:, None], bases=("emulation",), **asked)
+    found = study(question)
+    change = stored_response(source.model, found.answer.format)._replace(format=stored.format(found.answer.digits))
+    assert found.entries["stored"] == str(change)
 
 
 def test_the_state_with_the_largest_share_of_its_tolerance_limits():

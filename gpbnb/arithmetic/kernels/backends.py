@@ -136,7 +136,7 @@ class Exact(Backend):
 
     def _place(self, name: str, operands: tuple[Components, ...]) -> str:
         """Index of the first entry that overflows, for the message."""
-        parts = np.broadcast_arrays(*(part for components in operands for part in components))
+        parts = np.broadcast_arrays(*(np.asarray(part, object) for components in operands for part in components))
         operation = getattr(self.kernel, name)
         for index in np.ndindex(parts[0].shape):
             try:

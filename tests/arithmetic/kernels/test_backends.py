@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 import pickle
+import re
 from collections import Counter
 from fractions import Fraction
 from random import Random
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpbnb import BFLOAT16
+from gpbnb import BFLOAT16, BINARY32
 from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
@@ -256,3 +257,20 @@ def test_the_first_operations_of_a_kind_are_exact_and_the_next_ones_compiled(
     assert used
     assert all(each.backend is fmt.backend for each in late)
     assert all(same(a, b) for a, b in zip(early, late, strict=True))
+
+
+@pytest.mark.parametrize("after", [0, 10**9], ids=["in loops", "before loops"])
+@pytest.mark.parametrize(
+    "fmt",
+    [BINARY32, FloatFormat(2, 60, emin=-30, emax=30), FloatFormat(10, 7, emin=-30, emax=30), FixedFormat(4, 11)],
+    ids=str,
+)
+def test_an_overflow_is_named_with_the_place_of_the_first(
+    fmt: Any, after: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(backends, "LOOPS_AFTER", after)
+    x = fmt.array([0, fmt.largest, fmt.largest])
+    for operation, name in ((operator.add, "addition"), (operator.mul, "multiplication")):
+        for a, b, place in ((x, x, " at [1]"), (x[2], x, " at [1]"), (x, x[:, None], " at [1, 1]"), (x[1], x[2], "")):
+            with pytest.raises(OverflowError, match=f"^{re.escape(name + place)}: (got|overflow)"):
+                operation(a, b)
