@@ -210,7 +210,7 @@ class Search(Generic[Kind]):
         return most + 1 if most + 1 < largest else None
 
     def _counted(self, digits: int) -> str:
-        return digits_text(digits, self._like.base, "fraction" if isinstance(self._like, FixedFormat) else "")
+        return digits_text(digits, self._like.base)
 
     @property
     def limit(self) -> str:

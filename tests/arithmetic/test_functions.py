@@ -91,7 +91,7 @@ def test_choosing_and_moving_rounds_nothing(fmt):
     assert np.max(x, axis=1, keepdims=True).shape == (3, 1)
     assert np.sort(x, axis=1).tolist() == np.sort(rows, axis=1).tolist()
     assert np.clip(x, -1, 2).tolist() == np.clip(rows, -1, 2).tolist()
-    assert np.append(x, x, axis=0).shape == (6, 4)
+    assert np.append(x, x[:, ::-1], axis=1).tolist() == np.append(rows, rows[:, ::-1], axis=1).tolist()
     assert np.append(x, -x[:1], axis=0).tolist() == np.append(rows, -rows[:1], axis=0).tolist()
     assert np.append(x, 1).tolist() == [*rows.ravel(), 1]
     assert np.zeros_like(x).tolist() == [[0] * 4] * 3

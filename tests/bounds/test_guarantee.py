@@ -281,3 +281,13 @@ def test_outputs_and_delays_have_a_guarantee():
     assert found.bound == pytest.approx(np.full(4, found.bound[0]), rel=1e-6)
     outcome = attack(found, 200, 50)
     assert 0.1 < outcome.ratio <= 1
+
+
+def test_a_filter_that_forgets_too_slowly_for_a_proof_is_told_so():
+    """With its first variance, the gain K = 2**-20 stays, and an error decays by 1 - K a step."""
+    K = 2.0**-20
+    model = LinearModel([[1]], [[1]], [[K * K]], [[1 - K]], [0], [[K - K * K]])
+    found = guarantee(model, FloatFormat(2, 53), limits(state=1, innovation=1))
+    later = math.ceil(26 * math.log(2) / -math.log1p(-K))
+    assert f"its gain takes 1 steps to settle, and errors take {later} to decay, of which four" in found.why
+    assert (found.steps, found.bound.tolist()) == (0, [math.inf])

@@ -261,6 +261,7 @@ def test_a_header_states_the_bound(tmp_path):
     (bound,) = output_errors(BIQUAD.system(), BINARY32, within.measurement)
     assert f"each output stays within {bound:.3g} of that of the exact filter" in header(path)
     path = write_code(models()["one state"], BINARY32, tmp_path, form="Joseph", within=limits(state=9, innovation=9))[0]
+    assert "known inputs" not in header(path)
     found = guarantee(models()["one state"], BINARY32, limits(state=9, innovation=9), form=Form.JOSEPH)
     assert f"rounding moves the estimates by at most {found.bound[0]:.3g}, for ever" in header(path)
     path = write_code(LinearSystem.pid(1, "0.1"), BINARY32, tmp_path, within=limits(measurement=1))[0]

@@ -37,6 +37,18 @@ def test_a_run_shorter_than_the_memory_of_a_system_says_so():
     assert short < long / 2
 
 
+def test_an_output_within_its_tolerance_throughout_is_named():
+    """The outputs end with 3 and -1/2; zero would do for the second."""
+    system = LinearSystem(np.zeros((2, 2), int), [[1, 0], [0, 1]], output_names=["first", "second"])
+    u = np.array([[0, 0], [3, "0.25"], [1, "-0.5"], [0, 0]], dtype=object)
+    notes = required_precision(system, u, (1, 1)).notes
+    assert (
+        'output "second" never exceeds 0.5 in this run, so that zero would be within the tolerance of 1'
+        in "; ".join(notes)
+    )
+    assert "first" not in "; ".join(notes)
+
+
 def test_a_bound_and_a_system_that_never_forgets_have_no_such_warning():
     u = np.ones((1000, 1))
     assert "memory" not in str(required_precision(SLOW, u, 1e-3, basis="bound"))
