@@ -205,9 +205,8 @@ class Run(Progress):
         A run that has stopped does not continue.
         """
         self.model.check_measurements(z, self.steps)
-        if self.stopped is None:
-            packed = self.pack_measurements(z)
-            yield from self.advance(packed) if self._carried is None else self._advance_bounded(self._carried, packed)
+        packed = self.pack_measurements(z)
+        yield from self.advance(packed) if self._carried is None else self._advance_bounded(self._carried, packed)
 
     def _advance_bounded(self, carried: CarriedBound, z: NDArray[Any]) -> Iterator[Block]:
         """Take steps with packed measurements, and the bound over a block of them at a time."""

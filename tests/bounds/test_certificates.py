@@ -582,6 +582,7 @@ FORGED: dict[str, tuple[str, Callable[[Content], None]]] = {
     "no digits": ("joseph", set_to("format", "precision", 0)),
     "a million digits": ("joseph", set_to("format", "precision", 10**6)),
     "an exponent as a float": ("hung", lambda content: content["format"].update(emin=-14.0)),
+    "a largest number with too many digits": ("hung", set_to("format", "largest", "32897")),
     "exponents in the wrong order": ("hung", set_to("format", "emin", 20)),
     "subnormal numbers in words": ("hung", set_to("format", "subnormal", "no")),
     "a repair in words": ("joseph", set_to("filter", "repair", "no")),

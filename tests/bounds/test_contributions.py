@@ -89,6 +89,14 @@ def test_the_shares_of_the_tracker_are_nearly_its_whole_bound():
     assert contributions(found).sums.sum(axis=1) == pytest.approx(rounding, rel=2e-3)  # the gain still changes a little
 
 
+def test_a_rounding_is_as_large_as_the_estimate_with_its_error_may_be():
+    """Limits are powers of two, so that numbers beyond them have twice the error."""
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1024, 32], innovation=8))
+    program = found.schedule.program
+    (errors,) = separate_roundings(found)[2]
+    assert errors[program.outputs - program.n - program.m].tolist() == [2.0**-14, 2.0**-19]
+
+
 def test_a_filter_that_never_settles_is_refused():
     ended = guarantee(published.elaenia_gold(), FloatFormat(2, 24), limits(state=2000, innovation=100))
     with pytest.raises(ValueError, match=r"got a guarantee for .* steps: .*; needed one that holds for ever"):

@@ -43,6 +43,20 @@ def test_results_agree_in_some_bits_of_the_largest_of_each_entry(bits, share, ag
     assert precise_reference._agree(some, other, bits) is agree
 
 
+def test_runs_that_agree_in_few_bits_are_repeated_in_more():
+    """Errors of 1, 2**-30, 2**-60 and 2**-200: the first two runs agree in no bit, the next two in 29 of the 104."""
+    fmt, asked = FloatFormat(2, 400), []
+
+    def steps(bits):
+        x = fmt.array([[1 + Fraction(1, 2 ** (0, 30, 60, 200, 200)[len(asked)])]])
+        asked.append(bits)
+        return precise_reference.PreciseSteps(x, x[None], x[None])
+
+    found = precise_reference.agreed("model", 1, steps)
+    assert asked == [40, 256, 512, 1024, 2048]
+    assert found.x.tolist() == [[1 + Fraction(1, 2**200)]]
+
+
 def states(model, z):
     return [step.x for step in exact_steps(model, z)]
 

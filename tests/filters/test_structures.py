@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from gpbnb.filters.sections import _filtered, scaled
 from gpbnb.filters.structures import STRUCTURES, companion, reflections, steady_covariance
 from gpbnb.wordlength.asked import Asked, Data
 from gpbnb.wordlength.judges import judge_for
+from tests import plain_structures
 
 FORMATS = [
     FloatFormat(2, 11),
@@ -103,6 +105,24 @@ def test_scaled_sections_hand_on_numbers_within_one_and_beyond_half_of_it(form):
             reached.append(signal.sosfilt([[1, 0, 0, *rows[i, 3:]]], reached[0]))
         assert 1 / 2 < max(np.abs(each).sum() for each in reached) <= 1
     assert signal.sosfilt(rows, impulse) == pytest.approx(20**3 * signal.sosfilt(sos, impulse), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"Kd": "0.7", "leak": "0.9", "limits": ("-0.5", "0.7"), "back_calculation": "0.05"},
+        {"Kd": "-0.3", "integral_limits": ("-0.2", "0.3"), "limits": ("-0.6", 1)},
+    ],
+    ids=str,
+)
+def test_a_controller_without_rounding_is_its_formula(given):
+    exactly = SimpleNamespace(**dict.fromkeys(("coefficient", "data", "product", "sum", "store"), Fraction))
+    settings = {"Kp": "0.8", "Ki": "0.1", "leak": 1, "integral_limits": None, "back": given.get("back_calculation")}
+    e = [Fraction(each) for each in np.round(np.random.default_rng(5).uniform(-64, 64, 80)) / 64]
+    found = LinearSystem.pid("0.8", "0.1", **given).outputs(np.array(e)[:, None])[:, 0]
+    expected = plain_structures.pid(settings | given, e, exactly)
+    assert {min(expected), max(expected)} == {Fraction(each) for each in given["limits"]}
+    assert max(abs(sum(map(Fraction, y)) - exact) for y, exact in zip(found.tolist(), expected, strict=True)) < 1e-28
 
 
 def test_reflections_of_a_filter_of_second_order():
