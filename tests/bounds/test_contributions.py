@@ -90,8 +90,8 @@ def test_the_shares_of_the_tracker_are_nearly_its_whole_bound():
 
 
 def test_a_rounding_is_as_large_as_the_estimate_with_its_error_may_be():
-    """Limits are powers of two, so that numbers beyond them have twice the error."""
-    found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1024, 32], innovation=8))
+    """The error takes estimates beyond a power of two, from where on roundings are twice as large."""
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1024 - 2**-10, 32 - 2**-10], innovation=8))
     program = found.schedule.program
     (errors,) = separate_roundings(found)[2]
     assert errors[program.outputs - program.n - program.m].tolist() == [2.0**-14, 2.0**-19]

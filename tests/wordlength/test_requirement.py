@@ -41,3 +41,4 @@ def test_a_guarantee_says_that_the_given_run_leaves_its_limits(z, leaves):
     system = LinearSystem([["0.9"]], [["0.1"]])
     proved = required_precision(system, np.array(z), 0.05, basis="guarantee", within=limits(measurement=5))
     assert ("input 0 reaches 7, above 5" in str(proved)) is bool(leaves)
+    assert ("leaves the limits" in str(proved)) is bool(leaves)
