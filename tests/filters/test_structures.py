@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -116,11 +115,10 @@ def test_scaled_sections_hand_on_numbers_within_one_and_beyond_half_of_it(form):
     ids=str,
 )
 def test_a_controller_without_rounding_is_its_formula(given):
-    exactly = SimpleNamespace(**dict.fromkeys(("coefficient", "data", "product", "sum", "store"), Fraction))
     settings = {"Kp": "0.8", "Ki": "0.1", "leak": 1, "integral_limits": None, "back": given.get("back_calculation")}
     e = [Fraction(each) for each in np.round(np.random.default_rng(5).uniform(-64, 64, 80)) / 64]
     found = LinearSystem.pid("0.8", "0.1", **given).outputs(np.array(e)[:, None])[:, 0]
-    expected = plain_structures.pid(settings | given, e, exactly)
+    expected = plain_structures.pid(settings | given, e, plain_structures.uniform(Fraction))
     assert {min(expected), max(expected)} == {Fraction(each) for each in given["limits"]}
     assert max(abs(sum(map(Fraction, y)) - exact) for y, exact in zip(found.tolist(), expected, strict=True)) < 1e-28
 

@@ -55,19 +55,6 @@ def test_a_limit_beyond_the_data_is_their_last_number(tmp_path):
     assert "high = 32767;" in write_code(pid, words, tmp_path)[1].read_text()
 
 
-def test_an_answer_is_true_if_it_meets_the_tolerance():
-    z = np.ones((5, 1))
-    for tolerance, met in ((0.01, True), (1e-40, False)):
-        answers = [
-            required_precision(WALK, z, tolerance),
-            judge(WALK, BINARY32, z, tolerance),
-            required_precision(SYSTEM, z, tolerance, kind="fixed"),
-            required_precision(WALK, z, tolerance, kind="blocks"),
-            required_precision(SYSTEM, z, tolerance, kind="words"),
-        ]
-        assert [(bool(each), each.met) for each in answers] == [(met, met)] * 5
-
-
 @pytest.mark.parametrize("name", ["filter.h", "filter.c", "test_filter.c", "filter_vectors.txt", "Makefile"])
 def test_written_code_replaces_only_files_that_gpbnb_has_written(name, tmp_path):
     for _ in range(2):
