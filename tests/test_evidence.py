@@ -25,10 +25,14 @@ def test_a_run_beyond_its_bound_is_wrong(monkeypatch):
     row = evidence.survey.load()[0]
     kalman = evidence.filters.load()[0]
     monkeypatch.setattr(evidence.filters, "load", lambda: (kalman,))
-    monkeypatch.setattr(evidence.survey, "load", lambda: (row, row._replace(constant="1.001")))
+    monkeypatch.setattr(evidence.survey, "load", lambda: (row._replace(constant="1"), row._replace(constant="1.001")))
     assert evidence.attacks() == Checked(kalman.runs + 2 * row.runs, 1)
     monkeypatch.setattr(evidence.filters, "load", lambda: (kalman._replace(chosen="1.001"),))
     assert evidence.attacks().wrong == 2
+    known = next(row for row in evidence.scalar.load() if row.result == "compared")
+    found = (known._replace(ratio="1"), known._replace(ratio="1.001"), known._replace(result="failed", ratio="2"))
+    monkeypatch.setattr(evidence.scalar, "load", lambda: found)
+    assert evidence.true_errors() == Checked(2, 1)
 
 
 def test_nothing_that_the_page_counts_disagrees():

@@ -71,10 +71,10 @@ def test_short_numbers(value, figures, text):
     assert short(value, figures) == text
 
 
-def column(*given, header="h", quoted=()):
+def column(*given):
     """The cells of a column as a page shows them, beside a column of names; spaces as wide as a digit are `_`."""
     body = tuple((f"row {chr(65 + i)}", cell) for i, cell in enumerate(given))
-    text = html.unescape(Table("t", ("name", header), body, quoted).page())
+    text = html.unescape(Table("t", ("name", "h"), body).page())
     return [
         line.split(" | ")[1][:-2].replace("\u2007", "_").replace("\u2008\u2060", ",") for line in text.splitlines()[2:]
     ]

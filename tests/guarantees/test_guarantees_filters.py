@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from copy import copy
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -125,6 +126,15 @@ def test_errors_are_those_of_filters_without_the_package(seed):
             assert all(abs(e) <= b for e, b in zip(errors, found.bound, strict=True))
             compared_steps += 1
     assert compared_steps > 100
+
+
+def test_a_step_with_another_gain_than_the_guarantee_is_counted():
+    drawn = draw(3)
+    found = guarantee(drawn.model, drawn.fmt, drawn.within, form=drawn.form, most=filters.MOST, horizon=filters.STEPS)
+    assert filters.other_gains(drawn, found) == 0
+    others = found.schedule.packed.copy()
+    others[0, -1] += 1
+    assert filters.other_gains(drawn, replace(found, schedule=replace(found.schedule, packed=others))) == 1
 
 
 def test_a_run_counts_until_the_exact_filter_leaves_its_limits():

@@ -86,6 +86,12 @@ def test_every_certificate_of_the_book_is_stored_and_proved() -> None:
     assert {row.verdict for row in rows} == {"proved"}
 
 
+@pytest.mark.parametrize("name", ["tracker, limits four times as wide", "tracker within 0.01 m"])
+def test_a_certificate_comes_out_again(name: str) -> None:
+    (row,) = (row for row in certificates.load() if row.name == name)
+    assert certificates.checked(name)._replace(seconds=row.seconds) == row
+
+
 def test_every_filter_of_the_chapter_has_a_certificate() -> None:
     assert {row.name for row in table.load()} <= certificates.guarantees().keys()
     assert not certificates.guarantees().keys() & certificates.WITHOUT.keys()

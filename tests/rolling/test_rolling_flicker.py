@@ -6,6 +6,7 @@ import math
 from fractions import Fraction
 
 import numpy as np
+import pytest
 
 from gpbnb.report.rolling import experiment, theory
 from gpbnb.report.rolling.experiment import record
@@ -51,6 +52,16 @@ def test_channels_and_length_do_not_change_a_record():
 
 
 # -- the density --------------------------------------------------------------------------------------
+
+
+def test_windows_that_overlap_are_worth_fewer_independent_values():
+    """The correlations of periodograms, and of their frequencies, are those of the window with itself (Welch 1967)."""
+    w = 1 - np.cos(2 * np.pi * np.arange(1000) / 1000)
+    neighbours = (w[500:] @ w[:500] / (w @ w)) ** 2
+    frequencies = sum(abs(np.fft.fft(w**2)[1:3] / (w @ w)) ** 2)
+    three_segments = 3 / (1 + 2 * (2 / 3) * neighbours)
+    averages = experiment.welch(np.zeros((2000, 2)), 1.0, 1000)[2]
+    assert averages == pytest.approx(2 * three_segments / (1 + 2 * frequencies), rel=1e-5)
 
 
 def test_the_slope_over_four_decades():

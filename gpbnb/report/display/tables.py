@@ -35,13 +35,11 @@ class Table:
     ----------
     title : short plain text that stands for the table, and for its rows where a page folds it.
     header, body : cells; prose with math between single dollar signs.
-    quoted : headers of the columns that quote a document, whose numbers stay as printed.
     """
 
     title: str
     header: tuple[str, ...]
     body: tuple[tuple[str, ...], ...]
-    quoted: tuple[str, ...] = ()
 
     def markdown(self) -> str:
         """Return the table as lines with the same number of cells between unescaped pipes."""
@@ -59,8 +57,7 @@ class Table:
         if len(kept) < 2:
             same, kept = [], list(range(len(columns)))
         header = [self.header[k] for k in kept] if columns else list(self.header)
-        shown = [list(map(_cell, columns[k])) if self.header[k] in self.quoted else _aligned(columns[k]) for k in kept]
-        text = _lines(header, [list(row) for row in zip(*shown, strict=True)])
+        text = _lines(header, [list(row) for row in zip(*(_aligned(columns[k]) for k in kept), strict=True)])
         if same:
             words = "; ".join(f"{_cell(self.header[k])} = {_cell(minus_signs(columns[k][0]))}" for k in same)
             text += f"\n\nIn all rows: {words}."
