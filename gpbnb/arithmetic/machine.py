@@ -94,7 +94,7 @@ def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
         return tags.DoubleDouble(), Addresses(whole, numbers, random)
     kinds = set()
     for i, fmt in enumerate(formats):
-        found = selection.tag_of(fmt.rules)
+        found = None if isinstance(tag, tags.Wide) else selection.tag_of(fmt.rules)
         if found is None:
             found = selection.wide_tag(fmt.rules)
         if found is None:

@@ -8,25 +8,24 @@ digits.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels import doubledouble, tags
-from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
-from gpbnb.arithmetic.kernels.compiling import compiled, inner
-from gpbnb.arithmetic.kernels.scalar import add, less, load, multiply, put, round_, store, subtract
-from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
+from gpbnb.arithmetic.algebra import product_in_order
+from gpbnb.arithmetic.interpreting import Numbers, Segment
+from gpbnb.arithmetic.kernels.backends import double_doubles
+from gpbnb.arithmetic.machine import rounded, tables
 from gpbnb.bounds.gains import Schedule
 from gpbnb.bounds.guarantee import FilterGuarantee, closed_loops
-from gpbnb.bounds.guess import FilterLimits, linear_steps
+from gpbnb.bounds.guess import linear_steps
 from gpbnb.bounds.units import largest_errors, units
 from gpbnb.filters.opening import as_packed
-from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT, Program
+from gpbnb.filters.pairs import double_doubles_near
+from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, matrices_of, recorded
 
-_POWERS = np.array([10.0**k for k in range(23)])  # exact
+_BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,100 +54,6 @@ class Attack:
     admissible: bool
 
 
-def number(fmt: Any, x: Any) -> Any:
-    """Round a float64 into a format; in base 10, use its first decimals."""
-    raise TypeError("got a call of number from Python; needed one from a function compiled by numba")
-
-
-@overload(number, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
-def _overloaded_number(fmt: Any, x: Any) -> Any:
-    if getattr(fmt, "instance_class", None) in PAIRS:
-        return lambda fmt, x: round_(fmt, _scaled(x))
-    return lambda fmt, x: round_(fmt, x)
-
-
-def widened(fmt: Any, a: Any) -> Any:
-    """Convert a number to double-double: exactly in bases 2 and 16, within four roundings in base 10."""
-    raise TypeError("got a call of widened from Python; needed one from a function compiled by numba")
-
-
-@overload(widened, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
-def _overloaded_widened(fmt: Any, a: Any) -> Any:
-    def of_float(fmt: Any, a: Any) -> Any:
-        return a, 0.0
-
-    def of_pair(fmt: Any, a: Any) -> Any:
-        high = np.float64(a[0])
-        x, e = (high, np.float64(a[0] - np.int64(high))), a[1]
-        while e > 0:
-            x = doubledouble.operate(tags.MULTIPLY, x, (_POWERS[min(e, 22)], 0.0))
-            e -= min(e, 22)
-        while e < 0:
-            x = doubledouble.operate(tags.DIVIDE, x, (_POWERS[min(-e, 22)], 0.0))
-            e += min(-e, 22)
-        return x
-
-    return of_pair if getattr(fmt, "instance_class", None) in PAIRS else of_float
-
-
-@inner
-def _scaled(x: float) -> Any:
-    e = 0
-    while x != 0.0 and abs(x) < 1e15:
-        x *= 10.0
-        e -= 1
-    while abs(x) > 1e17:
-        x /= 10.0
-        e += 1
-    return np.int64(x), np.int64(e)
-
-
-@inner
-def _times(a: Any, x: Any, c: Any) -> None:
-    """Compute c = a x for a matrix and a column in double-double."""
-    exactly = DoubleDouble()
-    for i in range(a.shape[0]):
-        s = (0.0, 0.0)
-        for j in range(a.shape[1]):
-            p = doubledouble.operate(tags.MULTIPLY, load(exactly, a, (i, j)), load(exactly, x, j))
-            s = doubledouble.operate(tags.ADD, s, p)
-        put(exactly, c, i, s)
-
-
-@inner
-def _worth(fmt: Any, row: Any, x: Any, x_exact: Any) -> float:
-    """Return the weighted error of an estimate."""
-    exactly, total = DoubleDouble(), 0.0
-    for i in range(x_exact.shape[0]):
-        e = doubledouble.operate(tags.SUBTRACT, widened(fmt, load(fmt, x, i)), load(exactly, x_exact, i))
-        total += row[i] * e[0]
-    return total
-
-
-@inner
-def _share(size: float, limit: float) -> float:
-    """Return a size as a share of its limit, which may be zero."""
-    if size == 0.0:
-        return 0.0
-    return size / limit if limit > 0.0 else 1e10
-
-
-class _Attacked(NamedTuple):
-    """The filter that is attacked: the operations of a step, and coefficients whose rows from `first` on repeat."""
-
-    operations: NDArray[np.int64]
-    outputs: NDArray[np.int64]
-    #: packed, (steps, c).
-    coefficients: NDArray[Any]
-    #: the exact filter, double-double.
-    Phi: NDArray[np.float64]
-    HPhi: NDArray[np.float64]
-    K: NDArray[np.float64]
-    first: int
-    #: limits of the exact filter.
-    limits: FilterLimits
-
-
 class Plan(NamedTuple):
     """How measurements are chosen, step by step."""
 
@@ -165,149 +70,144 @@ class Plan(NamedTuple):
     ahead: bool
 
 
-class _Measured(NamedTuple):
-    """A measurement: packed, and minus what the exact filter expects, in double-double."""
+class _Lanes:
+    """A program on the machine, with a candidate in each lane; the format None is double-double."""
 
-    z: NDArray[Any]
-    nu: NDArray[np.float64]
+    def __init__(self, fmt: Any, program: Program, lanes: int) -> None:
+        self._program, self._numbers = program, Numbers([fmt], program.sizes, lanes)
+        self._code = Numbers.ready([Segment(program.rows, np.zeros(len(program.rows), np.int64), None)])
+
+    def take(self, coefficients: Any, states: Any, inputs: Any = ()) -> NDArray[Any]:
+        """Return the results, (results, lanes, ...), from numbers (count, ...) or (count, lanes, ...)."""
+        program, values = self._program, self._numbers.values
+        given = (program.coefficients, coefficients), (program.states, states), (program.inputs, inputs)
+        for places, numbers in given:
+            if len(places):
+                values[places] = numbers if numbers.ndim == values.ndim else numbers[:, np.newaxis]
+        if not self._numbers.run(self._code):
+            raise OverflowError(_BEYOND)
+        return self._numbers.at(program.after)
 
 
-@inner
-def _row(given: Any, k: int) -> int:
-    """Return the row of the coefficients of step k + 1."""
-    count = given.Phi.shape[0]
-    return k if k < count else given.first + (k - given.first) % (count - given.first)
+def _expected(n: int, m: int) -> Program:
+    """The exact filter before a measurement: the predicted estimate (n,), and what it expects (m,)."""
+
+    def step(c: Any, x: Any, z: Any) -> list[Any]:
+        Phi, HPhi = matrices_of(c, (n, n), (m, n))
+        return [*_product(Phi, x), *_product(HPhi, x)]
+
+    return recorded(step, n, 0, n * (n + m))
 
 
-@inner
-def _measure(fmt: Any, given: Any, plan: Any, values: Any, pull: Any, seen: Any, into: Any) -> float:
-    """Turn a candidate into a measurement; return the largest share of a limit."""
-    exactly, limits, excess = DoubleDouble(), given.limits, 0.0
-    for r in range(values.shape[0]):
-        value = values[r]
+def _compared(n: int, m: int) -> Program:
+    """The exact filter after a measurement: innovation (m,), estimate (n,), and the error of another one (n,)."""
+
+    def step(K: Any, x: Any, z: Any) -> list[Any]:
+        predicted, seen, computed = x[:n], x[n : n + m], x[n + m :]
+        innovation = z - seen
+        after = predicted + _product(K.reshape(n, m), innovation)
+        return [*innovation, *after, *(computed - after)]
+
+    return recorded(step, 2 * n + m, m, n * m)
+
+
+def _product(a: Any, x: Any) -> Any:
+    return product_in_order(a, x[:, None])[:, 0]
+
+
+class _Search:
+    """A filter and its exact counterpart, each in as many lanes as there are candidates."""
+
+    def __init__(self, found: FilterGuarantee, plan: Plan) -> None:
+        given, lanes = found.schedule, plan.pool.shape[1]
+        self._given, self._plan, self._limits = given, plan, found.limits
+        n, m = given.program.n, given.program.m
+        self._rounded = _Lanes(given.fmt, given.program, lanes)
+        self._expected, self._compared = _Lanes(None, _expected(n, m), lanes), _Lanes(None, _compared(n, m), lanes)
+        self._machine = tables([given.fmt])
+        #: Coefficients of each step: of the rounded filter, packed, and Phi with HPhi, in double-double.
+        self._matrices = np.concatenate([each.reshape(len(each), -1, 2) for each in (given.Phi, given.HPhi)], axis=1)
+        self._gains = given.exact.reshape(len(given.exact), n * m, 2)
+
+    def _at(self, k: int) -> int:
+        """Return the row of the coefficients of step k + 1."""
+        first, count = self._given.first, len(self._given.Phi)
+        return k if k < count else first + (k - first) % (count - first)
+
+    def _numbers(self, values: NDArray[np.float64]) -> NDArray[Any]:
+        """Round float64, (m, lanes), into the format; in base 10, their first decimals."""
+        packed = values if self._given.fmt.base != 10 else _first_decimals(values)
+        found = rounded(*self._machine, packed.reshape(-1, *packed.shape[2:]))
+        if found is None:
+            raise OverflowError(_BEYOND)
+        return found.reshape(packed.shape)
+
+    def expected(self, k: int, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the predicted estimate of the exact filter, and what it expects, in double-double."""
+        found = self._expected.take(self._matrices[self._at(k)], x)
+        return found[: len(x)], found[len(x) :]
+
+    def step(
+        self, k: int, x: NDArray[Any], z: NDArray[Any], predicted: Any, seen: Any
+    ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Take a step; return the packed estimate, innovation and estimate of the exact filter, and the error."""
+        n, m, at = len(predicted), len(seen), self._at(k)
+        after = self._rounded.take(self._given.packed[at], x, z)
+        lanes = after.shape[1:2]
+        both = [np.broadcast_to(each if each.ndim == 3 else each[:, np.newaxis], (len(each), *lanes, 2))
+                for each in (predicted, seen)]  # fmt: skip
+        found = self._compared.take(self._gains[at], np.concatenate([*both, _widened(after)]), _widened(z))
+        innovation, exactly, error = np.split(found, [m, m + n])
+        return after, innovation[..., 0], exactly, error[..., 0]
+
+    def measurements(self, k: int, predicted: NDArray[Any], seen: NDArray[Any]) -> NDArray[Any]:
+        """Return the candidates of a step, (m, lanes, ...), packed."""
+        plan, values = self._plan, self._plan.pool[k].T
         if plan.by_range:
-            most = limits.innovation[r]
-            value = seen[r, 0] + min(max(pull[r] + value, -most), most) * (1 - 1e-6)
-        c = number(fmt, value)
-        put(fmt, into.z, r, c)
-        c_exact = widened(fmt, c)
-        put(exactly, into.nu, r, doubledouble.operate(tags.SUBTRACT, c_exact, load(exactly, seen, r)))
-        excess = max(excess, _share(abs(into.nu[r, 0]), limits.innovation[r]))
-        excess = max(excess, _share(abs(c_exact[0]), limits.measurement[r]))
-    return excess
+            pull = plan.steer[:, -1] * min(1.0, k / plan.ramp)
+            for j, column in enumerate(plan.steer.T[:-1]):
+                pull = pull + column * predicted[j, 0]
+            most = self._limits.innovation[:, np.newaxis]
+            within = np.minimum(np.maximum(pull[:, np.newaxis] + values, -most), most)
+            values = seen[:, :1] + within * (1 - 1e-6)
+        return self._numbers(values)
+
+    def excess(self, z: NDArray[Any], innovation: NDArray[np.float64], exactly: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the largest share of a limit that each candidate takes."""
+        state, most, measured = self._limits.state, self._limits.innovation, self._limits.measurement
+        sizes = (innovation, most), (_widened(z)[..., 0], measured), (exactly[..., 0], state)
+        return np.max([_shares(np.abs(each), limit[:, np.newaxis]).max(axis=0) for each, limit in sizes], axis=0)
+
+    def ahead(self, k: int, x: NDArray[Any], exactly: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the error after the next step, (n, lanes), with a measurement from the middle of the range."""
+        predicted, seen = self.expected(k, exactly)
+        middle = self._plan.pool[k, 0][:, np.newaxis] + np.zeros(seen.shape[1])
+        return self.step(k, x, self._numbers(seen[..., 0] if self._plan.by_range else middle), predicted, seen)[3]
 
 
-@inner
-def _corrected(K: Any, nu: Any, predicted: Any, c: Any) -> None:
-    """Compute c = predicted + K nu in double-double; c is not the predicted estimate itself."""
-    exactly = DoubleDouble()
-    _times(K, nu, c)
-    for i in range(c.shape[0]):
-        put(exactly, c, i, doubledouble.operate(tags.ADD, load(exactly, predicted, i), load(exactly, c, i)))
+def _shares(sizes: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return sizes as shares of their limits, which may be zero."""
+    found = np.where(sizes == 0, 0.0, 1e10)
+    return np.asarray(np.divide(sizes, limits, out=found, where=(sizes != 0) & (limits > 0)))
 
 
-@inner
-def _execute(fmt: Any, operations: Any, outputs: Any, coefficients: Any, x: Any, z: Any, values: Any) -> None:
-    """Take one step in the arithmetic that the tag selects, and overwrite x and the workspace `values`."""
-    n, m = x.shape[0], z.shape[0]
-    for i in range(n):
-        put(fmt, values, i, load(fmt, x, i))
-    for i in range(m):
-        put(fmt, values, n + i, load(fmt, z, i))
-    for o in range(operations.shape[0]):
-        code, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
-        right = load(fmt, values, b)
-        if code == MULTIPLY:
-            put(fmt, values, n + m + o, multiply(fmt, load(fmt, coefficients, a), right))
-        elif code == ADD:
-            put(fmt, values, n + m + o, add(fmt, load(fmt, values, a), right))
-        elif code == SUBTRACT:
-            put(fmt, values, n + m + o, subtract(fmt, load(fmt, values, a), right))
-        else:
-            limit = load(fmt, coefficients, a)
-            beyond = less(fmt, right, limit) if code == AT_LEAST else less(fmt, limit, right)
-            put(fmt, values, n + m + o, limit if beyond else right)
-    for i in range(n):
-        store(fmt, x, i, load(fmt, values, outputs[i]))
+def _widened(numbers: NDArray[Any]) -> NDArray[np.float64]:
+    """Convert packed numbers to double-double: exactly in bases 2 and 16, within four roundings in base 10."""
+    if numbers.dtype == np.float64:
+        return np.stack([numbers, np.zeros_like(numbers)], axis=-1)
+    return double_doubles_near(numbers)
 
 
-@inner
-def _error_ahead(fmt: Any, given: Any, plan: Any, k: int, x: Any, x_exact: Any, values: Any) -> float:
-    """Return the weighted error one step after step k + 1, with a measurement from the middle of the range."""
-    exactly, m, then = DoubleDouble(), given.HPhi.shape[1], _row(given, k + 1)
-    beyond, moved, nu = np.empty_like(x_exact), np.empty_like(x_exact), np.empty((m, 2))
-    z, later = np.empty((m, *x.shape[1:]), x.dtype), x.copy()
-    _times(given.Phi[then], x_exact, beyond)
-    _times(given.HPhi[then], x_exact, nu)
-    for r in range(m):
-        c = number(fmt, nu[r, 0] if plan.by_range else plan.pool[k + 1, 0, r])
-        put(fmt, z, r, c)
-        put(exactly, nu, r, doubledouble.operate(tags.SUBTRACT, widened(fmt, c), load(exactly, nu, r)))
-    _corrected(given.K[then], nu, beyond, moved)
-    _execute(fmt, given.operations, given.outputs, given.coefficients[then], later, z, values)
-    return _worth(fmt, plan.rows[k + 1], later, moved)
-
-
-@compiled
-def greedy(fmt: Any, given: Any, plan: Any, x: Any, x_exact: Any, chosen: Any, errors: Any) -> Any:
-    """Choose a measurement at each step from a pool; keeps the errors in `errors` (steps, n).
-
-    Most products of a step depend only on the estimate. So each candidate may be judged by the error one step later.
-
-    Parameters
-    ----------
-    given : _Attacked.
-    plan : Plan.
-    x, x_exact : the first estimate, packed and double-double.
-    chosen : (steps, m[, 2]), the chosen measurements, packed.
-
-    Returns
-    -------
-    violations : steps at which no candidate kept the exact filter within its limits.
-    """
-    n, m, steps = given.Phi.shape[1], given.HPhi.shape[1], plan.rows.shape[0]
-    exactly, trial, best = DoubleDouble(), np.empty_like(x), np.empty_like(x)
-    values = np.empty((n + m + given.operations.shape[0], *x.shape[1:]), x.dtype)
-    tried, taken = _Measured(np.empty((m, *x.shape[1:]), x.dtype), np.empty((m, 2))), np.empty_like(chosen[0])
-    predicted, following, best_exact = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 2))
-    seen, pull, violations = np.empty((m, 2)), np.zeros(m), 0
-    for k in range(steps):
-        at = _row(given, k)
-        _times(given.Phi[at], x_exact, predicted)
-        _times(given.HPhi[at], x_exact, seen)
-        if plan.by_range:
-            for r in range(m):
-                pull[r] = plan.steer[r, n] * min(1.0, k / plan.ramp)
-                for j in range(n):
-                    pull[r] += plan.steer[r, j] * predicted[j, 0]
-        largest, found = -np.inf, -1
-        for q in range(plan.pool.shape[1]):
-            excess = _measure(fmt, given, plan, plan.pool[k, q], pull, seen, tried)
-            _corrected(given.K[at], tried.nu, predicted, following)
-            for i in range(n):
-                excess = max(excess, _share(abs(following[i, 0]), given.limits.state[i]))
-            trial[:] = x
-            _execute(fmt, given.operations, given.outputs, given.coefficients[at], trial, tried.z, values)
-            if excess > 1.0:
-                score = -1e300 * min(excess, 1e7)
-            elif k + 1 == steps or not plan.ahead:
-                score = _worth(fmt, plan.rows[k], trial, following)
-            else:
-                score = _error_ahead(fmt, given, plan, k, trial, following, values)
-            if score > largest or found < 0:
-                largest, found = score, q
-                best[:] = trial
-                best_exact[:] = following
-                taken[:] = tried.z
-        if largest <= -1e299:
-            violations += 1
-        x[:] = best
-        x_exact[:] = best_exact
-        chosen[k] = taken
-        for i in range(n):
-            e = doubledouble.operate(tags.SUBTRACT, widened(fmt, load(fmt, x, i)), load(exactly, x_exact, i))
-            errors[k, i] = e[0]
-    return violations
+def _first_decimals(x: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return significands of 15 to 17 digits, and their exponents."""
+    x, e = x.copy(), np.zeros(x.shape, np.int64)
+    while (small := (x != 0) & (np.abs(x) < 1e15)).any():
+        x[small] *= 10.0
+        e[small] -= 1
+    while (large := np.abs(x) > 1e17).any():
+        x[large] /= 10.0
+        e[large] += 1
+    return np.stack([x.astype(np.int64), e], axis=-1)
 
 
 def responses(given: Schedule, F: NDArray[np.float64], state: int, steps: int) -> NDArray[np.float64]:
@@ -455,18 +355,40 @@ def run_against(
     ramp: float = 1.0,
     ahead: bool = False,
 ) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
-    """Run :func:`greedy` once; return the steps outside the limits, measurements in float64, and errors (steps, n)."""
-    given, program = found.schedule, found.schedule.program
-    backend = cast(Compiled, given.fmt.backend)
-    steps = len(rows)
-    x = as_packed(given.fmt, given.x0)
-    chosen, errors = np.zeros((steps, program.m, *x.shape[1:]), x.dtype), np.zeros((steps, program.n))
-    numbers = given.packed, given.Phi, given.HPhi, given.exact, given.first
-    attacked = _Attacked(program.operations, program.outputs, *numbers, found.limits)
-    plan = Plan(rows, pool, steer, by_range, float(ramp), ahead)
-    outside = greedy(backend.tag, attacked, plan, x, double_doubles(given.x0), chosen, errors)
-    z = chosen if x.dtype == np.float64 else chosen[..., 0] * 10.0 ** chosen[..., 1]
-    return outside, z, errors
+    """Choose a measurement at each step from a pool.
+
+    Most products of a step depend only on the estimate. So each candidate may be judged by the error one step later.
+
+    Parameters
+    ----------
+    rows, pool, steer, by_range, ramp, ahead : the fields of :class:`Plan`.
+
+    Returns
+    -------
+    outside : number of steps at which no candidate kept the exact filter within its limits.
+    z : (steps, m), the measurements in float64.
+    errors : (steps, n).
+    """
+    given, steps = found.schedule, len(rows)
+    x, x_exact = as_packed(given.fmt, given.x0), double_doubles(given.x0)
+    search = _Search(found, Plan(rows, pool, steer, by_range, float(ramp), ahead))
+    chosen, errors, outside = [], np.zeros((steps, given.program.n)), 0
+    for k in range(steps):
+        predicted, seen = (each[:, 0] for each in search.expected(k, x_exact))
+        z = search.measurements(k, predicted, seen)
+        after, innovation, exactly, error = search.step(k, x, z, predicted, seen)
+        excess = search.excess(z, innovation, exactly)
+        judged = search.ahead(k + 1, after, exactly) if ahead and k + 1 < steps else error
+        weights, worth = rows[k + (judged is not error)], np.zeros(len(excess))
+        for weight, each in zip(weights, judged, strict=True):
+            worth = worth + weight * each
+        scores = np.where(excess > 1, -1e300 * np.minimum(excess, 1e7), worth)
+        best = int(np.argmax(scores))
+        outside += int(scores[best] <= -1e299)
+        x, x_exact, errors[k] = after[:, best], exactly[:, best], error[:, best]
+        chosen.append(z[:, best])
+    numbers = np.array(chosen)
+    return outside, numbers if numbers.dtype == np.float64 else numbers[..., 0] * 10.0 ** numbers[..., 1], errors
 
 
 def _pool(

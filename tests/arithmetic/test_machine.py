@@ -18,6 +18,7 @@ from gpbnb.arithmetic.machine import (
     OVERFLOW,
     ZERO_DIVISOR,
     ZERO_PIVOT,
+    accumulate,
     code_of,
     evaluate,
     fault_of,
@@ -281,3 +282,22 @@ def test_rows_run_together_that_do_not_take_results_of_each_other():
             assert code == rows[begin, 0]
             assert not [each for each in own if rows[begin, 4] <= each < result]
     assert max(end - begin for begin, end in found) > 5
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(2, 53, "chop"), FloatFormat(16, 6)], ids=str)
+@pytest.mark.parametrize("factor", [2.0**100, 2.0**-100])
+def test_powers_beyond_the_range_of_float64_have_no_result(fmt, factor):
+    held = 10 if factor > 1 else 9
+    kind, formats = tables([fmt])
+    rows = np.array([(CODES["multiply"], k, 0, 0, k + 1) for k in range(12)])
+    powers, truths = np.full((13, 1), factor), np.array([[0], [1]], np.uint8)
+    assert evaluate(kind, formats, code_of(rows, np.zeros(12, np.int64)), powers, truths) == held - 1
+    assert powers[:held, 0].tolist() == [factor**k for k in range(1, held + 1)]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_decimal_exponent_beyond_the_machine_has_no_result(sign):
+    kind, formats = tables([FloatFormat(10, 2)])
+    for count in (3, 20):
+        powers = np.full((count, 1, 2), [10, sign * 2**58])
+        assert accumulate(kind, formats, "multiply", powers) == (count == 3)

@@ -215,36 +215,25 @@ class Looped(Backend):
         """Return opposites or absolute values, if the format has all of them."""
 
     def _applied(self, name: str, shape: tuple[int, ...], flat: Sequence[Components]) -> Components | None:
-        tag = self.fusing_tag if name == "fused" else self.tag
-        if tag is None:
-            fused = self._fused_in_two_words(*flat)
-            return None if fused is None else tuple(part.reshape(shape) for part in fused)
         size = math.prod(shape)
         if name == "round_" and 0 < size <= _FEW:
             found = machine.rounded(*self._machine, self.pack(flat[0]))
             return None if found is None else tuple(part.reshape(shape) for part in self.unpack(found))
-        out, inputs = self._empty(size), [self._seen(each) for each in flat]
+        out, (kind, formats) = self._empty(size), self._machine
         try:
-            gone = _along(_loops().ENTRIES[name], (tag,), size, *inputs, self._seen(out))
+            if name == "fused":
+                _along(_loops().fused, (kind, formats.address), size, *flat, out)
+            else:
+                code = machine.CODES[_CODED.get(name, name)]
+                _along(_loops().ALONG[code], (kind, formats.address, code), size, flat[0], flat[-1], out)
         except OverflowError:
             return None
-        return None if gone else tuple(part.reshape(shape) for part in out)
+        return tuple(part.reshape(shape) for part in out)
 
     @cached_property
     def _machine(self) -> tuple[Any, Any]:
         """The kind and columns of the format on the machine."""
         return machine.tables([self], self.tag)
-
-    @property
-    def fusing_tag(self) -> Tag | None:
-        """The tag for fused multiply-add on the same numbers, if there is one."""
-        return None
-
-    def _fused_in_two_words(self, *operands: Components) -> Components | None:
-        if self.wide is None:
-            return None
-        found = TwoWords(self.rules, self.wide).apply("fused", *map(self.in_two_words, operands))
-        return None if found is None else self.from_two_words(found)
 
     def fold(self, name: str, components: Components) -> Components | None:
         found = self._accumulated(name, components)
@@ -313,7 +302,8 @@ class Looped(Backend):
             return self.exact.compare(self.to_exact(a), self.to_exact(b))
         order = np.empty(math.prod(shape), np.int8)
         x, y = (tuple(_flat(part, shape) for part in components) for components in (a, b))
-        _along(_loops().compared, (self.tag,), order.size, x, y, order)
+        kind, formats = self._machine
+        _along(_loops().compared, (kind, formats.address), order.size, x, y, order)
         return order.reshape(shape)
 
     def matmul(self, a: Components, b: Components) -> Components | None:
@@ -391,10 +381,6 @@ class Looped(Backend):
 
     def _empty(self, size: int) -> Components:
         return tuple(np.empty(size, self.dtype) for _ in range(self.count))
-
-    def _seen(self, components: Components) -> Any:
-        """Bring components into the form that a compiled loop expects."""
-        return components[0] if self.count == 1 else components
 
 
 class Compiled(Looped):
@@ -587,6 +573,14 @@ class Pairs(Compiled):
             return self._from_numbers(components[0], exactly=False)
         return super()._from_backend(other, components)
 
+    def _applied(self, name: str, shape: tuple[int, ...], flat: Sequence[Components]) -> Components | None:
+        if name != "fused":
+            return super()._applied(name, shape, flat)
+        if self.wide is None:
+            return None
+        found = TwoWords(self.rules, self.wide).apply(name, *map(self.in_two_words, flat))
+        return None if found is None else tuple(part.reshape(shape) for part in self.from_two_words(found))
+
     def in_two_words(self, components: Components) -> Components:
         return components[0], np.zeros(components[0].shape, np.int64), components[1]
 
@@ -663,10 +657,6 @@ class TwoWords(Looped):
 
     def in_two_words(self, components: Components) -> Components:
         return components
-
-    @property
-    def fusing_tag(self) -> Tag:
-        return self.tag
 
     def from_two_words(self, components: Components) -> Components:
         return components

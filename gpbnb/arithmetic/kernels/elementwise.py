@@ -1,64 +1,50 @@
-"""Compiled loops over whole arrays: entry by entry, of numbers that are not float64.
+"""Compiled loops over whole arrays: entry by entry, of numbers on integers.
 
-If a result leaves the range of its backend, a loop returns True or raises OverflowError, and its output is invalid.
+Arrays have a component for each part of their numbers. If a format does not have a result, a loop raises
+OverflowError, and its output is invalid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from gpbnb.arithmetic.kernels import scalar
+from gpbnb.arithmetic.kernels.bits import words
 from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.arithmetic.kernels.scalar import compare, load, lost, put
+from gpbnb.arithmetic.kernels.kinds import compare, format_of, get_number, other, product, set_number, sum_of
+from gpbnb.arithmetic.kernels.kinds import fused as fused_of
+from gpbnb.arithmetic.kernels.tags import ADD, MULTIPLY, SKIP, SUBTRACT
 
 
-def _two(operation: Any) -> Callable[..., bool]:
+def _loop(operate: Any) -> Any:
     @compiled
-    def loop(fmt: Any, n: int, a: Any, b: Any, c: Any) -> Any:
-        gone = False
+    def along(kind: Any, formats: int, operation: int, n: int, a: Any, b: Any, out: Any) -> None:
+        fmt = format_of(kind, words(formats), formats)
         for i in range(n):
-            x = operation(fmt, load(fmt, a, i), load(fmt, b, i))
-            gone |= lost(fmt, x)
-            put(fmt, c, i, x)
-        return gone
+            x, y = get_number(kind, fmt, a, i), get_number(kind, fmt, b, i)
+            set_number(kind, fmt, out, i, operate(kind, fmt, operation, x, y))
 
-    return loop
+    return along
 
 
-def _one(operation: Any) -> Callable[..., bool]:
-    @compiled
-    def loop(fmt: Any, n: int, a: Any, c: Any) -> Any:
-        gone = False
-        for i in range(n):
-            x = operation(fmt, load(fmt, a, i))
-            gone |= lost(fmt, x)
-            put(fmt, c, i, x)
-        return gone
-
-    return loop
-
-
-def _three(operation: Any) -> Callable[..., bool]:
-    @compiled
-    def loop(fmt: Any, n: int, a: Any, b: Any, c: Any, d: Any) -> Any:
-        gone = False
-        for i in range(n):
-            x = operation(fmt, load(fmt, a, i), load(fmt, b, i), load(fmt, c, i))
-            gone |= lost(fmt, x)
-            put(fmt, d, i, x)
-        return gone
-
-    return loop
-
-
-ENTRIES = {name: _two(getattr(scalar, name)) for name in ("add", "subtract", "multiply")}
-ENTRIES |= {"divide": _two(scalar.quotient), "sqrt": _one(scalar.root), "round_": _one(scalar.round_)}
-ENTRIES["fused"] = _three(scalar.fused)
+_sums, _products, _others = map(_loop, (sum_of, product, other))
+ALONG = {code: {MULTIPLY: _products, ADD: _sums, SUBTRACT: _sums}.get(code, _others) for code in range(SKIP)}
+"""For each code of an operation, the loop (kind, formats, operation, n, a, b, out) that sets `out` to its results.
+Operations on one number take it twice. Sums and products have loops of their own, which what depends on the format
+alone is computed before, and the loop of the others takes longer to compile."""
 
 
 @compiled
-def compared(fmt: Any, n: int, a: Any, b: Any, c: Any) -> None:
-    """c[i] = -1, 0 or 1 if a[i] is less than, equal to or greater than b[i]."""
+def fused(kind: Any, formats: int, n: int, a: Any, b: Any, c: Any, out: Any) -> None:
+    """out = a b + c, rounded once."""
+    fmt = format_of(kind, words(formats), formats)
     for i in range(n):
-        c[i] = compare(fmt, load(fmt, a, i), load(fmt, b, i))
+        x, y, z = get_number(kind, fmt, a, i), get_number(kind, fmt, b, i), get_number(kind, fmt, c, i)
+        set_number(kind, fmt, out, i, fused_of(kind, fmt, x, y, z))
+
+
+@compiled
+def compared(kind: Any, formats: int, n: int, a: Any, b: Any, order: Any) -> None:
+    """order[i] = -1, 0 or 1 if a[i] is less than, equal to or greater than b[i]."""
+    fmt = format_of(kind, words(formats), formats)
+    for i in range(n):
+        order[i] = compare(kind, fmt, get_number(kind, fmt, a, i), get_number(kind, fmt, b, i))

@@ -22,6 +22,7 @@ from gpbnb.arithmetic.kernels import decimal, doubledouble, shortdecimal, wide
 from gpbnb.arithmetic.kernels.bits import at, call, entries, words
 from gpbnb.arithmetic.kernels.careful import carefully, masked
 from gpbnb.arithmetic.kernels.compiling import address_of, addressed, borrowing, compiled, inner
+from gpbnb.arithmetic.kernels.kinds import operations_of, pair_format, short_format, word_format
 from gpbnb.arithmetic.kernels.quick import (
     COLUMNS,
     LONG,
@@ -37,7 +38,6 @@ from gpbnb.arithmetic.kernels.quick import (
 from gpbnb.arithmetic.kernels.tags import (
     ABSOLUTE,
     ADD,
-    AWAY,
     CHOOSE,
     COMBINE,
     COMPARE,
@@ -50,14 +50,11 @@ from gpbnb.arithmetic.kernels.tags import (
     SKIP,
     SUBTRACT,
     Careful,
-    Decimal,
     DoubleDouble,
     InPairs,
     InShortPairs,
     InTwoWords,
     Quick,
-    ShortDecimal,
-    Wide,
 )
 
 ONE_BY_ONE, GATHERED, NEIGHBOURS = range(3)
@@ -257,26 +254,6 @@ def _careful_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 # -- other numbers -----------------------------------------------------------------------------------------------------
 
 
-def _operation(kind: Any) -> Any:
-    """Return the function for all operations of an arithmetic on integers."""
-    add, multiply, divide, sqrt, round_ = kind.add, kind.multiply, kind.divide, kind.sqrt, kind.round_
-    opposite, negative = kind.opposite, kind.negative
-
-    @borrowing(forceinline=True)
-    def operate(fmt: Any, operation: Any, x: Any, y: Any) -> Any:
-        if operation == MULTIPLY:
-            return multiply(fmt, x, y)
-        if operation <= SUBTRACT:
-            return add(fmt, x, opposite(fmt, y) if operation == SUBTRACT else y)
-        if operation == DIVIDE:
-            return divide(fmt, x, y)
-        if operation == ROOT:
-            return sqrt(fmt, x)
-        return round_(fmt, x) if operation == ROUND else negative(fmt, x)
-
-    return operate
-
-
 @inner(forceinline=True)
 def _double_double(fmt: Any, operation: Any, x: Any, y: Any) -> Any:
     return doubledouble.operate(operation, x, y)
@@ -344,28 +321,8 @@ def _segment(formats: Any, code: Any, s: Any) -> Any:
     return at(entries(formats, WHOLE, np.int64), COLUMNS * f), operation, entries(code, BEGINS, np.int64)[s + 1]
 
 
-_run_pairs, _run_short = (_loop(kind, _operation(kind), 2) for kind in (decimal, shortdecimal))
-_run_two_words, _run_double_doubles = _loop(wide, _operation(wide), 3), _loop(doubledouble, _double_double, 2)
-
-
-@borrowing(forceinline=True)
-def pair_format(columns: Any) -> Any:
-    """The format of base 10 of these columns."""
-    return Decimal(columns[1], columns[0], columns[2], columns[3], columns[4])
-
-
-@borrowing(forceinline=True)
-def short_format(columns: Any) -> Any:
-    """The short format of base 10 of these columns."""
-    return ShortDecimal(columns[0], columns[1] == AWAY)
-
-
-@borrowing(forceinline=True)
-def word_format(columns: Any) -> Any:
-    """The format with significands of two words of these columns."""
-    lowest, largest = (columns[7], columns[8], columns[9]), (columns[10], columns[11], columns[12])
-    bits, mode, precision, room, split = columns[0], columns[1], columns[2], columns[3], columns[4]
-    return Wide(bits, mode, precision, room, split, columns[5], columns[6], lowest, largest, columns[13] != 0)
+_run_pairs, _run_short = (_loop(kind, operations_of(kind).any, 2) for kind in (decimal, shortdecimal))
+_run_two_words, _run_double_doubles = _loop(wide, operations_of(wide).any, 3), _loop(doubledouble, _double_double, 2)
 
 
 @addressed

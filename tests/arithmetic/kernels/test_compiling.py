@@ -207,3 +207,28 @@ def test_numbers_in_names_are_random():
     generate_on_demand()
     numbers = sorted(next(FunctionIdentity._unique_ids) for _ in range(4))
     assert all(two - one > 1000 for one, two in itertools.pairwise(numbers))
+
+
+def test_importing_gpbnb_is_light() -> None:
+    code = (
+        "import sys, gpbnb\n"
+        "from gpbnb.arithmetic import array, bounds, formats, linalg\n"
+        "gpbnb.FloatFormat(2, 24).round('0.1')\n"
+        "print([name for name in ('numba', 'llvmlite', 'sympy', 'matplotlib', 'mpmath') if name in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
+
+
+def test_compiled_functions_are_loaded_without_what_only_compiling_needs() -> None:
+    code = (
+        "import sys, gpbnb\n"
+        "from gpbnb.arithmetic.kernels import backends\n"
+        "backends.LOOPS_AFTER = 0\n"
+        "x = gpbnb.FloatFormat(2, 24).array(['0.1'])\n"
+        "x + x\n"
+        "print([name for name in ('numba', 'numba.np.linalg', 'scipy.linalg', 'sympy') if name in sys.modules])"
+    )
+    for _ in range(2):  # the first run may compile
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "['numba']"
