@@ -73,8 +73,6 @@ def in_floats(values: Any) -> bool:
 
 def repair_tolerance(values: Any) -> float | None:
     """Return the largest repair of a matrix given in floats: half the digits of their type. None for other input."""
-    if hasattr(values, "to_fractions"):
-        return None
     dtype = getattr(values, "dtype", None)
     if isinstance(dtype, np.dtype) and np.issubdtype(dtype, np.floating):
         return max(REPAIR_TOLERANCE, math.sqrt(float(np.finfo(dtype).eps)))

@@ -130,6 +130,7 @@ class TestFormulas:
         weight = 3 * one + one * one
         ratio = bounds.higham_probabilistic(factors, x) / bounds.higham(factors, x)
         assert ratio == pytest.approx(weight / (6 * u), rel=1e-5)  # to first order in G
+        assert bounds.rule_of_thumb(factors, x) / bounds.higham(factors, x) == pytest.approx(6**-0.5, rel=1e-5)
         assert bounds.higham_probabilistic(factors, x, 0.5) < bounds.higham_probabilistic(factors, x)
 
     def test_rows_in_the_order_of_the_matrix(self):

@@ -144,6 +144,14 @@ def test_a_run_that_ends_says_why(part, reason):
         assert reason in run.reason
 
 
+def test_a_model_is_described_by_its_sizes_and_those_of_its_numbers_that_are_not_zero():
+    assert repr(by_functions(iterations=2, steps=9)).splitlines() == [
+        "NonlinearModel 'a nonlinear model', extended, iterated 2 times, 2 states; 2 measurements; at most 9 steps",
+        "  Q 0.01, R 0.1 … 1",
+        "  x0 1, P0 1",
+    ]
+
+
 def test_new_estimates_are_normalized():
     def unit(x):
         return x / np.linalg.norm(x)

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+import gpbnb
 from gpbnb import required_precision
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
@@ -134,6 +135,13 @@ def test_stochastic_rounding_is_searched_as_far_as_it_has_loops():
     assert found.format is None
     assert found.tried[-1][0] == 29
     assert "no precision up to 29 bits" in str(found)
+
+
+def test_a_run_is_described_and_has_its_estimates():
+    history = emulate(MODEL, Z, FloatFormat(2, 12), checkpoint_steps=[7, 30])
+    largest = ", ".join(f"{each:.2g}" for each in abs(history.state).max(axis=0))
+    assert repr(history) == f"innovation in 12 bits, 30 steps: largest error of each state {largest}"
+    assert history.estimate.tolist() == gpbnb.emulate(MODEL, Z, FloatFormat(2, 12)).x.to_float()[[6, 29]].tolist()
 
 
 def test_a_seed_selects_the_random_roundings_of_a_run():
