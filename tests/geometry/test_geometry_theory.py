@@ -32,6 +32,11 @@ def test_second_order_of_a_rolling_spacecraft_is_that_of_sympy():
         y, z = (float(e.subs(numbers)) for e in mean_errors(2))
         # products of two numbers of 1e-4; sympy and numpy round them differently by an ulp or two
         assert np.allclose(theory.measured(case, True, 1.0), [z, -y], rtol=1e-12, atol=1e-22)
+        for phase in (0.0, 0.7):
+            turn = {derivation.C: math.cos(phase), derivation.S: math.sin(phase)}
+            y, z = (float(each.subs(numbers | turn)) for each in derivation.drift_errors(2))
+            # products of three angles of 1e-4
+            assert theory.measured(case, False, 1.0, phase) == pytest.approx([z, -y], rel=0, abs=1e-11)
 
 
 def test_without_roll_the_readout_misalignment_stands_and_the_telescope_one_cancels():

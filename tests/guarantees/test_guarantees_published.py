@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from fractions import Fraction
 
 import numpy as np
@@ -90,6 +91,19 @@ def test_every_certificate_of_the_book_is_stored_and_proved() -> None:
 def test_a_certificate_comes_out_again(name: str) -> None:
     (row,) = (row for row in certificates.load() if row.name == name)
     assert certificates.checked(name)._replace(seconds=row.seconds) == row
+
+
+@pytest.mark.parametrize("name", ["elaenia, gold", "filterpy, velocity", "Dyer and McReynolds"])
+def test_a_guarantee_of_a_published_filter_comes_out_again(name: str) -> None:
+    """It takes 4 s: the bits that each filter needs are searched for."""
+    (row,) = (row for row in table.load() if row.name == name)
+    assert table.compute(table.case_named(name))[:-1] == row[:-1]
+
+
+def test_a_certificate_that_promises_too_much_is_not_proved() -> None:
+    given = json.loads(certificates.tracker_guarantee().certificate())
+    given["bound"] = [f"{Fraction(each) / 2}" for each in given["bound"]]
+    assert certificates.verdict("half", json.dumps(given)).verdict.startswith("not proved: ")
 
 
 def test_every_filter_of_the_chapter_has_a_certificate() -> None:
