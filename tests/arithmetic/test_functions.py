@@ -106,14 +106,14 @@ def test_choosing_and_moving_rounds_nothing(fmt):
 
 def test_reductions_keep_dimensions(fmt):
     """The entries are those without keepdims, and the shape is NumPy's; methods and functions agree."""
-    for name in ["sum", "prod", "mean", "max", "min", "argmax", "argmin", "any", "all", "norm"]:
+    for name in ["sum", "prod", "mean", "max", "min", "argmax", "argmin", "any", "all", "var", "std", "norm"]:
         x = drawn(fmt, 3, 4)
         function = np.linalg.norm if name == "norm" else getattr(np, name)
         for axis in (None, 0, 1, -1):
             flat, kept = function(x, axis=axis), function(x, axis=axis, keepdims=True)
             assert kept.shape == function(x.to_float(), axis=axis, keepdims=True).shape, axis
             assert np.array_equal(kept.reshape(flat.shape), flat), axis
-            if name != "norm":
+            if hasattr(x, name):
                 assert np.array_equal(getattr(x, name)(axis=axis, keepdims=True), kept), axis
                 assert np.array_equal(getattr(x, name)(axis), flat), axis
 
