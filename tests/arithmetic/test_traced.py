@@ -210,9 +210,11 @@ def test_what_cannot_be_traced_runs_as_it_is_and_says_why(function, reason):
 
 
 def test_constants_must_be_exact_where_the_function_demands_it():
+    for constant in (0.1, [0.5, 0.1], np.array([0.5, 0.1])):
+        traced = TracedFunction(lambda fmt, z, constant=constant: z * constant)
+        with pytest.raises(ValueError, match=r"got the operand 0.1; needed a number that .* holds exactly"):
+            traced(BINARY32, [1])
     traced = TracedFunction(lambda fmt, z: z * 0.1)
-    with pytest.raises(ValueError, match=r"got the operand 0.1; needed a number that .* holds exactly"):
-        traced(BINARY32, [1])
     assert traced(FloatFormat(2, 60), [2]).to_float().tolist() == [0.2]
     assert traced.reason == ""
 

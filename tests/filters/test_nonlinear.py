@@ -17,6 +17,7 @@ from gpbnb import (
     required_precision,
 )
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_reference, simulated, true_states
+from gpbnb.filters.steps import lower_root
 from gpbnb.wordlength.records import survey_records
 from tests.step_functions import tracked_motion, tracked_sight
 from tests.surveying import survey
@@ -150,6 +151,13 @@ def test_a_model_is_described_by_its_sizes_and_those_of_its_numbers_that_are_not
         "  Q 0.01, R 0.1 … 1",
         "  x0 1, P0 1",
     ]
+
+
+def test_a_zero_pivot_of_a_root_gives_a_zero_column():
+    """The second pivot is 1 - 1, although 3 - 1 remains below it."""
+    for fmt in (FloatFormat(2, 24), FloatFormat(10, 5)):
+        root = lower_root(fmt.array([[4, 2, 2], [2, 1, 3], [2, 3, 5]]))
+        assert root.tolist() == [[2, 0, 0], [1, 0, 0], [1, 0, 2]]
 
 
 def test_new_estimates_are_normalized():

@@ -12,9 +12,9 @@ from gpbnb import BINARY64, LinearSystem, WordFormats, emulate, guarantee, limit
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.probable import probable_output_errors
-from gpbnb.bounds.words import bounded_rounding
+from gpbnb.bounds.words import bounded_rounding, rounding_limits
 from gpbnb.filters.system import controller, state_space
-from gpbnb.filters.words import run_words
+from gpbnb.filters.words import integer_program, run_words
 from gpbnb.wordlength.required import judge
 
 
@@ -27,6 +27,13 @@ def test_the_bound_of_one_state_is_its_geometric_series() -> None:
     assert exact <= bound[0] <= exact * (1 + 2.0**-19)  # a claim leaves the checker a margin of 2**-20
     chopped = bounded_rounding(made, WordFormats(FixedFormat(2, 10, Rounding.CHOP), 15))
     assert np.allclose(chopped, 2 * bound)
+
+
+def test_a_sum_is_rounded_whichever_operand_has_more_bits() -> None:
+    """x / 2 + z, and x + (z - x) / 2, where nothing before the sum is rounded."""
+    words = WordFormats(FixedFormat(2, 10), 15, FixedFormat(4, 20))
+    for made in (state_space([["0.5"]], [["1"]]), LinearSystem.smoother("0.5").as_filter()):
+        assert rounding_limits(integer_program(made, words)).tolist() == [0, 0, 2.0**-11]
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,9 @@ def test_systems_of_scipy_are_read_in_a_structure(structure):
     expected = signal.lfilter(B, A, np.eye(1, 80)[0])
     impulse = np.eye(80, 1)
     for given in (signal.dlti(B, A, dt=1), signal.dlti(z, p, k, dt=1)):
-        found = read_model(given, structure=structure).outputs(impulse)[:, 0, 0]
+        system = read_model(given, structure=structure)
+        assert system.name.startswith(structure)
+        found = system.outputs(impulse)[:, 0, 0]
         assert found == pytest.approx(expected, abs=1e-12)  # z, p and k differ from b and a in their last digits
     with pytest.raises(ValueError, match="needed a TransferFunction or a ZerosPolesGain"):
         read_model(signal.StateSpace([[0.5]], [[1]], [[1]], [[0]], dt=1), structure=structure)
