@@ -166,6 +166,22 @@ def test_links_lead_within_where_all_pages_are_one(tmp_path):
     assert raw.astext() == raw.rawsource == mended
 
 
+def test_a_count_is_that_of_the_rows_with_all_its_words():
+    rows = ledger.all_rows()
+
+    def shown(text):
+        ((node,), _) = ledger.count("ledger-count", "", text, 1, None)
+        return node.astext()
+
+    for document in {row.statement.document for row in rows}:
+        for outcome in ("verified", "wrong", "not reproduced"):
+            expected = sum(row.statement.document == document and row.outcome == outcome for row in rows)
+            assert shown(f"{document} {outcome}") == str(expected)
+    assert shown("statements") == f"{len(rows):,}"
+    assert shown("roots") == str(len({row.finding.root for row in rows} - {""}))
+    assert 0 < int(shown("claims refuted")) < int(shown("claims"))
+
+
 def test_powers_of_ten_in_tables_too_but_not_in_code_and_formulas():
     document = new_document("page")
     document += [table(("a", "b"), ("1e-05 to 2e3, x2e3", "")), nodes.paragraph("", "1e-05")]

@@ -24,7 +24,6 @@ class Ledger(SphinxDirective):
 
     ``page NAME`` is a page of the complete ledger; ``errors TOPIC`` the errors in the statements of a chapter;
     ``verdict NAME`` the statements with one verdict; ``undone NAME`` what the documents leave undone, with one verdict;
-    ``printed TITLE: IDS`` some statements as printed, collapsed;
     ``roots`` the root errors, and ``root-squares`` the squares of what each affects; ``squares`` every statement as a
     square; ``argument`` how wrong statements pass from one part of the documents to the next; ``correction`` the main
     result above its correction; ``timeline`` the history, with sources; ``claims`` the principal claims;

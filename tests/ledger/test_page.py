@@ -151,6 +151,14 @@ def test_what_most_readers_skip_is_collapsed(finding, shown, collapsed):
     assert [re.findall(r'<p class="(\w+)">', text) for text in (before, after)] == [shown, collapsed]
 
 
+@pytest.mark.parametrize(("undone", "shown"), [(False, ["note"]), (True, ["printed", "recomputed", "note"])])
+def test_a_note_comes_first_unless_the_documents_left_the_work_undone(undone, shown):
+    html = ledger.note_table([Row(LEGIBLE, Finding("1", None, Verdict.UNVERIFIABLE, "n"))], undone).html
+    before = html.partition("<summary>Evidence")[0]
+    assert re.findall(r'<p class="(\w+)">', before) == shown
+    assert ("ledger-undone" in html) is undone
+
+
 WRONG = compare(False, "1", Verdict.WRONG, "n")
 
 
