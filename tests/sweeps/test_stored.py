@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import pytest
 
+from gpbnb.report import stored_rows
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.inversion.experiment import SWEEPS as INVERSIONS
 from gpbnb.report.inversion.experiment import format_name
@@ -44,6 +47,21 @@ def test_inversions_are_stored_for_the_formats_of_their_cells(name):
     (sweep,) = (each for each in SWEEPS if each.name == f"inversion/{name}")
     formats = {row[1] for row in sweep.load().rows} - {"all"}
     assert formats == {format_name(cell.fmt) for cell in sweep.cells()}
+
+
+class Bounded(NamedTuple):
+    name: str
+    steps: int
+    bound: float
+    text: stored_rows.Number
+
+
+def test_the_columns_of_a_row_accept_what_its_fields_hold_and_no_negative_number():
+    found = stored_rows.columns(Bounded)
+    assert [column.fault("1") for column in found] == [None] * 4
+    assert [column.fault("-1") is None for column in found] == [True, False, False, False]
+    assert [column.fault("1.5") is None for column in found] == [True, False, True, True]
+    assert [column.fault("") is None for column in stored_rows.columns(Bounded, optional=True)] == [True] * 4
 
 
 def test_the_first_steps_include_the_last_of_them():

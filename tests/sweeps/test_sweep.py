@@ -148,6 +148,9 @@ def test_the_command_fails_where_a_result_must_not_occur(sweep, tmp_path, capsys
         one = dataclasses.replace(sweep, faults=lambda file, faults=faults: faults if file.exists() else ["no file"])
         assert run([one], ["recompute", one.name, "--output", str(tmp_path / str(status)), "--cells", "1"]) == status
         assert capsys.readouterr().out.splitlines()[1:] == faults
+    last = dataclasses.replace(one, name="tests/last", faults=lambda file: [])
+    assert run([one, last], ["recompute", one.name, last.name, "--output", str(tmp_path), "--cells", "1"]) == 1
+    assert capsys.readouterr().out.splitlines()[2:] == faults
 
 
 def test_the_processes_of_this_machine_give_the_stored_rows(tmp_path, capsys):

@@ -66,6 +66,15 @@ def test_spans_hold_every_number():
     assert found["model"][1:] == (-34, 8)  # 1e-10 and 400
 
 
+@pytest.mark.parametrize("state", range(3))
+def test_a_curve_of_variances_is_that_of_the_exact_filter_to_the_digits_of_the_format(state):
+    curve, lost = study.variances(TILT, FloatFormat(2, 50), state, 300)
+    steps = tuple(range(3, 301, 3))
+    assert [step for step, _ in curve] == list(steps)
+    assert lost is None
+    assert [P for _, P in curve] == pytest.approx(reference(TILT, Z, steps).P[:, state, state].astype(float), rel=1e-9)
+
+
 def test_update_stagnation_is_that_of_the_runs():
     fmt, checkpoint_steps = FloatFormat(2, 12), tuple(range(1, 301))
     (coarse, fine) = study.update_stagnation(TILT, Z, 2, [fmt, FloatFormat(2, 40)], last=200)
