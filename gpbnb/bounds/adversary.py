@@ -55,11 +55,11 @@ class Attack:
 
 
 class Plan(NamedTuple):
-    """How measurements are chosen, step by step."""
+    """How measurements are chosen in some runs, step by step."""
 
-    #: (steps, n), weight of an error after each step.
+    #: (runs, steps, n), weight of an error after each step.
     rows: NDArray[np.float64]
-    #: (steps, candidates, m), measurements; with `by_range`, innovations, to which steering is added.
+    #: (runs, steps, candidates, m), measurements; with `by_range`, innovations, to which steering is added.
     pool: NDArray[np.float64]
     #: (m, n + 1), with `by_range`: steer (x_predicted, share) is added to innovations, within their limit.
     steer: NDArray[np.float64]
@@ -71,7 +71,7 @@ class Plan(NamedTuple):
 
 
 class _Lanes:
-    """A program on the machine, with a candidate in each lane; the format None is double-double."""
+    """A program on the machine, with a candidate of a run in each lane; the format None is double-double."""
 
     def __init__(self, fmt: Any, program: Program, lanes: int) -> None:
         self._program, self._numbers = program, Numbers([fmt], program.sizes, lanes)
@@ -116,10 +116,10 @@ def _product(a: Any, x: Any) -> Any:
 
 
 class _Search:
-    """A filter and its exact counterpart, each in as many lanes as there are candidates."""
+    """A filter and its exact counterpart, each in as many lanes as all runs have candidates."""
 
     def __init__(self, found: FilterGuarantee, plan: Plan) -> None:
-        given, lanes = found.schedule, plan.pool.shape[1]
+        given, lanes = found.schedule, plan.pool.shape[0] * plan.pool.shape[2]
         self._given, self._plan, self._limits = given, plan, found.limits
         n, m = given.program.n, given.program.m
         self._rounded = _Lanes(given.fmt, given.program, lanes)
@@ -153,23 +153,19 @@ class _Search:
         """Take a step; return the packed estimate, innovation and estimate of the exact filter, and the error."""
         n, m, at = len(predicted), len(seen), self._at(k)
         after = self._rounded.take(self._given.packed[at], x, z)
-        lanes = after.shape[1:2]
-        both = [np.broadcast_to(each if each.ndim == 3 else each[:, np.newaxis], (len(each), *lanes, 2))
-                for each in (predicted, seen)]  # fmt: skip
-        found = self._compared.take(self._gains[at], np.concatenate([*both, _widened(after)]), _widened(z))
+        found = self._compared.take(self._gains[at], np.concatenate([predicted, seen, _widened(after)]), _widened(z))
         innovation, exactly, error = np.split(found, [m, m + n])
         return after, innovation[..., 0], exactly, error[..., 0]
 
     def measurements(self, k: int, predicted: NDArray[Any], seen: NDArray[Any]) -> NDArray[Any]:
         """Return the candidates of a step, (m, lanes, ...), packed."""
-        plan, values = self._plan, self._plan.pool[k].T
+        plan, values = self._plan, self._plan.pool[:, k].reshape(predicted.shape[1], -1).T
         if plan.by_range:
-            pull = plan.steer[:, -1] * min(1.0, k / plan.ramp)
-            for j, column in enumerate(plan.steer.T[:-1]):
-                pull = pull + column * predicted[j, 0]
+            pull = plan.steer[:, -1:] * min(1.0, k / plan.ramp)
+            for column, each in zip(plan.steer.T[:-1, :, np.newaxis], predicted, strict=True):
+                pull = pull + column * each[:, 0]
             most = self._limits.innovation[:, np.newaxis]
-            within = np.minimum(np.maximum(pull[:, np.newaxis] + values, -most), most)
-            values = seen[:, :1] + within * (1 - 1e-6)
+            values = seen[..., 0] + np.minimum(np.maximum(pull + values, -most), most) * (1 - 1e-6)
         return self._numbers(values)
 
     def excess(self, z: NDArray[Any], innovation: NDArray[np.float64], exactly: NDArray[Any]) -> NDArray[np.float64]:
@@ -181,8 +177,12 @@ class _Search:
     def ahead(self, k: int, x: NDArray[Any], exactly: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the error after the next step, (n, lanes), with a measurement from the middle of the range."""
         predicted, seen = self.expected(k, exactly)
-        middle = self._plan.pool[k, 0][:, np.newaxis] + np.zeros(seen.shape[1])
-        return self.step(k, x, self._numbers(seen[..., 0] if self._plan.by_range else middle), predicted, seen)[3]
+        middle = seen[..., 0] if self._plan.by_range else self.in_lanes(self._plan.pool[:, k, 0].T)
+        return self.step(k, x, self._numbers(middle), predicted, seen)[3]
+
+    def in_lanes(self, numbers: NDArray[Any]) -> NDArray[Any]:
+        """Return numbers of each run, (count, runs, ...), for each of its candidates, (count, lanes, ...)."""
+        return np.repeat(numbers, self._plan.pool.shape[2], axis=1)
 
 
 def _shares(sizes: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -247,22 +247,21 @@ def attack(
     by_range = not np.isfinite(found.limits.measurement).all()
     errors, best, best_z, allowed, runs = np.zeros(n), 0.0, np.zeros((steps, m)), True, 0
     at: tuple[Any, ...] = ()
-    F = closed_loops(given)
+    F, steer = closed_loops(given), _steering(found, center) if by_range else np.zeros((m, n + 1))
     for state in range(n) if states is None else states:
-        rows = responses(given, F, state, steps)
-        for plan in range(plans):
-            pool = _pool(found, F, state, steps, candidates, plan, by_range, rng)
-            steer = _steering(found, center) if by_range else np.zeros((m, n + 1))
-            rise = steps / 2 if ramp is None else ramp
-            outcome = run_against(found, rows, pool, steer, by_range, rise, ahead=True)
-            runs += 1
-            allowed = allowed and not outcome[0]
-            if outcome[0]:
-                continue
-            errors = np.maximum(errors, np.abs(outcome[2]).max(axis=0))
-            reached = shares_of(np.abs(outcome[2]), found.bound)
+        rows = np.broadcast_to(responses(given, F, state, steps), (plans, steps, n))
+        pool = np.array(
+            [_pool(found, F, state, steps, candidates, plan, by_range, rng) for plan in range(plans)]
+        ).reshape(plans, steps, candidates, m)
+        rise = steps / 2 if ramp is None else ramp
+        outside, z, off = run_against(found, rows, pool, steer, by_range, rise, ahead=True)
+        runs += plans
+        allowed = allowed and not outside.any()
+        for plan in np.flatnonzero(outside == 0):
+            errors = np.maximum(errors, np.abs(off[plan]).max(axis=0))
+            reached = shares_of(np.abs(off[plan]), found.bound)
             if reached.max() > best or not at:
-                best, best_z, at = float(reached.max()), outcome[1], np.unravel_index(reached.argmax(), reached.shape)
+                best, best_z, at = float(reached.max()), z[plan], np.unravel_index(reached.argmax(), reached.shape)
     ratios, (step, state) = shares_of(errors, found.bound), at or (0, 0)
     return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, int(state), int(step) + 1, allowed)
 
@@ -338,12 +337,14 @@ def random_errors(found: FilterGuarantee, steps: int, center: Any = None) -> NDA
     n, m = given.program.n, given.program.m
     by_range = not np.isfinite(found.limits.measurement).all()
     share = 0.3 * found.limits.innovation if by_range else found.limits.measurement * (1 - 1e-6)
-    pool = share * rng.uniform(-1, 1, (steps, 1, m))
+    pool = share * rng.uniform(-1, 1, (1, steps, 1, m))
     steer = _steering(found, center) if by_range else np.zeros((m, n + 1))
-    outside, _, errors = run_against(found, np.zeros((steps, n)), pool, steer, by_range, steps / 4)
-    if outside:
-        raise ArithmeticError(f"got random measurements that leave the limits at {outside} steps; needed wider limits")
-    return errors
+    outside, _, errors = run_against(found, np.zeros((1, steps, n)), pool, steer, by_range, steps / 4)
+    if outside[0]:
+        raise ArithmeticError(
+            f"got random measurements that leave the limits at {outside[0]} steps; needed wider limits"
+        )
+    return errors[0]
 
 
 def run_against(
@@ -354,8 +355,8 @@ def run_against(
     by_range: bool,
     ramp: float = 1.0,
     ahead: bool = False,
-) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
-    """Choose a measurement at each step from a pool.
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Choose a measurement at each step from a pool, in some runs at once.
 
     Most products of a step depend only on the estimate. So each candidate may be judged by the error one step later.
 
@@ -365,29 +366,31 @@ def run_against(
 
     Returns
     -------
-    outside : number of steps at which no candidate kept the exact filter within its limits.
-    z : (steps, m), the measurements in float64.
-    errors : (steps, n).
+    outside : (runs,), number of steps at which no candidate kept the exact filter within its limits.
+    z : (runs, steps, m), the measurements in float64.
+    errors : (runs, steps, n).
     """
-    given, steps = found.schedule, len(rows)
-    x, x_exact = as_packed(given.fmt, given.x0), double_doubles(given.x0)
+    given, (runs, steps, candidates, _) = found.schedule, pool.shape
+    x, x_exact = (each[:, np.newaxis] for each in (as_packed(given.fmt, given.x0), double_doubles(given.x0)))
+    x, x_exact = np.repeat(x, runs, axis=1), np.repeat(x_exact, runs, axis=1)
     search = _Search(found, Plan(rows, pool, steer, by_range, float(ramp), ahead))
-    chosen, errors, outside = [], np.zeros((steps, given.program.n)), 0
+    chosen, errors, outside = [], np.zeros((runs, steps, given.program.n)), np.zeros(runs, np.int64)
     for k in range(steps):
-        predicted, seen = (each[:, 0] for each in search.expected(k, x_exact))
+        x, x_exact = search.in_lanes(x), search.in_lanes(x_exact)
+        predicted, seen = search.expected(k, x_exact)
         z = search.measurements(k, predicted, seen)
         after, innovation, exactly, error = search.step(k, x, z, predicted, seen)
         excess = search.excess(z, innovation, exactly)
         judged = search.ahead(k + 1, after, exactly) if ahead and k + 1 < steps else error
-        weights, worth = rows[k + (judged is not error)], np.zeros(len(excess))
+        weights, worth = search.in_lanes(rows[:, k + (judged is not error)].T), np.zeros(len(excess))
         for weight, each in zip(weights, judged, strict=True):
             worth = worth + weight * each
         scores = np.where(excess > 1, -1e300 * np.minimum(excess, 1e7), worth)
-        best = int(np.argmax(scores))
-        outside += int(scores[best] <= -1e299)
-        x, x_exact, errors[k] = after[:, best], exactly[:, best], error[:, best]
+        best = np.arange(runs) * candidates + scores.reshape(runs, candidates).argmax(axis=1)
+        outside += scores[best] <= -1e299
+        x, x_exact, errors[:, k] = after[:, best], exactly[:, best], error[:, best].T
         chosen.append(z[:, best])
-    numbers = np.array(chosen)
+    numbers = np.moveaxis(np.array(chosen), 2, 0)
     return outside, numbers if numbers.dtype == np.float64 else numbers[..., 0] * 10.0 ** numbers[..., 1], errors
 
 
