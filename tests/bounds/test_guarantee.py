@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, Rounding
+from gpbnb import FloatFormat, LinearSystem, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.adversary import attack, ceiling, random_errors
 from gpbnb.bounds.gains import filter_schedule, schedule
@@ -291,3 +291,9 @@ def test_a_filter_that_forgets_too_slowly_for_a_proof_is_told_so():
     later = math.ceil(26 * math.log(2) / -math.log1p(-K))
     assert f"its gain takes 1 steps to settle, and errors take {later} to decay, of which four" in found.why
     assert (found.steps, found.bound.tolist()) == (0, [math.inf])
+
+
+def test_an_input_that_is_always_zero_is_bounded():
+    found = guarantee(LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 24), limits(measurement=0))
+    assert found.for_ever
+    assert 0 <= found.bound[0] < 2.0**-24
