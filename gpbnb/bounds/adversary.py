@@ -150,12 +150,13 @@ class _Search:
     def step(
         self, k: int, x: NDArray[Any], z: NDArray[Any], predicted: Any, seen: Any
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Take a step; return the packed estimate, innovation and estimate of the exact filter, and the error."""
+        """Return the packed estimate after a step, the exact one, the error, and the largest share of a limit."""
         n, m, at = len(predicted), len(seen), self._at(k)
         after = self._rounded.take(self._given.packed[at], x, z)
-        found = self._compared.take(self._gains[at], np.concatenate([predicted, seen, _widened(after)]), _widened(z))
+        computed, measured = np.split(_widened(np.concatenate([after, z])), [n])
+        found = self._compared.take(self._gains[at], np.concatenate([predicted, seen, computed]), measured)
         innovation, exactly, error = np.split(found, [m, m + n])
-        return after, innovation[..., 0], exactly, error[..., 0]
+        return after, exactly, error[..., 0], self._excess(measured[..., 0], innovation[..., 0], exactly[..., 0])
 
     def measurements(self, k: int, predicted: NDArray[Any], seen: NDArray[Any]) -> NDArray[Any]:
         """Return the candidates of a step, (m, lanes, ...), packed."""
@@ -168,17 +169,17 @@ class _Search:
             values = seen[..., 0] + np.minimum(np.maximum(pull + values, -most), most) * (1 - 1e-6)
         return self._numbers(values)
 
-    def excess(self, z: NDArray[Any], innovation: NDArray[np.float64], exactly: NDArray[Any]) -> NDArray[np.float64]:
-        """Return the largest share of a limit that each candidate takes."""
-        state, most, measured = self._limits.state, self._limits.innovation, self._limits.measurement
-        sizes = (innovation, most), (_widened(z)[..., 0], measured), (exactly[..., 0], state)
-        return np.max([_shares(np.abs(each), limit[:, np.newaxis]).max(axis=0) for each, limit in sizes], axis=0)
+    def _excess(self, *sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the largest share of a limit that measurement, innovation and state of each candidate take."""
+        limits = self._limits.measurement, self._limits.innovation, self._limits.state
+        shares = _shares(np.abs(np.concatenate(sizes)), np.concatenate(limits)[:, np.newaxis])
+        return np.asarray(shares.max(axis=0))
 
     def ahead(self, k: int, x: NDArray[Any], exactly: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the error after the next step, (n, lanes), with a measurement from the middle of the range."""
         predicted, seen = self.expected(k, exactly)
         middle = seen[..., 0] if self._plan.by_range else self.in_lanes(self._plan.pool[:, k, 0].T)
-        return self.step(k, x, self._numbers(middle), predicted, seen)[3]
+        return self.step(k, x, self._numbers(middle), predicted, seen)[2]
 
     def in_lanes(self, numbers: NDArray[Any]) -> NDArray[Any]:
         """Return numbers of each run, (count, runs, ...), for each of its candidates, (count, lanes, ...)."""
@@ -379,8 +380,7 @@ def run_against(
         x, x_exact = search.in_lanes(x), search.in_lanes(x_exact)
         predicted, seen = search.expected(k, x_exact)
         z = search.measurements(k, predicted, seen)
-        after, innovation, exactly, error = search.step(k, x, z, predicted, seen)
-        excess = search.excess(z, innovation, exactly)
+        after, exactly, error, excess = search.step(k, x, z, predicted, seen)
         judged = search.ahead(k + 1, after, exactly) if ahead and k + 1 < steps else error
         weights, worth = search.in_lanes(rows[:, k + (judged is not error)].T), np.zeros(len(excess))
         for weight, each in zip(weights, judged, strict=True):
