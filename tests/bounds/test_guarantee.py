@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import gpbnb
 from gpbnb import FloatFormat, LinearSystem, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.adversary import attack, ceiling, random_errors
@@ -294,6 +295,6 @@ def test_a_filter_that_forgets_too_slowly_for_a_proof_is_told_so():
 
 
 def test_an_input_that_is_always_zero_is_bounded():
-    found = guarantee(LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 24), limits(measurement=0))
-    assert found.for_ever
+    found = gpbnb.guarantee(LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 24), limits(measurement=0))
+    assert found.steps is None
     assert 0 <= found.bound[0] < 2.0**-24
