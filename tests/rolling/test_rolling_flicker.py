@@ -40,6 +40,16 @@ def test_the_noise_is_white_noise_through_the_full_response():
     assert np.allclose(fast, slow, rtol=0, atol=1e-13 * np.max(abs(slow)))  # some roundings of the largest numbers
 
 
+@pytest.mark.parametrize("period", [None, 77.5])
+def test_filtered_noise_has_the_variance_of_all_that_each_white_sample_adds(period):
+    weights, n = [0.5, 0.3, 0.2], 8
+    h = theory.impulse_response(n)
+    turn = np.ones(n) if period is None else np.exp(1j * theory.roll_phase(np.arange(n), period))
+    added = [sum(w * turn[n - 1 - j] * h[n - 1 - j - k] for j, w in enumerate(weights) if j + k < n) for k in range(n)]
+    expected = math.pi * LEVEL * np.sum(np.abs(added) ** 2)
+    assert theory.filtered_variance(weights, LEVEL, n, period) == pytest.approx(expected, rel=1e-12)
+
+
 # -- what a record depends on -----------------------------------------------------------------------
 
 
