@@ -9,6 +9,7 @@ import pytest
 
 from gpbnb import BINARY32, FixedFormat, FloatFormat, peek, required_precision
 from gpbnb.arithmetic import linalg, tape
+from gpbnb.arithmetic.machine import CODES
 from gpbnb.arithmetic.traced import TracedFunction
 
 FORMATS = {
@@ -257,3 +258,15 @@ def test_a_remainder_that_is_flushed_on_its_way_is_rounded_once(function):
     assert np.fmod(x, y).tolist() == [0, 0]
     assert function(fmt, x, y).tolist() == [23 * unit, -23 * unit]
     assert not getattr(function, "reason", "")
+
+
+def test_what_a_changing_choice_may_leave_out_changes_with_it():
+    """A product of constants runs only if x < 0, so it stands with the operations that depend on x."""
+    found = tape.Tape(3)
+    truth = found.record("compare", np.array(1), np.array(0), 1)
+    product = found.only_if(truth, lambda: found.record("multiply", np.array(2), np.array(3)))
+    alone = found.record("add", np.array(2), np.array(3))
+    found.record("choose", truth, product, alone)
+    once, each = found.divided(np.array([1]))
+    assert [row[0] for row in once[0].rows] == [CODES["add"]]
+    assert [row[0] for row in each[0].rows] == [CODES[name] for name in ("compare", "skip", "multiply", "choose")]

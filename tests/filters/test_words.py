@@ -82,6 +82,24 @@ def test_half_up_is_the_shift_of_integers_in_c(wide):
     assert differ["nearest"] > 0
 
 
+def test_the_output_of_a_section_is_stored_before_the_next_takes_it():
+    """Two sections v = u - a v_, y = b v + v_ in whole numbers: sums of 8 more bits are rounded down between them."""
+    words = WordFormats(FixedFormat(15, 0, "down"), FixedFormat(1, 8), FixedFormat(30, 8, "down"))
+    factors, u = [(200, 100), (90, -60)], np.random.default_rng(3).integers(-500, 500, 300).tolist()
+    signal = u
+    for b, a in factors:
+        t = s = 0
+        made = []
+        for each in signal:
+            v = ((each << 8) - (t << 8)) >> 8
+            made.append((b * v + (s << 8)) >> 8)
+            t, s = a * v >> 8, v
+        signal = made
+    sections = [[Fraction(b, 256), 1, 0, 1, Fraction(a, 256), 0] for b, a in factors]
+    system = LinearSystem.from_sections(sections, "direct form I transposed")
+    assert run_words(system, np.array(u)[:, None], words).states[:, -1].tolist() == signal
+
+
 @pytest.mark.parametrize("structure", STRUCTURES)
 @pytest.mark.parametrize("wide", [False, True])
 def test_no_run_is_beyond_its_guarantee(structure, wide):
