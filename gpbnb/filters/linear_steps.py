@@ -80,13 +80,12 @@ class LinearSteps:
         ------
         OverflowError : a step has no result.
         """
-        loop, sizes, n = self._loop, np.zeros(len(self._places)), len(self._after)
+        loop, sizes = self._loop, np.zeros(len(self._places))
         for part in slices(len(z), len(self._rows)):
-            kept, _, row = loop.take(part.start, z[part], n + 1, self._places)
+            kept, _, row = loop.take(part.start, z[part], len(self._after) + 1, self._places)
             if row >= 0:
                 raise OverflowError(f"got no result of step {part.start + len(kept) + 1}")
             np.maximum(sizes, np.abs(kept).max(axis=0), out=sizes)
-        np.maximum(sizes[:n], np.abs(loop.states), out=sizes[:n])
         return sizes
 
 

@@ -14,7 +14,7 @@ import pytest
 import gpbnb
 from gpbnb import FloatFormat, LinearSystem, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.bounds.adversary import attack, ceiling, random_errors
+from gpbnb.bounds.adversary import attack, ceiling, random_errors, run_against
 from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.guess import GAIN, LOOP, gains, linear_steps, rounding_errors, value_sizes
@@ -162,6 +162,26 @@ def test_an_adversary_comes_near_but_not_above(form: Form, rounding: Rounding) -
     outcome = attack(found, 1500, 100, center=[750, 0], plans=1)
     assert outcome.admissible
     assert 0.3 < outcome.ratio <= 1
+
+
+def test_an_attack_takes_the_candidate_within_the_limits_whose_error_is_largest_one_step_later() -> None:
+    fmt = FloatFormat(2, 9)
+    found = from_schedule(filter_schedule(biquad("0.2", "0.1", "0.05", "-0.5", "0.3"), fmt), limits(measurement=1))
+    n, rng = found.schedule.program.n, np.random.default_rng(4)
+    steer = np.zeros((1, n + 1))
+
+    def errors(rows: Any, *z: float) -> Any:
+        return run_against(found, rows, np.reshape(z, (2, 1, 1)), steer, False)[2]
+
+    for _ in range(8):
+        pool, rows = rng.uniform(-1, 1, (2, 6, 1)), rng.standard_normal((2, n))
+        pool[0, 2], pool[1, 4] = 1.6, -1.2
+        outside, z, _ = run_against(found, rows, pool, steer, False, ahead=True)
+        inside = [[each for each in some[:, 0].tolist() if abs(each) <= 1] for some in pool]
+        first = max(inside[0], key=lambda q: rows[1] @ errors(rows, q, float(pool[1, 0, 0]))[1])
+        second = max(inside[1], key=lambda q: rows[1] @ errors(rows, first, q)[1])
+        assert (outside, z[:, 0].tolist()) == (0, [float(fmt.round(first)), float(fmt.round(second))])
+    assert run_against(found, rows, np.full((2, 3, 1), 1.5), steer, False)[0] == 2
 
 
 def test_the_error_of_the_gain_matters() -> None:

@@ -83,17 +83,21 @@ def test_half_up_is_the_shift_of_integers_in_c(wide):
 
 
 def test_the_output_of_a_section_is_stored_before_the_next_takes_it():
-    """Two sections v = u - a v_, y = b v + v_ in whole numbers: sums of 8 more bits are rounded down between them."""
-    words = WordFormats(FixedFormat(15, 0, "down"), FixedFormat(1, 8), FixedFormat(30, 8, "down"))
+    """Two sections v = u - a v_, y = b v + v_ in whole numbers: sums with 8 more bits are cut between them."""
+    words = WordFormats(FixedFormat(15, 0, "chop"), FixedFormat(1, 8), FixedFormat(30, 8, "chop"))
     factors, u = [(200, 100), (90, -60)], np.random.default_rng(3).integers(-500, 500, 300).tolist()
     signal = u
+
+    def cut(n):
+        return n // 256 if n >= 0 else -(-n // 256)
+
     for b, a in factors:
         t = s = 0
         made = []
         for each in signal:
-            v = ((each << 8) - (t << 8)) >> 8
-            made.append((b * v + (s << 8)) >> 8)
-            t, s = a * v >> 8, v
+            v = each - t
+            made.append(cut(b * v + 256 * s))
+            t, s = cut(a * v), v
         signal = made
     sections = [[Fraction(b, 256), 1, 0, 1, Fraction(a, 256), 0] for b, a in factors]
     system = LinearSystem.from_sections(sections, "direct form I transposed")

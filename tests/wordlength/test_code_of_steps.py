@@ -173,3 +173,8 @@ def test_a_header_claims_no_bound(tmp_path):
     text = write_code(SYSTEMS[0], BINARY32, tmp_path)[0].read_text()
     assert "a PI controller with two clips, in BINARY32" in text
     assert "bounds" not in text
+
+
+def test_a_divisor_that_is_a_number_needs_no_check(tmp_path):
+    always = NonlinearSystem(lambda fmt, x, u: (x / 3 + u, x), [1])
+    assert "STOPPED" not in write_code(always, BINARY32, tmp_path)[1].read_text()
