@@ -114,7 +114,7 @@ def test_rational_values_are_found_in_every_rounding(base: int, rounding: Roundi
     assert np.exp2(fmt.array([3, -2, 0])).tolist() == [8, Fraction(1, 4), 1]
     assert np.log2(fmt.array([8, "0.25", 1])).tolist() == [3, -2, 0]
     assert np.log10(fmt.array([1000, 1])).tolist() == [3, 0]
-    bases, exponents = fmt.array([4, 4, "2.25", -3, 0, 0]), fmt.array(["0.5", "-0.5", "-1.5", 3, 0, 2])
+    bases, exponents = fmt.array([4, 16, "2.25", -3, 0, 0]), fmt.array(["0.5", "-0.25", "-1.5", 3, 0, 2])
     assert np.float_power(bases, exponents).tolist() == [2, Fraction(1, 2), fmt.round(Fraction(8, 27)), -27, 1, 0]
     assert np.arctan2(fmt.array(0), fmt.array([2, 0])).tolist() == [0, 0]
 
