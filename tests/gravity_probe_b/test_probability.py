@@ -58,3 +58,9 @@ def test_what_is_stored_answers():
     # One record in eleven exceeds the tolerance, which one record of a year could not show.
     assert 0 < thirty_two.records - thirty_two.within < thirty_two.records // 5
     assert most(thirty_two) < 0.99
+
+
+@pytest.mark.parametrize("sweep", [threshold.SWEEP, threshold.MISSION_SWEEP], ids=lambda sweep: sweep.name)
+def test_the_years_of_the_cells_are_stored_and_no_others(sweep):
+    years = [(*head, str(cell.first + i)) for cell in sweep.cells() for head in cell.heads() for i in range(cell.count)]
+    assert sorted(years) == sorted(row[: sweep.key] for row in sweep.load().rows)
