@@ -170,18 +170,21 @@ def test_an_attack_takes_the_candidate_within_the_limits_whose_error_is_largest_
     n, rng = found.schedule.program.n, np.random.default_rng(4)
     steer = np.zeros((1, n + 1))
 
+    def ran(rows: Any, pool: Any, ahead: bool = False) -> Any:
+        return [each[0] for each in run_against(found, rows[None], pool[None], steer, False, ahead=ahead)]
+
     def errors(rows: Any, *z: float) -> Any:
-        return run_against(found, rows, np.reshape(z, (2, 1, 1)), steer, False)[2]
+        return ran(rows, np.reshape(z, (2, 1, 1)))[2]
 
     for _ in range(8):
         pool, rows = rng.uniform(-1, 1, (2, 6, 1)), rng.standard_normal((2, n))
         pool[0, 2], pool[1, 4] = 1.6, -1.2
-        outside, z, _ = run_against(found, rows, pool, steer, False, ahead=True)
+        outside, z, _ = ran(rows, pool, ahead=True)
         inside = [[each for each in some[:, 0].tolist() if abs(each) <= 1] for some in pool]
         first = max(inside[0], key=lambda q: rows[1] @ errors(rows, q, float(pool[1, 0, 0]))[1])
         second = max(inside[1], key=lambda q: rows[1] @ errors(rows, first, q)[1])
         assert (outside, z[:, 0].tolist()) == (0, [float(fmt.round(first)), float(fmt.round(second))])
-    assert run_against(found, rows, np.full((2, 3, 1), 1.5), steer, False)[0] == 2
+    assert ran(rows, np.full((2, 3, 1), 1.5))[0] == 2
 
 
 def test_the_error_of_the_gain_matters() -> None:
