@@ -79,11 +79,11 @@ class _Lanes:
 
     def take(self, coefficients: Any, states: Any, inputs: Any = ()) -> NDArray[Any]:
         """Return the results, (results, lanes, ...), from numbers (count, ...) or (count, lanes, ...)."""
-        program, values = self._program, self._numbers.values
+        program = self._program
         given = (program.coefficients, coefficients), (program.states, states), (program.inputs, inputs)
         for places, numbers in given:
             if len(places):
-                values[places] = numbers if numbers.ndim == values.ndim else numbers[:, np.newaxis]
+                self._numbers.hold(places, numbers)
         if not self._numbers.run(self._code):
             raise OverflowError(_BEYOND)
         return self._numbers.at(program.after)
@@ -124,15 +124,10 @@ class _Search:
         n, m = given.program.n, given.program.m
         self._rounded = _Lanes(given.fmt, given.program, lanes)
         self._expected, self._compared = _Lanes(None, _expected(n, m), lanes), _Lanes(None, _compared(n, m), lanes)
-        self._machine = tables([given.fmt])
+        self._machine, self._at = tables([given.fmt]), given.rows(np.arange(plan.pool.shape[1]))
         #: Coefficients of each step: of the rounded filter, packed, and Phi with HPhi, in double-double.
         self._matrices = np.concatenate([each.reshape(len(each), -1, 2) for each in (given.Phi, given.HPhi)], axis=1)
         self._gains = given.exact.reshape(len(given.exact), n * m, 2)
-
-    def _at(self, k: int) -> int:
-        """Return the row of the coefficients of step k + 1."""
-        first, count = self._given.first, len(self._given.Phi)
-        return k if k < count else first + (k - first) % (count - first)
 
     def _numbers(self, values: NDArray[np.float64]) -> NDArray[Any]:
         """Round float64, (m, lanes), into the format; in base 10, their first decimals."""
@@ -144,14 +139,14 @@ class _Search:
 
     def expected(self, k: int, x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the predicted estimate of the exact filter, and what it expects, in double-double."""
-        found = self._expected.take(self._matrices[self._at(k)], x)
+        found = self._expected.take(self._matrices[self._at[k]], x)
         return found[: len(x)], found[len(x) :]
 
     def step(
         self, k: int, x: NDArray[Any], z: NDArray[Any], predicted: Any, seen: Any
     ) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return the packed estimate after a step, the exact one, the error, and the largest share of a limit."""
-        n, m, at = len(predicted), len(seen), self._at(k)
+        n, m, at = len(predicted), len(seen), self._at[k]
         after = self._rounded.take(self._given.packed[at], x, z)
         computed, measured = np.split(_widened(np.concatenate([after, z])), [n])
         found = self._compared.take(self._gains[at], np.concatenate([predicted, seen, computed]), measured)
@@ -215,9 +210,8 @@ def responses(given: Schedule, F: NDArray[np.float64], state: int, steps: int) -
     """Return how much an error after each step adds to the error of one state after the last step, (steps, n)."""
     rows = np.zeros((steps, given.program.n))
     c = np.eye(given.program.n)[state]
-    for k in range(steps - 1, -1, -1):
+    for k, at in reversed(list(enumerate(given.rows(np.arange(steps))))):
         rows[k] = c
-        at = k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
         c = c @ F[at]
     return rows
 
@@ -292,8 +286,7 @@ def ceiling(found: FilterGuarantee, z: NDArray[np.float64], state: int) -> float
     rows, known = responses(given, parts.F, state, steps), 0.0
     values, x = np.empty(first + len(program.operations)), given.x0.astype(np.float64)
     powers, total = {0.0, *table.exact.tolist()}, 0.0
-    for k in range(steps):
-        at = k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
+    for k, at in enumerate(given.rows(np.arange(steps))):
         coefficients = np.ascontiguousarray(given.coefficients[at, :, 0])
         values[:first] = *x, *z[k]
         errors = np.zeros(len(program.operations))
@@ -359,7 +352,8 @@ def run_against(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Choose a measurement at each step from a pool, in some runs at once.
 
-    Most products of a step depend only on the estimate. So each candidate may be judged by the error one step later.
+    A measurement enters only a few products of its own step. Each candidate may therefore be judged by the error one
+    step later.
 
     Parameters
     ----------
@@ -416,13 +410,7 @@ def _pool(
     if plan >= 4:  # the input that attains the peak gain of a state
         given = found.schedule
         back = responses(given, F, (state + plan) % given.program.n, steps)
-        at = np.array(
-            [
-                k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
-                for k in range(steps)
-            ]
-        )
-        course = np.sign(np.einsum("ki,kim->km", back, given.exact[at][..., 0]))
+        course = np.sign(np.einsum("ki,kim->km", back, given.exact[given.rows(np.arange(steps)), ..., 0]))
     low = np.clip(course - width, -1, 1)[:, None, :]
     high = np.clip(course + width, -1, 1)[:, None, :]
     return Z * (1 - 1e-9) * (low + (high - low) * rng.uniform(0, 1, (steps, candidates, m)))

@@ -37,7 +37,8 @@ class LinearSteps:
         given = rows[:, 0] != CODES["compare"]
         rows[given, 4] = place[rows[given, 4]]
         #: The rows in the order of the program, and the number of the row that computes each output.
-        self._rows, self._formats, self._inputs = rows, np.zeros(len(rows), np.int64), program.inputs
+        self._rows, self._formats = rows, np.zeros(len(rows), np.int64)
+        self._m, self._input = program.m, next(iter(program.inputs.tolist()), 0)
         self._after = place[program.after]
         self._outputs = np.array([np.flatnonzero(given & (rows[:, 4] == each)).max(initial=-1) for each in self._after])
         #: The place of each value.
@@ -56,20 +57,21 @@ class LinearSteps:
         states : (steps, n, ...), of the steps that have results.
         output : number of the first output that the next step cannot compute; -1 if all steps have results.
         """
-        loop, m, at = self._loop, len(self._inputs), len(self._after) + 1
+        loop = self._loop
         out, done = np.empty((len(z), len(self._after), *z.shape[2:]), z.dtype), 0
         most = next(slices(len(z), len(self._rows)), slice(0)).stop
         while done < len(z):
             some = z[done : done + most]
-            found, _, row = loop.take(done, some.reshape(len(some), m, *loop.values.shape[1:]), at, loop.after)
+            found, _, row = loop.take(
+                done, some.reshape(len(some), self._m, *loop.values.shape[1:]), self._input, loop.after
+            )
             out[done : done + len(found)] = found.reshape(len(found), *out.shape[1:])
             done += len(found)
             if row >= 0:
                 states = loop.states
                 if not drop_decayed(states):
-                    return out[:done], int(
-                        np.argmax(self._outputs >= loop.first_without_result(self._rows, self._formats))
-                    )
+                    fault = loop.first_without_result(self._rows, self._formats)
+                    return out[:done], int(np.argmax(self._outputs >= fault))
                 loop.states = states
         return out, -1
 
@@ -82,7 +84,7 @@ class LinearSteps:
         """
         loop, sizes = self._loop, np.zeros(len(self._places))
         for part in slices(len(z), len(self._rows)):
-            kept, _, row = loop.take(part.start, z[part], len(self._after) + 1, self._places)
+            kept, _, row = loop.take(part.start, z[part], self._input, self._places)
             if row >= 0:
                 raise OverflowError(f"got no result of step {part.start + len(kept) + 1}")
             np.maximum(sizes, np.abs(kept).max(axis=0), out=sizes)

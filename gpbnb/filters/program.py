@@ -1,7 +1,7 @@
 r"""One step of a filter as a program: rounded operations in the order in which they run.
 
 A step is written for arrays of any kind, as in :mod:`gpbnb.filters.steps` and :mod:`gpbnb.filters.structures`, and
-recorded once. The same rows serve several purposes, so that they cannot disagree:
+recorded once. All of these use the same rows, so they cannot disagree:
 
 * :mod:`gpbnb.filters.linear_steps` and :mod:`gpbnb.filters.recording` run them in any format;
 * :mod:`gpbnb.bounds` follows the effect of a rounding error in each operation on the result of the step;
@@ -107,7 +107,7 @@ class Program:
 
         Raises
         ------
-        ValueError : the program is not linear and has more than limits.
+        ValueError : an operation is neither linear nor a limit.
         """
         number = np.full(self.sizes[0], -1)
         number[self.coefficients] = np.arange(len(self.coefficients))
@@ -164,11 +164,6 @@ class Program:
     def roots(self) -> NDArray[np.int64]:
         """For each group, an operation in it."""
         return self._effects[1]
-
-    @property
-    def roundings(self) -> NDArray[np.int64]:
-        """Number of operations that share each effect, (groups,)."""
-        return np.bincount(self.groups, minlength=len(self.roots))
 
     @cached_property
     def wide(self) -> NDArray[np.bool_]:

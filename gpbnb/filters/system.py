@@ -84,7 +84,7 @@ class LinearFilter:
     def __post_init__(self) -> None:
         checked_name(self.name)
         try:
-            self.program.operations  # noqa: B018
+            _ = self.program.operations
         except ValueError as error:
             raise ValueError(f"{self.name}: {error}") from None
 

@@ -29,7 +29,7 @@ _KEYWORDS = frozenset(_WORDS.split())
 """Words of C and of the generated code, which are no names of coefficients or states."""
 
 _NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)((?:\[\d+\])*)")
-_WHOLE = {"floor": "floor", "ceil": "ceil", "trunc": "trunc", "rint": "rint"}
+_WHOLE = ("floor", "ceil", "trunc", "rint")
 _ON_TWO = ("arctan2", "hypot", "float_power")
 _ON_ONE = (
     "exp", "expm1", "exp2", "log", "log1p", "log2", "log10", "cbrt", "sin", "cos", "tan", "arcsin", "arccos", "arctan",
@@ -96,12 +96,7 @@ class Operation(NamedTuple):
 
 
 def listed(program: Program) -> list[Operation]:
-    """Return the operations of a program, and its calls of functions, in their order.
-
-    Raises
-    ------
-    ValueError : a call of a function that C lacks.
-    """
+    """Return the operations and function calls of a program, in order."""
     found, ends, calls = list[Operation](), list[int](), list(program.calls)
     for o, (code, *given, out) in enumerate([*program.rows.tolist(), [-1, 0]]):
         while ends and ends[-1] == o:
@@ -186,6 +181,17 @@ class CodeStep:
         i = self.coefficient_at.get(place)
         return i is None or bool((self.coefficients[:, i] == 0).any())
 
+    @cached_property
+    def wide(self) -> set[int]:
+        """Places of results that stay in the accumulator; for a linear program."""
+        results = self.program.places[self.program.n + self.program.m :]
+        return {*results[self.program.wide].tolist()}
+
+    @cached_property
+    def data(self) -> set[int]:
+        """Places of numbers that something else than a product takes; coefficients among them are data."""
+        return {place for each in self.operations if each.name != "multiply" for place in each.takes[0]}
+
     @property
     def is_exact(self) -> bool:
         """Whether it calls no function whose digits C's library does not guarantee."""
@@ -197,7 +203,7 @@ class CodeStep:
         return self.program.definite != 1
 
     def refuse_functions(self, exact: bool) -> None:
-        """Refuse functions that C lacks, or whose digits its library does not guarantee if they must be exact."""
+        """Refuse functions that C lacks or, if digits must be exact, whose digits its library does not guarantee."""
         for each in self.operations:
             inexact = each.name in LIBRARY
             if each.name in CODES or each.name in ("if", "end") or each.name in _EXACT or (inexact and not exact):
@@ -309,12 +315,12 @@ class CodeWords:
             left, right = (self._term(step, *given) for given in zip(each.given[:2], texts, strict=True))
         shift = _shift(step, each, words) if each.name == "multiply" else 0
         found = _INTEGER[each.name].format(*texts, left=left, right=right, shift=shift, o=overflow)
-        is_stored = each.name in _SUMMED and words.sums is not None and not _is_wide(step, each.out)
+        is_stored = each.name in _SUMMED and words.sums is not None and each.out not in step.wide
         return f"store({found}{overflow})" if is_stored else found
 
     def _term(self, step: CodeStep, place: int, text: str) -> str:
         """Return a term of a sum in units of the accumulator."""
-        is_sum = self.words.sums is None or _is_wide(step, place)
+        is_sum = self.words.sums is None or place in step.wide
         return text if is_sum or self.words.gap == 0 else f"lifted({text})"
 
     def helpers(self, body: str) -> str:
@@ -330,23 +336,10 @@ CodeNumbers = CodeFloats | CodeWords
 """How the operations of a program are written for a type of number."""
 
 
-def _is_wide(step: CodeStep, place: int) -> bool:
-    """Whether a number stays in the accumulator."""
-    program = step.program
-    o = np.flatnonzero(program.places == place) - program.n - program.m
-    return bool(len(o) and o[0] >= 0 and program.wide[o[0]])
-
-
-def _is_data(step: CodeStep, coefficient: int) -> bool:
-    """Whether a coefficient is a number of the data, as what it is compared with or added to."""
-    place = step.program.coefficients[coefficient]
-    return any(place in each.takes[0] for each in step.operations if each.name != "multiply")
-
-
 def _integer(step: CodeStep, coefficient: int, words: WordFormats, member: int = 0) -> tuple[int, int]:
     """Return the integer of a coefficient and its fraction bits."""
     value = step.coefficients[member, coefficient]
-    is_data = _is_data(step, coefficient)
+    is_data = int(step.program.coefficients[coefficient]) in step.data
     if isinstance(words.coefficients, int) and not is_data:
         point = int(value.denominator).bit_length() - 1
         return int(value * 2**point), point

@@ -1,4 +1,4 @@
-"""Compiled loops over whole arrays: entry by entry, of numbers on integers.
+"""Compiled loops over the entries of arrays whose numbers are stored as integers.
 
 Arrays have a component for each part of their numbers. If a format does not have a result, a loop raises
 OverflowError, and its output is invalid.
@@ -29,8 +29,8 @@ def _loop(operate: Any) -> Any:
 _sums, _products, _others = map(_loop, (sum_of, product, other))
 ALONG = {code: {MULTIPLY: _products, ADD: _sums, SUBTRACT: _sums}.get(code, _others) for code in range(SKIP)}
 """For each code of an operation, the loop (kind, formats, operation, n, a, b, out) that sets `out` to its results.
-Operations on one number take it twice. Sums and products have loops of their own, which what depends on the format
-alone is computed before, and the loop of the others takes longer to compile."""
+For an operation on one number, `a` and `b` are the same array. Sums and products have loops of their own, because one
+loop for all operations takes about five times as long to compile."""
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""What compiled loops need of each kind of numbers.
+"""Functions that compiled loops call, for each kind of numbers.
 
 A loop is written once. Its first argument is a kind of :mod:`gpbnb.arithmetic.kernels.tags`, for whose type numba
 compiles it; precision, rounding and range are data. The functions here take the kind, and return what the loop needs

@@ -33,7 +33,7 @@ greater. COMBINE combines two truth values by a table, the bits of its third ope
 format into that of the segment, FUSED adds its third operand to a product, NONZERO stops where a number is zero,
 and SKIP leaves out as many rows as its second operand says if its truth value is false."""
 
-AT_LEAST, AT_MOST = range(14, 16)
+AT_LEAST, AT_MOST = range(SKIP + 1, SKIP + 3)
 """Codes of the limits of a linear program, which the machine has as a comparison and a choice."""
 
 
