@@ -108,7 +108,8 @@ format: .venv/with-dev ## let ruff lay out the code and mend what it can
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-exactness: .venv/made-for ## the golden corpus, other inputs each day compared with independent arithmetic, and more altered statements; SLICE, SEED
+exactness: .venv/made-for ## long tests, the golden corpus, other inputs each day compared with independent arithmetic, more altered statements; SLICE, SEED
+	$(PY) -m pytest -m long --ignore=tests/pages
 	$(PY) -m tests.corpus $(if $(SLICE),--slice $(SLICE))
 	$(PY) -m tests.corpus.conformance --seed $(SEED) $(if $(SLICE),--slice $(SLICE))
 	$(if $(SLICE),,GPBNB_ALTERATIONS=more $(PY) -m pytest -q tests/ledger/test_verdicts.py)

@@ -16,6 +16,11 @@ from gpbnb.arithmetic.kernels import backends
 matplotlib.use("Agg")
 
 
+def pytest_report_header(config: pytest.Config) -> list[str]:
+    left_out = config.option.markexpr == "not long"
+    return ["long tests are left out: -m long runs them alone, -m '' with the others"] if left_out else []
+
+
 @pytest.fixture(scope="module")
 def loops_at_once() -> Iterator[None]:
     """Compile a loop for its first numbers, which exact arithmetic would else compute."""

@@ -36,6 +36,7 @@ def kinds() -> dict[tuple[str, str], list[conformance.Row]]:
     return chosen
 
 
+@pytest.mark.long  # a slice of the conformance, which compiles loops for each kind of storage
 @pytest.mark.parametrize(
     ("kind", "rows"), kinds().items(), ids=lambda kind: ", ".join(kind) if isinstance(kind, tuple) else ""
 )
@@ -76,6 +77,7 @@ def test_rounding_twice_is_found(operation):
     assert np.any(twice != once)
 
 
+@pytest.mark.long  # a slice of the conformance
 @pytest.mark.parametrize("name", conformance.NATIVE)
 def test_processors_formats_have_the_digits_of_their_types(name):
     compared, different = conformance.native(name, 2000, SEED)

@@ -72,6 +72,7 @@ def refused(content: Content) -> str:
 # -- what is proved ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long  # each certificate of the book is written and proved
 @pytest.mark.parametrize("name", [name for name in CHAPTER if name not in certificates.SLOW])
 def test_the_checker_proves_the_guarantees_of_the_book(name: str) -> None:
     found = CHAPTER[name]()
@@ -112,6 +113,7 @@ def test_models_of_cycles_and_of_some_steps_are_proved() -> None:
     assert "after 7 steps" in prove(content)
 
 
+@pytest.mark.long  # 250 phases, proved one by one
 def test_a_long_cycle_is_proved() -> None:
     """Its phases are proved one by one."""
     content = written(cyclic(2, 1, cycle=250, decay=0.8), FORMAT, limits(state=100, innovation=10), Form.UD)
@@ -159,6 +161,7 @@ def test_random_filters_are_proved(seed: int) -> None:
 REFUSED, WITHOUT_BOUND = (14,), (11,)
 
 
+@pytest.mark.long  # this filter settles after thousands of steps
 def test_a_gain_that_hardly_moves_gives_no_warning() -> None:
     """A step adds so little to the bound of one state that the quotient of both leaves the range of float64."""
     drawn = draw(20261191)

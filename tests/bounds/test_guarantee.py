@@ -154,6 +154,7 @@ def test_sums_by_squares_are_those_of_balls(radius: float, steps: int | None, la
 # -- the guarantee ----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long  # attacks in every form
 @pytest.mark.parametrize(("form", "rounding"), [*zip(WITH_PROGRAM, itertools.cycle(Rounding.documented()))])
 def test_an_adversary_comes_near_but_not_above(form: Form, rounding: Rounding) -> None:
     """Measured with these seeds: 0.33 to 0.73."""
@@ -268,6 +269,7 @@ def test_the_probable_error_of_a_periodic_model_is_the_largest_of_its_steps() ->
     assert np.allclose(probable_error(found), scatter.max(axis=0), rtol=1e-9, atol=0)
 
 
+@pytest.mark.long  # 20,000 steps, each with roundings drawn at random
 def test_the_probable_error_is_the_scatter_of_an_emulated_run() -> None:
     """Near the limits, where roundings are as large as assumed; measured: 0.99 and 1.04 of it.
 

@@ -7,6 +7,7 @@ import pytest
 from tests.guarantees import attack
 
 
+@pytest.mark.long  # attacks
 @pytest.mark.parametrize("seed", range(10))
 def test_no_run_of_a_linear_system_exceeds_its_bound(seed: int) -> None:
     found = attack.linear(seed)

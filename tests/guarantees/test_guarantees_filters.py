@@ -85,6 +85,7 @@ SLICE = (2, 3, 20, 47)
 examined = cache(filters.examine)
 
 
+@pytest.mark.long  # rows of the survey with all their runs
 @pytest.mark.parametrize("seed", SLICE)
 def test_no_run_of_a_slice_exceeds_its_bound(seed):
     row = examined(seed)
@@ -94,6 +95,7 @@ def test_no_run_of_a_slice_exceeds_its_bound(seed):
     assert row in filters.load()
 
 
+@pytest.mark.long  # rows of the survey with all their runs, three times
 @pytest.mark.parametrize("seed", SLICE)
 def test_the_survey_finds_a_guarantee_that_is_too_small(seed):
     """A bound below the largest error is found to be exceeded, by as much."""
@@ -104,6 +106,7 @@ def test_the_survey_finds_a_guarantee_that_is_too_small(seed):
     assert 1 < filters.examine(seed, smaller=(1 - 1e-9) * largest).largest < 1 + 1e-8
 
 
+@pytest.mark.long  # all runs of a row repeated in Fractions
 @pytest.mark.parametrize("seed", [3, 47])
 def test_errors_are_those_of_filters_without_the_package(seed):
     """The run is repeated in integers, and the exact filter in Fractions; both for as long as Fractions stay short."""
@@ -173,6 +176,7 @@ def test_no_stored_run_exceeds_its_bound():
 # -- scalar filters ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long  # thousands of runs in integers
 @pytest.mark.parametrize(("form", "steps"), [(Form.INNOVATION, 3), (Form.HUNG, 2)], ids=str)
 def test_the_worst_error_is_that_of_all_sequences(form, steps):
     """Every sequence of some measurements in three bits, each run in integers."""

@@ -19,11 +19,13 @@ def numbered():
     return [each for each in comparison.rows() if each.published is not None]
 
 
+@pytest.mark.long  # the bounds of all published filters
 def test_no_bound_of_ours_is_larger_than_a_published_one():
     for each in numbered():
         assert each.ours == pytest.approx(each.published, rel=1e-8) or each.ours < each.published, each.program
 
 
+@pytest.mark.long  # the bounds of all published filters
 def test_a_number_is_missing_only_with_a_reason_and_every_row_has_its_source():
     for each in comparison.rows():
         assert each.source
@@ -57,6 +59,7 @@ def test_every_printed_digit_of_fixif_is_ours():
     assert [round(float(each), 6) for each in ours] == given["published_E"]
 
 
+@pytest.mark.long  # rows of the survey with all their runs
 @pytest.mark.parametrize("seed", [8, 9, 26, 27])
 def test_a_row_comes_out_again(seed: int) -> None:
     (row,) = (row for row in survey.load() if row.seed == seed)
@@ -87,12 +90,14 @@ def test_every_certificate_of_the_book_is_stored_and_proved() -> None:
     assert {row.verdict for row in rows} == {"proved"}
 
 
+@pytest.mark.long  # whole certificates of published filters
 @pytest.mark.parametrize("name", ["tracker, limits four times as wide", "tracker within 0.01 m"])
 def test_a_certificate_comes_out_again(name: str) -> None:
     (row,) = (row for row in certificates.load() if row.name == name)
     assert certificates.checked(name)._replace(seconds=row.seconds) == row
 
 
+@pytest.mark.long  # the bits that each filter needs are searched for
 @pytest.mark.parametrize("name", ["elaenia, gold", "filterpy, velocity", "Dyer and McReynolds"])
 def test_a_guarantee_of_a_published_filter_comes_out_again(name: str) -> None:
     """It takes 4 s: the bits that each filter needs are searched for."""

@@ -47,6 +47,7 @@ def following(found: FilterGuarantee, x: NDArray[np.float64], z: NDArray[np.floa
     return np.asarray(values[program.outputs[0]].to_float())
 
 
+@pytest.mark.long  # attacks over hundreds of steps
 @pytest.mark.parametrize(
     ("form", "rounding"), [*zip(WITH_PROGRAM, cycle([Rounding.NEAREST, Rounding.EVEN, Rounding.HALF_UP]))], ids=str
 )
@@ -67,6 +68,7 @@ def test_an_estimate_that_stands_still_nearly_reaches_the_bound(form: Form, roun
     assert REACHED.get(form, 0.75) * found.bound[0] < np.abs(off).max() <= found.bound[0]
 
 
+@pytest.mark.long  # attacks over thousands of steps
 @pytest.mark.parametrize("form", [Form.HUNG, Form.INNOVATION])
 def test_a_slow_tracker_comes_near_its_bound(form: Form) -> None:
     """Its position moves by less than its last place in a step, or by a little more; the best of some courses."""

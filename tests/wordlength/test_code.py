@@ -44,6 +44,7 @@ from tests.corpus import conformance
 needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang")
 
 
+@pytest.mark.long  # a slice of the conformance, which runs a compiler for each build
 @needs_compiler
 @pytest.mark.parametrize("name", [f"code {i}" for i in range(0, 60, 11)])
 def test_code_has_the_digits_of_its_emulation(name):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from gpbnb import FloatFormat, NonlinearModel, emulate
 from gpbnb.filters.nonlinear_run import simulated
@@ -58,6 +59,7 @@ def covariances(fmt, steps):
         yield P, sound and all(P[i][i] > 0 for i in range(7))
 
 
+@pytest.mark.long  # 1,791 steps of a filter of seven states in plain loops
 def test_the_collapse_is_that_of_plain_loops():
     """The loops in Python take seconds: the variance is lost after 1,790 steps, not before."""
     run, double = (

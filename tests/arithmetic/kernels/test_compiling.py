@@ -108,6 +108,7 @@ def copy(tmp_path):
     return Copy(tmp_path)
 
 
+@pytest.mark.long  # five processes compile from scratch
 def test_what_changed_is_compiled_again(copy):
     """A change in a folder of kernels concerns all functions, another one those of its file."""
     assert copy.run() == (VALUES, ALL)
@@ -120,6 +121,7 @@ def test_what_changed_is_compiled_again(copy):
     assert len(copy.kept) == 4  # new files take the place of old ones
 
 
+@pytest.mark.long  # three processes compile from scratch
 def test_damaged_files_are_compiled_again(copy):
     """Each of the four in its way; one is cut by a byte."""
     copy.run()
