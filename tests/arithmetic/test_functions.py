@@ -16,7 +16,8 @@ from gpbnb.arithmetic.named import BFLOAT16, BINARY32
 
 pytestmark = pytest.mark.usefixtures("loops_at_once")
 
-FORMATS = [FloatFormat(2, 11), FloatFormat(10, 4), FloatFormat(2, 113), FloatFormat(2, 24, Rounding.CHOP)]
+LONG = pytest.param(FloatFormat(2, 113), marks=pytest.mark.long)  # loops of two words take seconds to compile
+FORMATS = [FloatFormat(2, 11), FloatFormat(10, 4), LONG, FloatFormat(2, 24, Rounding.CHOP)]
 
 
 @pytest.fixture(params=FORMATS, ids=str)

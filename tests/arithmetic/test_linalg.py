@@ -112,7 +112,8 @@ class TestPivoting:
         assert linalg.lu(a[[0, 2, 1]], pivot=True).permutation.tolist()[0] == 1
 
     @pytest.mark.parametrize("overflow", ["raise", "saturate", "wrap"])
-    @pytest.mark.parametrize("fraction_bits", [5, 100])
+    # Loops of two words take seconds to compile.
+    @pytest.mark.parametrize("fraction_bits", [5, pytest.param(100, marks=pytest.mark.long)])
     def test_the_lowest_number_of_fixed_point_is_larger_than_the_largest(
         self, overflow: str, fraction_bits: int
     ) -> None:

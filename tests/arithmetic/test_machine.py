@@ -190,7 +190,7 @@ def test_double_doubles_have_twice_the_digits():
         assert abs(high + low - x * x / y) < abs(x * x / y) / 2**99
 
 
-COUNT = 20_000
+COUNT = 4_000
 # Of the theorems cited in the kernel, the largest: quotients, 15 u**2 and terms of higher order, u = 2**-53.
 BOUND = 2.0**-102
 

@@ -32,10 +32,11 @@ FORMATS = [
     FloatFormat(2, 53, "even", -100, 100),
     FloatFormat(16, 6, "chop", -20, 20, subnormal=False),
     FloatFormat(16, 13),
-    FloatFormat(10, 12, "even", -30, 30),
     FloatFormat(10, 7),
     FixedFormat(4, 12, rounding="down", overflow="saturate"),
-    FloatFormat(2, 64, "even", -40, 40),
+    # Loops of two numbers take seconds to compile.
+    pytest.param(FloatFormat(10, 12, "even", -30, 30), marks=pytest.mark.long),
+    pytest.param(FloatFormat(2, 64, "even", -40, 40), marks=pytest.mark.long),
 ]
 
 

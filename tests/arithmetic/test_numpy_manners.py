@@ -133,12 +133,12 @@ def test_the_format_stands_in_the_first_line_of_the_text():
 def test_the_text_of_every_number_is_read_back():
     """All significands, also those with an even last digit, with exponents around zero and far from it."""
     for rounding in Rounding:
-        for base, precision in [(2, 3), (3, 1), (3, 2), (6, 2), (7, 2), (10, 1), (16, 1), (60, 1)]:
+        for base, precision in [(2, 3), (3, 2), (6, 2), (10, 1)]:
             fmt = FloatFormat(base, precision, rounding)
             numbers = [
                 sign * m * Fraction(base) ** e
                 for m in range(base ** (precision - 1), base**precision)
-                for e in (*range(-5, 6), -40, 40)
+                for e in (-40, -3, -1, 0, 1, 2, 40)
                 for sign in (1, -1)
             ]
             x = fmt.array(numbers)

@@ -69,7 +69,7 @@ def test_each_share_is_the_error_followed_through_exact_steps(found):
     given = contributions(found)
     period = found.schedule.steps - found.schedule.first
     for operation, error in enumerate(given.errors):
-        path = np.array(list(followed(found, operation, 2000 if period == 1 else 1)))
+        path = np.array(list(followed(found, operation, 400 if period == 1 else 1)))
         assert given.effects[:, operation] == pytest.approx(path[0], rel=1e-12, abs=1e-15)
         if period == 1:
             assert given.sums[:, operation] == pytest.approx(error * np.abs(path).sum(axis=0), rel=1e-6, abs=1e-30)

@@ -240,7 +240,7 @@ def test_a_covariance_that_loses_definiteness_ends_the_bound() -> None:
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(2, 12, Rounding.CHOP)], ids=str)
 def test_a_second_order_section(fmt: FloatFormat) -> None:
     found = from_schedule(filter_schedule(biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), fmt), limits(measurement=1))
-    outcome = attack(found, 1000, 100)
+    outcome = attack(found, 100, 100)
     assert 0.3 < outcome.ratio <= 1
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from fractions import Fraction
 from typing import Any
 
@@ -12,7 +13,7 @@ from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding,
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.units import largest_errors, stored_sizes
-from gpbnb.filters.forms import WITH_PROGRAM
+from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.run import Run, reference_states
 
 
@@ -53,30 +54,26 @@ def test_fixed_coefficients_may_be_rounded_at_random() -> None:
     assert found.format is not None
 
 
-# -- limits -----------------------------------------------------------------------------------------------------------
-
-
 # -- nothing measured, nothing allowed --------------------------------------------------------------------------------
 
 
 DETERMINISTIC = [each for each in Rounding if each is not Rounding.STOCHASTIC]
 
 
-@pytest.mark.parametrize("rounding", DETERMINISTIC)
+@pytest.mark.parametrize(("rounding", "form"), [*zip(DETERMINISTIC, itertools.cycle(WITH_PROGRAM))])
 @pytest.mark.parametrize("x0", [[0, 0], ["0.3", "-0.7"]])
-def test_a_filter_that_measures_nothing(rounding: Rounding, x0: list[Any]) -> None:
+def test_a_filter_that_measures_nothing(rounding: Rounding, form: Form, x0: list[Any]) -> None:
     """Its estimate is the first one, predicted: from zero it stays zero, otherwise only roundings of that decay."""
     model, fmt = two_states(H=[[0, 0]], x0=x0), FloatFormat(2, 7, rounding)
     for within in (limits(measurement=10), limits(state=1, innovation=10)):
-        for form in WITH_PROGRAM:
-            found = guarantee(model, fmt, within, form=form)
-            assert found.for_ever
-            run = Run(model, fmt, form, ())
-            z = fmt.array(np.full((30, 1), 10.0))
-            error = np.abs((run.states(z) - reference_states(model.rounded(fmt), z.to_fractions())).sum(axis=2))
-            assert (error.max(axis=0) <= found.bound).all()
-            if within.state[0] > 1:
-                assert (found.bound < 1e-9).all() == (x0 == [0, 0])  # the checker rounds outwards
+        found = guarantee(model, fmt, within, form=form)
+        assert found.for_ever
+        run = Run(model, fmt, form, ())
+        z = fmt.array(np.full((30, 1), 10.0))
+        error = np.abs((run.states(z) - reference_states(model.rounded(fmt), z.to_fractions())).sum(axis=2))
+        assert (error.max(axis=0) <= found.bound).all()
+        if within.state[0] > 1:
+            assert (found.bound < 1e-9).all() == (x0 == [0, 0])  # the checker rounds outwards
 
 
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 11, emin=-14, emax=15), FixedFormat(3, 8)], ids=str)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from itertools import product
+from itertools import cycle, product
 
 import pytest
 
@@ -31,14 +31,16 @@ def ends_of(step, states):
     return found
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize(("a1", "a2"), [("-1.5", "0.75"), ("0.7", "0.85"), ("-1.2", "0.8"), ("0", "-0.9")])
-def test_cycles_are_those_in_which_runs_from_every_state_end(mode, a1, a2):
+POLES = [("-1.5", "0.75"), ("0.7", "0.85"), ("-1.2", "0.8"), ("0", "-0.9")]
+
+
+@pytest.mark.parametrize(("mode", "poles"), [*zip(MODES, cycle(POLES)), ("nearest", POLES[1]), ("chop", POLES[2])])
+def test_cycles_are_those_in_which_runs_from_every_state_end(mode, poles):
     """A section of second order in direct form I with one rounding for each output; words of 7 bits."""
-    system = LinearSystem.from_coefficients([1], [1, a1, a2], "direct form I")
+    system = LinearSystem.from_coefficients([1], [1, *poles], "direct form I")
     words = WordFormats(FixedFormat(6, 0, mode, "saturate"), FixedFormat(2, 8), FixedFormat(12, 8))
     r, keep = fixed(0, mode), limited(0, 6, "saturate")
-    c1, c2 = (fixed(8, "nearest")(Fraction(each)) for each in (a1, a2))
+    c1, c2 = (fixed(8, "nearest")(Fraction(each)) for each in poles)
 
     def step(state):
         y = keep(r(Fraction(0) - c1 * state[0] - c2 * state[1]))

@@ -76,7 +76,7 @@ FORMATS = [NINE, FloatFormat(2, 7, Rounding.CHOP), FloatFormat(10, 3, Rounding.U
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
 def test_the_coefficients_of_a_guarantee_are_those_of_the_run(fmt: FloatFormat) -> None:
     """For models whose factors are raised in cycles, and in forms without factors."""
-    for model in _raised_models(fmt, 4):
+    for model in _raised_models(fmt, 2):
         for form in (Form.UD, Form.INNOVATION):
             run = Run(model, fmt, form, range(1, 7))
             run.take(fmt.array(np.zeros((6, model.m))))

@@ -63,14 +63,14 @@ def test_a_filter_in_integers_gives_the_digits_of_a_run():
     """In every form, rounding, kind of model and range, in bases 2, 10 and 16, from the model as given."""
     rng = np.random.default_rng(8)
     ends, seen = Counter(), set()
-    for seed in range(80):
+    for seed in range(30):
         drawn = draw(seed)
         end = compared(drawn, 12, rng)
         ends[end] += 1
         if end == "equal":
             limited = "unlimited" if drawn.fmt.emin is None else ("subnormal" if drawn.fmt.subnormal else "flushed")
             seen |= {drawn.form, drawn.kind, drawn.fmt.rounding, drawn.fmt.base, limited, drawn.model.n}
-    assert ends["equal"] > 65, ends
+    assert ends["equal"] > 25, ends
     assert seen >= {*WITH_PROGRAM, *KINDS, *DETERMINISTIC, 2, 10, 16, *RANGES, 1, 3, 4}
 
 

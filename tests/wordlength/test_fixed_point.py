@@ -54,7 +54,7 @@ def near_a_power_of_two(seed):
     return system, u * ((1 - 2.0**-12) / max(sizes) * 2.0 ** rng.integers(-2, 3))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("basis", ["emulation", "guarantee"])
 def test_no_other_integer_bits_give_a_shorter_word(seed, basis):
     system, u = near_a_power_of_two(seed)

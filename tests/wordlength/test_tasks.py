@@ -78,6 +78,8 @@ MODELS = {
     "path": "model.toml",
     "scipy": signal.dlti([0.1], [1, -0.9], dt=1),
 }
+READ = ("mapping", "path", "scipy")
+"""What is read as one of the others; a few tasks show that each kind of task reads it."""
 FILTERS = ("filter", "driven", "cyclic", "extended", "unscented", "mapping", "path")
 
 
@@ -173,6 +175,10 @@ FURTHER = {
 """Refusals that do not follow from the kind alone."""
 
 
+FEW = ("emulate", "search", "survey", "guarantee", "code")
+CELLS = [(task, name) for task in TASKS for name in MODELS if name not in READ or task in FEW]
+
+
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -182,7 +188,8 @@ def folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize("task", TASKS)
 def test_a_task_works_or_names_its_way(task, tmp_path):
     ways, does = TASKS[task]
-    for name, model in MODELS.items():
+    for name in (name for each, name in CELLS if each == task):
+        model = MODELS[name]
         kind = kind_of(admitted(model))
         needs = next((each for each in ([ways] if isinstance(ways, str) else ways) if kind in CANNOT.get(each, ())), "")
         if needs:
@@ -212,9 +219,8 @@ def test_what_is_read_is_itself():
 
 
 def test_most_cells_work():
-    cells = [(task, name) for task in TASKS for name in MODELS]
     needs = {task: [needs] if isinstance(needs, str) else needs for task, (needs, _) in TASKS.items()}
     kinds = {name: kind_of(admitted(model)) for name, model in MODELS.items()}
-    refused = [1 for task, name in cells if any(kinds[name] in CANNOT.get(each, ()) for each in needs[task])]
-    assert len(cells) == 26 * 14
-    assert len(refused) < 0.35 * len(cells)
+    refused = [1 for task, name in CELLS if any(kinds[name] in CANNOT.get(each, ()) for each in needs[task])]
+    assert len(CELLS) == 26 * 11 + 5 * 3
+    assert len(refused) < 0.4 * len(CELLS)
