@@ -270,10 +270,13 @@ def independent(rows: NDArray[Any]) -> Iterator[tuple[int, int]]:
 
 def _divided(operands: NDArray[Any], begin: int) -> Iterator[tuple[int, int, bool]]:
     """Yield first and last of parts of a run, and whether their operands are neighbours."""
-    edges = np.flatnonzero((np.diff(operands, axis=0) != 1).any(axis=1)) + 1
-    edges = np.array([0, *edges, len(operands)])
+    along = (operands[1:] - operands[:-1] == 1).all(axis=1)
+    if len(operands) < _MANY or along.all():
+        yield begin, begin + len(operands), bool(along.all())
+        return
+    edges = np.array([0, *np.flatnonzero(~along) + 1, len(operands)])
     waiting = 0
-    for i in np.flatnonzero((np.diff(edges) >= _MANY) | (len(edges) == 2)):
+    for i in np.flatnonzero(np.diff(edges) >= _MANY):
         first, last = edges[i], edges[i + 1]
         if waiting < first:
             yield begin + waiting, begin + first, False
