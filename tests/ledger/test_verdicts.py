@@ -8,7 +8,6 @@ import os
 import random
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,13 +15,12 @@ from alterations import COMPARISON, altered
 
 from gpbnb.report.ledger import TOPICS as EXAMINED
 from gpbnb.report.ledger import Row, examine, judge, rows
-from gpbnb.report.ledger.checks import TOPICS, rounding
+from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict
 from gpbnb.report.ledger.formula import Undefined, Words
 from gpbnb.report.ledger.statements import Statement, load_statements
 from gpbnb.report.ledger.stored import FILE, load_findings, to_table
-from gpbnb.report.rounding import experiment
 
 CHECKED = {key: checks for checks in TOPICS.values() for key in checks}
 MOST = 5 if os.environ.get("GPBNB_ALTERATIONS") == "more" else 3
@@ -82,12 +80,6 @@ def test_twins_of_the_two_reports_with_one_form_have_the_same_verdict():
     assert all(one is other for one, other in same)
 
 
-def forget():
-    for module in (rounding, experiment):
-        for value in vars(module).values():
-            getattr(value, "cache_clear", lambda: None)()
-
-
 def until_violated(stated, domain, mode="exact"):
     """Judge a statement only up to the first instance that violates it: no check verifies it after that."""
     violated = []
@@ -113,18 +105,11 @@ HELD, JUDGE = judge._held, judge.judge
 
 @pytest.fixture(scope="module")
 def verdicts_alone():
-    """From here on, leave notes as they are stored, and run a third of the trials of a survey.
-
-    Fewer trials make it harder to reject a statement.
-    """
-    survey = experiment.survey.__wrapped__
+    """From here on, leave notes as they are stored."""
     with pytest.MonkeyPatch.context() as patch:
-        forget()
         patch.setattr(judge, "judge", until_violated)
         patch.setattr(judge, "_filled", lambda text, names: text)
-        patch.setattr(experiment, "survey", cache(lambda trial: survey(trial, repeats=3)))
         yield
-    forget()
 
 
 def still_true():
