@@ -24,7 +24,7 @@ from gpbnb.filters.contraction import (
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import opening
-from gpbnb.filters.recording import recorded_step, step_kind
+from gpbnb.filters.recording import kalman_step, step_kind
 from gpbnb.filters.steps import FACTORED, StepModel, combined_gain
 
 Array = NDArray[np.float64]
@@ -160,11 +160,10 @@ class CarriedBound:
 
 def _repetition(exact: dict[str, Array]) -> Lanes:
     """Return a step in double-double from a given state; it takes the arrays x, P, z, Phi, H, Q and R."""
-    step = recorded_step(step_kind(Form.INNOVATION, exact, None))
-    parts = step.gain, step.estimate
-    rows = np.concatenate([part.rows for part in parts])[np.argsort(np.concatenate([part.at for part in parts]))]
-    given = [step.places[letter] for letter in ("x", "P", "z", "Phi", "H", "Q", "R")]
-    return Lanes(rows, step.sizes, step.constants, given, [step.after["x"], step.K, step.after["P"], step.S])
+    step, found = kalman_step(step_kind(Form.INNOVATION, exact, None))
+    given = [*step.states, *step.own, *step.cycles]
+    returned = [each.components[0] for each in (found.x, found.K, found.P, found.S) if each is not None]
+    return Lanes(step.rows, step.tape.sizes, step.tape.all_constants, given, returned)
 
 
 def _symmetric(P: Any) -> Any:

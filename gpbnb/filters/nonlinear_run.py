@@ -25,9 +25,10 @@ from gpbnb.filters.opening import double_doubles_of
 from gpbnb.filters.program import Program
 from gpbnb.filters.recording import block_algebra, filter_program, program_states
 from gpbnb.filters.reference import PreciseSteps, agreed, joined
-from gpbnb.filters.repeating import RepeatedStep, StepTaken
+from gpbnb.filters.repeating import RepeatedStep
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
+from gpbnb.filters.stepping import StepTaken
 from gpbnb.filters.steps import (
     FACTORED,
     BlockAlgebra,
@@ -173,12 +174,12 @@ class NonlinearRun(Progress):
         ValueError : the step cannot be traced; the message says why.
         """
         found = self._step.recorded(self._step.given(self._stored(np.zeros(self.model.m))))
-        tape, places = found.tape, dict(zip(("x", "P", "z", *self.given), found.places, strict=True))
+        tape, taken = found.tape, (*found.states, *found.own, *found.cycles)
+        places = dict(zip(("x", "P", "z", *self.given), taken, strict=True))
         constants = {at: value for at, value in tape.constants_in(self.fmt).items() if at not in (0, tape.one)}
         states = program_states(self.form, places["x"][None], places["P"][None])[0]
         constants |= dict.fromkeys({*places["P"].ravel().tolist()} - {*states.tolist()}, Fraction(0))
-        taken = found.taken
-        program = filter_program(self.form, tape, places, [*constants], taken.states, taken.definite)
+        program = filter_program(self.form, tape, places, [*constants], found.after, found.definite)
         cycles = (each.reshape(len(each), -1).to_fractions() for name, each in self.given.items() if name != "u")
         return program, [*cycles, np.array([list(constants.values())], dtype=object)]
 

@@ -28,7 +28,8 @@ from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, sized, whole_number
 from gpbnb.filters.program import Program, entries, without_exact
-from gpbnb.filters.repeating import RepeatedStep, StepTaken
+from gpbnb.filters.repeating import RepeatedStep
+from gpbnb.filters.stepping import StepTaken
 
 Step = Callable[[Any, Any, Any], tuple[Any, Any]]
 """A function ``step(fmt, x, u)`` that returns the next state and the output."""

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
-from gpbnb.arithmetic.interpreting import Constants
-from gpbnb.arithmetic.machine import CODES, packed_one, takes_numbers
+from gpbnb.arithmetic.machine import CODES, packed_one
 from gpbnb.arithmetic.rounding import Order
-from gpbnb.arithmetic.tape import MOST_OPERATIONS, TRUTHS, Tape, UntraceableError, depending
-from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
+from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
+from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.program import Program, entries
+from gpbnb.filters.stepping import DividedStep, RecordedStep, divided, truth_of
 from gpbnb.filters.steps import FACTORED, BlockAlgebra, BlockStorage, LinearStep, LinearTaken
 
 
@@ -89,53 +89,39 @@ def step_kind(
     return StepKind(form, n, m, tuple(known), one is not None, blocks, sums, compensated, fmt is None, not parts)
 
 
-class ProgramPart(NamedTuple):
-    """One of the two programs of a step: its rows (o, 5), their formats (o,), and their numbers in the whole step."""
-
-    rows: NDArray[Any]
-    formats: NDArray[np.int64]
-    at: NDArray[np.int64]
-
-
-class RecordedStep(NamedTuple):
-    """A step of a filter as programs; places are those of one list of numbers.
-
-    Parameters
-    ----------
-    gain : the program of what does not depend on the measurements. estimate : that of the rest.
-    sizes : numbers of places, and of truth values.
-    places : places of the states, the measurements, and of each matrix of the model.
-    after : places of x, of the compensation if there is any, and of P after the step.
-    K, S : places of the gain (n, m), or of the gains of single measurements, and of the innovation covariance.
-    definite : truth value of the gain's program.
-    shared : places that the estimate's program takes from the gain's.
-    """
-
-    gain: ProgramPart
-    estimate: ProgramPart
-    sizes: tuple[int, int]
-    constants: tuple[Constants, Constants]
-    places: dict[str, NDArray[np.int64]]
-    after: dict[str, NDArray[np.int64]]
-    K: NDArray[np.int64]
-    S: NDArray[np.int64]
-    definite: int
-    shared: NDArray[np.int64]
-    labels: list[tuple[int, str]]
-
-    def quantity(self, part: ProgramPart, row: int) -> str:
-        """Name what a row of a program computes."""
-        found = ""
-        for begin, name in self.labels:
-            if begin <= part.at[row]:
-                found = name
-        return found
+@lru_cache(maxsize=64)
+def recorded_step(kind: StepKind) -> DividedStep:
+    """Return a step of a filter, divided into what depends on the measurements and what does not."""
+    return divided(kalman_step(kind)[0])
 
 
 @lru_cache(maxsize=64)
-def recorded_step(kind: StepKind) -> RecordedStep:
-    """Record a step of a filter, divided into what depends on the measurements and what does not."""
-    return _divided(kind, *whole_step(kind))
+def kalman_step(kind: StepKind) -> tuple[RecordedStep, LinearTaken]:
+    """Record a step of a filter, whose states are x and P, then what compensated summation carries; it gives K."""
+    tape, places, found = whole_step(kind)
+    rows = tape.instructions.copy()
+    if kind.reference and kind.form not in FACTORED:
+        first = np.zeros(tape.sizes[0], np.bool_)
+        first[np.concatenate([places["Phi"].ravel(), places["H"].ravel()])] = True
+        turned = (rows[:, 0] == CODES["multiply"]) & first[rows[:, 2]] & ~first[rows[:, 1]]
+        for (begin, name), (end, _) in zip(tape.labels, [*tape.labels[1:], (len(rows), "")], strict=True):
+            turned[begin:end] &= name != "the gain"
+        rows[turned, 1:3] = rows[turned, 2:0:-1]
+    states = ("x", "P", "carried") if kind.compensated or kind.form is Form.COMPENSATED else ("x", "P")
+    late = [places[letter].ravel() for letter in (*states[::2], "u", "b", "d", "B") if letter in places]
+    recorded = RecordedStep(
+        tape,
+        rows,
+        tape.formats,
+        [places[letter] for letter in states],
+        [places["z"]],
+        [places[known.letter] for known in kind.model],
+        [getattr(found, letter).components[0] for letter in states],
+        [found.K.components[0]],
+        truth_of(found.definite),
+        np.concatenate(late),
+    )
+    return recorded, found
 
 
 def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], LinearTaken]:
@@ -185,7 +171,8 @@ def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
     unknown = (Known(letter, shape, bytes([2]) * math.prod(shape)) for letter, shape in shapes.items())
     tape, places, found = whole_step(StepKind(form, n, m, tuple(unknown)))
     del places["carried"]
-    return filter_program(form, tape, places, [], (found.x, found.P), found.definite)
+    after = [found.x.components[0], found.P.components[0]]
+    return filter_program(form, tape, places, [], after, truth_of(found.definite))
 
 
 def filter_program(
@@ -193,8 +180,8 @@ def filter_program(
     tape: Tape,
     places: dict[str, NDArray[np.int64]],
     others: Sequence[int],
-    after: Sequence[Any],
-    definite: Any,
+    after: Sequence[NDArray[np.int64]],
+    definite: int,
 ) -> Program:
     """Return a recorded step of a filter as a program whose states are those of :func:`program_states`.
 
@@ -203,14 +190,14 @@ def filter_program(
     places : those of x, P and z, of the known inputs u if there are any, and of matrices by their letters. Coefficients
         are the entries of the matrices in this order, then the others, and 1.
     others : places of other coefficients.
-    after : x and P after the step.
+    after, definite : places of x and P after the step, and of a truth value.
     """
     x, P, z = (places[letter] for letter in "xPz")
     matrices = {letter: each for letter, each in places.items() if letter not in ("x", "P", "z", "u")}
     names = [each for letter, at in matrices.items() for each in entries(letter, *at.shape)]
     letter = "U" if form is Form.UD else "S" if form in ROOTS else "P"
     named = (np.array(entries(each, *at.shape)).reshape(1, *at.shape) for each, at in (("x", x), (letter, P)))
-    ends = (each.components[0][None] for each in after)
+    ends = (each[None] for each in after)
     return Program(
         tape.instructions.astype(np.int64),
         tape.sizes,
@@ -222,7 +209,7 @@ def filter_program(
         tuple(program_states(form, *named)[0].tolist()),
         (*names, *(f"c{i}" for i in range(len(others))), "one"),
         calls=tape.calls,
-        definite=int(definite.components[0]) if isinstance(definite, TracedTruth) else 1,
+        definite=definite,
     )
 
 
@@ -255,36 +242,3 @@ def _algebra(fmt: Any, fused: bool, order: Order, block: int, sums: Any) -> Alge
             return fmt.array(linalg.matmul(sums.array(a), sums.array(b), order, fused, block))
 
     return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), times, inverse_in_order)
-
-
-def _divided(kind: StepKind, tape: Tape, places: dict[str, NDArray[np.int64]], found: LinearTaken) -> RecordedStep:
-    """Divide the operations of a step into those of the gain and those of the estimate."""
-    rows, formats = tape.instructions.copy(), tape.formats
-    values, truths = tape.sizes
-    late = np.zeros(values, np.bool_)
-    for letter in ("x", "z", "carried", "u", "b", "d", "B"):
-        late[places.get(letter, [])] = True
-    later = depending(rows, late, np.zeros(truths, np.bool_))
-    if kind.reference and kind.form not in FACTORED:
-        first = np.zeros(values, np.bool_)
-        first[np.concatenate([places["Phi"].ravel(), places["H"].ravel()])] = True
-        turned = (rows[:, 0] == CODES["multiply"]) & first[rows[:, 2]] & ~first[rows[:, 1]]
-        for (begin, name), (end, _) in zip(tape.labels, [*tape.labels[1:], (len(rows), "")], strict=True):
-            turned[begin:end] &= name != "the gain"
-        rows[turned, 1:3] = rows[turned, 2:0:-1]
-    x, carried, P, K = (each.components[0] for each in (found.x, found.carried, found.P, found.K))
-    S = np.zeros((0, kind.m), np.int64) if found.S is None else found.S.components[0]
-    made = np.zeros(values, np.bool_)  # by operations of the gain's program
-    mine = ~later & ~np.isin(rows[:, 0], [CODES[name] for name in (*TRUTHS, "nonzero", "skip")])
-    made[rows[mine, 4]] = True
-    used = np.zeros(values, np.bool_)
-    used[rows[later, 1:4][takes_numbers(rows[later, 0])]] = True
-    used[np.concatenate([x.ravel(), carried.ravel()])] = True
-    shared = np.flatnonzero(made & used)
-    early, rest = (ProgramPart(rows[chosen], formats[chosen], np.flatnonzero(chosen)) for chosen in (~later, later))
-    after = {"x": x, "carried": carried, "P": P}
-    definite = found.definite
-    truth = int(definite.components[0]) if isinstance(definite, TracedTruth) else 1
-    return RecordedStep(
-        early, rest, (values, truths), tape.all_constants, places, after, K, S, truth, shared, tape.labels
-    )

@@ -19,7 +19,8 @@ from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.recording import block_algebra
-from gpbnb.filters.repeating import RepeatedStep, StepTaken
+from gpbnb.filters.repeating import RepeatedStep
+from gpbnb.filters.stepping import StepTaken
 from gpbnb.filters.steps import LinearStep
 
 FEW_BITS = 40

@@ -22,7 +22,7 @@ from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed, Progress
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.forms import WITH_PROGRAM, Form, form_named
-from gpbnb.filters.model import INPUTS, LinearModel, identity_in
+from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.opening import (
     Opening,
     as_packed,
@@ -33,7 +33,7 @@ from gpbnb.filters.opening import (
 from gpbnb.filters.pairs import double_doubles_near, nearest_floats
 from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
-from gpbnb.filters.stepping import Block, Stepper, Stop
+from gpbnb.filters.stepping import RunningStep, Stop
 from gpbnb.filters.steps import FACTORED, HUNG_FORMS, combined_gain
 
 LEAST_SHARE = 2.0**-60
@@ -59,6 +59,19 @@ class Sums(NamedTuple):
 
 LEFT_TO_RIGHT = Sums()
 """Each product and each sum is rounded in the format of the run, from left to right."""
+
+
+class Block(NamedTuple):
+    """Results after each of some steps, which are fewer than asked for if a step has none."""
+
+    #: (steps, n, records, ...).
+    x: NDArray[Any]
+    #: (steps, n, m, ...) and (steps, n, n, ...).
+    K: NDArray[Any]
+    P: NDArray[Any]
+    #: (steps,).
+    definite: NDArray[np.bool_]
+    stop: Stop | None
 
 
 class Run(Progress):
@@ -124,7 +137,7 @@ class Run(Progress):
         if fmt is not None:
             identity_in(fmt, 1)
         self._compensation = np.zeros_like(self.x)
-        self._stepper: Stepper | None = None
+        self._ready: RunningStep | None = None
         self._carried: CarriedBound | None = None
         if bounded:
             self._stored = model if fmt is None else model.rounded(fmt)
@@ -280,7 +293,7 @@ class Run(Progress):
         else:
             packed = as_packed(self.fmt, H)
         self.letters["H"] = packed
-        self._stepper = None
+        self._ready = None
 
     def save_at(self, checkpoint_steps: NDArray[np.int64]) -> None:
         """Save the results of other steps, at most as many as before, in place of all results saved so far."""
@@ -304,14 +317,12 @@ class Run(Progress):
         Formats without a range run in float64. Where a step would leave it, for example because an estimate decays
         below 2**-960, entries of the estimate below 2**-700 become zero first. A step that has no result ends the run.
         """
-        if self._stepper is None:
-            self._stepper = self._made_stepper()
+        if self._ready is None:
+            self._ready = self._made_ready()
         at = 0
         while at < len(z) and self.stopped is None:
             begin = self.saved
-            found = self._stepper.take(
-                self.steps, z[at : at + self._stepper.longest], self.x, self._compensation, self.P
-            )
+            found = self._take(self._ready, z[at : at + self._ready.longest])
             at += len(found.x)
             rows = self.done(found.definite)
             for array, each in zip((self.X, self.G, self.C), (found.x, found.K, found.P), strict=True):
@@ -344,12 +355,25 @@ class Run(Progress):
             reason += "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
         return reason
 
-    def _made_stepper(self) -> Stepper:
+    def _made_ready(self) -> RunningStep:
         """Record a step, and make it ready to run in the run's formats."""
         model, (formats, blocks, sums) = self.letters, self._formats()
-        cycle = int(np.lcm.reduce([len(table) for letter, table in model.items() if letter not in INPUTS]))
         kind = step_kind(self.form, model, formats[0], blocks, sums, "increment" in model)
-        return Stepper(recorded_step(kind), formats, model, self.records, cycle, self.tag)
+        parts = recorded_step(kind)
+        cycles = zip(model.values(), parts.step.cycles, strict=True)
+        tables = [each.reshape(len(each), at.size, *each.shape[1 + at.ndim :]) for each, at in cycles]
+        return RunningStep(parts, formats, tables, self.records, self.tag)
+
+    def _take(self, steps: RunningStep, z: NDArray[Any]) -> Block:
+        """Take some steps, and keep the estimate and the covariance after the last."""
+        states = [self.x, self.P, self._compensation][: steps.states]
+        found = steps.take(self.steps, states, z)
+        shapes = [*(each.shape for each in states), self.G.shape[1:]]
+        given = [each.reshape(len(each), *shape) for each, shape in zip(found.given, shapes, strict=True)]
+        if len(given[0]):
+            for state, each in zip(states, given, strict=False):
+                state[:] = each[-1]
+        return Block(given[0], given[-1], given[1], found.definite, found.stop)
 
     def _formats(self) -> tuple[list[Any], tuple[int, ...], tuple[Any, ...]]:
         """Return all formats; the numbers of those of the blocks and of the model; how sums are computed."""

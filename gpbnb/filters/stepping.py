@@ -1,23 +1,158 @@
-"""A recorded step as the machine repeats it: the gain once for all records, then the estimates of all of them."""
+"""A recorded step as the machine repeats it: what no measurement changes once for all records, then the rest.
+
+A step takes numbers of its own, such as measurements, numbers of the model in cycles, and states, which it replaces.
+States that depend on none of the step's own numbers, such as the covariance of a linear filter, may repeat.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import compress
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.interpreting import Numbers
 from gpbnb.arithmetic.loop import Loop, steps_at_once
-from gpbnb.arithmetic.machine import Fault, fault_of, takes_numbers
+from gpbnb.arithmetic.machine import CODES, OPERANDS, Fault, fault_of, takes_numbers
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.recording import ProgramPart, RecordedStep
+from gpbnb.arithmetic.tape import TRUTHS, Places, Tape, depending
+from gpbnb.arithmetic.traced import TracedTruth
+
+NONE = np.zeros(0, np.int64)
+"""No places."""
 
 LARGEST_KEPT = 1 << 18
-"""Most numbers of covariances that repeat."""
+"""Most numbers that are kept of steps that repeat."""
 
-_GAIN = ("P",)
-_ESTIMATE = ("x", "carried")
+_TRUTHS = [CODES[name] for name in TRUTHS]
+_WITHOUT_NUMBER = [*_TRUTHS, CODES["nonzero"], CODES["skip"]]
+
+
+class StepTaken(NamedTuple):
+    """What a step gives: its states, its gain as arrays in tuples or lists, and whether all is definite.
+
+    Of several steps, arrays and truth values have one row for each.
+    """
+
+    states: tuple[Any, ...]
+    gain: Any
+    definite: Any
+
+
+class RecordedStep(NamedTuple):
+    """A recorded step.
+
+    Parameters
+    ----------
+    tape : the tape. rows, formats : operations (o, 5) to repeat, and the number of the format of each.
+    states, own, cycles : places of the arrays that it takes: of states, of its own numbers, which follow each other,
+        and of those of which each step takes the next of a cycle.
+    after, results : places of the states after the step, and of the rest that it gives.
+    definite : a truth value.
+    late : places of states that depend on the step's own numbers, and of cycles that count as such, as they are long.
+    """
+
+    tape: Tape
+    rows: NDArray[Any]
+    formats: NDArray[np.int64]
+    states: Sequence[Places]
+    own: Sequence[Places]
+    cycles: Sequence[Places]
+    after: Sequence[Places]
+    results: Sequence[Places]
+    definite: int
+    late: Places = NONE
+
+    def quantity(self, row: int) -> str:
+        """Name what an operation computes."""
+        found = ""
+        for begin, name in self.tape.labels:
+            if begin <= row:
+                found = name
+        return found
+
+
+def truth_of(definite: Any) -> int:
+    """Return the place of a truth value that a recorded step gives."""
+    return int(definite.components[0]) if isinstance(definite, TracedTruth) else int(bool(definite))
+
+
+class StepPart(NamedTuple):
+    """Operations of a step that run together.
+
+    Parameters
+    ----------
+    rows, at : operations, and their numbers in the whole step.
+    changes, gives : which of the states are its own, and which of all that a step gives, its states and then the rest.
+    states, after, kept : places of these states before and after a step, and of what it gives.
+    truth : the truth value that is kept of each step.
+    """
+
+    rows: NDArray[Any]
+    at: NDArray[np.int64]
+    changes: list[int]
+    gives: list[int]
+    states: Places
+    after: Places
+    kept: Places
+    truth: int
+
+
+class DividedStep(NamedTuple):
+    """A recorded step in two parts: what depends on no number of its own, and the rest.
+
+    Parameters
+    ----------
+    shared : places of the numbers that the rest takes from the other part, where they follow each other at the end.
+    """
+
+    step: RecordedStep
+    early: StepPart
+    rest: StepPart
+    shared: Places
+
+
+def divided(step: RecordedStep) -> DividedStep:
+    """Divide the operations of a step into those that depend on its own numbers and those that do not."""
+    rows, (values, truths) = step.rows, step.tape.sizes
+    given, before = [*step.after, *step.results], list[bool]()
+    changes = [bool(np.isin(each, step.late).any()) for each in step.states]
+    while changes != before:
+        before, marks = changes, (np.zeros(values, np.bool_), np.zeros(truths, np.bool_))
+        for places in (*step.own, step.late, *compress(step.states, changes)):
+            marks[0][places] = True
+        late = depending(rows, *marks)
+        is_late = [bool(marks[0][each].any()) for each in given]
+        changes = [one or other for one, other in zip(is_late, before, strict=False)]
+    is_late[: len(changes)] = changes
+    early = ~late
+    if OPERANDS[1][rows[late, 0]].any():  # truth values are not shared: each part computes its own
+        late |= np.isin(rows[:, 0], _TRUTHS)
+    made, used = np.zeros(values, np.bool_), np.zeros(values, np.bool_)
+    made[rows[early & ~np.isin(rows[:, 0], _WITHOUT_NUMBER), 4]] = True
+    used[rows[late, 1:4][takes_numbers(rows[late, 0])]] = True
+    for state in compress(step.states, [not each for each in changes]):
+        made[state] = True
+    for each in compress(given, is_late):
+        used[each] = True
+    shared = np.flatnonzero(made & used)
+    moved = np.arange(values)
+    moved[shared] = values + np.arange(len(shared))
+
+    def part(own: bool, chosen: NDArray[np.bool_], places: Places) -> StepPart:
+        mine, gives = ([i for i, each in enumerate(some) if each == own] for some in (changes, is_late))
+        states, after, kept = (
+            np.concatenate([NONE, *(each[i].ravel() for i in some)])
+            for each, some in ((step.states, mine), (step.after, mine), (given, gives))
+        )
+        part, truth = rows[chosen], step.definite if marks[1][step.definite] == own else 1
+        taken = takes_numbers(part[:, 0])
+        part[:, 1:4][taken] = places[part[:, 1:4][taken]]
+        return StepPart(part, np.flatnonzero(chosen), mine, gives, states, places[after], places[kept], truth)
+
+    return DividedStep(step, part(False, early, np.arange(values)), part(True, late, moved), shared)
 
 
 class Stop(NamedTuple):
@@ -27,155 +162,146 @@ class Stop(NamedTuple):
     quantity: str
 
 
-class Block(NamedTuple):
-    """Results after each of some steps, which are fewer than asked for if a step has none."""
+class StepsTaken(NamedTuple):
+    """Results after each of some steps, which are fewer than asked for if a step has none.
 
-    #: (steps, n, records, ...).
-    x: NDArray[Any]
-    #: (steps, n, m, ...) and (steps, n, n, ...).
-    K: NDArray[Any]
-    P: NDArray[Any]
-    #: (steps,).
+    Parameters
+    ----------
+    given : states, and the rest that a step gives, each (steps, entries, ...).
+    definite : (steps,).
+    """
+
+    given: list[NDArray[Any]]
     definite: NDArray[np.bool_]
     stop: Stop | None
 
 
-class Stepper:
-    """A filter that takes steps with packed numbers.
+class RunningStep:
+    """A recorded step that is repeated on packed numbers.
 
     Parameters
     ----------
-    step : the recorded step.
+    parts : the step.
     formats : the formats of the numbers that it names; None is double-double.
-    model : matrices of the model by their letters, (p, rows, columns, ...) or (p, rows, ...), packed.
-    records : number of records.
-    cycle : number of steps after which covariances may repeat, if no format draws random numbers.
+    cycles : numbers (p, entries, ...) for the places of its cycles.
+    records : number of lanes of what depends on the step's own numbers.
     tag : the arithmetic of the run, from which both parts of a step draw random numbers.
+    held : other numbers and truth values, which stay as they are.
     """
 
     def __init__(
         self,
-        step: RecordedStep,
+        parts: DividedStep,
         formats: Sequence[Any],
-        model: dict[str, NDArray[Any]],
-        records: int,
-        cycle: int,
+        cycles: Sequence[NDArray[Any]],
+        records: int = 1,
         tag: Any = None,
+        held: Numbers | None = None,
     ) -> None:
-        self._step = step
-        self._shared_at = step.sizes[0] + np.arange(len(step.shared))
-        moved = np.arange(step.sizes[0] + len(step.shared))
-        moved[step.shared] = self._shared_at
-        rows = step.estimate.rows.copy()
-        given, taken = rows[:, 1:4], takes_numbers(rows[:, 0])
-        given[taken] = moved[given[taken]]
-        late = step._replace(after={**step.after, **{each: moved[step.after[each]] for each in _ESTIMATE}})
-        lanes = records if records > 1 else None
+        self._parts, step, shared = parts, parts.step, parts.shared
+        self._shared_at = step.tape.sizes[0] + np.arange(len(shared))
+        self._kept_at = np.concatenate([shared, parts.early.kept])
 
-        def loop(step: RecordedStep, part: ProgramPart, changes: Sequence[str], lanes: int | None = None) -> Loop:
+        def loop(part: StepPart, lanes: int | None = None) -> Loop:
             """Return a part of a step that is repeated on its own values."""
-            sizes = step.sizes[0] + len(step.shared), step.sizes[1]
-            states, after = (np.concatenate([at[each].ravel() for each in changes]) for at in (step.places, step.after))
-            found = Loop(formats, part.rows, part.formats, sizes, states, after, step.definite, lanes, tag)
-            found.hold_constants(step.constants)
+            (places, truths), numbers = step.tape.sizes, step.formats[part.at]
+            sizes = places + len(shared), truths
+            found = Loop(formats, part.rows, numbers, sizes, part.states, part.after, part.truth, lanes, tag)
+            if not found.hold_constants(step.tape.all_constants):
+                raise OverflowError("got a constant beyond the range of the loops")
+            if held is not None:
+                found.hold(np.arange(len(held.values)), held.values)
+                found.truths[:] = held.truths
             return found
 
-        self._gain = loop(step, step.gain, _GAIN)
-        self._estimate = loop(late, step.estimate._replace(rows=rows), _ESTIMATE, lanes)
-        self._kept_at = np.concatenate([step.shared, step.K.ravel(), step.after["P"].ravel()])
+        self._early, self._rest = loop(parts.early), loop(parts.rest, records if records > 1 else None)
+        #: The number of states, and what holds the step's own numbers.
+        self.states, self.numbers = len(step.states), self._rest
+        of_early, self._of_rest = self._taken_of(cycles, parts.early), self._taken_of(cycles, parts.rest)
+        self._early.feed(of_early)
         repeats = all(fmt is None or fmt.rounding is not Rounding.STOCHASTIC for fmt in formats)
-        self._cycle = cycle if repeats else 0
-        kept, work = len(self._kept_at) + len(step.after["x"]) * records, len(step.gain.rows) + records * len(rows)
+        self._cycle = int(np.lcm.reduce([1, *(len(table) for _, table in of_early)])) if repeats else 0
+        kept = len(self._kept_at) + records * len(parts.rest.kept)
+        work = len(parts.early.rows) + records * len(parts.rest.rows)
         #: The largest number of steps taken at once; random numbers are drawn step by step.
         self.longest = steps_at_once(kept, work) if repeats else 1
         self._repeated: tuple[int, NDArray[Any], NDArray[np.bool_]] | None = None
         self._last: NDArray[Any] | None = None
-        self._gain.feed(self._groups(model, self._gain))
-        self._of_estimate = self._groups(model, self._estimate)
 
-    def _groups(self, model: dict[str, NDArray[Any]], part: Loop) -> list[tuple[NDArray[np.int64], NDArray[Any]]]:
-        """Return the numbers of the model that a part of a step takes, and their places."""
-        found = []
-        for letter, table in model.items():
-            places = self._step.places[letter].ravel()
-            if np.isin(places, part.rows[:, 1:4]).any() or np.isin(places, part.after).any():
-                parts = table.shape[1 + self._step.places[letter].ndim :]
-                found.append((places, table.reshape(len(table), places.size, *parts)))
-        return found
+    def _taken_of(self, cycles: Sequence[NDArray[Any]], part: StepPart) -> list[tuple[Places, Any]]:
+        """Return places and numbers of the cycles that a part of a step takes."""
+        read = np.concatenate([part.rows[:, 1:4].ravel(), part.after, part.kept])
+        places = (each.ravel() for each in self._parts.step.cycles)
+        return [(at, table) for at, table in zip(places, cycles, strict=True) if np.isin(at, read).any()]
 
-    def take(self, first: int, z: NDArray[Any], x: NDArray[Any], carried: NDArray[Any], P: NDArray[Any]) -> Block:
-        """Take one step for each of the measurements (steps, m, records, ...), at most :attr:`longest`.
+    def take(self, first: int, states: Sequence[NDArray[Any]], own: NDArray[Any]) -> StepsTaken:
+        """Take one step for each row of the step's own numbers (steps, entries, ...), at most :attr:`longest`.
 
         Parameters
         ----------
         first : number of steps taken before.
-        x, carried (n, records, ...), P (n, n, ...) : before the first step; they are overwritten.
+        states : (entries, ...), before the first step.
         """
-        step = self._step
-        kept, definite, gain_stop = self._gains(first, len(z), P)
-        count, m = len(kept), z.shape[1]
-        estimate = self._estimate
-        lanes = estimate.values.shape[1:]
-        parts = kept.shape[3:]
-        shared = len(step.shared)
-        table = kept[:, :shared].reshape(count, shared, *parts)
-        groups = list(self._of_estimate)
-        if shared and count:
-            groups.append((self._shared_at, np.roll(table, first % count, axis=0)))
-        estimate.feed(groups)
-        estimate.states = np.concatenate([x, carried])
-        n = len(x)
-        own = np.ascontiguousarray(z[:count].reshape(count, m, *lanes))
-        at = int(step.places["z"][0])
-        found, _, row = estimate.take(first, own, at, estimate.after[:n])
-        stop = gain_stop if row < 0 else self._stop(estimate, step.estimate, row)
-        done = len(found)
-        states = estimate.states.reshape(2 * n, *x.shape[1:])
-        x[:], carried[:] = states[:n], states[n:]
-        K, covariances = (
-            each.reshape(done, *like.shape, *parts)
-            for each, like in zip(
-                np.split(kept[:done, shared:], [step.K.size], axis=1), (step.K, step.after["P"]), strict=True
-            )
+        (step, of_early, of_rest, places), rest = self._parts, self._rest
+        before, rest.states = (
+            np.concatenate([loop.states[:0], *(states[i].reshape(-1, *loop.values.shape[1:]) for i in part.changes)])
+            for loop, part in ((self._early, of_early), (rest, of_rest))
         )
-        if done:
-            P[:] = covariances[-1]
-        self._last = P.copy() if done == count else None  # the gain is ahead of the estimate
-        return Block(found.reshape(done, *x.shape), K, covariances, definite[:done], stop)
+        kept, definite, stop = self._early_steps(first, len(own), before)
+        count, shared = len(kept), len(places)
+        groups = list(self._of_rest)
+        if shared and count:
+            table = kept[:, :shared].reshape(count, shared, *kept.shape[3:])  # without the axis of the one lane
+            groups.append((self._shared_at, np.roll(table, first % count, axis=0)))
+        rest.feed(groups)
+        given = np.ascontiguousarray(own[:count].reshape(count, own.shape[1], *rest.values.shape[1:]))
+        at = next((int(each.ravel()[0]) for each in step.own if each.size), 0)
+        found, held, row = rest.take(first, given, at, of_rest.kept)
+        stop = stop if row < 0 else self._stop(rest, of_rest, row)
+        done, sizes = len(found), [each.size for each in (*step.after, *step.results)]
+        results = dict[int, NDArray[Any]]()
+        for part, each in ((of_early, kept[:done, shared:]), (of_rest, found)):
+            ends = np.cumsum([sizes[i] for i in part.gives])[:-1]
+            results.update(zip(part.gives, np.split(each, ends, axis=1), strict=False))
+        self._last = None  # the early part is ahead of the rest
+        if done == count:
+            self._last = kept[-1, shared : shared + len(of_early.after)] if done else before
+        return StepsTaken([results[i] for i in range(len(sizes))], definite[:done] & held, stop)
 
-    def _gains(self, first: int, count: int, P: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_], Stop | None]:
-        """Return what the gain's program computes in some steps."""
-        gain = self._gain
-        if self._last is None or not np.array_equal(self._last, P):
+    def _early_steps(
+        self, first: int, count: int, states: NDArray[Any]
+    ) -> tuple[NDArray[Any], NDArray[np.bool_], Stop | None]:
+        """Return what the early part computes in some steps."""
+        early = self._early
+        if self._last is None or not np.array_equal(self._last, states):
             self._repeated = None
-            gain.states = P
-            gain.compare_from(gain.states, self._cycle)
+            early.states = states
+            early.compare_from(states, self._cycle)
         if self._repeated is not None:
             return (*self._of_cycle(first, count), None)
-        gain.states = P
-        kept, held, stop = self._gains_alone(first, count, self._cycle)
-        period = gain.period
+        early.states = states
+        kept, held, stop = self._early_alone(first, count, self._cycle)
+        period = early.period
         if not period:
             return kept, held, stop
-        gain.compare_from(gain.states, 0)
+        early.compare_from(early.states, 0)
         first, count = first + len(kept), count - len(kept)
-        if period * self._step.after["P"].size > LARGEST_KEPT:
+        if period * len(self._kept_at) > LARGEST_KEPT:
             self._cycle = 0
-            rest = self._gains_alone(first, count, 0)
+            rest = self._early_alone(first, count, 0)
         else:
-            self._repeated = first, *self._gains_alone(first, period, 0)[:2]
+            self._repeated = first, *self._early_alone(first, period, 0)[:2]
             rest = (*self._of_cycle(first, count), None)
         return np.concatenate([kept, rest[0]]), np.concatenate([held, rest[1]]), rest[2]
 
-    def _gains_alone(self, first: int, count: int, cycle: int) -> tuple[NDArray[Any], NDArray[np.bool_], Stop | None]:
-        gain = self._gain
-        own = np.empty((count, 0, *gain.values.shape[1:]), gain.values.dtype)
-        kept, held, row = gain.take(first, own, 0, self._kept_at, cycle)
-        stop = None if row < 0 else self._stop(gain, self._step.gain, row)
-        return kept, held, stop
+    def _early_alone(self, first: int, count: int, cycle: int) -> tuple[NDArray[Any], NDArray[np.bool_], Stop | None]:
+        early = self._early
+        own = np.empty((count, 0, *early.values.shape[1:]), early.values.dtype)
+        kept, held, row = early.take(first, own, 0, self._kept_at, cycle)
+        return kept, held, None if row < 0 else self._stop(early, self._parts.early, row)
 
-    def _stop(self, loop: Loop, part: ProgramPart, row: int) -> Stop:
-        return Stop(fault_of(loop.rows, loop.values, row), self._step.quantity(part, row))
+    def _stop(self, loop: Loop, part: StepPart, row: int) -> Stop:
+        return Stop(fault_of(loop.rows, loop.values, row), self._parts.step.quantity(int(part.at[row])))
 
     def _of_cycle(self, first: int, count: int) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         assert self._repeated is not None

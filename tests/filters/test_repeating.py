@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from gpbnb import FixedFormat, FloatFormat, NonlinearModel
+from gpbnb.filters import repeating
 from gpbnb.filters.nonlinear_run import NonlinearRun
 from gpbnb.filters.repeating import RepeatedStep
+from gpbnb.filters.stepping import RunningStep, StepTaken
+from gpbnb.filters.steps import if_holds
 from tests.step_functions import tracked_motion, tracked_sight
 
 Z = [[5.0, 0.93], [5.6, 0.9], [None, 0.88], [6.9, 0.86], [7.5, None], [8.1, 0.83], [8.8, 0.81], [9.4, 0.8]]
@@ -27,7 +32,7 @@ def by_operations(monkeypatch, make, z):
 
 
 def repeats(run) -> bool:
-    return run._step._inside is not None
+    return run._step._repeated is not None
 
 
 FORMATS = [FloatFormat(2, 24), FloatFormat(10, 8, "even"), FloatFormat(2, 300), FixedFormat(8, 60, "chop", "wrap")]
@@ -83,3 +88,60 @@ def test_a_function_that_branches_on_a_number_is_called_in_each_step():
     run = NonlinearRun(NonlinearModel(turning, None, tracked_sight, None, **PLANE), FloatFormat(2, 24))
     assert len(run.states([[5, 1]] * 3)) == 3
     assert not repeats(run)
+
+
+def random_step(rng):
+    """A step on two states and cycles, of which only the first state, at random, depends on the step's own numbers."""
+
+    def mixed(numbers, count):
+        numbers = list(numbers)
+        for _ in range(count):
+            a, b, c = (numbers[i] for i in rng.integers(len(numbers), size=3))
+            numbers.append(
+                [
+                    lambda a, b, c: a * b + c,
+                    lambda a, b, c: (a - b) / (c * c + 1),
+                    lambda a, b, c: np.where(a > b, c, a),
+                    lambda a, b, c: np.where((a > b) & (b > c), b - a, c),
+                    lambda a, b, c: np.sqrt(abs(a)) * 0.5,
+                    lambda a, b, c: if_holds(a > b, lambda: c / (b * b + 1), c * 0.25),
+                ][rng.integers(6)](a, b, c)
+            )
+        return numbers[-1], numbers[-2], numbers[-1] > numbers[-2]
+
+    seed = rng.integers(1 << 32)
+
+    def step(formats, states, given):
+        nonlocal rng
+        rng = np.random.default_rng(seed)
+        (a, b), (z, c, d) = states, given
+        b1, b2, early = mixed([*b, *c], 6)
+        a1, a2, late = mixed([*a, *z, *b, *c, *d, b1], 8)
+        bounded = [each / (abs(each) + 1) for each in (a1, a2, b1, b2)]
+        return StepTaken(
+            (np.stack(bounded[:2]), np.stack(bounded[2:])), [np.stack([a2, b1]), np.stack([b2])], early & late
+        )
+
+    return step
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8, "even"), FloatFormat(2, 100)], ids=str)
+def test_what_does_not_depend_on_the_own_numbers_of_a_step_runs_apart(fmt, monkeypatch):
+    monkeypatch.setattr(repeating, "FEW_OPERATIONS", 0)
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        step = random_step(rng)
+        z, c, d = (fmt.array(rng.standard_normal((count, 2))) for count in (60, 3, 1))
+        start = fmt.array([0.5, -0.25]), fmt.array([0.125, 1])
+        repeated = RepeatedStep(step, [fmt], start, [c, d])
+        parts = [part for i, j in pairwise([0, 1, 8, 28, 60]) for part in repeated.take(z[i:j])]
+        assert isinstance(repeated._repeated, RunningStep)
+        states, k = start, 0
+        for part in parts:
+            for i in range(len(part.definite)):
+                taken = step([fmt], states, [z[k], c[k % 3], d[0]])
+                states, k = taken.states, k + 1
+                for mine, right in zip((*part.states, *part.gain), (*taken.states, *taken.gain), strict=True):
+                    assert np.array_equal(mine[i], right), (seed, k)
+                assert part.definite[i] == bool(taken.definite), (seed, k)
+        assert k == 60
