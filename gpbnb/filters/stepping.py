@@ -26,8 +26,8 @@ NONE = np.zeros(0, np.int64)
 LARGEST_KEPT = 1 << 18
 """Most numbers that are kept of steps that repeat."""
 
-_TRUTHS = [CODES[name] for name in TRUTHS]
-_WITHOUT_NUMBER = [*_TRUTHS, CODES["nonzero"], CODES["skip"]]
+_GIVES_TRUTH = np.array([name in TRUTHS for name in CODES])
+_GIVES_NUMBER = np.array([name not in (*TRUTHS, "nonzero", "skip") for name in CODES])
 
 
 class StepTaken(NamedTuple):
@@ -129,9 +129,9 @@ def divided(step: RecordedStep) -> DividedStep:
     is_late[: len(changes)] = changes
     early = ~late
     if OPERANDS[1][rows[late, 0]].any():  # truth values are not shared: each part computes its own
-        late |= np.isin(rows[:, 0], _TRUTHS)
+        late |= _GIVES_TRUTH[rows[:, 0]]
     made, used = np.zeros(values, np.bool_), np.zeros(values, np.bool_)
-    made[rows[early & ~np.isin(rows[:, 0], _WITHOUT_NUMBER), 4]] = True
+    made[rows[early & _GIVES_NUMBER[rows[:, 0]], 4]] = True
     used[rows[late, 1:4][takes_numbers(rows[late, 0])]] = True
     for state in compress(step.states, [not each for each in changes]):
         made[state] = True
@@ -141,18 +141,20 @@ def divided(step: RecordedStep) -> DividedStep:
     moved = np.arange(values)
     moved[shared] = values + np.arange(len(shared))
 
-    def part(own: bool, chosen: NDArray[np.bool_], places: Places) -> StepPart:
+    def part(own: bool, chosen: NDArray[np.bool_]) -> StepPart:
         mine, gives = ([i for i, each in enumerate(some) if each == own] for some in (changes, is_late))
         states, after, kept = (
             np.concatenate([NONE, *(each[i].ravel() for i in some)])
             for each, some in ((step.states, mine), (step.after, mine), (given, gives))
         )
         part, truth = rows[chosen], step.definite if marks[1][step.definite] == own else 1
-        taken = takes_numbers(part[:, 0])
-        part[:, 1:4][taken] = places[part[:, 1:4][taken]]
-        return StepPart(part, np.flatnonzero(chosen), mine, gives, states, places[after], places[kept], truth)
+        if own:
+            taken = takes_numbers(part[:, 0])
+            part[:, 1:4][taken] = moved[part[:, 1:4][taken]]
+            after, kept = moved[after], moved[kept]
+        return StepPart(part, np.flatnonzero(chosen), mine, gives, states, after, kept, truth)
 
-    return DividedStep(step, part(False, early, np.arange(values)), part(True, late, moved), shared)
+    return DividedStep(step, part(False, early), part(True, late), shared)
 
 
 class Stop(NamedTuple):
@@ -230,9 +232,11 @@ class RunningStep:
 
     def _taken_of(self, cycles: Sequence[NDArray[Any]], part: StepPart) -> list[tuple[Places, Any]]:
         """Return places and numbers of the cycles that a part of a step takes."""
-        read = np.concatenate([part.rows[:, 1:4].ravel(), part.after, part.kept])
-        places = (each.ravel() for each in self._parts.step.cycles)
-        return [(at, table) for at, table in zip(places, cycles, strict=True) if np.isin(at, read).any()]
+        read = np.zeros(1 + max(len(self._rest.values), part.rows.max(initial=0)), np.bool_)
+        for places in (part.rows[:, 1:4], part.after, part.kept):
+            read[places] = True
+        given = ((each.ravel(), table) for each, table in zip(self._parts.step.cycles, cycles, strict=True))
+        return [(at, table) for at, table in given if read[at].any()]
 
     def take(self, first: int, states: Sequence[NDArray[Any]], own: NDArray[Any]) -> StepsTaken:
         """Take one step for each row of the step's own numbers (steps, entries, ...), at most :attr:`longest`.
