@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -65,11 +64,8 @@ def emulated(omega, f_c, duration, fmt, draw, paths):
     """RMS of the discretization error, of the rounding error and of both, with each sample and operation rounded."""
     x, d = experiment.simulate(theory.first_order(1.0, omega), f_c, round(duration * f_c), draw, paths)
     discretization, unrounded = d.sum(axis=0), (x[:-1] + x[1:]).sum(axis=0) / 2 / f_c
-    total = fmt.array(np.zeros(paths))
-    half = fmt.array(0.5 / f_c)
-    for old, new in pairwise(fmt.array(each) for each in x):
-        total = total + half * (old + new)
-    rounding = total.to_float() - unrounded
+    stored = fmt.array(x)
+    rounding = (fmt.array(0.5 / f_c) * (stored[:-1] + stored[1:])).sum(axis=0).to_float() - unrounded
     return [math.sqrt(np.mean(each**2)) for each in (discretization, rounding, discretization + rounding)]
 
 

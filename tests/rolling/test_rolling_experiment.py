@@ -134,7 +134,7 @@ def test_the_stored_survey_is_computed_again_for_one_gyro_to_the_last_digit():
 def test_filtered_drifts_agree_with_lag_and_exact_noise():
     study = material.filter_study()
     assert [len(set(weights)) == 1 for weights in study.filters] == [False] * 3 + [True] * 3
-    expected = material.expected_squares(study)
+    expected = material.expected_squares()
     assert np.max(abs(study.error - expected) / study.uncertainty) < 4
     assert np.max(study.uncertainty / study.error) < 0.06
     bandwidth = [np.sum(weights**2) / (2 * theory.INTERVAL) for weights in study.filters]

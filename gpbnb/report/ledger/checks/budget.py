@@ -48,6 +48,7 @@ def where(document: str, item: str) -> str:
     return found
 
 
+@cache
 def open_studies() -> tuple[int, int]:
     """Return how many of the studies that ch. III leaves open are answered, and their number."""
     left = [each for each in printed_in("hung1984") if each.chapter == "III" and each.kind == "open"]

@@ -76,13 +76,14 @@ def deviation(found: float, expected: float, error: float) -> float:
     return (found - expected) / error
 
 
-def expected_squares(study: experiment.FilterStudy, duration: float = YEAR / 16) -> np.ndarray:
-    """Return the mean square error of each filter of a study: the square of its lag, plus the exact noise.
+@cache
+def expected_squares() -> np.ndarray:
+    """Return the mean square error of each filter of the study: the square of its lag, plus the exact noise.
 
     The noise grows with the logarithm of time. It is taken at T/e, where the logarithm has its mean over a record of
     length T.
     """
-    middle = round(duration / theory.INTERVAL / math.e)
+    study, middle = filter_study(), round(YEAR / 16 / theory.INTERVAL / math.e)
     expected = []
     for weights in study.filters:
         lag = float(np.arange(len(weights)) @ weights) * theory.INTERVAL
@@ -273,7 +274,7 @@ def sections_of_sources() -> Names:
 def sources_4_and_5() -> tuple[float, float, float]:
     """Return how far simulated filters and roll rates are from theory, in standard errors, and what resets gain."""
     study = filter_study()
-    filters = float(np.max(abs(study.error - expected_squares(study)) / study.uncertainty))
+    filters = float(np.max(abs(study.error - expected_squares()) / study.uncertainty))
     sizes = np.sqrt(np.mean(walk_errors() ** 2, axis=1))
     expected = [theory.rate_walk_error(DRIFTS[0], WALK, reset=reset) for reset in (None, 60000.0)]
     walks = max(abs(deviation(s, e, e / math.sqrt(400))) for s, e in zip(sizes, expected, strict=True))
@@ -484,7 +485,7 @@ def optimum() -> Names:
     """Compare simulated filters of a third, one and three times the optimum bandwidth with theory."""
     study = filter_study()
     poles = study.error[:3]
-    worst = float(np.max(abs(study.error - expected_squares(study)) / study.uncertainty))
+    worst = float(np.max(abs(study.error - expected_squares()) / study.uncertainty))
     ratio = float(theory.signal_to_noise(DRIFTS[0], YEAR, poles[1]))
     return {"right": bool(worst < 4 and np.argmin(poles) == 1), "worst": worst, "least": math.sqrt(poles[1]),
             "errors": ", ".join(f"{math.sqrt(p):.2f}" for p in poles), "decibels": 10 * math.log10(ratio)}  # fmt: skip
