@@ -29,8 +29,8 @@ FORMATS = {
     "fixed": FixedFormat(4, 27, "even"),
     "stochastic": FloatFormat(2, 20, "stochastic", seed=5),
 }
-FEW = ("24 bits, even", "binary32", "8 decimal digits", "fixed, saturating", "fixed, wrapping", "100 bits")
-"""Formats of each kind of number; elimination takes long to compile for one more."""
+FEW = ("24 bits, even", "binary32", "8 decimal digits", "fixed, saturating", "fixed, wrapping")
+"""Formats of some kinds of numbers; elimination takes long to compile for one more."""
 Z = np.round(2 * np.sin(np.arange(100) / 5), 3)
 
 

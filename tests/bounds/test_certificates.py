@@ -255,6 +255,19 @@ def test_a_recursion_is_bounded_by_the_sums_of_its_effects(steps: int | None, ba
         assert steps is None or steps > back or claimed - true <= whole / 2**115
 
 
+def test_a_box_contains_what_steps_lose_and_what_they_turn() -> None:
+    """Without columns, the set is a box: that of the limits turned by each loop, and of the slack of each step."""
+    F, slack, bits = [[Fraction(1, 2), Fraction(-1, 4)], [Fraction(-1, 8), Fraction(3, 4)]], [10**9, 2 * 10**9], 64
+    found = check.ErrorSet([10**12] * 2, [], bits, "an error is larger")
+    found.box = [10**9, 3 * 10**9]
+    sizes = [Fraction(x) for x in found.box]
+    for _ in range(4):
+        found.advance([([[int(x * 2**bits) for x in row] for row in F], [], slack, [])], 64)
+        sizes = [sum(abs(c) * x for c, x in zip(row, sizes, strict=True)) + s for row, s in zip(F, slack, strict=True)]
+    for i, size in enumerate(sizes):
+        assert size <= found.most([(i == j) << bits for j in range(2)]) / Fraction(2**bits) <= size * Fraction("1.1")
+
+
 def test_an_ellipsoid_contains_parallel_segments_and_hardly_more() -> None:
     found = check.ErrorSet([10**12] * 2, [], 64, "an error is larger")
     found.x, found.groups = [[3 * 10**9, 9 * 10**9, -6 * 10**8], [-(10**9), -3 * 10**9, 2 * 10**8]], [(3, 1)]

@@ -96,7 +96,7 @@ def test_underflow_is_part_of_the_guarantee(subnormal, size):
     small = limits(state=2 * size, innovation=2 * size)
     fmt = FloatFormat(2, 11, EVEN, -6, 15, subnormal)
     model = LinearModel([["0.9"]], [[1]], [["0.03125"]], [["0.125"]], [0], [[1]])
-    z = np.random.default_rng(0).uniform(-size, size, (4000, 1))
+    z = np.random.default_rng(0).uniform(-size, size, (1000, 1))
     run = Run(model, fmt, "innovation", ())
     true = reference_states(model.rounded(fmt), fmt.array(z).to_fractions())
     error = np.abs((run.states(fmt.array(z)) - true).sum(axis=2)).max()
@@ -109,7 +109,7 @@ def test_no_rounding_error_exceeds_its_unit(fmt):
     table, kernel = units(fmt), fmt.round
     largest = float(fmt.limits.largest)
     rng = np.random.default_rng(1)
-    sizes = np.concatenate([largest * 2.0 ** -rng.uniform(0, 60, 3000), table.powers[table.powers <= largest]])
+    sizes = np.concatenate([largest * 2.0 ** -rng.uniform(0, 60, 600), table.powers[table.powers <= largest]])
     for size in sizes:
         at = np.searchsorted(table.powers, size)
         assert abs(float(kernel(float(size))) - size) <= table.errors[at] * (1 + 2.0**-40)
@@ -125,7 +125,7 @@ ROAD = limits(state=(100, 20), innovation=10)
 def test_a_filter_in_fixed_point_has_a_guarantee(form):
     """Covariance and gain are computed in fixed point, too."""
     found = guarantee(CAR, FixedFormat(8, 12, EVEN), ROAD, form=form)
-    against = attack(found, 300, 20)
+    against = attack(found, 100, 20)
     assert found.for_ever
     assert against.admissible
     assert 0.1 < against.ratio <= 1
@@ -158,8 +158,7 @@ def in_units(exponent):
     return LinearModel(CAR.Phi, CAR.H, CAR.Q * square, CAR.R * square, CAR.x0, CAR.P0 * square)
 
 
-@pytest.mark.parametrize("form", ["innovation", "Joseph", "UD"])
-@pytest.mark.parametrize("basis", ["emulation", "bound"])
+@pytest.mark.parametrize(("form", "basis"), [("innovation", "bound"), ("Joseph", "emulation"), ("UD", "bound")])
 def test_units_far_from_one_change_nothing(form, basis):
-    answers = {required_precision(in_units(e), 30, 0.01 * 2.0**e, form=form, basis=basis).tried for e in (0, 210, -210)}
+    answers = {required_precision(in_units(e), 12, 0.01 * 2.0**e, form=form, basis=basis).tried for e in (0, 210, -210)}
     assert len(answers) == 1

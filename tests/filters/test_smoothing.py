@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from functools import cache
 
 import numpy as np
 import pytest
@@ -114,10 +113,8 @@ def tracked():
     )
 
 
-@cache
-def exact_track(steps=60):
+def exact_track(given, steps):
     """The smoothed estimates without rounding, (steps, n)."""
-    given = tracked()
     models = [StepModel(given.Phi[0], given.H[0], given.Q[0], given.R[0])] * steps
     z = list(exact(simulated_measurements(given, steps))[:, :, None])
     found = smooth_covariances(EXACT, Form.INNOVATION, models, given.x0[:, None], given.P0, z)
@@ -127,13 +124,13 @@ def exact_track(steps=60):
 @pytest.mark.parametrize(("form", "bits"), [("innovation", 31), ("Joseph", 29)])
 def test_the_search_is_right_by_the_exact_smoother(form, bits):
     """The answer meets 0.01, one bit less does not; the true estimates are exact."""
-    given, steps = tracked(), 60
+    given, steps = tracked(), 20
     z = simulated_measurements(given, steps)
     read = FixedIntervalSmoother(given, z, form)
     found = required_precision(read, steps, 0.01)
     assert found.digits == bits
     assert "operation by operation" not in str(found)
-    true = exact_track()
+    true = exact_track(given, steps)
     for digits, ratio in dict(found.tried).items():
         try:
             error = np.abs(read(FloatFormat(2, digits)).to_fractions() - true).max()

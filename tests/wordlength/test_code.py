@@ -114,7 +114,7 @@ int main(void)
 
 
 @needs_compiler
-@pytest.mark.parametrize(("integer", "fraction", "overflow"), [(8, 55, "wrap"), (63, -3, "saturate")])
+@pytest.mark.parametrize(("integer", "fraction", "overflow"), [(8, 55, "wrap"), (8, 55, "saturate"), (63, -3, "wrap")])
 def test_the_longest_words_are_divided_as_fractions(integer, fraction, overflow, tmp_path):
     """Also the lowest number of 64 bits, whose negative has 65, without undefined behaviour."""
     edges = [2**63 - 1, 2**62, 2**40 + 1, 3, 1]

@@ -59,7 +59,7 @@ def last_status(system, fmt, u, folder):
 
 
 @pytest.mark.skipif(not installed(), reason="no gcc and no clang")
-@pytest.mark.parametrize("fmt", [BINARY32, FixedFormat(4, 11), FixedFormat(4, 59)], ids=str)
+@pytest.mark.parametrize("fmt", [BINARY32, FixedFormat(4, 59)], ids=str)
 @pytest.mark.parametrize(
     ("step", "status"),
     [

@@ -25,7 +25,7 @@ B, A = signal.butter(4, 0.1)
 def filters(tmp_path):
     """A file with sections, and a file with an impulse."""
     (tmp_path / "sections.toml").write_text(f"sos = {SOS.tolist()}\n", encoding="utf-8")
-    (tmp_path / "u.csv").write_text("\n".join(["1", *["0"] * 99]), encoding="utf-8")
+    (tmp_path / "u.csv").write_text("\n".join(["1", *["0"] * 39]), encoding="utf-8")
     return tmp_path
 
 
@@ -111,7 +111,7 @@ def test_a_design_passes_on_what_it_is_asked_for(scale):
 
 @pytest.mark.parametrize("structure", ["direct form I", "cascade", "lattice", "state space"])
 def test_fraction_bits_of_a_system(structure):
-    u = np.random.default_rng(0).uniform(-1, 1, (300, 1))
+    u = np.random.default_rng(0).uniform(-1, 1, (100, 1))
     system = FilterDesign(sos=SOS).system(structure)
     like = WordFormats(FixedFormat(12, 1), FixedFormat(6, 24), FixedFormat(16, 13, overflow="wrap"))
     observed = required_precision(system, u, 1e-3, kind="fixed", like=like)
