@@ -178,16 +178,15 @@ def measurement_matrix(
     phase: ArrayLike,
     states: Sequence[str] = GPB_STATES,
     *,
-    signal: Signal = "gyro",
-    derolled: bool = True,
     nominal_theta: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Floats:
-    r"""Two readings, y and z, as a linear function of the unknowns, at given roll phases.
+    r"""Two derolled readings of the gyro, y and z, as a linear function of the unknowns, at given roll phases.
 
     Let :math:`\vec\theta = (-\theta_3, \theta_2)^T`, define :math:`\vec\alpha`, :math:`\vec\beta` and
     :math:`\vec\gamma` in the same way, and let :math:`\vec\theta = \vec\varphi + \vec\alpha`. R is the 2×2 block of
     :func:`roll`, :math:`J = \begin{bmatrix} 0 & 1 \\ -1 & 0 \end{bmatrix}`, b is the bias and k the error of the scale
-    factor. In the roll frame, to first order in every unknown, the readings are
+    factor. In the roll frame, to first order in every unknown, the readings, which :func:`deroll` transforms into the
+    intermediate frame, and those of the telescope, which :func:`measurement_rows` has too, are
 
     .. math::
 
@@ -203,8 +202,6 @@ def measurement_matrix(
     ----------
     phase : (...), ωt in radians.
     states : names from `STATES`, one for each column, in this order; rates are per any unit of time.
-    signal : which readings to use.
-    derolled : whether the readings are transformed into the intermediate frame, as by :func:`deroll`.
     nominal_theta : (..., 3), in radians; broadcast against `phase`. The first element is not used.
 
     Returns
@@ -217,7 +214,7 @@ def measurement_matrix(
     hung1982, ch. IV, eqs. (1)-(7); bias and scale factor from the classification of ch. II.
     """
     turned, theta = _finite("phase", phase), _angles("nominal_theta", nominal_theta, 3)
-    rows = measurement_rows(np.cos(turned), np.sin(turned), states, signal=signal, derolled=derolled, theta=theta)
+    rows = measurement_rows(np.cos(turned), np.sin(turned), states, theta=theta)
     return np.asarray(rows, dtype=np.float64) + 0.0  # no minus sign before a zero
 
 
@@ -235,7 +232,9 @@ def measurement_rows(
     Parameters
     ----------
     cosine, sine : (...), of ωt; floats, or objects such as Fractions for an exact model.
-    states, signal, derolled : as in :func:`measurement_matrix`.
+    states : as in :func:`measurement_matrix`.
+    signal : which readings to use.
+    derolled : whether the readings are transformed into the intermediate frame, as by :func:`deroll`.
     theta : (..., 3), the nominal θ, numbers of the same type or integers.
     """
     if not states or len(set(states)) != len(states) or not set(states) <= set(STATES):

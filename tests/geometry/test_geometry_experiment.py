@@ -76,8 +76,8 @@ def test_the_line_fit_to_samples_keeps_what_the_fit_to_means_drops():
     time = k * STEP / theory.YEAR
     samples = experiment.difference(case, time, 2 * np.pi / 5 * (k % 5))
     sampled = np.hypot(*(np.polyfit(time, samples, 1)[0] - case.drift))
-    leak = theory.line_fit_leak(SIZE, rolls, 5) / (rolls * PERIOD / theory.YEAR)
-    assert sampled == pytest.approx(leak, rel=1e-3)
+    leak = theory.line_fit_leak(SIZE, rolls) / (rolls * PERIOD / theory.YEAR)
+    assert sampled == pytest.approx(leak / (5 / np.pi * np.sin(np.pi / 5)), rel=1e-3)  # of five samples a roll
     assert np.hypot(*experiment.year(case, PERIOD, STEP).drift) <= third_order(case) < sampled / 1e3
 
 

@@ -73,6 +73,7 @@ def test_stored_bounds_of_gravity_probe_b() -> None:
     assert (last["deviation"][narrower] < last["absolute"][narrower] / 3).all()
 
 
+@pytest.mark.long  # 2,340 steps of ten states, in double-double
 def test_the_first_cycle_of_gravity_probe_b_again() -> None:
     first = {row.states: row for row in horizon.load()[:2]}
     assert {row.steps for row in first.values()} == {2340}

@@ -48,7 +48,7 @@ def test_a_part_that_is_not_in_the_formula_cannot_be_marked():
 
 def test_the_digits_follow_from_counting_step_by_step():
     k, n, m = 3_153_600, 10, 2
-    j = np.arange(1, k + 1, dtype=np.longdouble)
+    j = np.arange(1, k + 1, dtype=float)
 
     def digits(loop, entry, sign, more):
         loops, entries = (

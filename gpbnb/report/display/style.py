@@ -182,16 +182,15 @@ def legend(ax: Axes, **options: Any) -> None:
     ax.legend(frameon=False, fontsize=TEXT, **options)
 
 
-def envelope(ax: Axes, x: ArrayLike, y: ArrayLike, bins: int = 60, **style: Any) -> Any:
+def envelope(ax: Axes, x: ArrayLike, y: ArrayLike, **style: Any) -> Any:
     """Draw the least and the largest value of a long series within each bin of a logarithmic axis, as a band.
 
     Parameters
     ----------
     x, y : (n,), positive `x`; values of `y` that are not positive are left out.
-    bins : number of bins over the range of `x`.
     style : passed to :meth:`matplotlib.axes.Axes.fill_between`.
     """
-    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    x, y, bins = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64), 60
     place = np.minimum((bins * np.log(x / x[0]) / np.log(x[-1] / x[0])).astype(int), bins - 1)
     groups = [np.flatnonzero((place == each) & (y > 0)) for each in range(bins)]
     groups = [group for group in groups if group.size]
@@ -295,22 +294,14 @@ def label(ax: Axes, x: str, y: str, title: str = "") -> None:
         ax.set_title(title, fontsize=TEXT, loc="left")
 
 
-def defects(fig: Figure, placed: bool = True) -> list[str]:
-    """List where a drawn figure departs from the rule of this module.
-
-    Parameters
-    ----------
-    fig : a figure that was drawn.
-    placed : whether to judge the places of texts and points, which depend on the data, and the axes.
-    """
+def defects(fig: Figure) -> list[str]:
+    """List where a drawn figure departs from the rule of this module."""
     found = [*_wrong_texts(fig)]
     for ax in fig.axes:
         found += [*_wrong_lines(ax)]
         if (box := ax.get_legend()) is not None and len(box.get_texts()) > MOST_ENTRIES:
             found.append(f"a legend has {len(box.get_texts())} entries; at most {MOST_ENTRIES}, or name the curves")
-    if placed:
-        found += [*_wrong_places(fig), *_wrong_axes(fig)]
-    return found
+    return [*found, *_wrong_places(fig), *_wrong_axes(fig)]
 
 
 def contrast(colour: str) -> float:

@@ -184,30 +184,25 @@ def effect(case: Misalignments, rolling: bool, phase: float = 0.0) -> Effect:
     return Effect((float(start[0]), float(start[1])), (float(drift[0]), float(drift[1])), line)
 
 
-def line_fit_leak(amplitude: float, rolls: float, samples: float | None = None) -> float:
+def line_fit_leak(amplitude: float, rolls: float) -> float:
     r"""Return the drift error of a line fitted to all samples, due to an offset fixed in the spacecraft.
 
-    .. math:: |\Delta\text{drift}| = \frac{6}{\pi N}\,\text{amplitude}, \qquad
-        \text{or } \frac{6}{nN\sin(\pi/n)}\,\text{amplitude for n samples a roll}
+    .. math:: |\Delta\text{drift}| = \frac{6}{\pi N}\,\text{amplitude}
 
-    for N whole rolls, to first order in 1/N. It vanishes if the line is fitted to means of whole rolls.
+    for N whole rolls of many samples, to first order in 1/N. It vanishes if the line is fitted to means of whole rolls.
 
     Parameters
     ----------
     amplitude : amplitude at the roll frequency, in any unit.
     rolls : N, above 0.
-    samples : n, samples per roll, at least 2; infinitely many by default.
 
     Returns
     -------
     leak : length of the vector of both drift errors, in the unit of `amplitude` per length of the record.
     """
-    if not rolls > 0 or (samples is not None and samples < 2):
-        raise ValueError(
-            f"got {rolls} rolls with {samples} samples each; needed more than 0 rolls, and 2 or more samples"
-        )
-    spread = math.pi if samples is None else samples * math.sin(math.pi / samples)
-    return 6 / (rolls * spread) * abs(amplitude)
+    if not rolls > 0:
+        raise ValueError(f"got {rolls} rolls; needed more than 0")
+    return 6 / (rolls * math.pi) * abs(amplitude)
 
 
 def twist_limit(allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:

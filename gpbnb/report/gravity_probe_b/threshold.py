@@ -276,13 +276,12 @@ class Share(NamedTuple):
         return len(self.errors)
 
 
-def shares(table: StoredTable, tolerance: float = 1.0) -> tuple[Share, ...]:
-    """Return, for each format, the share of records that stay within the tolerance throughout the year.
+def shares(table: StoredTable) -> tuple[Share, ...]:
+    """Return, for each format, the share of records that stay within 1 mas and 1 mas/yr throughout the year.
 
     Parameters
     ----------
     table : table with the columns of ``COLUMNS``, and possibly a column `setting` before them.
-    tolerance : tolerance for the drift angles in mas and their rates in mas/yr, at every step.
     """
     groups: dict[tuple[str, ...], list[float]] = {}
     for row in table.records():
@@ -291,7 +290,7 @@ def shares(table: StoredTable, tolerance: float = 1.0) -> tuple[Share, ...]:
     found = []
     for (setting, states, form, base, precision, rounding), group in groups.items():
         errors = np.array(group)
-        within = int((errors <= tolerance).sum())
+        within = int((errors <= 1).sum())
         fmt = FloatFormat(int(base), int(precision), Rounding(rounding))
         found.append(Share(setting, states, form, fmt, errors, within))
     return tuple(sorted(found, key=_order))

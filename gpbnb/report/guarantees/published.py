@@ -28,19 +28,17 @@ def elaenia_gold() -> LinearModel:
     return LinearModel([[1]], [[1]], [[0]], [[225]], [990], [[100]], name="elaenia, gold")
 
 
-def dyer_mcreynolds(d: str = "0.0024") -> LinearModel:
+def dyer_mcreynolds() -> LinearModel:
     """Three constants seen by two nearly parallel measurements: an example by Dyer and McReynolds.
 
-    Parameters
-    ----------
-    d : deviation of the two measurements from parallel. Grewal and Andrews compare filters for
-        ``d = eps**(2/3) * 10**(10 - k)``; in binary32, k = 8 gives about the default.
+    They deviate from parallel by 0.0024. Grewal and Andrews compare filters for ``eps**(2/3) * 10**(10 - k)``; in
+    binary32, k = 8 gives about this.
 
     References
     ----------
     dyer1969; the script ``shootout.m`` of grewal2008.
     """
-    e = Fraction(d)
+    e = Fraction("0.0024")
     unit, H = exact(np.eye(3, dtype=np.int64)), exact([[1, 1, 1], [1, 1, 1 + e]])
     R = exact(np.eye(2, dtype=np.int64)) * e**2
     return LinearModel(unit, H, 0 * unit, R, [1, 1, -1], unit, name="Dyer and McReynolds")

@@ -67,16 +67,11 @@ def fit_drift(derolled: NDArray[np.complex128], interval: float = INTERVAL) -> N
     return np.array([float(np.sum(weights * part)) * YEAR for part in (derolled.real, derolled.imag)])
 
 
-def clean_drift_error(
-    drift: tuple[float, float],
-    phase_error: Callable[[Any], Any],
-    period: float = PERIOD,
-    duration: float = YEAR,
-    interval: float = 100.0,
-) -> NDArray[np.float64]:
+def clean_drift_error(drift: tuple[float, float], phase_error: Callable[[Any], Any]) -> NDArray[np.float64]:
     """Return the errors (2,) of both drifts, in mas a year, for a noise-free record derolled with a phase error."""
+    interval = 100.0
     stages = derolled_record(
-        drift, 0.0, period, np.random.default_rng(0), round(duration / interval), interval, phase_error
+        drift, 0.0, PERIOD, np.random.default_rng(0), round(YEAR / interval), interval, phase_error
     )
     return fit_drift(stages["derolled"], interval) - np.array(drift)
 
@@ -133,11 +128,11 @@ class Slope:
     decades: float
 
 
-def fit_slope(spectrum: Spectrum, interval: float = INTERVAL) -> Slope:
+def fit_slope(spectrum: Spectrum) -> Slope:
     """Fit a line to log density against log frequency, with a weight for each band, and correct for sampling."""
     x = np.log10(spectrum.frequency)
     # The logarithm of a mean of m values is too low by 1/(2m). Sampling raises the density by x/sin x, x = πfΔt.
-    y = np.log10(spectrum.density * np.sinc(spectrum.frequency * interval)) + np.log10(np.e) / (2 * spectrum.averages)
+    y = np.log10(spectrum.density * np.sinc(spectrum.frequency * INTERVAL)) + np.log10(np.e) / (2 * spectrum.averages)
     w = spectrum.averages
     x = x - np.sum(w * x) / np.sum(w)
     square = np.sum(w * x**2)
@@ -149,13 +144,12 @@ def noise_spectrum(
     samples: int = 2**21,
     channels: int = 4,
     segment: int = 2**19,
-    interval: float = INTERVAL,
     bands: int = 24,
 ) -> Spectrum:
     """Estimate the density of generated noise by Welch's method, in bands from 4 cycles a segment to f = 0.12/Δt."""
     records = record(LEVEL, samples, channels, rng)
-    f, p, averages = welch(records, interval, segment)
-    return in_bands(f, p, averages, 4 / (segment * interval), 0.12 / interval, bands)
+    f, p, averages = welch(records, INTERVAL, segment)
+    return in_bands(f, p, averages, 4 / (segment * INTERVAL), 0.12 / INTERVAL, bands)
 
 
 @dataclass(frozen=True)
@@ -211,9 +205,6 @@ class DriftStudy:
     """Errors of fitted drift rates of x and y in mas a year, (periods, gyros, 2); a period of None means no roll."""
 
     periods: tuple[float | MaybeNone, ...]
-    level: float
-    samples: int
-    interval: float
     errors: NDArray[np.float64]
 
     def standard_error(self) -> NDArray[np.float64]:
@@ -229,24 +220,20 @@ def drift_rates(
     periods: Sequence[float | None],
     gyros: int,
     rng: np.random.Generator,
-    level: float = LEVEL,
-    duration: float = YEAR,
-    interval: float = INTERVAL,
-    drift: tuple[float, float] = theory.DRIFTS,
+    samples: int = YEAR_SAMPLES,
     progress: bool = False,
 ) -> DriftStudy:
     """Roll, measure, deroll and fit both drifts of gyros with two readouts each; all periods use the same noise."""
-    n = round(duration / interval)
-    index = np.arange(n)
-    ramp = complex(*drift) * (index * interval / YEAR)
-    phases = [np.zeros(n) if p is None else theory.roll_phase(index, p, interval) for p in periods]
+    index = np.arange(samples)
+    ramp = complex(*theory.DRIFTS) * (index * INTERVAL / YEAR)
+    phases = [np.zeros(samples) if p is None else theory.roll_phase(index, p) for p in periods]
     errors = np.empty((len(periods), gyros, 2))
     for g in tqdm(range(gyros), desc="gyros", ncols=80, disable=not progress):
-        noise = record(level, n, 2, rng) @ (1, 1j)
+        noise = record(LEVEL, samples, 2, rng) @ (1, 1j)
         for p, phase in enumerate(phases):
             turn = np.exp(1j * phase)
-            errors[p, g] = fit_drift((ramp * turn.conj() + noise) * turn, interval) - np.array(drift)
-    return DriftStudy(tuple(periods), level, n, interval, errors)
+            errors[p, g] = fit_drift((ramp * turn.conj() + noise) * turn) - np.array(theory.DRIFTS)
+    return DriftStudy(tuple(periods), errors)
 
 
 SURVEY_PERIODS = (None, 6000.0, 600.0, 200.0, 77.5)
@@ -268,7 +255,7 @@ def survey() -> DriftStudy:
     """Read the stored survey."""
     table = np.array([row[1:] for row in SWEEP.load().rows], dtype=np.float64)
     errors = table.reshape(len(table), len(SURVEY_PERIODS), 2).transpose(1, 0, 2)
-    return DriftStudy(SURVEY_PERIODS, LEVEL, YEAR_SAMPLES, INTERVAL, errors)
+    return DriftStudy(SURVEY_PERIODS, errors)
 
 
 def survey_rows(study: DriftStudy) -> list[tuple[str, ...]]:
@@ -305,7 +292,6 @@ class FilterStudy:
     """
 
     drift: float
-    period: float
     filters: tuple[NDArray[np.float64], ...]
     squares: NDArray[np.float64]
 
@@ -325,26 +311,23 @@ def filter_study(
     bandwidths: Sequence[float],
     gyros: int,
     rng: np.random.Generator,
-    period: float = PERIOD_FLOWN,
-    level: float = LEVEL,
-    duration: float = YEAR,
-    interval: float = INTERVAL,
+    duration: float,
 ) -> FilterStudy:
     """Measure the error of a drift after a single pole and after a moving average, for each noise bandwidth in Hz.
 
     Each component of each gyro, rolled and derolled, is a record. Averages start after ten time constants.
     """
-    n = round(duration / interval)
-    skip = math.ceil(10 / (4 * min(bandwidths)) / interval)
-    filters = [theory.single_pole(1 / (4 * b), interval) for b in bandwidths]
-    filters += [theory.moving_average(1 / (2 * b), interval) for b in bandwidths]
+    n = round(duration / INTERVAL)
+    skip = math.ceil(10 / (4 * min(bandwidths)) / INTERVAL)
+    filters = [theory.single_pole(1 / (4 * b)) for b in bandwidths]
+    filters += [theory.moving_average(1 / (2 * b)) for b in bandwidths]
     squares = np.zeros((len(filters), 2 * gyros))
     for g, child in enumerate(rng.spawn(gyros)):
-        stages = derolled_record((drift, drift), level, period, child, n, interval)
+        stages = derolled_record((drift, drift), LEVEL, PERIOD_FLOWN, child, n)
         for i, weights in enumerate(filters):
             late = scipy.signal.oaconvolve(stages["derolled"], weights)[:n] - stages["signal"]
             squares[i, 2 * g : 2 * g + 2] = np.mean(late.real[skip:] ** 2), np.mean(late.imag[skip:] ** 2)
-    return FilterStudy(drift, period, tuple(filters), squares)
+    return FilterStudy(drift, tuple(filters), squares)
 
 
 # -- an uneven roll rate -------------------------------------------------------------------------

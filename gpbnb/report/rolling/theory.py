@@ -210,16 +210,14 @@ def single_pole(time_constant: float, interval: float = INTERVAL) -> NDArray[np.
     return np.asarray((1 - keep) * keep ** np.arange(math.ceil(37 * time_constant / interval) + 1))
 
 
-def filtered_variance(
-    weights: Any, level: float, samples: int, period: float | None, interval: float = INTERVAL
-) -> float:
+def filtered_variance(weights: Any, level: float, samples: int, period: float | None) -> float:
     """Exact variance, in mas², of the derolled and filtered noise in one component at the last sample."""
     a = np.zeros(samples)
     kept = min(samples, len(weights))
     a[samples - kept :] = np.asarray(weights)[:kept][::-1]
     if period is None:
         return variance_of_sum(a, level)
-    phase = roll_phase(np.arange(samples), period, interval)
+    phase = roll_phase(np.arange(samples), period)
     return sum(variance_of_sum(a * part(phase), level) for part in (np.cos, np.sin))
 
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.inverse import check_relative, smallest_precision
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.contraction import companion_bound
@@ -69,7 +68,6 @@ def update_stagnation(
     z: NDArray[Any],
     state: int,
     formats: Sequence[FloatFormat],
-    form: Form | str = Form.INNOVATION,
     last: int = 200,
 ) -> tuple[UpdateStagnation, ...]:
     """Measure how much the updates of a slow state stagnate in several formats.
@@ -87,7 +85,7 @@ def update_stagnation(
     checkpoint_steps = tuple(sorted({*log_spaced(len(z), 16), *range(max(len(z) - last, 1), len(z) + 1)}))
     true, found = reference(model, z, checkpoint_steps), []
     for fmt in formats:
-        run = Run(model, fmt, form, checkpoint_steps)
+        run = Run(model, fmt, Form.INNOVATION, checkpoint_steps)
         run.take(fmt.array(z))
         history, checkpoints = compare_runs(run, true), run.checkpoints()
         variance = float(checkpoints.P[-1, state, state] / true.P[len(checkpoints.P) - 1, state, state])
@@ -132,9 +130,7 @@ class InversePrecision(NamedTuple):
     needed: int
 
 
-def inverse_precision(
-    name: str, matrix: NDArray[Any], tolerance: float, rounding: Rounding = Rounding.NEAREST
-) -> InversePrecision:
+def inverse_precision(name: str, matrix: NDArray[Any], tolerance: float) -> InversePrecision:
     r"""Return bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` tolerance, and the bits that are needed.
 
     D scales by powers of two to a diagonal near 1, as a choice of units would. Elimination makes the same rounding
@@ -163,6 +159,6 @@ def inverse_precision(
     scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
     pairs = ((matrix, inverse), (scaled, true_inverse(scaled)))
     conditions = [column_sum_norm(rationals(a)) * column_sum_norm(b) for a, b in pairs]
-    expected = report_bounds.precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
-    needed = smallest_precision(matrix, tolerance, 2, rounding).fmt.precision
+    expected = report_bounds.precision_for_coefficient(conditions[1], Fraction(tolerance), 2)
+    needed = smallest_precision(matrix, tolerance, 2).fmt.precision
     return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, needed)

@@ -58,7 +58,7 @@ def stages() -> dict[str, np.ndarray]:
 def filter_study() -> experiment.FilterStudy:
     best = theory.best_bandwidth(DRIFTS[0], FLOWN_DENSITY)
     rng = np.random.default_rng(8)
-    return experiment.filter_study(DRIFTS[0], [best / 3, best, 3 * best], 8, rng, duration=YEAR / 16)
+    return experiment.filter_study(DRIFTS[0], [best / 3, best, 3 * best], 8, rng, YEAR / 16)
 
 
 @cache
@@ -87,7 +87,7 @@ def expected_squares() -> np.ndarray:
     expected = []
     for weights in study.filters:
         lag = float(np.arange(len(weights)) @ weights) * theory.INTERVAL
-        noise = theory.filtered_variance(weights, LEVEL, middle, study.period)
+        noise = theory.filtered_variance(weights, LEVEL, middle, PERIOD_FLOWN)
         expected.append((study.drift / YEAR * lag) ** 2 + noise)
     return np.array(expected)
 
