@@ -57,7 +57,7 @@ class RepeatedStep:
     def take(self, *own: FloatArray) -> Iterator[StepTaken]:
         """Take a step for each row of some arrays (steps, ...), and give the results of some steps at a time."""
         count, at = len(own[0]), 0
-        if self._opens:
+        if self._opens and count:
             self._opens, self._repeated = False, self._opened(self.given(*(each[0] for each in own)), count)
         while at < count:
             if self._repeated is not None:

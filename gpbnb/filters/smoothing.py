@@ -26,8 +26,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -42,6 +41,8 @@ from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel, identity_in, in_columns
+from gpbnb.filters.repeating import RepeatedStep
+from gpbnb.filters.stepping import StepTaken
 from gpbnb.filters.steps import (
     StepModel,
     corrected,
@@ -56,15 +57,6 @@ from gpbnb.filters.steps import (
 
 SMOOTHER_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.CARLSON)
 """Forms of the filter that a smoother has; the last one computes square roots, forwards and backwards."""
-
-Each = TypeVar("Each")
-
-
-class SmoothedStep(NamedTuple):
-    """The smoothed estimate (n, 1), or (n,) with roots, of one step, and its covariance or root (n, n)."""
-
-    x: Matrix
-    P: Matrix
 
 
 class SmoothedRecord(NamedTuple):
@@ -83,82 +75,53 @@ class RootModel(NamedTuple):
     UR: Matrix
 
 
-class _Passed(NamedTuple):
-    """One step of the filter: its transition, prediction and estimate."""
-
-    Phi: Matrix
-    ahead: Matrix
-    V: Matrix
-    x: Matrix
-    P: Matrix
-
-
-class _PassedRoot(NamedTuple):
-    """One step of the filter with roots; A and B correct the step before, C is the root of the prediction."""
-
-    A: Matrix
-    B: Matrix
-    C: Matrix
-    ahead: Matrix
-    x: Matrix
-
-
-def smooth_covariances(
-    algebra: Algebra, form: Form, models: Sequence[StepModel], x: Matrix, P: Matrix, z: Sequence[Matrix]
-) -> list[SmoothedStep]:
-    """Smooth with covariances, over numbers of any kind.
+def filtered(
+    algebra: Algebra, form: Form, model: StepModel, x: Matrix, P: Matrix, z: Matrix
+) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+    """Take one step of the filter over numbers of any kind; return x, P, and what a smoother keeps of the step.
 
     Parameters
     ----------
     algebra : how numbers of this kind are computed.
     form : Form.INNOVATION or Form.JOSEPH.
-    models, z : the matrices and the measurement (m, 1) of each step.
-    x (n, 1), P (n, n) : the first estimate and its covariance, before the first step.
+    x (n, 1), P (n, n), z (m, 1) : estimate and covariance before the step, and its measurement.
     """
-    times, rounded, passed = algebra.times, algebra.rounded, []
-    for model, measured in zip(models, z, strict=True):
-        V = predicted(algebra, model.Phi, P, model.Q)
-        K = gain(algebra, model.H, model.R, V).K
-        P = updated(algebra, form, model, V, K)
-        ahead = times(model.Phi, x)
-        x = corrected(algebra, model.H, K, ahead, measured)
-        passed.append(_Passed(model.Phi, ahead, V, x, P))
-    found = [SmoothedStep(x, P)]
-    for k in range(len(passed) - 1, 0, -1):
-        now, after = passed[k - 1], passed[k]
-        inverse = algebra.invert(after.V, algebra.identity(len(P))).matrix
-        G = times(times(now.P, after.Phi.T), inverse)
-        x = rounded(now.x + times(G, rounded(x - after.ahead)))
-        P = rounded(now.P + times(times(G, rounded(P - after.V)), G.T))
-        found.append(SmoothedStep(x, P))
-    return found[::-1]
+    V = predicted(algebra, model.Phi, P, model.Q)
+    K = gain(algebra, model.H, model.R, V).K
+    P = updated(algebra, form, model, V, K)
+    ahead = algebra.times(model.Phi, x)
+    return corrected(algebra, model.H, K, ahead, z), P, ahead, V
 
 
-def smooth_roots(
-    models: Sequence[RootModel], x: Matrix, S: Matrix, z: Sequence[Matrix], identity: Matrix
-) -> list[SmoothedStep]:
-    """Smooth with upper triangular square roots, over arrays of numbers that have ``sqrt``.
+def smoothed(
+    algebra: Algebra, Phi: Matrix, before: Sequence[Matrix], ahead: Matrix, V: Matrix, x: Matrix, P: Matrix
+) -> tuple[Matrix, Matrix]:
+    """Smooth a step of the filter, x and P of which are given before the next step, by the next smoothed ones."""
+    times, rounded = algebra.times, algebra.rounded
+    G = times(times(before[1], Phi.T), algebra.invert(V, algebra.identity(len(P))).matrix)
+    x = rounded(before[0] + times(G, rounded(x - ahead)))
+    return x, rounded(before[1] + times(times(G, rounded(P - V)), G.T))
+
+
+def filtered_root(model: RootModel, x: Matrix, S: Matrix, z: Matrix, identity: Matrix) -> tuple[Matrix, ...]:
+    """Take one step with square roots; return x and S, the prediction, and A, B and C of the triangle.
 
     Parameters
     ----------
-    models, z : the matrices and the measurement (m,) of each step.
-    x (n,), S (n, n) : the first estimate and a root of its covariance, before the first step.
-    identity : (n, n).
+    x (n,), S (n, n), z (m,) : estimate and root before the step, and its measurement. identity : (n, n).
     """
-    passed: list[_PassedRoot] = []
-    for model, measured in zip(models, z, strict=True):
-        A, B, C = _joint_root(model, S, identity)
-        ahead = model.Phi @ x
-        x, S, _, _ = observed(observe_carlson, model.H, model.UR, measured, ahead, C)
-        passed.append(_PassedRoot(A, B, C, ahead, x))
-    found = [SmoothedStep(x, S)]
-    for k in range(len(passed) - 1, 0, -1):
-        A, B, C, ahead, _ = passed[k]
-        solved = inverse_in_order(C, np.concatenate([(x - ahead)[:, None], S], axis=1)).matrix
-        x = passed[k - 1].x + B @ solved[:, 0]
-        S, _ = predict_root(B, solved[:, 1:], A)
-        found.append(SmoothedStep(x, S))
-    return found[::-1]
+    A, B, C = _joint_root(model, S, identity)
+    ahead = model.Phi @ x
+    x, S, _, _ = observed(observe_carlson, model.H, model.UR, z, ahead, C)
+    return x, S, ahead, A, B, C
+
+
+def smoothed_root(
+    before: Matrix, ahead: Matrix, A: Matrix, B: Matrix, C: Matrix, x: Matrix, S: Matrix
+) -> tuple[Matrix, Matrix]:
+    """Smooth as :func:`smoothed` does, with the estimate before the next step, and its triangle."""
+    solved = inverse_in_order(C, np.concatenate([(x - ahead)[:, None], S], axis=1)).matrix
+    return before + B @ solved[:, 0], predict_root(B, solved[:, 1:], A)[0]
 
 
 def _joint_root(model: RootModel, S: Matrix, identity: Matrix) -> tuple[Matrix, Matrix, Matrix]:
@@ -252,37 +215,59 @@ class FixedIntervalSmoother:
         OverflowError : a number leaves the range of the format.
         """
         try:
-            steps = self._by_roots(fmt) if self.form is Form.CARLSON else self._by_covariances(fmt)
+            x, P = self._smoothed(fmt)
         except ZeroDivisionError:
             raise ZeroDivisionError(
                 f"got a singular innovation covariance or predicted covariance of {self.model.name} in "
                 f"{format_text(fmt)}; needed pivots other than zero; use more {digit_unit(fmt.base)}, or add a little "
                 "to the diagonals of Q and P0"
             ) from None
-        x: Any = np.stack([step.x.reshape(self.model.n) for step in steps])
-        P: Any = np.stack([step.P for step in steps])
-        return SmoothedRecord(x, P)
+        return SmoothedRecord(x.reshape(len(x), self.model.n), P)
 
-    def _by_covariances(self, fmt: FloatFormat | FixedFormat) -> list[SmoothedStep]:
+    def _smoothed(self, fmt: FloatFormat | FixedFormat) -> tuple[FloatArray, FloatArray]:
+        """Run the filter forwards and the smoother backwards."""
+        roots, join = self.form is Form.CARLSON, cast(Any, np.concatenate)
+        (start, cycles), z = self._factored(fmt) if roots else self._stored(fmt), fmt.array(self.z)
+        identity_in(fmt, 1)
+        forwards = RepeatedStep(self._forwards, [fmt], start, cycles).take(z if roots else z[:, :, None])
+        found = zip(*((*each.states, *each.gain) for each in forwards), strict=True)
+        x, P, *passed = (join(each)[::-1] for each in found)
+        Phi = cycles[0][[(len(z) - 1 - k) % len(cycles[0]) for k in range(len(cycles[0]))]]
+        own = (x[1:], *(() if roots else (P[1:],)), *(each[:-1] for each in passed))
+        backwards = RepeatedStep(self._backwards, [fmt], (x[0], P[0]), [Phi])
+        steps = [each.states for each in backwards.take(*own)]
+        ends = zip((x[:1], P[:1]), *steps, strict=True)
+        x, P = (join(each)[::-1] for each in ends)
+        return x, P
+
+    def _stored(self, fmt: FloatFormat | FixedFormat) -> tuple[tuple[FloatArray, ...], list[FloatArray]]:
         stored = self.model.definite_in(fmt).arrays(fmt)
-        parts = [list(stored[letter]) for letter in ("Phi", "H", "Q", "R")]
-        models = [StepModel(*(_member(each, k) for each in parts)) for k in range(len(self.z))]
-        algebra = Algebra(cache(lambda n: identity_in(fmt, n)), operator.matmul)
-        x, z = stored["x0"][:, None], list(fmt.array(self.z)[:, :, None])
-        return smooth_covariances(algebra, form_named(self.form), models, x, stored["P0"], z)
+        return (stored["x0"][:, None], stored["P0"]), [stored[letter] for letter in ("Phi", "H", "Q", "R")]
 
-    def _by_roots(self, fmt: FloatFormat | FixedFormat) -> list[SmoothedStep]:
-        model = self.model
+    def _factored(self, fmt: FloatFormat | FixedFormat) -> tuple[tuple[FloatArray, ...], list[FloatArray]]:
+        model, stack = self.model, cast(Any, np.stack)
         fmt.restart()
-        Phi, H = ([fmt.store(each) for each in cycle] for cycle in (model.Phi, model.H))
-        SQ = [root_of_factors(fmt.store(upper_factors(each))) for each in model.Q]
-        UR = [fmt.store(upper_factors(each)) for each in model.R]
+        Phi, H = (stack([fmt.store(each) for each in cycle]) for cycle in (model.Phi, model.H))
+        SQ = stack([root_of_factors(fmt.store(upper_factors(each))) for each in model.Q])
+        UR = stack([fmt.store(upper_factors(each)) for each in model.R])
         S = root_of_factors(fmt.store(upper_factors(model.P0)))
-        parts = (Phi, H, SQ, UR)
-        models = [RootModel(*(_member(each, k) for each in parts)) for k in range(len(self.z))]
-        identity = identity_in(fmt, model.n)
-        return smooth_roots(models, fmt.store(model.x0), S, list(fmt.array(self.z)), identity)
+        return (fmt.store(model.x0), S), [Phi, H, SQ, UR]
+
+    def _forwards(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
+        (fmt,), (z, *model), (x, P) = formats, given, states
+        if self.form is Form.CARLSON:
+            identity = fmt.array(np.eye(self.model.n, dtype=int))
+            x, P, *kept = filtered_root(RootModel(*model), x, P, z, identity)
+        else:
+            x, P, *kept = filtered(_algebra(fmt), form_named(self.form), StepModel(*model), x, P, z)
+        return StepTaken((x, P), tuple(kept), True)
+
+    def _backwards(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
+        (fmt,), (*kept, Phi) = formats, given
+        if self.form is Form.CARLSON:
+            return StepTaken(smoothed_root(*kept, *states), (), True)
+        return StepTaken(smoothed(_algebra(fmt), Phi, kept[:2], *kept[2:], *states), (), True)
 
 
-def _member(cycle: Sequence[Each], k: int) -> Each:
-    return cycle[k % len(cycle)]
+def _algebra(fmt: Any) -> Algebra:
+    return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), operator.matmul)

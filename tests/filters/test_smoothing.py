@@ -14,7 +14,7 @@ from gpbnb.arithmetic.algebra import EXACT
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
 from gpbnb.filters.simulation import simulated_measurements
-from gpbnb.filters.smoothing import smooth_covariances
+from gpbnb.filters.smoothing import filtered, smoothed
 from gpbnb.filters.steps import StepModel
 
 FORMS = ("innovation", "Joseph", "square root")
@@ -78,6 +78,18 @@ def solved(a, b):
     return b
 
 
+def smoothed_exactly(form, models, x, P, z):
+    """Smoothed estimates (n, 1) and covariances without rounding."""
+    passed = []
+    for step, measured in zip(models, z, strict=True):
+        x, P, ahead, V = filtered(EXACT, form, step, x, P, measured)
+        passed.append((x, P, ahead, V))
+    found = [(x, P)]
+    for step, before, (_, _, ahead, V) in zip(models[:0:-1], passed[-2::-1], passed[:0:-1], strict=True):
+        found.append(smoothed(EXACT, step.Phi, before[:2], ahead, V, *found[-1]))
+    return found[::-1]
+
+
 def gaps():
     """The record with a whole step and single measurements missing."""
     z = measurements()
@@ -95,9 +107,9 @@ def test_the_algebra_is_that_of_exact_least_squares(z):
             StepModel(*(c[k % len(c)] for c in (read.model.Phi, read.model.H, read.model.Q, read.model.R)))
             for k in range(len(z))
         ]
-        found = smooth_covariances(EXACT, form, models, given.x0[:, None], given.P0, list(read.z[:, :, None]))
-        assert [step.x[:, 0].tolist() for step in found] == x.tolist()
-        assert [step.P.tolist() for step in found] == [each.tolist() for each in P]
+        found = smoothed_exactly(form, models, given.x0[:, None], given.P0, read.z[:, :, None])
+        assert [x[:, 0].tolist() for x, _ in found] == x.tolist()
+        assert [P.tolist() for _, P in found] == [each.tolist() for each in P]
     root = FixedIntervalSmoother(given, z, "square root").run(FloatFormat(2, 300))
     S = root.P.to_fractions()
     assert np.abs(root.x.to_fractions() - x).max() < Fraction(1, 2**280)  # 300 bits lose fewer than 20
@@ -116,9 +128,9 @@ def tracked():
 def exact_track(given, steps):
     """The smoothed estimates without rounding, (steps, n)."""
     models = [StepModel(given.Phi[0], given.H[0], given.Q[0], given.R[0])] * steps
-    z = list(exact(simulated_measurements(given, steps))[:, :, None])
-    found = smooth_covariances(EXACT, Form.INNOVATION, models, given.x0[:, None], given.P0, z)
-    return np.array([step.x[:, 0] for step in found])
+    z = exact(simulated_measurements(given, steps))[:, :, None]
+    found = smoothed_exactly(Form.INNOVATION, models, given.x0[:, None], given.P0, z)
+    return np.array([x[:, 0] for x, _ in found])
 
 
 @pytest.mark.parametrize(("form", "bits"), [("innovation", 31), ("Joseph", 29)])
