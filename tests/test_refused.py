@@ -38,6 +38,7 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters import emulation
 from gpbnb.filters.blocks import BLOCKS
+from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.run import Run, Sums
 from gpbnb.filters.simulation import simulated_inputs
 from gpbnb.report.integration import precision, theory
@@ -149,6 +150,7 @@ NAMES |= {
     "rows": lambda n: D4.array(np.arange(1, n * n + 1).reshape(n, n)),
     "WALK": gpbnb.LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]]),
     "SYSTEM": gpbnb.LinearSystem([["0.9"]], [["0.1"]]),
+    "BIQUAD": FilterDesign(["0.1", "0.2", "0.1"], [1, "-1.2", "0.5"]),
     "STEP": gpbnb.NonlinearSystem(lambda fmt, x, u: (x + u / 8, x), [0]),
     "WITHIN": gpbnb.limits(measurement=0.001),
     "MIMO": ([[0.5, 0.1], [-0.2, 0.8]], [[1.0, 0.3], [0.2, -1.0]], [[1.0, 2.0], [0.5, -1.0]], [[0.1, 0], [0, 0.2]]),
@@ -176,6 +178,7 @@ def folder():
         os.link("z.csv", "hard.html")
         patch.setattr(report, "study", mock.Mock(side_effect=AssertionError("something was computed")))
         yield
+        assert not Path("code").exists()
         assert {name: Path(name).read_text(encoding="utf-8") for name in FILES} == FILES
 
 

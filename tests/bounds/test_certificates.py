@@ -446,8 +446,8 @@ def original(name: str) -> str:
     return json.dumps(contents[name]())
 
 
-KALMAN = ("tracker", "joseph", "ud", "hung")
-STEADY = ("tracker", "joseph", "hung", "section")  # the bound of the UD form is that of its first steps
+KALMAN = ("joseph", "ud", "hung")
+STEADY = ("joseph", "hung", "section")  # the bound of the UD form is that of its first steps
 EVERY = (*KALMAN, "section")
 
 
@@ -564,7 +564,7 @@ ALTERED: dict[str, tuple[tuple[str, ...], Callable[[Content], None]]] = {
 }
 
 
-@pytest.mark.parametrize("name", [*EVERY, "cycle", "words"])
+@pytest.mark.parametrize("name", [*EVERY, "tracker", "cycle", "words"])
 def test_originals_are_proved_and_altered_certificates_are_rejected(name: str) -> None:
     """Where a smaller bound might hold, the rows do not prove it."""
     prove(json.loads(original(name)))

@@ -9,6 +9,7 @@ from gpbnb import FixedFormat, FloatFormat, LinearSystem, required_precision
 from gpbnb.bounds.guarantee import limits
 from gpbnb.bounds.limited import limited_errors
 from gpbnb.bounds.system import output_errors
+from gpbnb.wordlength.required import judge
 
 LEAKING = [
     {"Kd": "0.7", "leak": "0.99", "limits": (-1, 1)},
@@ -51,8 +52,8 @@ def test_an_integral_without_limits_or_leak_has_no_bound_for_ever():
     system = LinearSystem.pid("0.5", "0.1", limits=(-1, 1))
     with pytest.raises(ValueError, match="whose states may grow without end; needed limits on them"):
         limited_errors(system, FloatFormat(2, 24), np.ones(1))
-    found = required_precision(system, e, 0.01, basis="bound")
-    assert found.steps == 10
+    found = judge(system, FloatFormat(2, 24), e, 0.01, basis="bound")
+    assert (found.met, found.steps) == (True, 10)
     assert str(found).endswith("proved for this run of 10 steps")
     with pytest.raises(ValueError, match="a linear system with limits, cannot have a probable error; ask"):
         required_precision(system, 10, 0.01, basis="probable", within=limits(measurement=1))

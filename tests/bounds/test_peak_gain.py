@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gpbnb import LinearSystem, limits, required_precision
+from gpbnb import FloatFormat, LinearSystem, limits
 from gpbnb.bounds.check import prove
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule
 from gpbnb.bounds.linear import peak_gain
+from gpbnb.wordlength.required import judge
 
 ONE = 2**300
 """A unit of fixed point, whose rounding errors are far below those that are measured."""
@@ -100,9 +101,10 @@ def test_peak_gains_of_slow_filters_are_those_of_a_plain_loop(
 
 def test_a_low_frequency_has_a_guarantee_that_the_checker_proves() -> None:
     _, system = cascade(2, 20, 48_000)
-    found = required_precision(system, np.ones((100, 1)), 1e-3, basis="guarantee", within=limits(measurement=1))
-    assert found.format is not None
+    fmt = FloatFormat(2, 36)
+    found = judge(system, fmt, np.ones((100, 1)), 1e-3, basis="guarantee", within=limits(measurement=1))
+    assert found.met
     assert str(found).endswith("guaranteed for ever")
-    made = filter_schedule(system.as_filter(), found.format)
+    made = filter_schedule(system.as_filter(), fmt)
     proof = from_schedule(made, limits(measurement=1.0), 1).certificate()
     assert "after any number of steps" in prove(json.loads(proof))

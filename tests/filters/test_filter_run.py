@@ -251,10 +251,3 @@ def test_a_step_releases_exactly_the_arrays_that_it_makes():
         counts.append(made)
         assert (made - released, last.alloc - first.alloc - (last.free - first.free)) == (0, 0)
     assert max(counts) > 0
-
-
-def test_a_filter_whose_step_is_too_long_to_record_is_refused_with_its_size() -> None:
-    n = 128
-    model = LinearModel(np.ones((n, n)) / n, np.ones((1, n)), np.eye(n), [[1]], np.zeros(n), np.eye(n))
-    with pytest.raises(ValueError, match=r"^got a filter with n = 128 and m = 1; needed a step of at most 8388608"):
-        emulate(model, np.zeros((2, 1)), FloatFormat(2, 24))

@@ -45,14 +45,6 @@ def test_overflow_names_operation_and_step(in_python, monkeypatch):
         run_words(system, np.full((9, 1), 3.0), words)
 
 
-def test_a_coefficient_beyond_its_range_is_named():
-    system = LinearSystem.from_coefficients(["0.5"], [1, "-1.9", "0.95"])
-    with pytest.raises(
-        OverflowError, match=r"got a1 = -1\.9, beyond the range of fixed point of 16 bits, 15 of them fraction"
-    ):
-        run_words(system, np.zeros((3, 1)), WordFormats(FixedFormat(4, 15), FixedFormat(0, 15)))
-
-
 @pytest.mark.parametrize("wide", [False, True])
 def test_half_up_is_the_shift_of_integers_in_c(wide):
     """Two sections in direct form I, as fixed-point C has them: (p + half) >> n for each product, or for each sum."""

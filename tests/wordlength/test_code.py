@@ -13,10 +13,8 @@ import pytest
 from built_code import SANITIZER, disagreement, driven, installed, models
 
 from gpbnb import (
-    BINARY16,
     BINARY32,
     BINARY64,
-    DECIMAL32,
     FixedFormat,
     FloatFormat,
     Form,
@@ -31,7 +29,6 @@ from gpbnb import (
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import WITH_PROGRAM
-from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
 from gpbnb.wordlength.__main__ import main
@@ -66,13 +63,6 @@ def test_known_inputs_follow_the_measurements(fmt, tmp_path):
     assert "const filter_number input[3]" in path.read_text()
     moved = emulate(driven(), z, fmt).x.to_float()
     assert not np.array_equal(moved, emulate(driven().without_inputs(), z, fmt).x.to_float())
-
-
-def test_offsets_and_inputs_of_hungs_forms_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="make each a known input that is always 1"):
-        write_code(replace(driven(), d=["0.5"]), BINARY32, tmp_path)
-    with pytest.raises(ValueError, match="not defined with them; needed another form"):
-        write_code(driven(), BINARY32, tmp_path, form="hung")
 
 
 def built(folder, flags=FLAGS):
@@ -169,15 +159,6 @@ def fits(model, fmt, form):
         return False
 
 
-@pytest.mark.parametrize("form", WITH_PROGRAM, ids=str)
-@pytest.mark.parametrize("fmt", [FixedFormat(17, -1), FixedFormat(0, 15, "even", "saturate")])
-def test_a_format_without_the_number_one_is_refused(fmt, form, tmp_path):
-    whole, even = fmt.fraction_bits > 0, np.array([[2]])
-    model = LinearModel(*(np.array([["0.5"]]) if whole else even for _ in range(4)), [0], [["0.5"]] if whole else even)
-    with pytest.raises(ValueError, match=r"which does not hold the number 1; needed .* at least 1 integer bit"):
-        write_code(model, fmt, tmp_path, form=form)
-
-
 def test_the_ud_form_divides_by_no_factor_of_r_that_is_zero(tmp_path):
     R = [["5/2048", "-13/4096"], ["-13/4096", "17/4096"]]
     model = LinearModel([["0.9"]], [["1"], ["0.5"]], [["0.5"]], R, [0], [["1"]])
@@ -232,21 +213,6 @@ def test_a_constant_gain_is_that_of_the_riccati_equation():
     assert filter_.outputs(z)[-1, 0, 0] == pytest.approx(float(K / (1 - Fraction("0.95") * (1 - K))), rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("model", "message"),
-    [
-        (models()["a cycle of three"], "which changes from step to step; needed a model that never changes"),
-        (
-            LinearModel([[1]], [[1]], [[0]], [[1]], [0], [[1]], "a mean"),
-            "whose gain does not settle within 100000 steps",
-        ),
-    ],
-)
-def test_a_gain_that_does_not_settle_is_refused(model, message):
-    with pytest.raises(ValueError, match=message):
-        settled_filter(model)
-
-
 # -- the header ------------------------------------------------------------------------------------------------------
 
 
@@ -278,53 +244,6 @@ def test_a_name_cannot_end_a_comment(tmp_path):
 
 
 # -- refusals --------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("given", "fmt", "form", "message"),
-    [
-        (BIQUAD, FloatFormat(2, 24), None, "no type; needed BINARY32, which rounds ties to even"),
-        (BIQUAD, FloatFormat(2, 19), None, "no type; needed BINARY32, which has more bits"),
-        (BIQUAD, BINARY16, None, "got BINARY16, for which C99 has no type"),
-        (BIQUAD, DECIMAL32, None, "no type; needed BINARY32 or BINARY64, or fixed point"),
-        (BIQUAD, FixedFormat(1, 63), None, "got data of 65 bits; needed at most 64"),
-        (BIQUAD, WordFormats(FixedFormat(0, 15), 12, FixedFormat(30, 40)), None, "got sums of 71 bits"),
-        (BIQUAD, FixedFormat(4, 11, "stochastic"), None, "stochastic rounding"),
-        (BIQUAD, BINARY32, "ladder", "got structure 'ladder'"),
-        (LinearSystem.smoother("0.5"), BINARY32, "lattice", "for a LinearSystem, which has its structure; needed None"),
-        (
-            models()["one state"],
-            WordFormats(FixedFormat(4, 11)),
-            "Joseph",
-            "needed BINARY32, BINARY64 or a FixedFormat",
-        ),
-        (models()["one state"], BINARY32, "Potter", "got the Potter form"),
-        (models()["one state"], FixedFormat(4, 11, "stochastic"), "UD", "stochastic rounding"),
-        (models()["one state"], FixedFormat(8, 55), "UD", "got 63 bits in fixed point; needed at most 51 for compiled"),
-        (
-            models()["one state"],
-            FixedFormat(8, 23, "even", "wrap"),
-            "UD",
-            "got overflow that wraps around; needed",
-        ),
-        (
-            NonlinearSystem(lambda fmt, x, u: (x[0] / u[0], x[0]), [2], 1),
-            FixedFormat(64, -1, "up", "saturate"),
-            None,
-            "got divisors of 64 bits",
-        ),
-    ],
-)
-def test_what_has_no_code_is_refused(given, fmt, form, message, tmp_path):
-    with pytest.raises(ValueError, match=re.escape(message)):
-        write_code(given, fmt, tmp_path / "code", form=form)
-    assert not (tmp_path / "code").exists()
-
-
-@pytest.mark.parametrize("name", ["", "1st", "a-b", "while", "../x", "x" * 32, None, "filtré"])
-def test_a_name_that_c_does_not_take_is_refused(name, tmp_path):
-    with pytest.raises(ValueError, match="got name"):
-        write_code(BIQUAD, BINARY32, tmp_path, name=name)
 
 
 def test_names_that_are_none_in_c_are_numbered():

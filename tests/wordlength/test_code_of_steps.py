@@ -16,8 +16,6 @@ from gpbnb import (
     FixedFormat,
     NonlinearModel,
     NonlinearSystem,
-    WordFormats,
-    limits,
     write_code,
 )
 from gpbnb.wordlength.c_files import FLAGS
@@ -89,18 +87,6 @@ def turning(fmt, x, u):
     return x / 2 + u, np.append(y, np.hypot(np.cbrt(y[0]), np.arctanh(y[0] / 2)))
 
 
-def test_functions_of_c_are_taken_only_if_digits_may_differ(tmp_path):
-    system, folder = NonlinearSystem(turning, [0]), tmp_path / "code"
-    with pytest.raises(ValueError, match=r"got np\.sin in the step, .* ask with exact=False"):
-        write_code(system, BINARY32, folder)
-    with pytest.raises(ValueError, match="got exact=False in fixed point; needed BINARY32 or BINARY64"):
-        write_code(system, FixedFormat(4, 11), folder, exact=False)
-    degrees = NonlinearSystem(lambda fmt, x, u: (x, np.rad2deg(u)), [0])
-    with pytest.raises(ValueError, match=r"got np\.rad2deg in the step.*np\.rint; write a polynomial"):
-        write_code(degrees, BINARY32, folder, exact=False)
-    assert not folder.exists()
-
-
 @pytest.mark.skipif(not installed(), reason="no gcc and no clang")
 @pytest.mark.parametrize("fmt", [BINARY32, BINARY64], ids=["binary32", "binary64"])
 def test_functions_of_c_stay_within_the_tolerance_that_the_header_states(fmt, tmp_path):
@@ -152,23 +138,6 @@ def test_nonlinear_filters_have_the_digits_of_their_emulation(fmt):
     assert [disagreement(beacon("extended", seen), fmt, form, z) for form in FORMS] == [""] * 4
     assert disagreement(beacon("unscented", seen), fmt, None, z) == ""
     assert disagreement(beacon("extended", bearing, angles=[1]), BINARY32, "UD", z, exact=False) == ""
-
-
-def test_a_filter_without_code_says_why(tmp_path):
-    def branching(x, u):
-        return seen(x, u) if x[0] > 0 else x
-
-    for model, more, message in (
-        (beacon("extended", branching), {}, "got a step that cannot be traced: it branches on a comparison"),
-        (beacon("extended", bearing), {}, r"got np\.hypot in the step, .* ask with exact=False"),
-        (beacon("extended", seen), {"form": "hung"}, "got the Hung .1984. form for a nonlinear filter"),
-        (beacon("extended", seen), {"within": limits(measurement=1)}, "got limits for a nonlinear model; needed none"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            write_code(model, BINARY32, tmp_path, **more)
-    for model in (beacon("extended", seen), SYSTEMS[0]):
-        with pytest.raises(ValueError, match="got formats of words for a nonlinear system"):
-            write_code(model, WordFormats(FixedFormat(3, 12), 9), tmp_path)
 
 
 def test_a_header_claims_no_bound(tmp_path):
