@@ -24,7 +24,7 @@ from tests import oracles
 
 pytestmark = pytest.mark.usefixtures("loops_at_once")
 
-seeded = settings(derandomize=True, deadline=None, database=None, max_examples=1000)
+seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 OPERATIONS = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}

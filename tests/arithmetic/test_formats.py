@@ -22,7 +22,7 @@ from tests import oracles
 
 pytestmark = pytest.mark.usefixtures("loops_at_once")
 
-seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
+seeded = settings(derandomize=True, deadline=None, database=None, max_examples=200)
 
 
 def digits(fewest: int, most: int) -> st.SearchStrategy[str]:

@@ -159,7 +159,7 @@ def test_rounded_up_to_float64(text):
 class TestSmallestPrecision:
     HILBERT = np.array([[Fraction(1, i + j + 1) for j in range(5)] for i in range(5)], dtype=object)
 
-    @pytest.mark.parametrize(("tolerance", "base", "rounding"), [(0.5, 10, NEAREST), (1e-9, 2, CHOP)])
+    @pytest.mark.parametrize(("tolerance", "base", "rounding"), [(0.5, 16, NEAREST), (1e-9, 2, CHOP)])
     @pytest.mark.parametrize("name", ["hilbert", "far from its origin", "in unequal units"])
     def test_it_is_the_first_of_all_precisions_that_meets_the_tolerance_with_the_next(
         self, name, tolerance, base, rounding

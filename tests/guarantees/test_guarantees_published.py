@@ -33,6 +33,7 @@ def test_a_number_is_missing_only_with_a_reason_and_every_row_has_its_source():
     assert len(comparison.table().body) == len(comparison.rows())
 
 
+@pytest.mark.long  # a thousand steps in Fractions, in which the controller forgets
 def test_the_lead_lag_controller_is_that_of_the_program_in_a_plain_loop():
     r, system, fmt = floating(2, 24, "even"), comparison.lead_lag(), comparison.SINGLE
     bound, rng, worst = comparison.output_errors(system, fmt, 1.0)[0], np.random.default_rng(2), Fraction(0)
