@@ -379,9 +379,8 @@ class LinearModel:
         ------
         OverflowError : the absolute value of an entry is not between 2**-450 and 2**450.
         """
-        for letter in (*LETTERS, *INPUTS):
-            given = getattr(self, letter)
-            for entry in () if given is None else {abs(each) for each in given.flat if each}:
+        for letter, (values, _) in different_entries(self).items():
+            for entry in filter(None, abs(values)):
                 exponent = entry.numerator.bit_length() - entry.denominator.bit_length()
                 if abs(exponent) > LARGEST_EXPONENT:
                     raise OverflowError(
@@ -448,11 +447,9 @@ class LinearModel:
         if random:
             fmt.restart()
         made: dict[str, FloatArray] = {}
-        for letter in (*LETTERS, *INPUTS):
-            if (given := getattr(self, letter)) is None:
-                continue
+        for letter, (values, places) in different_entries(self).items():
             try:
-                made[letter] = fmt.store(given)
+                made[letter] = fmt.store(values[places]) if random else _in_places(fmt, values, places)
             except OverflowError as error:
                 raise OverflowError(f"{letter}: {error}") from None
             if letter in _COVARIANCES and random:
@@ -472,6 +469,30 @@ class LinearModel:
 def remembered(function: F) -> F:
     """Keep the last results of a function of a model, and perhaps of a format; models are told apart by identity."""
     return cast(F, lru_cache(maxsize=16)(function))
+
+
+@remembered
+def different_entries(model: LinearModel) -> dict[str, tuple[NDArray[Any], NDArray[np.int64]]]:
+    """Return the different entries (k,) of each array of a model, and the place of each of its entries among them.
+
+    A long cycle of matrices shares few; equal numbers that are not one object count as different.
+    """
+    found = {}
+    for letter in (*LETTERS, *INPUTS):
+        if (given := getattr(model, letter)) is not None:
+            entries = {id(entry): entry for entry in given.flat}
+            order = dict(zip(entries, range(len(entries)), strict=True))
+            places = np.array([order[id(entry)] for entry in given.flat], np.int64).reshape(given.shape)
+            found[letter] = np.array([*entries.values()], object), places
+    return found
+
+
+def _in_places(fmt: FloatFormat | FixedFormat, values: NDArray[Any], places: NDArray[np.int64]) -> FloatArray:
+    try:
+        found: FloatArray = fmt.store(values)[places]
+    except OverflowError:
+        return fmt.store(values[places])  # which names the entry
+    return found
 
 
 def stored_arrays(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
@@ -557,8 +578,9 @@ def _mirrored(matrices: NDArray[Any]) -> NDArray[Any]:
 def _floats(model: LinearModel) -> dict[str, NDArray[np.float64]]:
     found = {}
     for letter in LETTERS:
+        values, places = different_entries(model)[letter]
         try:
-            found[letter] = getattr(model, letter).astype(np.float64)
+            found[letter] = values.astype(np.float64)[places]
         except OverflowError:
             raise OverflowError(
                 f"got {letter} with an entry beyond the range of float64; needed entries below 1.8e308; scale the model"

@@ -33,7 +33,7 @@ from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
 from gpbnb.filters.factors import factors_of_each, inverses_of_each, roots_of_each
 from gpbnb.filters.forms import ROOTS, Form
-from gpbnb.filters.model import INPUTS, LETTERS, LinearModel, remembered, stored_arrays
+from gpbnb.filters.model import LinearModel, different_entries, remembered, stored_arrays
 from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.steps import FACTORED
 
@@ -183,8 +183,7 @@ def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
 
 @remembered
 def _double_doubles(model: LinearModel) -> dict[str, NDArray[np.float64]]:
-    given = {letter: getattr(model, letter) for letter in (*LETTERS, *INPUTS)}
-    return {letter: double_doubles(each) for letter, each in given.items() if each is not None}
+    return {letter: double_doubles(values)[places] for letter, (values, places) in different_entries(model).items()}
 
 
 def _packed(model: LinearModel, fmt: FloatFormat) -> dict[str, NDArray[Any]]:
