@@ -227,9 +227,6 @@ def test_a_number_rounded_or_chopped_prints_as_it_is_printed(value, printed, so)
     assert prints_as(value, printed, *Rounding.documented()) is so
 
 
-B24, FIXED = FloatFormat(2, 24), FixedFormat(4, 4)
-
-
 def test_random_numbers_come_from_one_sequence_however_many_formats_are_in_use():
     first = FloatFormat(2, 12, "stochastic")
     kept = first.backend

@@ -59,10 +59,3 @@ def reason(fmt):
     with pytest.raises(ValueError, match=r"^got ") as caught:
         fmt.check_compiled()
     return str(caught.value)
-
-
-@pytest.mark.parametrize("options", [{"order": "pairwise"}, {"fused": True}])
-def test_other_sums_in_53_bits_name_the_digits(options):
-    model = LinearModel([["0.9"]], [[1]], [[1]], [[1]], [0], [[1]])
-    with pytest.raises(ValueError, match=r"in 53 bits; needed up to 52 bits, or up to 13 base-16 digits"):
-        Run(model, FloatFormat(2, 53), "innovation", (1,), Sums(**options))

@@ -54,25 +54,6 @@ def value(bound, *arguments):
         return None
 
 
-class TestTruth:
-    def test_inverse_of_hilbert(self):
-        # The inverse of the Hilbert matrix has integer entries, in closed form.
-        n = 6
-        hilbert = [[Fraction(1, i + j + 1) for j in range(n)] for i in range(n)]
-        entries = [
-            [
-                (-1) ** (i + j)
-                * (i + j + 1)
-                * math.comb(n + i, n - j - 1)
-                * math.comb(n + j, n - i - 1)
-                * math.comb(i + j, i) ** 2
-                for j in range(n)
-            ]
-            for i in range(n)
-        ]
-        assert fractions_of(bounds.true_inverse(np.array(hilbert, dtype=object))).tolist() == entries
-
-
 class TestHold:
     @each_format
     def test_no_bound_is_below_the_error(self, fmt):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.definiteness import factor
+from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.gravity_probe_b.model import STATES, YEAR, gravity_probe_b
 
@@ -102,3 +103,18 @@ def test_the_gp_b_model_is_that_of_the_geometry_to_first_order():
         shown = model.H[k].astype(float) @ state
         # six decimals of the directions, and the second order
         assert np.abs(shown - [gyro[2], telescope[2]]).max() < 4 * 1e-6 * size * 4 + 20 * size**2
+
+
+# -- names of forms -------------------------------------------------------------------------------------------------
+
+NAMES = {
+    "innovation": Form.INNOVATION, "Joseph": Form.JOSEPH, "ud": Form.UD, "symmetrized": Form.SYMMETRIZED,
+    "symmetrised": Form.SYMMETRIZED, "compensated": Form.COMPENSATED, "Potter": Form.POTTER, "Carlson": Form.CARLSON,
+    "Cholesky": Form.CARLSON, "square root": Form.CARLSON, "square-root": Form.CARLSON, "hung": Form.HUNG,
+    "Hung second gain": Form.HUNG_SECOND_GAIN,
+}  # fmt: skip
+
+
+def test_a_form_has_its_usual_names_and_the_one_that_is_shown():
+    for name, form in (*NAMES.items(), *((str(form), form) for form in Form)):
+        assert form_named(name) is form_named(f" {name.upper()} ") is Form(name) is form

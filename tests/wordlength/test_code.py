@@ -82,13 +82,6 @@ BIQUAD = FilterDesign(["0.1", "0.2", "0.1"], [1, "-1.2", "0.5"], name="a low-pas
 # -- the operations of a covariance ----------------------------------------------------------------------------------
 
 
-def numbers(run, x, P):
-    """An estimate and a covariance, or its factors, as the program of a step orders them."""
-    upper = run.form is Form.UD
-    n = len(x)
-    return [*x[:, 0], *(P[i, j] for i in range(n) for j in range(n) if not upper or i <= j)]
-
-
 DIVISIONS = """
 #include <inttypes.h>
 #include <stdio.h>
