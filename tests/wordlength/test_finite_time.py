@@ -139,7 +139,6 @@ def test_a_tree_of_1024_numbers_stays_below_the_published_bound():
     """SATIRE prints 11 · 1024 · 2**-53 for numbers within 1: ten levels, and storing as if a number lost a whole unit.
 
     A number within 1 loses half a unit when it is stored, and so does a sum of two within 2, so 10 remain.
-    The bound of 1023 sums takes seconds.
     """
     published = 1.2505552149377763e-12
     assert published == 11 * 1024 * 2.0**-53
