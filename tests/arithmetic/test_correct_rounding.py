@@ -24,6 +24,7 @@ FORMATS = {
     "bfloat16": BFLOAT16,
     "binary32": BINARY32,
     "binary64": BINARY64,
+    "44 bits": FloatFormat(2, 44, emin=-255, emax=255),  # the most whose functions begin in float64
     "8 digits": FloatFormat(10, 8),
     "17 digits": FloatFormat(10, 17),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 
@@ -79,22 +80,21 @@ def test_systems_of_scipy_are_read_in_a_structure(structure):
 
 
 def test_sections_are_paired_and_ordered_as_stated():
-    near, far = [1, 0, 1, 1, 0, 0.81], [1, -1.8, 1, 1, -1, 0.5]
-    given = LinearSystem.from_sections([near, far])
-    assert given.made.coefficients[[2, 4]].tolist() == [1, pytest.approx(0.81)]
-    up = LinearSystem.from_sections([near, far], order="up")
-    assert up.made.coefficients[[4, 9]].astype(float).tolist() == [0.5, 0.81]
-    down = LinearSystem.from_sections([far, near], order="down")
-    assert down.made.coefficients[[4, 9]].astype(float).tolist() == [0.81, 0.5]
-    swapped = LinearSystem.from_sections([near, far], order=[1, 0])
-    assert swapped.made.coefficients[[4, 9]].astype(float).tolist() == [0.5, 0.81]
-    crossed = [[1, -1.8, 1, 1, 0, 0.81], [1, 0, 1, 1, -1, 0.5]]
-    paired = LinearSystem.from_sections(crossed, pairing="nearest", order="down")
-    assert paired.made.coefficients[[1, 6]].astype(float).tolist() == [0, -1.8]
-    impulse = np.eye(40, 1)
-    outputs = [each.outputs(impulse)[:, 0, 0] for each in (given, up, down, swapped, paired)]
-    for each in outputs[1:]:
-        assert each == pytest.approx(outputs[0], abs=1e-13)
+    poles = {"far": (-1, 0.5), "near": (0, 0.81)}  # and the zeros that are nearest to each
+    zeros = {"far": -1.8, "near": 0}
+    crossed = [[1, zeros["far"], 1, 1, *poles["near"]], [1, zeros["near"], 1, 1, *poles["far"]]]
+    expected = LinearSystem.from_sections(crossed).outputs(np.eye(40, 1))[:, 0, 0]
+    orders = {None: None, "given": None, "up": "far", "down": "near", (1, 0): "far", (0, 1): "near"}
+    for pairing, (order, first) in itertools.product((None, "given", "nearest"), orders.items()):
+        if pairing == "nearest" and isinstance(order, tuple):
+            continue  # numbers of sections that are not made yet
+        made = LinearSystem.from_sections(crossed, pairing=pairing, order=order)
+        first = first or ("far" if pairing == "nearest" else "near")
+        second = "near" if first == "far" else "far"
+        zero = {each: zeros[each if pairing == "nearest" else "near" if each == "far" else "far"] for each in poles}
+        found = made.made.coefficients.astype(float)
+        assert found[[1, 4, 6, 9]].tolist() == [zero[first], poles[first][1], zero[second], poles[second][1]]
+        assert made.outputs(np.eye(40, 1))[:, 0, 0] == pytest.approx(expected, abs=1e-13)
 
 
 @pytest.mark.parametrize("scale", [False, True])
