@@ -112,7 +112,6 @@ class BookFigure(Figure):
     def _ipython_display_(self) -> None:
         picture = svg(self, TEXT)
         self.set_layout_engine("none")  # it is laid out now, which takes most of the time of a drawing
-        self.canvas.draw()
         show({"image/svg+xml": picture, "image/png": png(self), "text/plain": repr(self)}, raw=True)
 
     def draw(self, renderer: Any) -> None:
