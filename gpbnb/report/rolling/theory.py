@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import mpmath
@@ -73,10 +73,13 @@ def fitted_drift(
 
     The integral is evaluated by 400-point Gauss-Legendre quadrature, for phase errors below some hundred radians.
     """
-    nodes, weights = np.polynomial.legendre.leggauss(400)
+    nodes, weights = _legendre(400)
     x = (nodes + 1) / 2
     value = complex(*drift) * np.sum(weights * 6 * (x - 0.5) * x * np.exp(1j * np.asarray(phase(duration * x))))
     return np.array([value.real, value.imag])
+
+
+_legendre = cache(np.polynomial.legendre.leggauss)
 
 
 def roll_rate(period: float) -> Fraction:

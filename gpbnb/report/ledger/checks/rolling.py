@@ -402,6 +402,7 @@ def cosine_after_a_year() -> Names:
     return {"cos": cosine, "sin": math.sin, "pi": math.pi, "numbers": float, "value": math.cos(angle)}
 
 
+@cache
 def negligible() -> Names:
     worst = float(theory.worst_rate_error(PERIOD, TEN))
     drifts = (worst, abs(real_error(TEN)))
@@ -410,6 +411,7 @@ def negligible() -> Names:
     return {"effect": "negligible" if lost < ALLOWED else "not negligible", "lost": lost, "across": across}
 
 
+@cache
 def enough_digits() -> Names:
     across = {
         t: abs(theory.off_tuned_drift(DRIFTS[0], float(theory.worst_rate_error(PERIOD, FloatFormat(10, t)))))
