@@ -109,7 +109,10 @@ def app(folder, builder="html"):
 def test_no_page_that_moved_is_still_there():
     there = {path.stem for path in FOLDER.parent.glob("*.*")}
     assert there.isdisjoint(book.MOVED)
-    assert {target.partition(".")[0] for target in book.MOVED.values()} <= there
+    for name, _, heading in (target.partition(".html#") for target in book.MOVED.values()):
+        (page,) = FOLDER.parent.glob(f"{name}.*")
+        headings = re.findall(r"(?<![^\s\"])#+ ([^\"\n]+?)(?:\\n)?(?=[\"\n])", page.read_text(encoding="utf-8"))
+        assert heading in {re.sub(r"[^\w -]", "", each).lower().replace(" ", "-") for each in headings}
 
 
 # -- search, and what is shipped ------------------------------------------------------------------------

@@ -150,6 +150,8 @@ COMPUTED: dict[tuple[str, str], Callable[[], Any]] = {
     ("rolling", r"\sqrt{4T/3T_r}"): lambda: rolled_gain() == pytest.approx(math.sqrt(4 / 3 * 1e5), rel=1e-12),
     ("rolling", r"12\,t\,(t-T/2)/T^3"): lambda: fitted_slope(sp.Integer(1)) == 0 and fitted_slope(sp.Symbol("t")) == 1,
     ("kalman", r"6606/3{,}153{,}600 \approx 0.0021"): lambda: f"{6606 / YEAR:.4f}" == "0.0021",
+    ("notation", r"4.85\times10^{-9}"): lambda: f"{math.pi / 180 / 3.6e6:.2e}" == "4.85e-09",
+    ("story", "about 4,000 kilometres"): lambda: round(0.02 / (math.pi / 180 / 3.6e6) / 1e6) == 4,
     ("kalman", r"2^{-11} \approx 0.0005"): lambda: (
         f"{2.0 ** (math.floor(math.log2(6606)) - 23):.4f}" == f"{2.0**-11:.4f}" == "0.0005"
     ),

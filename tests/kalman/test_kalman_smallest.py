@@ -8,7 +8,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.kalman import smallest
+from gpbnb.report.kalman import report_bounds, smallest
 
 FORMATS = [
     FloatFormat(b, t, rounding)
@@ -40,7 +40,12 @@ def test_more_steps_and_more_states():
     assert later.gain == float(1 / (9 * four.unit_roundoff))
     assert smallest.ratios(four, smallest.scalar(four), steps=3).state == float(1 / (48 * four.unit_roundoff))
     # (4n + 2m + 3) β = 13 β, and the first entry of the gain is lost.
-    assert smallest.ratios(four, smallest.correlated()).gain == float(1 / (13 * four.unit_roundoff))
+    case, beta = smallest.correlated(), four.unit_roundoff
+    found = smallest.ratios(four, case)
+    assert found.gain == float(1 / (13 * beta))
+    K = case.P @ case.H.T / (case.H @ case.P @ case.H.T + case.R)[0, 0]
+    error = abs(smallest.rounded_step(four, case)[0] - K @ case.z).max()  # the estimate was zero
+    assert found.state == float(error / (beta * sum(report_bounds.coefficients(1, n=2, m=1)) * abs(K @ case.z).max()))
 
 
 def test_nothing_is_broken_where_nothing_cancels():

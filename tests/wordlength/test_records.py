@@ -52,8 +52,17 @@ def test_shares_and_what_is_enough():
     found = RecordSurvey(formats, ratios, (("",) * 4,) * 2)
     assert found.shares == (0.5, 0.5, 1.0, 1.0)
     assert found.enough() == (formats[2],)
-    fixed = tuple(FixedFormat(i, f) for i in (1, 2) for f in (8, 9, 10))
-    kinds = RecordSurvey(fixed, np.array([[2, 0.5, 0.5, 0.5, 0.5, 0.5]]), (("",) * 6,))
-    assert kinds.enough() == (fixed[1], fixed[3])
+    words, floats = FixedFormat(1, 8), FloatFormat(2, 8, emin=-9, emax=9)
+    others = [
+        replace(words, **{name: new}) for name, new in (("integer_bits", 2), ("rounding", "up"), ("overflow", "wrap"))
+    ]
+    others += [
+        replace(floats, **{name: new}) for name, new in (("emin", -8), ("rounding", "up"), ("overflow", "saturate"))
+    ]
+    for one, other in (*((words, each) for each in others[:3]), *((floats, each) for each in others[3:])):
+        digits = "fraction_bits" if one is words else "precision"
+        kinds = (one, replace(one, **{digits: 9}), replace(one, **{digits: 10}), other, replace(other, **{digits: 9}))
+        kept = RecordSurvey(kinds, np.array([[0.5, 2, 0.5, 0.5, 0.5]]), (("",) * 5,)).enough()
+        assert kept == (kinds[2], kinds[3]), other
     irregular = RecordSurvey(formats, np.array([[0.5, 0.5, 0.5, np.inf]]), (("",) * 4,))
     assert irregular.enough() == ()
