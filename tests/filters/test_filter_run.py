@@ -252,3 +252,11 @@ def test_a_step_releases_exactly_the_arrays_that_it_makes():
         counts.append(made)
         assert (made - released, last.alloc - first.alloc - (last.free - first.free)) == (0, 0)
     assert max(counts) > 0
+
+
+def test_the_first_quantity_that_leaves_the_range_stops_a_run():
+    """A variance of 1/16 that grows by 4 a step is 2**16 after the tenth."""
+    given = LinearModel([["0.5", 0], [0, 2]], [[1, 0]], [[1, 0], [0, 0]], [[1]], [0, 0], [[1, 0], [0, "0.0625"]])
+    for k, reason in ((4, "the estimate at step 6"), (12, "the predicted covariance at step 10")):
+        z = np.repeat([0.0, 60_000, -60_000], [k, 1, 19 - k])[:, None]
+        assert run(FloatFormat(2, 11, "even", -14, 15), Form.INNOVATION, given, z).reason == f"overflow in {reason}"
