@@ -49,7 +49,7 @@ def made(fmt: FloatFormat, pairs: list[tuple[int, int]]) -> FloatArray:
 @pytest.mark.parametrize(("base", "precision"), COMPILED[::2])
 def test_operations_at_the_edge_of_the_range_are_exact(base: int, precision: int, rounding: Rounding) -> None:
     fmt, random = FloatFormat(base, precision, rounding), Random(960)
-    for count in 60 * [1] + 20 * [3]:
+    for count in 30 * [1] + 10 * [3]:
         check_operations(*(made(fmt, [pair(random, fmt) for _ in range(count)]) for _ in range(2)))
 
 
