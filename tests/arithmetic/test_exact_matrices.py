@@ -64,6 +64,10 @@ def test_definite_matrices_are_told_from_those_that_miss_it_by_the_least(without
     singular = G @ G.T
     assert is_definite(singular)
     assert not is_definite(singular, strictly=True)
+    path = 2 * exact(np.eye(n, dtype=int)) - exact(np.eye(n, k=1, dtype=int)) - exact(np.eye(n, k=-1, dtype=int))
+    path[0, 0] = path[-1, -1] = Fraction(1)  # each row adds up to zero: no diagonal is larger than its row
+    assert is_definite(path)
+    assert not is_definite(path, strictly=True)
     for change, definite in ((Fraction(1, 10**50), True), (-Fraction(1, 10**50), False)):
         changed = singular + change * exact(np.eye(n, dtype=int))
         assert is_definite(changed, strictly=True) is is_definite(changed) is definite

@@ -7,8 +7,9 @@ import pytest
 from scipy.linalg import expm
 
 from gpbnb.arithmetic.definiteness import factor
+from gpbnb.arithmetic.named import BINARY16
 from gpbnb.arithmetic.rational import exact
-from gpbnb.filters.covariance import REPAIR_TOLERANCE
+from gpbnb.filters.covariance import REPAIR_TOLERANCE, Repair
 from gpbnb.filters.model import LinearModel
 
 
@@ -83,3 +84,14 @@ def test_a_repair_is_off_for_exact_input_and_on_demand():
     with pytest.raises(ValueError, match="got Q with"):
         model(Q, repair=False)
     assert model(as_fractions, repair=True).repairs == model(Q).repairs
+
+
+def test_a_repair_says_what_it_did():
+    both = Repair("Q", 0, 1e-9, 2e-9)
+    assert str(both) == (
+        "Q was made symmetric (it missed that by 1e-09 of its variances) and made semidefinite (its variances were "
+        "raised by 2e-09 of themselves)"
+    )
+    stored = Repair("R", 0, 0.0, 0.25, BINARY16)
+    text = "R, stored in BINARY16, was made definite (its variances were raised by 0.2 of themselves)"
+    assert str(stored) == text

@@ -75,6 +75,13 @@ def test_without_inputs_the_simulation_is_that_of_the_model():
     assert not np.array_equal(z, silent)
     simulation = Simulation(plain, tuple(map(float, plain.x0)), 0, fine_resolution(plain))
     assert np.array_equal(silent, simulation.measurements(STEPS))
+    x = np.zeros(model.n)
+    for k, moved in enumerate(z - silent):  # each matrix has a cycle of its own
+        Phi, H, B, b, d = (
+            each[k % len(each)].astype(float) for each in (model.Phi, model.H, model.B, model.b, model.d)
+        )
+        x = Phi @ x + B @ model.u[k].astype(float) + b
+        assert moved == pytest.approx(H @ x + d, abs=2 * max(fine_resolution(model)))
     walk = LinearModel([[1]], [[1]], [[1]], [[1]], [0], [[1]])
     assert (simulated_measurements(replace(walk, d=["0.25"]), 9) - simulated_measurements(walk, 9) == 0.25).all()
 
