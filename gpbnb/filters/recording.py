@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
-from gpbnb.arithmetic.machine import CODES, packed_one
+from gpbnb.arithmetic.machine import packed_one
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.program import Program, entries
 from gpbnb.filters.stepping import DividedStep, RecordedStep, divided, truth_of
-from gpbnb.filters.steps import FACTORED, BlockAlgebra, BlockStorage, LinearStep, LinearTaken
+from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep, LinearTaken
 
 
 class Known(NamedTuple):
@@ -45,7 +45,6 @@ class StepKind(NamedTuple):
     one : whether every format has the number one.
     blocks : number of the format of state, gain, covariance, innovation covariance, and the model.
     sums : fused, order and block of sums of products; then the number of the format that keeps them, or -1.
-    reference : whether numbers are pairs of float64, whose products depend on the order of their factors.
     alike : whether a number that several formats have is stored alike in all of them.
     """
 
@@ -57,7 +56,6 @@ class StepKind(NamedTuple):
     blocks: tuple[int, ...] = (0, 0, 0, 0, 0)
     sums: tuple[Any, ...] = (False, "left", 32, -1)
     compensated: bool = False
-    reference: bool = False
     alike: bool = True
 
 
@@ -86,7 +84,7 @@ def step_kind(
             zeros, ones = zeros[..., 0], ones.all(axis=-1)
         entries = np.where(zeros.all(axis=0), 0, np.where(ones.all(axis=0), 1, 2)).astype(np.uint8)
         known.append(Known(letter, entries.shape, entries.tobytes()))
-    return StepKind(form, n, m, tuple(known), one is not None, blocks, sums, compensated, fmt is None, not parts)
+    return StepKind(form, n, m, tuple(known), one is not None, blocks, sums, compensated, not parts)
 
 
 @lru_cache(maxsize=64)
@@ -99,19 +97,11 @@ def recorded_step(kind: StepKind) -> DividedStep:
 def kalman_step(kind: StepKind) -> tuple[RecordedStep, LinearTaken]:
     """Record a step of a filter, whose states are x and P, then what compensated summation carries; it gives K."""
     tape, places, found = whole_step(kind)
-    rows = tape.instructions.copy()
-    if kind.reference and kind.form not in FACTORED:
-        first = np.zeros(tape.sizes[0], np.bool_)
-        first[np.concatenate([places["Phi"].ravel(), places["H"].ravel()])] = True
-        turned = (rows[:, 0] == CODES["multiply"]) & first[rows[:, 2]] & ~first[rows[:, 1]]
-        for (begin, name), (end, _) in zip(tape.labels, [*tape.labels[1:], (len(rows), "")], strict=True):
-            turned[begin:end] &= name != "the gain"
-        rows[turned, 1:3] = rows[turned, 2:0:-1]
     states = ("x", "P", "carried") if kind.compensated or kind.form is Form.COMPENSATED else ("x", "P")
     late = [places[letter].ravel() for letter in (*states[::2], "u", "b", "d", "B") if letter in places]
     recorded = RecordedStep(
         tape,
-        rows,
+        tape.instructions,
         tape.formats,
         [places[letter] for letter in states],
         [places["z"]],
