@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from gpbnb import (
     FixedFormat,
     NonlinearModel,
     NonlinearSystem,
+    emulate,
     write_code,
 )
 from gpbnb.wordlength.c_files import FLAGS
@@ -94,8 +96,11 @@ def test_functions_of_c_stay_within_the_tolerance_that_the_header_states(fmt, tm
     system, u = NonlinearSystem(turning, [0]), np.random.default_rng(1).uniform(-1, 1, (200, 1))
     header, *_ = write_code(system, fmt, tmp_path, inputs=u, exact=False)
     stated = float(re.search(r"allows each state at most ([\d.e-]+):", header.read_text().replace("\n * ", " "))[1])
-    unit = float(fmt.unit_roundoff)
-    assert 4 * unit < stated < 1000 * unit  # four times a few roundings of numbers of up to 8
+    allowed = re.search(r"tolerance\[\] = \{(.*)\}", (tmp_path / "test_filter.c").read_text())[1].split(", ")
+    even, up, down = (emulate(system, u, replace(fmt, rounding=each)).y.to_float() for each in ("even", "up", "down"))
+    expected = 4 * np.maximum(abs(up - even), abs(down - even)).max(axis=0)
+    assert [float(each) for each in allowed[1:]] == pytest.approx(expected.tolist(), rel=1e-8)
+    assert stated == pytest.approx(max(map(float, allowed)), rel=0.05)
     command = [installed()[0], *FLAGS.split(), "-Werror", "-O2", "-o", "run", "test_filter.c", "filter.c", "-lm"]
     subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     done = subprocess.run(["./run"], cwd=tmp_path, capture_output=True, text=True, check=False)
