@@ -174,3 +174,15 @@ def test_fixed_point(form, bits):
     errors = [float(np.abs(read(FixedFormat(5, each)).to_fractions() - x).max()) for each in (bits - 1, bits, bits + 1)]
     assert max(errors[1:]) <= 0.001 < errors[0]
     assert all((value * 2**bits).denominator == 1 for value in read(FixedFormat(5, bits)).to_fractions().flat)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_random_roundings_are_the_same_in_each_run(form):
+    read, fmt = FixedIntervalSmoother(scalar(), measurements()[:, :1], form), FloatFormat(2, 12, "stochastic")
+    assert np.array_equal(read(fmt), read(fmt))
+
+
+def test_a_format_without_the_number_one_is_refused():
+    small = LinearModel([["0.5"]], [["0.5"]], [["0.1"]], [["0.2"]], ["0.1"], [["0.1"]])
+    with pytest.raises(ValueError, match="does not hold the number 1"):
+        FixedIntervalSmoother(small, [["0.1"]] * 3)(FixedFormat(0, 20))
