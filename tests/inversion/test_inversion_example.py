@@ -176,3 +176,8 @@ class TestPossible:
             assert example.agree(norm_of(found - true, norm), printed)
         for norm in existence.SEARCHED:  # and the largest error of the best inverse is above the print
             assert norm_of(example.METHODS["rounded once"](stored, fl) - true, norm) > Fraction(PRINTED["error"][0])
+
+
+def test_a_format_stands_for_fixed_point_with_the_same_roundings_near_one():
+    for places in (3, 5):
+        assert FIXED.format(places).unit_roundoff == Fraction(1, 2 * 10**places)
