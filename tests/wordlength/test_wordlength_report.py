@@ -58,31 +58,34 @@ def text_of(page: str) -> str:
 
 FULL = REPORT | {
     "name": "<script>alert(1)</script>",
+    "text": "21 bits <i>",
     "fixed": True,
-    "names": ("angle <rad>", "<i>", "bias & drift"),
+    "names": ("angle <rad>", "bias & drift", "<i>"),
     "measurement_names": ("gyro",),
     "tolerance": (0.01, None, 2.0),
     "limits": {"state": (10.0, 0.5, None), "measurement": (2.0,)},
+    "source": "<i>.csv",
+    "command": "gpbnb <i>",
     "exponents": "-14 to 15",
     "blocks": (("gain <K>", 9, 8), ("state", 20, None)),
-    "lacking": {"lattice": "a pole is > 1"},
-    "stored": "coefficients & poles",
+    "lacking": {"lattice": "a pole <i> is > 1"},
+    "stored": "coefficients <i>",
     "shortest": "fewest digits: <UD>",
 }
 TEXT = """
 Wordlength for <script>alert(1)</script>
 Wordlength for <script>alert(1)</script>
 This Kalman filter needs 21 fraction bits to keep rounding errors within the tolerance.
-21 bits.
+21 bits <i>.
 Fewest digits: <UD>.
-At this answer, coefficients & poles.
-State bias & drift limits the answer: its error is 0.5 of its tolerance.
+At this answer, coefficients <i>.
+State <i> limits the answer: its error is 0.5 of its tolerance.
 Basis of the answer
 question | value
 steps | 60
-measurements | z.csv
-tolerance | angle <rad>: 0.01, <i>: any, bias & drift: 2
-limit on the state | angle <rad>: 10, <i>: 0.5, bias & drift: any
+measurements | <i>.csv
+tolerance | angle <rad>: 0.01, bias & drift: any, <i>: 2
+limit on the state | angle <rad>: 10, bias & drift: 0.5, <i>: any
 limit on the measurement | gyro: 2
 rounding | nearest
 exponents | -14 to 15
@@ -91,7 +94,7 @@ Forms and bases compared
 form and basis | fraction bits | answer
 innovation, emulation | 21 | enough
 UD, bound | none | too few
-Left out: lattice: a pole is > 1.
+Left out: lattice: a pole <i> is > 1.
 Error / tolerance at each precision
 form and basis | fraction bits: error / tolerance
 innovation, emulation | 20: 10, 21: 0.4, 22: 0.2
@@ -103,13 +106,13 @@ state | 20 | none
 Error of each state at the answer
 state | error / tolerance
 angle <rad> | 0.25
-<i> | not limited
-bias & drift | 0.5
+bias & drift | not limited
+<i> | 0.5
 Range of the numbers
 numbers | smallest | largest
 gain | 2⁻³ | 2⁵
 How to reproduce this report
-python -m gpbnb.wordlength model.toml
+gpbnb <i>
 numpy: 2.0
 machine: x86
 """
