@@ -66,6 +66,14 @@ def test_the_bound_holds_with_inputs_and_is_not_vacuous(form):
     assert bound.max() < 2000 * errors.max()
 
 
+def test_a_run_that_goes_on_counts_the_steps_before():
+    model = drawn()
+    run, z = Run(model, FloatFormat(2, 20), Form.INNOVATION, ()), np.zeros((STEPS, model.m))
+    run.take(z[1:])
+    with pytest.raises(ValueError, match=f"got {STEPS + 1} steps; needed at most {STEPS}"):
+        run.take(z[:2])
+
+
 def test_without_inputs_the_simulation_is_that_of_the_model():
     model = drawn(8)
     plain = model.without_inputs()
