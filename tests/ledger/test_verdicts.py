@@ -103,13 +103,11 @@ def until_violated(stated, domain, mode="exact"):
 HELD, JUDGE = judge._held, judge.judge
 
 
-@pytest.fixture(scope="module")
-def verdicts_alone():
-    """From here on, leave notes as they are stored."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judge, "judge", until_violated)
-        patch.setattr(judge, "_filled", lambda text, names: text)
-        yield
+@pytest.fixture
+def verdicts_alone(monkeypatch):
+    """Leave notes as they are stored."""
+    monkeypatch.setattr(judge, "judge", until_violated)
+    monkeypatch.setattr(judge, "_filled", lambda text, names: text)
 
 
 def still_true():
