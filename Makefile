@@ -115,10 +115,9 @@ exactness: .venv/made-for ## long tests, the golden corpus, other inputs each da
 	$(if $(SLICE),,GPBNB_ALTERATIONS=more $(PY) -m pytest -q tests/ledger/test_verdicts.py)
 
 bench: .venv/with-bench ## timings against peers, side by side, the short formats against gfloat, and guarantees
-	$(PY) -m benchmarks
-	$(PY) -m benchmarks.year
-	$(PY) -m benchmarks.formats
-	$(PY) -m benchmarks.guarantee
+	@missed=0; for part in benchmarks benchmarks.year benchmarks.formats benchmarks.guarantee; do \
+		$(PY) -m $$part || missed=1; \
+	done; exit $$missed
 
 environment: .venv/with-dev ## compile the lists of pinned packages from pyproject.toml; UPGRADE=1 takes newer versions
 	$(PY) $(UV_COMPILE) $(if $(UPGRADE),--upgrade) pyproject.toml --extra report --group book --group test \
