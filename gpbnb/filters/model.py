@@ -473,9 +473,9 @@ def remembered(function: F) -> F:
 
 @remembered
 def different_entries(model: LinearModel) -> dict[str, tuple[NDArray[Any], NDArray[np.int64]]]:
-    """Return the different entries (k,) of each array of a model, and the place of each of its entries among them.
+    """Return, for each array of a model, its distinct entries (k,), and for every entry its index among them.
 
-    A long cycle of matrices shares few; equal numbers that are not one object count as different.
+    The matrices of a long cycle consist of few distinct numbers. Entries are told apart as objects, not as numbers.
     """
     found = {}
     for letter in (*LETTERS, *INPUTS):
@@ -491,7 +491,7 @@ def _in_places(fmt: FloatFormat | FixedFormat, values: NDArray[Any], places: NDA
     try:
         found: FloatArray = fmt.store(values)[places]
     except OverflowError:
-        return fmt.store(values[places])  # which names the entry
+        return fmt.store(values[places])  # whose message names the entry
     return found
 
 

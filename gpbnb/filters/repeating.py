@@ -91,9 +91,9 @@ class RepeatedStep:
         return found
 
     def _opened(self, given: Sequence[FloatArray], steps: int) -> RunningStep | _OneByOne | None:
-        """Record a step, and make it ready to run; None if it cannot be repeated.
+        """Record a step and load it; return None if it cannot be repeated.
 
-        Few operations run on integers, which need no loading.
+        A run of few operations uses Python's integers, which need no loading.
         """
         formats, alike = self._formats, True
         if any(fmt.rounding is Rounding.STOCHASTIC for fmt in formats):

@@ -137,7 +137,7 @@ class Run(Progress):
         if fmt is not None:
             identity_in(fmt, 1)
         self._compensation = np.zeros_like(self.x)
-        self._ready: RunningStep | None = None
+        self._running: RunningStep | None = None
         self._carried: CarriedBound | None = None
         if bounded:
             self._stored = model if fmt is None else model.rounded(fmt)
@@ -293,7 +293,7 @@ class Run(Progress):
         else:
             packed = as_packed(self.fmt, H)
         self.letters["H"] = packed
-        self._ready = None
+        self._running = None
 
     def save_at(self, checkpoint_steps: NDArray[np.int64]) -> None:
         """Save the results of other steps, at most as many as before, in place of all results saved so far."""
@@ -317,12 +317,12 @@ class Run(Progress):
         Formats without a range run in float64. Where a step would leave it, for example because an estimate decays
         below 2**-960, entries of the estimate below 2**-700 become zero first. A step that has no result ends the run.
         """
-        if self._ready is None:
-            self._ready = self._made_ready()
+        if self._running is None:
+            self._running = self._opened()
         at = 0
         while at < len(z) and self.stopped is None:
             begin = self.saved
-            found = self._take(self._ready, z[at : at + self._ready.longest])
+            found = self._take(self._running, z[at : at + self._running.longest])
             at += len(found.x)
             rows = self.done(found.definite)
             for array, each in zip((self.X, self.G, self.C), (found.x, found.K, found.P), strict=True):
@@ -355,8 +355,8 @@ class Run(Progress):
             reason += "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
         return reason
 
-    def _made_ready(self) -> RunningStep:
-        """Record a step, and make it ready to run in the run's formats."""
+    def _opened(self) -> RunningStep:
+        """Record a step, and load it in the formats of the run."""
         model, (formats, blocks, sums) = self.letters, self._formats()
         kind = step_kind(self.form, model, formats[0], blocks, sums, "increment" in model)
         parts = recorded_step(kind)

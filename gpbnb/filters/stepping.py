@@ -51,7 +51,8 @@ class RecordedStep(NamedTuple):
         and of those of which each step takes the next of a cycle.
     after, results : places of the states after the step, and of the rest that it gives.
     definite : a truth value.
-    late : places of states that depend on the step's own numbers, and of cycles that count as such, as they are long.
+    late : places of states that are known to depend on the step's own numbers, and of cycles that are too long to wait
+        until they repeat, such as known inputs.
     """
 
     tape: Tape
@@ -105,7 +106,8 @@ class DividedStep(NamedTuple):
 
     Parameters
     ----------
-    shared : places of the numbers that the rest takes from the other part, where they follow each other at the end.
+    shared : places in the early part of the numbers that the rest takes from it; in the rest, these numbers follow each
+        other behind all others.
     """
 
     step: RecordedStep

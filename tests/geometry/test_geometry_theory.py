@@ -78,7 +78,7 @@ def test_leaks_are_the_sums_written_out(rolls):
     turning = np.exp(2j * np.pi * k / samples)
     time = (k - k.mean()) / len(k)
     slope = abs(np.sum(time * turning) / np.sum(time**2))
-    # n sin(pi/n) in place of pi, for n samples a roll
+    # with n samples per roll, n sin(pi/n) replaces pi
     assert theory.line_fit_leak(1, rolls) == pytest.approx(slope, rel=2 * math.pi**2 / 6 / samples**2)
 
 

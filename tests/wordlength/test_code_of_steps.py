@@ -27,7 +27,7 @@ SHORT = [
     FixedFormat(4, 11, rounding, "saturate") if i % 2 else FixedFormat(0, 15, rounding, "wrap")
     for i, rounding in enumerate(("even", "nearest", "half up", "chop", "up", "down", "odd"))
 ]
-REST = [pytest.param(fmt, marks=pytest.mark.long) for fmt in SHORT[2:]]  # a compiler builds each
+REST = [pytest.param(fmt, marks=pytest.mark.long) for fmt in SHORT[2:]]  # a C compiler builds each
 
 
 def one_of_each(fmt, x, u):

@@ -1,4 +1,4 @@
-"""Functions that compiled loops call, for each kind of numbers.
+"""The functions that compiled loops call, one set for each kind of numbers.
 
 A loop is written once. Its first argument is a kind of :mod:`gpbnb.arithmetic.kernels.tags`, for whose type numba
 compiles it; precision, rounding and range are data. The functions here take the kind, and return what the loop needs

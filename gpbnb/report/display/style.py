@@ -189,7 +189,8 @@ def envelope(ax: Axes, x: ArrayLike, y: ArrayLike, **style: Any) -> Any:
     x, y : (n,), positive `x`; values of `y` that are not positive are left out.
     style : passed to :meth:`matplotlib.axes.Axes.fill_between`.
     """
-    x, y, bins = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64), 60
+    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    bins = 60
     place = np.minimum((bins * np.log(x / x[0]) / np.log(x[-1] / x[0])).astype(int), bins - 1)
     groups = [np.flatnonzero((place == each) & (y > 0)) for each in range(bins)]
     groups = [group for group in groups if group.size]
