@@ -114,11 +114,11 @@ def compiled(fmt: FloatFormat) -> tuple[Callable[[int], Any], Any]:
     packed = [a.backend.pack(a.components) for a in arrays]
     for each, numbers in zip(places, packed, strict=True):
         loop.hold(each.ravel(), numbers.reshape(each.size, *numbers.shape[2:]))
-    start, nothing = loop.states, np.zeros(0, np.int64)
+    start = loop.states
 
     def run(steps: int) -> Any:
         loop.states = start
-        loop.take(0, np.zeros((steps, 0, *loop.values.shape[1:]), loop.values.dtype), 0, nothing)
+        loop.take(0, steps)
         numbers = FloatArray.from_packed(loop.states.reshape(-1, *packed[0].shape[2:]), fmt).to_fractions()
         return numbers[:N, np.newaxis], numbers[N:].reshape(N, N)
 

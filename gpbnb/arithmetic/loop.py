@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -70,27 +71,25 @@ class Loop(Numbers):
         self.rows, self._numbers, self._code = rows, numbers, code_of(rows, numbers)
         self._machine, self._distant = machine, {"held": False, "fed": False}
         self._states, self.after, self._truth = states, after, truth
+        self._pieces = [self.memory.pieces(each) for each in (states, after)]
+        self.keep(np.zeros(0, np.int64))
         self._before = np.full(len(states) * self.memory.width, -1, self.values.dtype)
         self._notes = np.zeros(5, np.int64)
-        self._table, self._feeds = np.zeros((0, 1), self.values.dtype), np.zeros((0, 4), np.int64)
+        self._cycles = list[tuple[int, NDArray[Any]]]()
 
     def hold(self, places: Any, numbers: NDArray[Any]) -> None:
         """Set numbers that stay as they are, the same in all lanes, (count, ...)."""
         super().hold(places, numbers)
         self._distant["held"] |= self._far(numbers)
 
-    def feed(self, groups: Sequence[tuple[NDArray[np.int64], NDArray[Any]]]) -> None:
-        """Take numbers (members, count, ...) of which each step has one member, at places (count,)."""
-        flat, rows, at = [], [], 0
-        for places, table in groups:
-            members, count = table.shape[:2]
-            rows.append((places[0], count, members, at))
-            flat.append(table.reshape(members * count, *table.shape[2:]))
-            at += members * count
-        if flat:
-            table = np.concatenate(flat)
-            self._table, self._feeds = table.reshape(len(table), -1), np.array(rows, np.int64)
-        self._distant["fed"] = self._far(self._table)
+    def feed(self, cycles: Sequence[tuple[int, NDArray[Any]]]) -> None:
+        """Take numbers (members, count, ...) of which each step has one member, at places from one on."""
+        self._cycles = [(place, np.ascontiguousarray(numbers)) for place, numbers in cycles]
+        self._distant["fed"] = any(self._far(numbers) for _, numbers in self._cycles)
+
+    def keep(self, places: NDArray[np.int64]) -> None:
+        """Let :meth:`take` return the results at some places."""
+        self._kept = len(places), self.memory.pieces(places)
 
     def _far(self, numbers: NDArray[Any]) -> bool:
         """Whether numbers may be too small or too large for quick computation."""
@@ -117,35 +116,41 @@ class Loop(Numbers):
         self.values[self._states] = states.reshape(-1, *self.values.shape[1:])
 
     def take(
-        self, first: int, own: NDArray[Any], at: int, kept_at: NDArray[np.int64], cycle: int = 0
+        self,
+        first: int,
+        steps: int,
+        own: Sequence[tuple[int, NDArray[Any]]] = (),
+        cycle: int = 0,
     ) -> tuple[NDArray[Any], NDArray[np.bool_], int]:
         """Take steps, as far as they have results and until states repeat.
 
         Parameters
         ----------
-        first : number of steps taken before.
-        own, at : (steps, count, ...), numbers of each step, and the place of the first.
-        kept_at : places of results to return.
+        first, steps : numbers of steps taken before, and to take.
+        own : the place of the first of some numbers, and these numbers of each step, (steps, count, ...); those of a
+            step follow each other in memory.
         cycle : number of steps after which the model repeats; 0 if states are not compared.
 
         Returns
         -------
-        kept, held : the results of each step, and whether the truth value holds in all lanes, (steps,).
+        kept, held : the results of each step at the places that are kept, and whether the truth value holds in all
+            lanes, (steps,).
         row : the row without a result that ended the steps, or -1.
         """
-        steps, lanes, machine, memory = len(own), self.values.shape[1:], self._machine, self.memory
-        kept = np.empty((steps, len(kept_at), *lanes), self.values.dtype)
+        lanes, machine, memory = self.values.shape[1:], self._machine, self.memory
+        (states_at, after_at), (count, places) = self._pieces, self._kept
+        kept = np.empty((steps, count, *lanes), self.values.dtype)
         held, row = np.ones(steps * memory.lanes, np.uint8), 0
-        states_at, after_at, places = map(memory.places, (self._states, self.after, kept_at))
-        fed, after = self._table, np.empty(self._before.size, np.int64)
+        feeds = [*(self._fed(first, *each) for each in self._cycles), *(self._fed(0, *each) for each in own)]
+        after = np.empty(self._before.size, np.int64)
         # fmt: off
         run = Addresses(
-            first, steps, cycle, memory.lanes, memory.width, own, at * memory.width, own.shape[1] * memory.width,
-            fed, fed.shape[1], self._feeds, len(self._feeds), states_at, after_at, len(after_at), places, len(places),
-            self._truth, kept, held, self._before, after,
+            steps, cycle, memory.lanes, memory.width, np.array(feeds, np.int64), len(feeds), after.size, states_at,
+            len(states_at), after_at, len(after_at), count * memory.width, places, len(places), self._truth, kept,
+            held, self._before, after,
         )
         # fmt: on
-        far = any(self._distant.values()) or self._far(own) or self._far(self.states)
+        far = any(self._distant.values()) or any(map(self._far, (self.states, *(numbers for _, numbers in own))))
         self._notes[machine.DONE] = 0
         tables = self.tables.address, self._code.table.address, memory.table.address
         with contextlib.suppress(OverflowError, ZeroDivisionError):
@@ -160,3 +165,10 @@ class Loop(Numbers):
         elif row == 0:  # operations on integers do not tell which one it was
             row = self.first_without_result(self.rows, self._numbers)
         return kept[:done], np.asarray(np.all(held.reshape(steps, memory.lanes)[:done] != 0, axis=1)), row
+
+    @staticmethod
+    def _fed(begin: int, place: int, numbers: NDArray[Any]) -> tuple[int, ...]:
+        """Return the columns of a feed; see :data:`gpbnb.arithmetic.kernels.machine.PLACE`."""
+        (members, count), parts = numbers.shape[:2], math.prod(numbers.shape[2:])
+        between = numbers.strides[0] // numbers.itemsize
+        return place, count, members, begin, between, parts, numbers.__array_interface__["data"][0]

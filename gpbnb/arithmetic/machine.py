@@ -308,14 +308,17 @@ class Memory:
         self.width, self.lanes = math.prod(values.shape[1:]), math.prod(truths.shape[1:])
         self.table = Addresses(values, truths)
 
-    def places(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the places of numbers in flat memory, those of all lanes and parts."""
-        return (numbers[:, np.newaxis] * self.width + np.arange(self.width)).reshape(-1)
+    def pieces(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return where numbers are in flat memory: the first of those that follow each other, and how many, (p, 2)."""
+        begins = np.flatnonzero(np.diff(numbers, prepend=-2) != 1)
+        return self.width * np.stack([numbers[begins], np.diff(begins, append=len(numbers))], axis=1)
 
 
 def is_far(numbers: NDArray[Any]) -> bool:
     """Whether some numbers are too small or too large for quick computation."""
     sizes = np.abs(numbers)
+    if sizes.min(initial=1) >= tags.QUICK_LEAST and sizes.max(initial=1) <= 1 / tags.QUICK_LEAST:
+        return False
     return bool((((sizes < tags.QUICK_LEAST) & (sizes > 0)) | (sizes > 1 / tags.QUICK_LEAST)).any())
 
 

@@ -393,7 +393,9 @@ def _propagated_weights(L: Array, A: Array, *added: Array) -> Array:
     step = repeatable(_weights_after, (lower[0].shape, *((n, n),) * own.shape[1]))
     loop = step.loop(BINARY64)
     loop.states = L[lower]
-    kept, _, _ = loop.take(0, own.reshape(len(own), -1)[:most], int(step.given[1][0, 0]), loop.after)
+    given = int(step.given[1][0, 0]), own.reshape(len(own), -1)[:most]
+    loop.keep(loop.after)
+    kept, _, _ = loop.take(0, most, [given])
     weights = np.zeros((1 + len(own), n, n))
     weights[0] = L
     weights[1 : 1 + len(kept), lower[0], lower[1]] = kept

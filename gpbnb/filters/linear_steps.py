@@ -58,13 +58,13 @@ class LinearSteps:
         output : number of the first output that the next step cannot compute; -1 if all steps have results.
         """
         loop = self._loop
+        loop.keep(loop.after)
         out, done = np.empty((len(z), len(self._after), *z.shape[2:]), z.dtype), 0
         most = next(slices(len(z), len(self._rows)), slice(0)).stop
         while done < len(z):
             some = z[done : done + most]
-            found, _, row = loop.take(
-                done, some.reshape(len(some), self._m, *loop.values.shape[1:]), self._input, loop.after
-            )
+            own = some.reshape(len(some), self._m, *loop.values.shape[1:])
+            found, _, row = loop.take(done, len(some), [(self._input, own)])
             out[done : done + len(found)] = found.reshape(len(found), *out.shape[1:])
             done += len(found)
             if row >= 0:
@@ -83,8 +83,9 @@ class LinearSteps:
         OverflowError : a step has no result.
         """
         loop, sizes = self._loop, np.zeros(len(self._places))
+        loop.keep(self._places)
         for part in slices(len(z), len(self._rows)):
-            kept, _, row = loop.take(part.start, z[part], self._input, self._places)
+            kept, _, row = loop.take(part.start, part.stop - part.start, [(self._input, z[part])])
             if row >= 0:
                 raise OverflowError(f"got no result of step {part.start + len(kept) + 1}")
             np.maximum(sizes, np.abs(kept).max(axis=0), out=sizes)

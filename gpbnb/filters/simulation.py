@@ -116,9 +116,11 @@ def measured(
     nonzero = (*drawn, *((each != 0).any(axis=0) for each in matrices))
     step = repeatable(_measured, shapes, tuple(each.tobytes() for each in nonzero))
     loop = step.loop(BINARY64)
-    loop.feed([(at.ravel(), each.reshape(len(each), -1)) for at, each in zip(step.given[3:], matrices, strict=True)])
+    cycles = zip(step.given[3:], matrices, strict=True)
+    loop.feed([(int(at.flat[0]), each.reshape(len(each), -1)) for at, each in cycles])
+    loop.keep(step.found[1])
     loop.states = x
-    kept, _, _ = loop.take(first, np.concatenate([w[:steps], v[:steps]], axis=1), 1 + n, step.found[1])
+    kept, _, _ = loop.take(first, steps, [(1 + n, w[:steps]), (1 + 2 * n, v[:steps])])
     z[: len(kept)], z[len(kept) :], x[:] = kept, math.inf, loop.states if len(kept) == steps else math.inf
 
 

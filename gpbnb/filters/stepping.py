@@ -203,7 +203,7 @@ class RunningStep:
         held: Numbers | None = None,
     ) -> None:
         self._parts, step, shared = parts, parts.step, parts.shared
-        self._shared_at = step.tape.sizes[0] + np.arange(len(shared))
+        self._shared_at = step.tape.sizes[0]
         self._kept_at = np.concatenate([shared, parts.early.kept])
 
         def loop(part: StepPart, lanes: int | None = None) -> Loop:
@@ -221,8 +221,11 @@ class RunningStep:
         self._early, self._rest = loop(parts.early), loop(parts.rest, records if records > 1 else None)
         #: The number of states, and what holds the step's own numbers.
         self.states, self.numbers = len(step.states), self._rest
-        of_early, self._of_rest = self._taken_of(cycles, parts.early), self._taken_of(cycles, parts.rest)
+        of_early = self._taken_of(cycles, parts.early)
         self._early.feed(of_early)
+        self._early.keep(self._kept_at)
+        self._rest.feed(self._taken_of(cycles, parts.rest))
+        self._rest.keep(parts.rest.kept)
         repeats = all(fmt is None or fmt.rounding is not Rounding.STOCHASTIC for fmt in formats)
         self._cycle = int(np.lcm.reduce([1, *(len(table) for _, table in of_early)])) if repeats else 0
         kept = len(self._kept_at) + records * len(parts.rest.kept)
@@ -232,13 +235,13 @@ class RunningStep:
         self._repeated: tuple[int, NDArray[Any], NDArray[np.bool_]] | None = None
         self._last: NDArray[Any] | None = None
 
-    def _taken_of(self, cycles: Sequence[NDArray[Any]], part: StepPart) -> list[tuple[Places, Any]]:
-        """Return places and numbers of the cycles that a part of a step takes."""
+    def _taken_of(self, cycles: Sequence[NDArray[Any]], part: StepPart) -> list[tuple[int, NDArray[Any]]]:
+        """Return first places and numbers of the cycles that a part of a step takes."""
         read = np.zeros(1 + max(len(self._rest.values), part.rows.max(initial=0)), np.bool_)
         for places in (part.rows[:, 1:4], part.after, part.kept):
             read[places] = True
         given = ((each.ravel(), table) for each, table in zip(self._parts.step.cycles, cycles, strict=True))
-        return [(at, table) for at, table in given if read[at].any()]
+        return [(int(at[0]), table) for at, table in given if read[at].any()]
 
     def take(self, first: int, states: Sequence[NDArray[Any]], own: NDArray[Any]) -> StepsTaken:
         """Take one step for each row of the step's own numbers (steps, entries, ...), at most :attr:`longest`.
@@ -255,14 +258,10 @@ class RunningStep:
         )
         kept, definite, stop = self._early_steps(first, len(own), before)
         count, shared = len(kept), len(places)
-        groups = list(self._of_rest)
-        if shared and count:
-            table = kept[:, :shared].reshape(count, shared, *kept.shape[3:])  # without the axis of the one lane
-            groups.append((self._shared_at, np.roll(table, first % count, axis=0)))
-        rest.feed(groups)
         given = np.ascontiguousarray(own[:count].reshape(count, own.shape[1], *rest.values.shape[1:]))
         at = next((int(each.ravel()[0]) for each in step.own if each.size), 0)
-        found, held, row = rest.take(first, given, at, of_rest.kept)
+        groups = [(at, given), (self._shared_at, kept[:, :shared])]
+        found, held, row = rest.take(first, count, groups)
         stop = stop if row < 0 else self._stop(rest, of_rest, row)
         done, sizes = len(found), [each.size for each in (*step.after, *step.results)]
         results = dict[int, NDArray[Any]]()
@@ -302,8 +301,7 @@ class RunningStep:
 
     def _early_alone(self, first: int, count: int, cycle: int) -> tuple[NDArray[Any], NDArray[np.bool_], Stop | None]:
         early = self._early
-        own = np.empty((count, 0, *early.values.shape[1:]), early.values.dtype)
-        kept, held, row = early.take(first, own, 0, self._kept_at, cycle)
+        kept, held, row = early.take(first, count, cycle=cycle)
         return kept, held, None if row < 0 else self._stop(early, self._parts.early, row)
 
     def _stop(self, loop: Loop, part: StepPart, row: int) -> Stop:

@@ -76,7 +76,7 @@ def _computed(operation: Any, exact: Any, a: Any, b: Any, c: Any, p: Any, r: Any
 
 @inner(forceinline=True)
 def _round(how: Any, rule: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
-    any_gone = np.int64(0)
+    any_gone = False
     for i in range(count):
         out[i], gone = rounded(how, p[i], r[i], rule)
         any_gone |= gone
@@ -104,7 +104,7 @@ def _fit(fmt: Any, digits: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
 
     As :func:`gpbnb.arithmetic.kernels.careful.carefully`, without branches.
     """
-    mode, any_gone = fmt.mode, np.int64(0)
+    mode, any_gone = fmt.mode, False
     near = -np.int64(mode in (tags.AWAY, tags.EVEN, tags.HALF_UP))
     even, odd = np.int64(mode == tags.EVEN), np.int64(mode == tags.ODD)
     up, down, ties_up = np.int64(mode == tags.UP), np.int64(mode == tags.DOWN), np.int64(mode == tags.HALF_UP)
@@ -129,7 +129,7 @@ def _fit(fmt: Any, digits: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
         y = fmt.over if y > fmt.largest else y
         y = fmt.under if y < fmt.lowest else y
         out[i] = y
-        any_gone |= np.int64((y != y) | (a == np.inf))
+        any_gone |= (y != y) | (a == np.inf)
     return any_gone
 
 
@@ -142,14 +142,14 @@ def fitted(fmt: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
 
 @inner(forceinline=True)
 def _run(operation: Any, how: Any, sign: Any, rule: Any, doubtful: Any, a: Any, b: Any, out: Any, count: Any) -> Any:
-    any_gone = np.int64(0)
+    any_gone = False
     for i in range(count):
         if operation == tags.ROOT:
             out[i], gone = other(operation, how, rule, a[i], a[i], a[i])
         else:
             out[i], gone = basic(operation, how, rule, a[i], sign * b[i])
             if operation in (tags.MULTIPLY, tags.DIVIDE):
-                gone |= doubtful & np.int64(out[i] == 0.0)
+                gone |= doubtful & (out[i] == 0.0)
         any_gone |= gone
     return any_gone
 
@@ -179,8 +179,8 @@ def _along(formats: Any, operation: Any, a: Any, b: Any, c: Any, out: Any, room:
     fmt = masked(entries(formats, WHOLE, np.int64), entries(formats, NUMBER, np.float64))
     how, rule = rule_of(formats, 0)
     together = (how == SHORT and operation <= tags.ROOT) or (how == LONG and operation == tags.ROOT)
-    if together and not _at_once(operation, how, rule, np.int64(fmt.below != fmt.below), a, b, out, count):
-        return np.int64(0)
+    if together and not _at_once(operation, how, rule, fmt.below != fmt.below, a, b, out, count):
+        return False
     p, r, exact = room, at(room, TOGETHER), (how == SHORT) & (fmt.precision == 53)
     if operation == tags.ROUND:
         p = a
@@ -193,14 +193,14 @@ def _along(formats: Any, operation: Any, a: Any, b: Any, c: Any, out: Any, room:
             r[i] = 0.0
     chosen = LONG if operation == tags.FUSED and how == SHORT and not exact else how
     if how != NONE and not _rounded(chosen, rule, p, r, out, count):
-        return np.int64(0)
-    return np.int64(1) if fmt.precision == 53 or fmt.mode == tags.RANDOM else fitted(fmt, p, r, out, count)
+        return False
+    return fmt.precision == 53 or fmt.mode == tags.RANDOM or fitted(fmt, p, r, out, count)
 
 
 @compiled
 def along(formats: int, operation: int, n: int, a: Any, b: Any, c: Any, out: Any) -> Any:
     """out = the results of an operation, entry by entry; return whether :func:`carefully_along` has to compute them."""
-    table, any_gone, room = words(formats), np.int64(0), start(np.empty(2 * TOGETHER))
+    table, any_gone, room = words(formats), False, start(np.empty(2 * TOGETHER))
     for begin in range(0, n, TOGETHER):
         x, y, z, found = at(start(a), begin), at(start(b), begin), at(start(c), begin), at(start(out), begin)
         any_gone |= _along(table, operation, x, y, z, found, room, min(n - begin, TOGETHER))
@@ -231,11 +231,11 @@ def accumulate(formats: int, operation: int, rows: Any, width: int, numbers: Any
         x = found[(rows[0] - 1) * width + j]
         for i in range(rows[0], rows[1]):
             y = found[i * width + j]
-            z, gone = x, np.int64(1)
+            z, gone = x, True
             if how != NONE:
                 z, gone = basic(operation, how, rule, x, y)
-                gone |= np.int64((operation == tags.MULTIPLY) & (z == 0.0))  # it may have underflowed
-            if gone != 0:
+                gone |= (operation == tags.MULTIPLY) & (z == 0.0)  # it may have underflowed
+            if gone:
                 z = carefully(fmt, random, operation, x, y, y)
                 any_gone |= z != z
             x = z

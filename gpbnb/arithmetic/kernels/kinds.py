@@ -211,20 +211,20 @@ def _quick(checked: bool) -> _Kind:
 
     @inner(forceinline=True)
     def scale_row(how: Any, rule: Any, factor: Any, row: Any, out: Any, count: Any) -> Any:
-        any_gone = np.int64(0)
+        any_gone = False
         for k in range(count):
             out[k], gone = basic(_MULTIPLY, how, rule, factor, row[k])
             any_gone |= gone
-        return any_gone if checked else np.int64(0)
+        return any_gone if checked else False
 
     @inner(forceinline=True)
     def add_row(how: Any, rule: Any, sign: Any, factor: Any, row: Any, out: Any, count: Any) -> Any:
-        any_gone = np.int64(0)
+        any_gone = False
         for k in range(count):
             p, gone = basic(_MULTIPLY, how, rule, factor, row[k])
             out[k], beyond = basic(_ADD, how, rule, out[k], sign * p)
             any_gone |= gone | beyond
-        return any_gone if checked else np.int64(0)
+        return any_gone if checked else False
 
     @inner(forceinline=True)
     def add_up(how: Any, first: Any, rule: Any, row: Any, column: Any, count: Any) -> Any:
@@ -233,7 +233,7 @@ def _quick(checked: bool) -> _Kind:
         for k in range(1, count):
             p, gone = basic(_MULTIPLY, how, rule, row[k], column[k])
             found, beyond = basic(_ADD, first, rule, s, p)
-            if first != how and beyond != 0:
+            if first != how and beyond:
                 found, beyond = basic(_ADD, how, rule, s, p)
             s = found
             any_gone |= gone | beyond
@@ -338,7 +338,7 @@ def _careful_scale(fmt: Any, factor: Any, row: Any, i: Any, out: Any, j: Any, co
     for begin in range(0, count, TOGETHER):
         some = min(count - begin, TOGETHER)
         _products(factor, at(row, i + begin), p, r, some)
-        gone |= fitted(masks, p, r, at(out, j + begin), some) != 0
+        gone |= fitted(masks, p, r, at(out, j + begin), some)
     return gone
 
 
@@ -356,9 +356,9 @@ def _careful_add(fmt: Any, sign: Any, factor: Any, row: Any, i: Any, out: Any, j
     for begin in range(0, count, TOGETHER):
         some, found = min(count - begin, TOGETHER), at(out, j + begin)
         _products(factor, at(row, i + begin), p, r, some)
-        gone |= fitted(masks, p, r, products, some) != 0
+        gone |= fitted(masks, p, r, products, some)
         _sums(sign, found, products, p, r, some)
-        gone |= fitted(masks, p, r, found, some) != 0
+        gone |= fitted(masks, p, r, found, some)
     return gone
 
 

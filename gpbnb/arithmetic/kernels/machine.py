@@ -71,11 +71,16 @@ VALUES, TRUTHS = range(2)
 """Numbers and truth values; those of all lanes lie beside each other, and so do the parts of a number."""
 # fmt: off
 (
-    FIRST, STEPS, CYCLE_OF, LANES, WIDTH, OWN, OWN_AT, OWN_COUNT, GIVEN, GIVEN_WIDTH, FEEDS, FEED_COUNT, STATES_AT,
-    AFTER_AT, STATES, KEPT_AT, KEPT_COUNT, TRUTH_AT, KEPT, KEPT_TRUTHS, BEFORE, AFTER,
-) = range(22)
+    STEPS, CYCLE_OF, LANES, WIDTH, FEEDS, FEED_COUNT, STATES, STATES_AT, STATE_PIECES, AFTER_AT, AFTER_PIECES, KEPT_ROW,
+    KEPT_AT, KEPT_PIECES, TRUTH_AT, KEPT, KEPT_TRUTHS, BEFORE, AFTER,
+) = range(19)
 # fmt: on
-"""Steps of a run; a place or a number of each lane counts as one, and so does each of its parts."""
+"""Steps of a run; a place or a number of each lane counts as one, and so does each of its parts. Places are in pieces:
+the first of some that follow each other, and how many there are."""
+PLACE, COUNT, MEMBERS, BEGIN, BETWEEN, PARTS, ADDRESS = range(7)
+"""Columns of feeds: the place of the first of some numbers, and how many there are; how many members a cycle of such
+numbers has, and which is the first; how far members are apart; parts of a number, which are those of one lane if all
+lanes take the same; and an address."""
 
 
 # -- float64 with masks ------------------------------------------------------------------------------------------------
@@ -86,16 +91,17 @@ _ADD, _MULTIPLY, _SHORT, _LONG = map(np.int64, (ADD, MULTIPLY, SHORT, LONG))
 @borrowing(forceinline=True)
 def _along(operation: Any, how: Any, sign: Any, rule: Any, a: Any, b: Any, c: Any, count: Any) -> Any:
     """Compute c from a and b, entry by entry; return whether a result left the range."""
-    any_gone = np.int64(0)
+    any_gone = False
     for i in range(count):
         c[i], gone = basic(operation, how, rule, a[i], sign * b[i])
         any_gone |= gone
     return any_gone
 
 
-@borrowing
-def _all_along(operation: Any, how: Any, rule: Any, a: Any, b: Any, c: Any, count: Any) -> Any:
+@borrowing(forceinline=True)
+def _all_along(operation: Any, formats: Any, f: Any, a: Any, b: Any, c: Any, count: Any) -> Any:
     # A loop for each case, so that none branches and processors compute several entries at once.
+    how, rule = rule_of(formats, f)
     sign = -1.0 if operation == SUBTRACT else 1.0
     if operation == MULTIPLY:
         if how == SHORT:
@@ -112,7 +118,7 @@ def _all_along(operation: Any, how: Any, rule: Any, a: Any, b: Any, c: Any, coun
 
 @borrowing
 def _one_by_one(operation: Any, how: Any, rule: Any, a: Any, b: Any, out: Any, count: Any, values: Any) -> Any:
-    any_gone = np.int64(0)
+    any_gone = False
     for i in range(count):
         values[out[i]], gone = basic(operation, how, rule, values[a[i]], values[b[i]])
         any_gone |= gone
@@ -125,14 +131,14 @@ def _without_rounding(operation: Any, values: Any, truths: Any, a: Any, b: Any, 
     if operation == CHOOSE:
         values[out] = values[b] if truths[a] else values[c]
     elif operation == NONZERO:
-        return np.int64(values[a] == 0.0)
+        return values[a] == 0.0
     else:
         k = 2 * np.int64(truths[a]) + np.int64(truths[b])
         if operation == COMPARE:
             x, y = values[a], values[b]
             k = np.int64(x > y) - np.int64(x < y) + 1
         truths[out] = (code >> k) & 1
-    return np.int64(0)
+    return False
 
 
 @borrowing
@@ -153,7 +159,7 @@ def _quick_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8)
     operations, numbers = entries(code, OPERATIONS, np.int64), entries(code, FORMAT, np.int64)
     begins, together = entries(code, BEGINS, np.int64), entries(code, TOGETHER, np.int64)
-    any_gone, f, after = np.int64(0), np.int64(0), np.int64(0)
+    any_gone, f, after = False, np.int64(0), np.int64(0)
     how, rule = rule_of(formats, f)
     for s in range(code[SEGMENTS]):
         begin, count, operation = begins[s], begins[s + 1] - begins[s], operations[s]
@@ -171,8 +177,9 @@ def _quick_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
                 second = at(first, count)
                 for i in range(count):
                     first[i] = values[a[i]]
+                for i in range(count):
                     second[i] = values[b[i]]
-            any_gone |= _all_along(operation, how, rule, first, second, at(values, out[0]), count)
+            any_gone |= _all_along(operation, formats, f, first, second, at(values, out[0]), count)
         elif operation <= DIVIDE:
             any_gone |= _one_by_one(operation, how, rule, a, b, out, count, values)
         elif operation == SKIP:
@@ -187,14 +194,14 @@ def _quick_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
                     any_gone |= gone
                 else:
                     any_gone |= _without_rounding(operation, values, truths, x, y, z, np.int64(z), out[i])
-    return 0 if any_gone != 0 else code[ROWS]
+    return 0 if any_gone else code[ROWS]
 
 
 @addressed
 def _quick_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8)
     operations, numbers = entries(code, OPERATIONS, np.int64), entries(code, FORMAT, np.int64)
-    begins, any_gone = entries(code, BEGINS, np.int64), np.int64(0)
+    begins, any_gone = entries(code, BEGINS, np.int64), False
     for s in range(code[SEGMENTS]):
         operation = operations[s]
         how, rule = rule_of(formats, numbers[s])
@@ -203,7 +210,9 @@ def _quick_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
         for o in range(begins[s], begins[s + 1]):
             a, b, c, out, third = _row(code, lanes, o)
             if operation <= MULTIPLY:
-                any_gone |= _all_along(operation, how, rule, at(values, a), at(values, b), at(values, out), lanes)
+                any_gone |= _all_along(
+                    operation, formats, numbers[s], at(values, a), at(values, b), at(values, out), lanes
+                )
                 continue
             for i in range(lanes):
                 if operation <= DIVIDE:
@@ -215,7 +224,7 @@ def _quick_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
                     any_gone |= gone
                 else:
                     any_gone |= _without_rounding(operation, values, truths, a + i, b + i, c + i, third, out + i)
-    return 0 if any_gone != 0 else code[ROWS]
+    return 0 if any_gone else code[ROWS]
 
 
 @borrowing
@@ -261,13 +270,16 @@ def _double_double(fmt: Any, operation: Any, x: Any, y: Any) -> Any:
 
 def _loop(kind: Any, operate: Any, parts: int) -> Any:
     """Return the function that runs rows of one operation in an arithmetic whose numbers have some parts."""
-    load, put, compare = kind.load, kind.put, kind.compare
+    load, put, compare, alone = kind.load, kind.put, kind.compare, kind is shortdecimal
 
     @borrowing(forceinline=True)
     def run(fmt: Any, operation: Any, code: Any, o: Any, end: Any, values: Any, truths: Any, lanes: Any) -> Any:
         """Run rows from o on for each lane; return the row to go on with, or ~row if one has no result."""
+        first, second, last = entries(code, A, np.uint32), entries(code, B, np.uint32), entries(code, C, np.uint32)
+        results = entries(code, OUT, np.uint32)
         while o < end:
-            a, b, c, out, third = _row(code, lanes, o)
+            a, b, c, out = lanes * first[o], lanes * second[o], lanes * last[o], lanes * results[o]
+            third = np.int64(last[o])
             holds = operation != SKIP
             for i in range(lanes):
                 if operation == SKIP:
@@ -296,22 +308,23 @@ def _loop(kind: Any, operate: Any, parts: int) -> Any:
                         return ~o
                     found = x if operation == ABSOLUTE and not below else operate(fmt, operation, x, y)
                     put(fmt, values, out + i, found)
-                    first = values[(out + i) * parts]
-                    if first != first:
+                    lead = values[(out + i) * parts]
+                    if lead != lead:
                         return ~o
-            o += 1 if holds else 1 + np.int64(entries(code, B, np.uint32)[o])
+            o += 1 if holds else 1 + np.int64(second[o])
         return o
 
     @borrowing
-    def alone(fmt: Any, operation: Any, code: Any, o: Any, end: Any, values: Any, truths: Any, lanes: Any) -> Any:
-        """The same; a copy of the loop serves products, so that what depends on the format alone is computed once."""
-        if operation == MULTIPLY:
-            return run(fmt, _MULTIPLY, code, o, end, values, truths, lanes)
-        if operation <= SUBTRACT:
-            return run(fmt, operation & SUBTRACT, code, o, end, values, truths, lanes)
+    def in_copies(fmt: Any, operation: Any, code: Any, o: Any, end: Any, values: Any, truths: Any, lanes: Any) -> Any:
+        """The same; copies of the loop serve products and sums, so that what depends on the format is computed once."""
+        width = 1 if alone else lanes
+        if operation == MULTIPLY and lanes == width:
+            return run(fmt, _MULTIPLY, code, o, end, values, truths, width)
+        if operation <= SUBTRACT and lanes == width:
+            return run(fmt, operation & SUBTRACT, code, o, end, values, truths, width)
         return run(fmt, operation, code, o, end, values, truths, lanes)
 
-    return run if kind is doubledouble else alone
+    return run if kind is doubledouble else in_copies
 
 
 @borrowing
@@ -407,25 +420,41 @@ def once(execute: int, formats: int, code: int, held: int, lanes: int) -> Any:
 
 
 @inner
-def _moved(values: Any, places: Any, count: Any, to: Any) -> None:
-    for j in range(count):
-        to[j] = values[places[j]]
+def _gathered(values: Any, pieces: Any, count: Any, to: Any) -> None:
+    for i in range(count):
+        taken, length = at(values, pieces[2 * i]), pieces[2 * i + 1]
+        for j in range(length):
+            to[j] = taken[j]
+        to = at(to, length)
+
+
+@inner
+def _scattered(values: Any, pieces: Any, count: Any, given: Any) -> None:
+    for i in range(count):
+        to, length = at(values, pieces[2 * i]), pieces[2 * i + 1]
+        for j in range(length):
+            to[j] = given[j]
+        given = at(given, length)
 
 
 @inner
 def _feed(run: Any, values: Any, step: Any, begin: Any) -> None:
-    """Bring the numbers that a step takes from the cycles of a run to their places."""
-    given, width, wide = entries(run, GIVEN, np.int64), run[GIVEN_WIDTH], run[WIDTH]
+    """Bring the numbers that a step takes to their places."""
+    wide = run[WIDTH]
     for g in range(run[FEED_COUNT]):
-        feed = at(entries(run, FEEDS, np.int64), 4 * g)
-        count, members = feed[1], feed[2]
+        feed = at(entries(run, FEEDS, np.int64), 7 * g)
+        count, members, parts = feed[COUNT], feed[MEMBERS], feed[PARTS]
         if members > 1 or step == begin:
-            taken = at(given, (feed[3] + count * ((run[FIRST] + step) % members)) * width)
-            to = at(values, feed[0] * wide)
+            taken = at(entries(feed, ADDRESS, np.int64), feed[BETWEEN] * ((feed[BEGIN] + step) % members))
+            to = at(values, feed[PLACE] * wide)
+            if parts == wide:
+                for i in range(count * wide):
+                    to[i] = taken[i]
+                continue
             for i in range(count):
-                for k in range(0, wide, width):
-                    for m in range(width):
-                        to[i * wide + k + m] = taken[i * width + m]
+                for k in range(0, wide, parts):
+                    for m in range(parts):
+                        to[i * wide + k + m] = taken[i * parts + m]
 
 
 @compiled
@@ -440,41 +469,33 @@ def advance(execute: int, formats: int, code: int, held: int, run: int, notes: i
     """
     formats_at, code_at, held_at, run_at, noted = words(formats), words(code), words(held), words(run), words(notes)
     values, truths = entries(held_at, VALUES, np.int64), entries(held_at, TRUTHS, np.uint8)
-    own, kept, states, lanes, cycle = (
-        run_at[OWN_COUNT],
-        run_at[KEPT_COUNT],
-        run_at[STATES],
-        run_at[LANES],
-        run_at[CYCLE_OF],
-    )
+    kept, states, lanes, cycle = run_at[KEPT_ROW], run_at[STATES], run_at[LANES], run_at[CYCLE_OF]
     after, before = entries(run_at, AFTER, np.int64), entries(run_at, BEFORE, np.int64)
-    states_at = entries(run_at, STATES_AT, np.int64)
     begin = noted[DONE]
     for step in range(begin, run_at[STEPS]):
         _feed(run_at, values, step, begin)
-        given = at(entries(run_at, OWN, np.int64), step * own)
-        for j in range(own):
-            values[run_at[OWN_AT] + j] = given[j]
         noted[ROW] = 0
         done = call(execute, formats_at, code_at, held_at, lanes)
         if done < code_at[ROWS]:
             noted[ROW] = done
             return
-        _moved(values, entries(run_at, AFTER_AT, np.int64), states, after)
-        _moved(values, entries(run_at, KEPT_AT, np.int64), kept, at(entries(run_at, KEPT, np.int64), step * kept))
-        same = cycle > 0
-        for j in range(states):
-            values[states_at[j]] = after[j]
-            same &= after[j] == before[j]
+        _gathered(values, entries(run_at, AFTER_AT, np.int64), run_at[AFTER_PIECES], after)
+        row = at(entries(run_at, KEPT, np.int64), step * kept)
+        _gathered(values, entries(run_at, KEPT_AT, np.int64), run_at[KEPT_PIECES], row)
+        _scattered(values, entries(run_at, STATES_AT, np.int64), run_at[STATE_PIECES], after)
         for i in range(lanes):
             entries(run_at, KEPT_TRUTHS, np.uint8)[step * lanes + i] = truths[run_at[TRUTH_AT] * lanes + i]
         noted[DONE] = step + 1
         if cycle > 0:
             noted[SINCE] += 1
-            if noted[SINCE] % cycle == 0 and same:
-                noted[CYCLE] = noted[SINCE]
-                noted[ROW] = -1
-                return
+            if noted[SINCE] % cycle == 0:
+                same = True
+                for j in range(states):
+                    same &= after[j] == before[j]
+                if same:
+                    noted[CYCLE] = noted[SINCE]
+                    noted[ROW] = -1
+                    return
             if noted[SINCE] == noted[LASTS]:
                 for j in range(states):
                     before[j] = after[j]

@@ -51,12 +51,12 @@ def product(
         if columns == 1:
             found, beyond = dot(kind, fmt, a, i * count, b, count)
             put(kind, fmt, c, i, found)
-            gone |= beyond != 0
+            gone |= beyond
             continue
-        gone |= scale(kind, fmt, load(kind, fmt, a, i * count), b, 0, c, i * columns, columns) != 0
+        gone |= scale(kind, fmt, load(kind, fmt, a, i * count), b, 0, c, i * columns, columns)
         for k in range(1, count):
             factor = load(kind, fmt, a, i * count + k)
-            gone |= add(kind, fmt, 1, factor, b, k * columns, c, i * columns, columns) != 0
+            gone |= add(kind, fmt, 1, factor, b, k * columns, c, i * columns, columns)
     return gone | lost(kind, c, begin * columns, end * columns)
 
 
@@ -102,8 +102,8 @@ def factor(kind: Any, formats: int, room: Any, a: Any, order: Any, pivot: bool, 
             ratio, beyond = divide(kind, fmt, load(kind, fmt, a, i * n + k), head)
             put(kind, fmt, a, i * n + k, ratio)
             m = negative(kind, fmt, ratio)
-            gone |= beyond != 0
-            gone |= add(kind, fmt, 1, m, a, k * n + k + 1, a, i * n + k + 1, n - k - 1) != 0
+            gone |= beyond
+            gone |= add(kind, fmt, 1, m, a, k * n + k + 1, a, i * n + k + 1, n - k - 1)
     return GONE if gone | lost(kind, a, 0, n * n) else NONE
 
 
@@ -116,16 +116,16 @@ def solved(kind: Any, formats: int, room: Any, a: Any, b: Any, n: int, columns: 
     for k in range(n):
         for i in range(k + 1, n):
             m = negative(kind, fmt, load(kind, fmt, a, i * n + k))
-            gone |= add(kind, fmt, 1, m, b, k * columns, b, i * columns, columns) != 0
+            gone |= add(kind, fmt, 1, m, b, k * columns, b, i * columns, columns)
     for k in range(n - 1, -1, -1):
         for i in range(k + 1, n):
             upper = load(kind, fmt, a, k * n + i)
-            gone |= add(kind, fmt, -1, upper, b, i * columns, b, k * columns, columns) != 0
+            gone |= add(kind, fmt, -1, upper, b, i * columns, b, k * columns, columns)
         head = load(kind, fmt, a, k * n + k)
         for j in range(columns):
             found, beyond = divide(kind, fmt, load(kind, fmt, b, k * columns + j), head)
             put(kind, fmt, b, k * columns + j, found)
-            gone |= beyond != 0
+            gone |= beyond
     return gone | lost(kind, b, 0, n * columns)
 
 

@@ -74,7 +74,7 @@ def rounded(how: Any, p: Any, r: Any, rule: Any) -> Any:
     size = u & _MAGNITUDE
     # Rounded, a number below the range may be zero, but p is not.
     gone = (np.uint64(size - low) > np.uint64(span)) & (p != 0.0) if how != GRADUAL else size > low + span
-    return from_bits(u) + 0.0, np.int64(gone)
+    return from_bits(u) + 0.0, gone
 
 
 @borrowing(error_model="numpy", forceinline=True)
@@ -93,14 +93,14 @@ def basic(operation: Any, how: Any, rule: Any, x: Any, y: Any) -> Any:
         c = p - x
         r = (x - (p - c)) + (y - c)
     found, gone = rounded(how, p, r, rule)
-    return found, gone | np.int64((operation == DIVIDE) & (y == 0.0))
+    return found, gone | ((operation == DIVIDE) & (y == 0.0))
 
 
 @borrowing(error_model="numpy", forceinline=True)
 def other(operation: Any, how: Any, rule: Any, x: Any, y: Any, z: Any) -> Any:
     """The result of another operation on numbers, as :func:`basic`."""
     if operation in (NEGATIVE, ABSOLUTE):
-        return (0.0 - x if operation == NEGATIVE else abs(x)), np.int64(0)
+        return (0.0 - x if operation == NEGATIVE else abs(x)), False
     p, r = x, 0.0
     if operation == ROOT:
         p = math.sqrt(x)
@@ -112,6 +112,6 @@ def other(operation: Any, how: Any, rule: Any, x: Any, y: Any, z: Any) -> Any:
             p, r = two_sum(x * y, z)
             how = _LONG if how == SHORT else how
         else:
-            return x, np.int64(1)
+            return x, True
     found, gone = rounded(how, p, r, rule)
-    return found, gone | np.int64(p != p)
+    return found, gone | (p != p)

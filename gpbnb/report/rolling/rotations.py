@@ -76,11 +76,10 @@ def recursion(
         backend.pack(fmt.array(x).components) for x in ([1, 0], list(_exact_turn(1, period, interval)))
     )
     loop.hold(step.given[1], angle)
-    nothing, found = np.zeros(0, np.int64), []
+    found = []
     for gap in np.diff(marks, prepend=0).tolist():
         for part in slices(gap, len(loop.rows)):
-            own = np.empty((part.stop - part.start, 0, *loop.values.shape[1:]), loop.values.dtype)
-            loop.take(part.start, own, 0, nothing)
+            loop.take(part.start, part.stop - part.start)
         found.append(loop.states.reshape(angle.shape))
     return _compared(period, interval, marks, FloatArray.from_packed(np.stack(found), fmt).to_fractions())
 
