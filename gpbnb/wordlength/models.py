@@ -201,11 +201,14 @@ def _coefficients(source: Any) -> Mapping[str, Any]:
     """Return b and a, or second-order sections, as a mapping."""
     if len(source) == 2 and not isinstance(source, np.ndarray):
         return {"b": source[0], "a": source[1]}
-    if np.ndim(source) == 2 and np.shape(source)[1] == 6:
+    try:
+        shape = np.shape(source)
+    except ValueError:
+        raise ValueError("got rows of unequal lengths; needed (b, a), or sections of shape (sections, 6)") from None
+    if len(shape) == 2 and shape[1] == 6:
         return {"sos": source}
-    raise ValueError(
-        f"got a {type(source).__name__} of shape {np.shape(source)}; needed (b, a), or sections of shape (sections, 6)"
-    )
+    kind = type(source).__name__
+    raise ValueError(f"got a {kind} of shape {shape}; needed (b, a), or sections of shape (sections, 6)")
 
 
 def _from_opencv(given: Any) -> LinearModel:

@@ -139,7 +139,7 @@ def survey_records(
     BINARY32                  100%                   7.39e-06
     """
     given = admitted(model, TASK_OF_BASIS[checked_basis(basis)], "" if form is None else "have a form")
-    chosen = form_named(form or Form.INNOVATION)
+    chosen = form_named(Form.INNOVATION if form is None else form)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a record')
     if isinstance(formats, str) or not isinstance(formats, Iterable):
