@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Iterator
 
@@ -12,6 +13,9 @@ import pytest
 
 from gpbnb.arithmetic.kernels import backends
 
+# Modules and collected tests stay to the end. Python would look through them again and again for what nothing uses.
+gc.disable()
+
 # Set here, not in the environment, which the kernels of the notebooks inherit: they draw inline.
 matplotlib.use("Agg")
 
@@ -19,6 +23,11 @@ matplotlib.use("Agg")
 def pytest_report_header(config: pytest.Config) -> list[str]:
     left_out = config.option.markexpr == "not long"
     return ["long tests are left out: -m long runs them alone, -m '' with the others"] if left_out else []
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="module")
