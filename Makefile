@@ -29,7 +29,6 @@ export JUPYTER_RUNTIME_DIR := $(HERE)/.cache/jupyter/runtime
 export JUPYTER_PLATFORM_DIRS := 1
 export JUPYTER_PREFER_ENV_PATH := 1
 export PYTEST_DEBUG_TEMPROOT := $(HERE)/.cache/tmp
-export HYPOTHESIS_STORAGE_DIRECTORY := $(HERE)/.cache/hypothesis
 export RUFF_CACHE_DIR := $(HERE)/.cache/ruff
 export MYPY_CACHE_DIR := $(HERE)/.cache/mypy
 export PYTHONNOUSERSITE := 1

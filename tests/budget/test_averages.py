@@ -7,12 +7,8 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gpbnb.report.budget import derivation, experiment, theory
-
-SEEDED = settings(derandomize=True, deadline=None, database=None)
 
 
 def test_the_printed_example():
@@ -24,18 +20,16 @@ def test_the_printed_example():
 # -- averages -------------------------------------------------------------------------------------
 
 
-@settings(SEEDED)
-@given(st.integers(1, 10**7))
-def test_whole_cycles_leave_nothing(cycles):
-    assert theory.cycles_factor(cycles) == 0
+def test_whole_cycles_leave_nothing():
+    for cycles in [*range(1, 30), *np.random.default_rng(1).integers(1, 10**7, 70).tolist()]:
+        assert theory.cycles_factor(cycles) == 0
 
 
-@settings(SEEDED)
-@given(st.floats(0.01, 1e4))
-def test_cycles_factor_is_that_of_sinc(cycles):
-    # numpy's sinc takes the sine of a large number: its error is an ulp of that number
-    assert theory.cycles_factor(cycles) == pytest.approx(abs(np.sinc(cycles)), rel=1e-12, abs=1e-15)
-    assert theory.cycles_factor(cycles) <= min(1, 1 / (math.pi * cycles)) * (1 + 1e-15)
+def test_cycles_factor_is_that_of_sinc():
+    for cycles in [0.01, 0.5, 1.5, 1e4, *10 ** np.random.default_rng(2).uniform(-2, 4, 100)]:
+        # numpy's sinc takes the sine of a large number: its error is an ulp of that number
+        assert theory.cycles_factor(cycles) == pytest.approx(abs(np.sinc(cycles)), rel=1e-12, abs=1e-15)
+        assert theory.cycles_factor(cycles) <= min(1, 1 / (math.pi * cycles)) * (1 + 1e-15)
     assert theory.cycles_factor(0) == 1
 
 

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gpbnb.report.geometry import experiment, theory
 from gpbnb.report.geometry.theory import Misalignments
 from gpbnb.report.measurement import ARCSEC
-
-SEEDED = settings(derandomize=True, deadline=None, database=None)
 
 SIZE = 20 * ARCSEC
 STEP = 7200.0  # long steps in long rolls: as many rolls as the tests have time for
@@ -60,14 +56,12 @@ def test_a_year_agrees_with_the_analysis(period):
         )
 
 
-@settings(SEEDED, max_examples=15)
-@given(st.lists(st.floats(-1, 1), min_size=9, max_size=9))
-def test_any_misalignments(parts):
-    values = np.array(parts) * 1e-4
-    case = Misalignments(tuple(values[:3]), tuple(values[3:6]), tuple(values[6:]))
-    result = experiment.year(case, PERIOD, STEP)
-    assert np.hypot(*np.subtract(result.drift, theory.effect(case, True).drift)) <= 30 * 1e-12 + 1e-15
-    assert np.hypot(*np.subtract(result.angle, theory.effect(case, True).angle)) <= 30 * 1e-12 + 1e-15
+def test_any_misalignments():
+    for values in np.random.default_rng(9).uniform(-1e-4, 1e-4, (15, 9)):
+        case = Misalignments(tuple(values[:3]), tuple(values[3:6]), tuple(values[6:]))
+        result = experiment.year(case, PERIOD, STEP)
+        assert np.hypot(*np.subtract(result.drift, theory.effect(case, True).drift)) <= 30 * 1e-12 + 1e-15
+        assert np.hypot(*np.subtract(result.angle, theory.effect(case, True).angle)) <= 30 * 1e-12 + 1e-15
 
 
 def test_the_line_fit_to_samples_keeps_what_the_fit_to_means_drops():
