@@ -983,7 +983,8 @@ def main(arguments: Any = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m gpbnb.bounds.check", description="Prove a rounding guarantee.")
     parser.add_argument("certificate", type=argparse.FileType(encoding="utf-8"), help="JSON file")
     try:
-        given = json.load(parser.parse_args(arguments).certificate, object_pairs_hook=once)
+        with parser.parse_args(arguments).certificate as file:
+            given = json.load(file, object_pairs_hook=once)
         print(f"{prove(given)}.\nproved")
     except (NotProvedError, NotImplementedError) as error:
         print(f"not {'proved' if isinstance(error, NotProvedError) else 'covered'}: {error}")
