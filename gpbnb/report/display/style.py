@@ -111,7 +111,6 @@ class BookFigure(Figure):
 
     def _ipython_display_(self) -> None:
         picture = svg(self, TEXT)
-        self.set_layout_engine("none")  # it is laid out now, which takes most of the time of a drawing
         show({"image/svg+xml": picture, "image/png": png(self), "text/plain": repr(self)}, raw=True)
 
     def draw(self, renderer: Any) -> None:
@@ -144,6 +143,8 @@ def figure(
     figure, axes : `axes` is an array (rows · columns,), row by row.
     """
     plt.draw_if_interactive()  # loads the backend now, because rc_context would undo the settings that it makes
+    if "inline" in plt.get_backend():
+        plt.uninstall_repl_displayhook()  # it draws what a cell is about to show and to close
     with plt.rc_context(_STYLE):
         fig, axes = plt.subplots(
             rows,
