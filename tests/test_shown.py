@@ -8,7 +8,10 @@ from __future__ import annotations
 import contextlib
 import html
 import io
+import os
 import re
+import shlex
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -24,6 +27,7 @@ from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.required import judge
 from tests import test_refused
 
+ROOT = Path(__file__).resolve().parents[1]
 STORED = Path(__file__).with_name("shown.txt")
 FILES = test_refused.FILES | {
     "named.toml": (
@@ -68,8 +72,17 @@ def files(folder, *names):
     return "\n".join(f"== {name}\n{Path(folder, name).read_text(encoding='utf-8')}" for name in names)
 
 
+def made(words):
+    """The commands that make would run, with what few targets need installed."""
+    ready = [word for each in ("made-for", "with-dev", "with-pages", "with-bench") for word in ("-o", f".venv/{each}")]
+    command = ["make", "--no-print-directory", "-n", *ready, *shlex.split(words)]
+    env = {"PATH": os.environ["PATH"], "HOME": os.environ.get("HOME", "/")}
+    done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=True)
+    return (done.stdout + done.stderr).replace(str(ROOT), ".").replace("\\\n", "\n")
+
+
 NAMES = test_refused.NAMES | {
-    each.__name__: each for each in (ran, read, files, Path, judge, settled_filter, stored_response, FilterDesign)
+    each.__name__: each for each in (ran, read, files, made, Path, judge, settled_filter, stored_response, FilterDesign)
 }
 
 
@@ -116,7 +129,6 @@ def test_users_are_shown_the_stored_text(part, tmp_path, monkeypatch):
 
 
 if __name__ == "__main__":
-    import os
     import tempfile
 
     os.environ["COLUMNS"] = "100"
