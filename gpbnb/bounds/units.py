@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from bisect import bisect_left
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
@@ -34,27 +35,32 @@ class Units(NamedTuple):
     aligned: float
 
 
+@lru_cache(maxsize=2**14)
+def _power(base: int, exponent: int, share: int = 1) -> tuple[float, float, float]:
+    """Round base**exponent / share down, to nearest and up."""
+    exact = Fraction(base) ** exponent / share
+    return -above(-exact), float(exact), above(exact)
+
+
 @lru_cache(maxsize=64)
 def units(fmt: FloatFormat | FixedFormat) -> Units:
     """Tables of :class:`Units` for a format."""
-    limits, most = fmt.limits, int(850 / np.log2(fmt.base))
-    sizes, aligned = [Fraction(fmt.base) ** k for k in range(-most, most + 1)], 0.0
-    exact = [float(power) for power in sizes]
-    share = 2 if fmt.rounding.to_nearest else 1
-    errors = [power / fmt.base**fmt.precision / share for power in sizes]
-    if limits is not None and limits.fixed:
-        sizes, exact, aligned = [limits.largest], [1.0], np.inf
-        errors = [Fraction(1, 2) ** (fmt.precision - 1 - limits.emin) / share]
-    elif limits is not None:
-        normal, exact = Fraction(fmt.base) ** limits.emin, [1.0]
-        least = normal / fmt.base ** (fmt.precision - 1) / share if limits.subnormal else normal
-        aligned = float(normal * fmt.base) if limits.subnormal else 0.0
-        errors = [max(each, least) for each in errors]
-        last = next((i for i, power in enumerate(sizes) if power >= limits.largest), None)
-        if last is not None:
-            sizes, errors = [*sizes[:last], limits.largest], errors[: last + 1]
-    powers = [near if Fraction(near := float(power)) <= power else np.nextafter(near, 0) for power in sizes]
-    return Units(np.array(powers), np.array([above(error) for error in errors]), np.array(exact), aligned)
+    limits, base, most, aligned = fmt.limits, fmt.base, int(850 / np.log2(fmt.base)), 0.0
+    exponents, share = range(-most, most + 1), 2 if fmt.rounding.to_nearest else 1
+    powers, exact, _ = map(list, zip(*(_power(base, k) for k in exponents), strict=True))
+    errors = [_power(base, k - fmt.precision, share)[2] for k in exponents]
+    if limits is not None:
+        exact, largest = [1.0], -above(-limits.largest)
+        if limits.fixed:
+            powers, errors, aligned = [largest], [_power(2, limits.emin - fmt.precision + 1, share)[2]], np.inf
+        else:
+            least = (limits.emin - fmt.precision + 1, share) if limits.subnormal else (limits.emin, 1)
+            errors = [max(each, _power(base, *least)[2]) for each in errors]
+            aligned = _power(base, limits.emin + 1)[1] if limits.subnormal else 0.0
+            last = bisect_left(exponents, limits.largest, key=lambda k: Fraction(base) ** k)
+            if last < len(exponents):
+                powers, errors = [*powers[:last], largest], errors[: last + 1]
+    return Units(np.array(powers), np.array(errors), np.array(exact), aligned)
 
 
 def largest_errors(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
