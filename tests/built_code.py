@@ -23,7 +23,7 @@ def disagreement(given, fmt, form, z, exact=True):
     """What the test of the generated code says against its emulation with these inputs; empty if they agree."""
     with tempfile.TemporaryDirectory() as folder:
         write_code(given, fmt, folder, form=form, inputs=z, exact=exact)
-        build = f"{installed()[0]} {FLAGS} -Werror -O1 {SANITIZER} -o run filter.c test_filter.c -lm"
+        build = f"{installed()[0]} {FLAGS} -Werror -O0 {SANITIZER} -o run filter.c test_filter.c -lm"
         for command in (build.split(), ["./run"]):
             done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
             if done.returncode:

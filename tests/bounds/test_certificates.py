@@ -133,9 +133,9 @@ def test_phases_that_are_alike_are_taken_together(monkeypatch: pytest.MonkeyPatc
 
 def test_a_filter_that_settles_slowly_is_proved() -> None:
     """In a far wider interval of covariances, gains are too far apart. The proof takes each of the first steps."""
-    model = small(Phi=[["0.9", "0.1"], [0, 1]], H=[[1, 0]], Q=[["0.01", 0], [0, "4e-4"]], R=[["0.01"]], x0=[0, 0])
+    model = small(Phi=[["0.9", "0.1"], [0, 1]], H=[[1, 0]], Q=[["0.01", 0], [0, "4e-3"]], R=[["0.01"]], x0=[0, 0])
     content = written(model, FORMAT, limits(state=[10, 1], innovation=1))
-    assert content["first"] >= content["repeat"] > 300
+    assert content["first"] >= content["repeat"] > 100
     prove(content)
     wide = content | {"above": [[factor(each, "1e9") for each in row] for row in content["above"]]}
     assert "may exceed its bound later" in refused(wide)

@@ -75,7 +75,7 @@ def test_each_share_is_the_error_followed_through_exact_steps(found):
             assert given.sums[:, operation] == pytest.approx(error * np.abs(path).sum(axis=0), rel=1e-6, abs=1e-30)
             continue
         of_steps, total = separate_roundings(found)[2], np.zeros(found.schedule.program.n)
-        for back in range(60):  # each error decays by 0.6 a step or more
+        for back in range(36):  # each error decays by 0.6 a step or more
             *_, end = followed(found, operation, back + 1, -1 - back)
             total += of_steps[(-1 - back) % period, operation] * np.abs(end)
         assert given.sums[:, operation] == pytest.approx(total, rel=1e-6, abs=1e-30)
