@@ -233,5 +233,5 @@ def _beyond(program: Program, o: int, size: float, fmt: FixedFormat, is_data: bo
     where = "the data" if is_data else "the sums"
     return (
         f"{what}, operation {o + 1} of {len(program.operations)}, may reach {size:.6g}, beyond the {fmt.integer_bits} "
-        f"integer bits of {where}; {math.frexp(size)[1]} hold it"
+        f"integer bits of {where}; {math.frexp(size + float(fmt.unit))[1]} hold it"
     )

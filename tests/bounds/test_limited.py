@@ -7,7 +7,7 @@ import pytest
 
 from gpbnb import FixedFormat, FloatFormat, LinearSystem, required_precision
 from gpbnb.bounds.guarantee import limits
-from gpbnb.bounds.limited import limited_errors
+from gpbnb.bounds.limited import _Steps, limited_errors
 from gpbnb.bounds.system import output_errors
 from gpbnb.wordlength.required import judge
 
@@ -45,6 +45,15 @@ def test_two_numbers_between_limits_differ_by_their_distance():
     system = LinearSystem.pid("0.5", "0.1", integral_limits=("-0.25", "0.25"))
     bound = limited_errors(system, FloatFormat(2, 30), np.array([1.0]))[0]
     assert 0.5 <= bound < 0.5 + 1e-6
+
+
+def test_sizes_have_the_limits_as_given_and_distances_both():
+    """In two bits, limits of -0.7 and 0.7 are -0.75 and 0.75."""
+    system = LinearSystem.pid("0.5", "0.5", leak="0.5", integral_limits=("-0.7", "0.7"))
+    steps = _Steps(system, FloatFormat(2, 2), np.full(1, 8.0))
+    assert steps.sizes(np.full(2, 8.0))[0] == pytest.approx(0.7)
+    steps.largest_states = np.full(2, 8.0)
+    assert steps.errors(np.full(2, 8.0))[0] == pytest.approx(1.5)
 
 
 def test_an_integral_without_limits_or_leak_has_no_bound_for_ever():

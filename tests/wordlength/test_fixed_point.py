@@ -12,10 +12,26 @@ from gpbnb import BINARY64, LinearSystem, WordFormats, emulate, guarantee, limit
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.probable import probable_output_errors
-from gpbnb.bounds.words import bounded_rounding, rounding_limits
+from gpbnb.bounds.words import WordGuarantee, bounded_rounding, rounding_limits
 from gpbnb.filters.system import controller, state_space
 from gpbnb.filters.words import integer_program, run_words
 from gpbnb.wordlength.required import judge
+
+
+def test_a_negative_product_reaches_as_far_as_its_rounded_operand() -> None:
+    """w = u + 3/4 w_: 4 without rounding, and 1/4 of storing and 1/4 of the product in each step make 2 more."""
+    words = WordFormats(FixedFormat(3, 1), FixedFormat(3, 2))
+    system = LinearSystem.from_coefficients([-2, "0.5"], [1, "-0.75"], "direct form II")
+    with pytest.raises(OverflowError, match=r"operation 3 of 5, may reach 12, beyond the 3 .* of the data; 4 hold it"):
+        WordGuarantee(system, 1).errors(words)
+
+
+def test_bits_that_hold_a_number_hold_it_below_their_largest() -> None:
+    """3.875 is beyond 3.75, the largest number of 2 integer bits and 2 fraction bits."""
+    words = WordFormats(FixedFormat(2, 2), FixedFormat(3, 2))
+    system = LinearSystem.from_coefficients(["-1.5", "-0.5"], [1, "-0.75"], "direct form II")
+    with pytest.raises(OverflowError, match=r"may reach 3.875, beyond the 2 integer bits of the data; 3 hold it"):
+        WordGuarantee(system, 1).errors(words)
 
 
 def test_the_bound_of_one_state_is_its_geometric_series() -> None:
