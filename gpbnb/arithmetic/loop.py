@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -74,7 +74,7 @@ class Loop(Numbers):
         self._pieces = [self.memory.pieces(each) for each in (states, after)]
         self.keep(np.zeros(0, np.int64))
         self._before = np.full(len(states) * self.memory.width, -1, self.values.dtype)
-        self._notes = np.zeros(5, np.int64)
+        self._notes = np.zeros(6, np.int64)
         self._cycles = list[tuple[int, NDArray[Any]]]()
 
     def hold(self, places: Any, numbers: NDArray[Any]) -> None:
@@ -145,26 +145,38 @@ class Loop(Numbers):
         after = np.empty(self._before.size, np.int64)
         # fmt: off
         run = Addresses(
-            steps, cycle, memory.lanes, memory.width, np.array(feeds, np.int64), len(feeds), after.size, states_at,
+            cycle, memory.lanes, memory.width, np.array(feeds, np.int64), len(feeds), after.size, states_at,
             len(states_at), after_at, len(after_at), count * memory.width, places, len(places), self._truth, kept,
             held, self._before, after,
         )
         # fmt: on
         far = any(self._distant.values()) or any(map(self._far, (self.states, *(numbers for _, numbers in own))))
         self._notes[machine.DONE] = 0
-        tables = self.tables.address, self._code.table.address, memory.table.address
         with contextlib.suppress(OverflowError, ZeroDivisionError):
-            for execute in functions(self.kind, far, memory.lanes == 1):
-                machine.advance(execute, *tables, run.address, self._notes.ctypes.data)
-                row = int(self._notes[machine.ROW])
-                if row < 0:
-                    break
+            row = self._advance(steps, run, functions(self.kind, far, memory.lanes == 1))
         done = int(self._notes[machine.DONE])
-        if done == steps or self.period:
-            row = -1
-        elif row == 0:  # operations on integers do not tell which one it was
+        if row == 0:  # operations on integers do not tell which one it was
             row = self.first_without_result(self.rows, self._numbers)
         return kept[:done], np.asarray(np.all(held.reshape(steps, memory.lanes)[:done] != 0, axis=1)), row
+
+    def _advance(self, steps: int, run: Addresses, functions: Iterator[int]) -> int:
+        """Take steps, the second function those that the first leaves; return the row that has no result, or -1."""
+        notes, machine = self._notes, self._machine
+        tables = self.tables.address, self._code.table.address, self.memory.table.address, run.address
+
+        def advance(function: int, until: int) -> bool:
+            notes[machine.UNTIL] = until
+            machine.advance(function, *tables, notes.ctypes.data)
+            return int(notes[machine.ROW]) < 0
+
+        first, second, some = next(functions), 0, 1  # some steps of the second, until the first is asked again
+        while not advance(first, steps):
+            second = second or next(functions, 0)
+            until = min(int(notes[machine.DONE]) + some, steps)
+            if not second or not advance(second, until) or until == steps or self.period:
+                break
+            some *= 2
+        return int(notes[machine.ROW])
 
     @staticmethod
     def _fed(begin: int, place: int, numbers: NDArray[Any]) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.lanes import recorded
+from gpbnb.arithmetic.lanes import recorded, repeatable
 from gpbnb.arithmetic.machine import (
     CODES,
     OPERANDS,
@@ -301,3 +301,27 @@ def test_a_decimal_exponent_beyond_the_machine_has_no_result(sign):
     for count in (3, 20):
         powers = np.full((count, 1, 2), [10, sign * 2**58])
         assert accumulate(kind, formats, "multiply", powers) == (count == 3)
+
+
+def _times_all(x, factors):
+    for each in factors:
+        x = x * each
+    return x
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3, 100])
+def test_steps_whose_numbers_are_far_from_one_on_the_way_are_rounded_as_well(steps):
+    """Quick computation leaves the first step of four, in which a product is 1e-200, and goes on behind it."""
+    fmt, far = FloatFormat(2, 24), "1e-100"
+    factors = fmt.array([[far, far, "1e100", "1e100"], *([[each] * 4 for each in ("1.01", "0.99", "1.003")])])
+    loop = repeatable(_times_all, ((1,), (4,))).loop(fmt)
+    loop.states = np.array([1.5])
+    loop.feed([(2, factors.to_float())])
+    loop.keep(loop.after)
+    kept, _, row = loop.take(0, steps)
+    x, expected = fmt.round("1.5"), []
+    for k in range(steps):
+        x = _times_all(fmt.array([x]), factors[k % 4]).to_fractions()[0]
+        expected.append(x)
+    assert row == -1
+    assert list(map(Fraction, kept.ravel().tolist())) == expected

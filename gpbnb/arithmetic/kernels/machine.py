@@ -71,9 +71,9 @@ VALUES, TRUTHS = range(2)
 """Numbers and truth values; those of all lanes lie beside each other, and so do the parts of a number."""
 # fmt: off
 (
-    STEPS, CYCLE_OF, LANES, WIDTH, FEEDS, FEED_COUNT, STATES, STATES_AT, STATE_PIECES, AFTER_AT, AFTER_PIECES, KEPT_ROW,
+    CYCLE_OF, LANES, WIDTH, FEEDS, FEED_COUNT, STATES, STATES_AT, STATE_PIECES, AFTER_AT, AFTER_PIECES, KEPT_ROW,
     KEPT_AT, KEPT_PIECES, TRUTH_AT, KEPT, KEPT_TRUTHS, BEFORE, AFTER,
-) = range(19)
+) = range(18)
 # fmt: on
 """Steps of a run; a place or a number of each lane counts as one, and so does each of its parts. Places are in pieces:
 the first of some that follow each other, and how many there are."""
@@ -407,10 +407,10 @@ _TABLE = types.CPointer(types.int64)
 
 # -- steps -------------------------------------------------------------------------------------------------------------
 
-DONE, ROW, CYCLE, SINCE, LASTS = range(5)
-"""Entries of the notes of a run: how many of its steps are done; the row that has no result in the step that ended it;
-the number of steps after which the states repeat, once they do; and since when and until when they are compared with
-those of one step."""
+DONE, UNTIL, ROW, CYCLE, SINCE, LASTS = range(6)
+"""Entries of the notes of a run: how many of its steps are done, and how many are to be done; the row that has no
+result in the step that ended it; the number of steps after which the states repeat, once they do; and since when and
+until when they are compared with those of one step."""
 
 
 @compiled
@@ -459,7 +459,7 @@ def _feed(run: Any, values: Any, step: Any, begin: Any) -> None:
 
 @compiled
 def advance(execute: int, formats: int, code: int, held: int, run: int, notes: int) -> None:
-    """Take steps of a run, each of which replaces the states by their next values, from step notes[DONE] on.
+    """Take steps of a run, each of which replaces the states by their next values, from notes[DONE] to notes[UNTIL].
 
     Parameters
     ----------
@@ -472,7 +472,7 @@ def advance(execute: int, formats: int, code: int, held: int, run: int, notes: i
     kept, states, lanes, cycle = run_at[KEPT_ROW], run_at[STATES], run_at[LANES], run_at[CYCLE_OF]
     after, before = entries(run_at, AFTER, np.int64), entries(run_at, BEFORE, np.int64)
     begin = noted[DONE]
-    for step in range(begin, run_at[STEPS]):
+    for step in range(begin, noted[UNTIL]):
         _feed(run_at, values, step, begin)
         noted[ROW] = 0
         done = call(execute, formats_at, code_at, held_at, lanes)
