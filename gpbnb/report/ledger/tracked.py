@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from flint import fmpq
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.rational import exact
@@ -16,15 +17,15 @@ _NEW = itertools.count()
 
 
 class Rounded:
-    """A number and its derivatives by the rounding errors on which it depends."""
+    """A number and its derivatives by the rounding errors on which it depends, as python-flint's rationals."""
 
-    def __init__(self, value: Any, slopes: dict[int, Fraction] | None = None) -> None:
+    def __init__(self, value: fmpq, slopes: dict[int, fmpq] | None = None) -> None:
         self.value, self.slopes = value, slopes or {}
 
-    def _combined(self, value: Any, own: Any, other: Rounded, by: Any) -> Rounded:
+    def _combined(self, value: fmpq, own: Any, other: Rounded, by: Any) -> Rounded:
         slopes = {key: own * slope for key, slope in self.slopes.items()}
         for key, slope in other.slopes.items():
-            slopes[key] = slopes.get(key, Fraction(0)) + by * slope
+            slopes[key] = slopes.get(key, 0) + by * slope
         return Rounded(value, slopes)
 
     def __add__(self, other: Rounded) -> Rounded:
@@ -40,7 +41,7 @@ class Rounded:
         value = self.value / other.value
         return self._combined(value, 1 / other.value, other, -value / other.value)
 
-    def moved(self, size: Any) -> Rounded:
+    def moved(self, size: fmpq) -> Rounded:
         """Add an error of at most this size, times β, that depends on nothing else."""
         return Rounded(self.value, {**self.slopes, next(_NEW): size})
 
@@ -54,10 +55,25 @@ def rounded(x: Any) -> Any:
 
 def tracked(x: Any, sizes: Any = None) -> Matrix:
     """Return exact numbers as numbers with errors of at most these sizes, times β; without errors by default."""
-    found = np.vectorize(Rounded, otypes=[object])(exact(x))
-    return found if sizes is None else np.vectorize(Rounded.moved, otypes=[object])(found, exact(sizes))
+    found = np.vectorize(lambda each: Rounded(_rational(each)), otypes=[object])(exact(x))
+    if sizes is None:
+        return found
+    return np.vectorize(lambda each, size: each.moved(_rational(size)), otypes=[object])(found, exact(sizes))
+
+
+def without_errors(x: Matrix) -> Matrix:
+    """Return each entry without its errors."""
+    return np.vectorize(lambda each: _fraction(each.value), otypes=[object])(x)
 
 
 def largest(x: Matrix) -> Matrix:
     """Return the largest error of each entry over β."""
-    return np.vectorize(lambda each: sum(map(abs, each.slopes.values()), Fraction(0)), otypes=[object])(x)
+    return np.vectorize(lambda each: _fraction(sum(map(abs, each.slopes.values()), fmpq(0))), otypes=[object])(x)
+
+
+def _rational(x: Fraction) -> fmpq:
+    return fmpq(x.numerator, x.denominator)
+
+
+def _fraction(x: fmpq) -> Fraction:
+    return Fraction(int(x.p), int(x.q))

@@ -45,7 +45,7 @@ from gpbnb.report.ledger.elimination import (
 from gpbnb.report.ledger.first_order import EPSILON, FirstOrder, joined, matrix, quantity
 from gpbnb.report.ledger.judge import read
 from gpbnb.report.ledger.statements import Statement, load_statements, statement
-from gpbnb.report.ledger.tracked import Rounded, largest, rounded, tracked
+from gpbnb.report.ledger.tracked import largest, rounded, tracked
 
 Names = Mapping[str, Any]
 Matrix = NDArray[Any]
@@ -150,7 +150,7 @@ def _worst_names(system: Matrix) -> dict[str, Any]:
 
 def _error_of_a_step(before: Matrix, k: int) -> Matrix:
     """Return the error that step k + 1 adds, from the exact step of the same numbers."""
-    old, error, zero = tracked(before), tracked(before * 0), Rounded(Fraction(0))
+    old, error, zero = tracked(before), tracked(before * 0), tracked([0])[0]
     for i in range(k + 1, len(before)):
         m = zero - old[i, k] / old[k, k]
         for j in range(k + 1, before.shape[1]):

@@ -24,7 +24,7 @@ from gpbnb.filters.steps import StepModel, gain, predicted, reduction, updated
 from gpbnb.report.kalman import report_bounds, smallest
 from gpbnb.report.kalman.smallest import FilterCase
 from gpbnb.report.ledger.first_order import FirstOrder
-from gpbnb.report.ledger.tracked import Matrix, largest, rounded, tracked
+from gpbnb.report.ledger.tracked import Matrix, largest, rounded, tracked, without_errors
 
 Names = dict[str, Any]
 Number = Callable[[Any], Matrix]
@@ -369,8 +369,8 @@ def _steps_alone(n: int, k: int) -> Names:
     inputs = [_positive(30 + i, n, 1) * (-1) ** i for i in range(LAST)]
     of_loops, of_inputs = ([_positive(40 + 9 * j + i, n, c) for i in range(LAST)] for j, c in ((0, n), (1, 1)))
     run = _run_with_errors(x_0, loops, inputs, of_loops, of_inputs)
-    states = [np.vectorize(lambda each: each.value, otypes=[object])(x) for x in run]
-    names = _names_of_a_run(1, k, x_0, loops, inputs, of_loops, of_inputs, states, list(map(largest, run)), e)
+    states, of_states = list(map(without_errors, run)), list(map(largest, run))
+    names = _names_of_a_run(1, k, x_0, loops, inputs, of_loops, of_inputs, states, of_states, e)
     equal = _run_with_errors(x_0, loops, inputs, [loops[0] * 0] * LAST, [exact(np.full((n, 1), e))] * LAST)
     norms = {id(names[f"x_tilde_{i}"]): tilde(largest(x)).norm() for i, x in enumerate(equal, start=1)}
     norms[id(names["x_tilde_k"])] = norms[id(names[f"x_tilde_{k}"])]
