@@ -27,6 +27,7 @@ def pytest_report_header(config: pytest.Config) -> list[str]:
 
 def pytest_collection_finish() -> None:
     gc.freeze()
+    gc.set_threshold(50_000)
     gc.enable()
 
 

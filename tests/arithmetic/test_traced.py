@@ -99,10 +99,10 @@ def numbers(found):
 def test_traced_functions_have_the_digits_of_the_function(function, monkeypatch):
     for name in FEW if function is kalman else FORMATS:
         fmt, traced = FORMATS[name], TracedFunction(function)
-        expected = numbers((fmt.restart(), function(fmt, fmt.array(Z[:50])))[1])
+        expected = numbers((fmt.restart(), function(fmt, fmt.array(Z[:24])))[1])
         for few in (0, 10**9):  # in compiled code where the format has it, and in integers of Python
             monkeypatch.setattr(tape, "FEW_OPERATIONS", few)
-            assert numbers((fmt.restart(), traced(fmt, Z[:50]))[1]) == expected, name
+            assert numbers((fmt.restart(), traced(fmt, Z[:24]))[1]) == expected, name
             assert traced.refusal == ""
             assert bool(traced.reason) == (name == "stochastic")
 

@@ -138,17 +138,17 @@ def _effect(program: Any, coefficients: list[Fraction], o: int, n: int) -> np.nd
 
 @pytest.mark.parametrize(
     ("radius", "steps", "lags"),
-    [(0.95, None, 1024), (0.999, None, 4096), (1.0, 100_000, 1024), (1.02, 300, 1024)],
+    [(0.95, None, 1024), (0.999, None, 4096), (1.0, 10_000, 1024), (1.02, 300, 1024)],
 )
 def test_sums_by_squares_are_those_of_balls(radius: float, steps: int | None, lags: int) -> None:
-    """Against balls; blocks lose where a state is a difference of others."""
+    """Against balls; blocks lose where a state is a difference of others, and count one block more."""
     rng = np.random.default_rng(5)
     A, B = rng.standard_normal((4, 4)), rng.standard_normal((4, 2))
     A *= radius / np.abs(np.linalg.eigvals(A)).max()
     A = A if steps is None else np.diag(np.diag(A)) * radius / np.abs(np.diag(A)).max()
     found, gain = gains(A, B, np.zeros((0, 4)), steps, lags), peak_gain(A, B, np.eye(4, dtype=np.int64), terms=steps)
     assert (found >= gain.low * (1 - 1e-9)).all()
-    assert (found <= gain.high * 1.5).all()
+    assert (found <= gain.high * (1.5 if steps is None else 1.15)).all()
 
 
 # -- the guarantee ----------------------------------------------------------------------------------------------------

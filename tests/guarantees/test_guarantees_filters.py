@@ -65,7 +65,7 @@ def test_a_filter_in_integers_gives_the_digits_of_a_run():
     ends, seen = Counter(), set()
     for seed in range(30):
         drawn = draw(seed)
-        end = compared(drawn, 12, rng)
+        end = compared(drawn, 8, rng)
         ends[end] += 1
         if end == "equal":
             limited = "unlimited" if drawn.fmt.emin is None else ("subnormal" if drawn.fmt.subnormal else "flushed")
