@@ -24,13 +24,7 @@ def as_computed(value: Any) -> Any:
 
 
 def product_in_order(a: Matrix, b: Matrix, rounded: Callable[[Any], Any] = as_computed) -> Matrix:
-    """Multiply two matrices, with each entry summed from left to right.
-
-    Parameters
-    ----------
-    a (n, k), b (k, m) : matrices of the same kind of number.
-    rounded : function applied to the result of each operation.
-    """
+    """Multiply matrices (n, k) and (k, m), each entry summed from left to right and each operation rounded."""
     total = rounded(a[:, :1] * b[:1])
     for k in range(1, a.shape[1]):
         total = rounded(total + rounded(a[:, k : k + 1] * b[k : k + 1]))
@@ -45,17 +39,10 @@ class Inverse(NamedTuple):
 
 
 def inverse_in_order(a: Matrix, identity: Matrix, rounded: Callable[[Any], Any] = as_computed) -> Inverse:
-    """Invert a matrix by elimination without row exchanges and back substitution.
+    """Invert a matrix (m, m) by elimination without row exchanges and back substitution.
 
-    Parameters
-    ----------
-    a, identity : (m, m), in the same kind of number. With columns b (m, q) in place of the identity, the matrix
-        returned solves a X = b.
-    rounded : function applied to the result of each operation.
-
-    Raises
-    ------
-    ZeroDivisionError : a pivot is zero, and the numbers refuse to divide by zero.
+    With columns b (m, q) in place of the identity, solve a X = b. Some numbers refuse to divide by a pivot that is
+    zero.
     """
     m = len(a)
     rows, columns = [a[i] for i in range(m)], [identity[i] for i in range(m)]
@@ -72,30 +59,16 @@ def inverse_in_order(a: Matrix, identity: Matrix, rounded: Callable[[Any], Any] 
 
 
 class Algebra(NamedTuple):
-    """How matrices of one kind of number are made, multiplied, inverted and rounded.
+    """How matrices of one kind of number are made, multiplied, inverted and rounded."""
 
-    Parameters
-    ----------
-    identity : function that returns the identity matrix of a size.
-    times : product of two matrices.
-    invert : inverse of a matrix, from the matrix and the identity.
-    rounded : function applied to sums and differences; `times` and `invert` round their own operations.
-    """
-
-    identity: Callable[[int], Matrix]
+    identity: Callable[[int], Matrix]  # that of a size
     times: Callable[[Matrix, Matrix], Matrix] = product_in_order
-    invert: Callable[[Matrix, Matrix], Inverse] = inverse_in_order
-    rounded: Callable[[Any], Any] = as_computed
+    invert: Callable[[Matrix, Matrix], Inverse] = inverse_in_order  # a matrix, with the identity
+    rounded: Callable[[Any], Any] = as_computed  # for sums and differences; the others round their own operations
 
 
 def rounded_algebra(numbers: Callable[[Any], Matrix], rounded: Callable[[Any], Any]) -> Algebra:
-    """Return the algebra in which a function rounds the result of each operation.
-
-    Parameters
-    ----------
-    numbers : function that makes a matrix of numbers from a matrix of ints.
-    rounded : function that rounds a number, or each number of an array.
-    """
+    """Return the algebra of numbers made from ints, in which a function rounds the result of each operation."""
     return Algebra(
         lambda n: numbers(np.eye(n, dtype=int)),
         partial(product_in_order, rounded=rounded),

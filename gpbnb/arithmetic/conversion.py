@@ -50,12 +50,7 @@ _ACCEPTED = "a str, int, float, Decimal or Fraction"
 
 
 def exact_ratio(value: Any) -> tuple[int, int, int]:
-    """Read a number without rounding it.
-
-    Returns
-    -------
-    p, q, k : integers with value = ``p / q * 10**k``, ``q > 0``.
-    """
+    """Read a number without rounding it, as integers p, q > 0 and k: ``p / q * 10**k``."""
     if type(value) is Fraction:  # the commonest, and its class is slow to ask
         return value.numerator, value.denominator, 0
     if type(value) is int:

@@ -29,12 +29,7 @@ _TRANSFORMS = 20  # each gains about 50 bits of condition number
 
 
 def is_definite(matrix: NDArray[Any], strictly: bool = False) -> bool:
-    """Whether a symmetric matrix is positive semidefinite or, with `strictly`, definite, decided exactly.
-
-    Parameters
-    ----------
-    matrix : (n, n), Fractions.
-    """
+    """Whether an exact symmetric matrix, (n, n) Fractions, is positive semidefinite or, with `strictly`, definite."""
     if len(matrix) > SMALL and (found := _by_congruence(matrix, strictly)) is not None:
         return found
     try:

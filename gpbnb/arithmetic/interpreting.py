@@ -20,18 +20,11 @@ _DIVIDE, _SQRT, _CHOOSE, _COMPARE, _COMBINE, _NONZERO, _SKIP = (
 
 
 class Call(NamedTuple):
-    """A function of arrays that is called between two operations of a tape.
+    """A function of arrays that is called between two operations of a tape."""
 
-    Parameters
-    ----------
-    at : number of operations before it.
-    function : takes arrays of the format, each (n,), and returns another.
-    operands, results : places, each (n,).
-    """
-
-    at: int
-    function: Callable[..., FloatArray]
-    operands: Sequence[NDArray[np.int64]]
+    at: int  # number of operations before it
+    function: Callable[..., FloatArray]  # takes arrays of the format, each (n,), and returns another
+    operands: Sequence[NDArray[np.int64]]  # places, each (n,)
     results: NDArray[np.int64]
 
     @property
@@ -41,12 +34,7 @@ class Call(NamedTuple):
 
 
 class Constants:
-    """Numbers that a function takes from elsewhere, which each run rounds into its format.
-
-    Parameters
-    ----------
-    exactly : whether only numbers that the format holds are allowed.
-    """
+    """Numbers that each run rounds into its format or, with `exactly`, that its format must hold."""
 
     def __init__(self, exactly: bool) -> None:
         self.exactly = exactly
@@ -162,12 +150,7 @@ class Numbers:
 
 
 class OnIntegers:
-    """Numbers of a program as significands and exponents of Python, which hold the numbers of every format.
-
-    Parameters
-    ----------
-    fmt : the format. sizes : numbers of places, and of truth values.
-    """
+    """Numbers of a program as significands and exponents of Python, which hold the numbers of every format."""
 
     def __init__(self, fmt: Any, sizes: tuple[int, int]) -> None:
         self._kernel: ExactKernel = fmt.kernel

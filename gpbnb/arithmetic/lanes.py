@@ -22,12 +22,8 @@ _NUMBERS = 1 << 19  # that are computed at once
 class Lanes:
     """A program of one format that runs on many arrays, in any format with loops or in double-double.
 
-    Parameters
-    ----------
-    rows : operations of the machine.
-    sizes : numbers of places, and of truth values.
-    given : places of the arrays that it takes.
-    found : places of the arrays that it returns, or a truth value in an array of its own.
+    Given and found are places of the arrays that it takes and returns; a truth value that it returns is an array of its
+    own.
     """
 
     def __init__(
@@ -45,13 +41,7 @@ class Lanes:
     def run(self, fmt: Any, *given: NDArray[Any], tag: Any = None) -> list[NDArray[Any]]:
         """Return the results for packed arrays (lanes, ...), in double-double (lanes, ..., 2) if `fmt` is None.
 
-        Parameters
-        ----------
-        tag : the arithmetic from which random numbers are drawn.
-
-        Raises
-        ------
-        OverflowError, ZeroDivisionError : a lane has no result.
+        Random numbers are drawn from `tag`. A lane without a result raises OverflowError or ZeroDivisionError.
         """
         found, error = self.begin(fmt, *given, tag=tag)
         if error is not None:
@@ -103,18 +93,12 @@ def recorded(function: Callable[..., Any], *shapes: tuple[int, ...]) -> Lanes:
 
 
 class Repeatable(NamedTuple):
-    """A function of arrays as operations.
-
-    Parameters
-    ----------
-    given : places of the arrays that it takes.
-    found : places of the arrays that it returns, or truth values.
-    """
+    """A function of arrays as operations."""
 
     tape: Tape
     rows: NDArray[np.int64]
-    given: list[NDArray[np.int64]]
-    found: list[Any]
+    given: list[NDArray[np.int64]]  # places of the arrays that it takes
+    found: list[Any]  # places of the arrays that it returns, or truth values
 
     def loop(self, fmt: Any) -> Loop:
         """Return a loop whose state is the first array that the function takes, and then the first that it returns."""
@@ -130,9 +114,8 @@ def repeatable(
 ) -> Repeatable:
     """Record a function of arrays of some shapes, which returns arrays as :func:`recorded` has them.
 
-    Parameters
-    ----------
-    nonzero : for each array, which entries are ever other than zero, as the bytes of truth values; all by default.
+    For each array, `nonzero` tells which entries are ever other than zero, as the bytes of truth values; all by
+    default.
     """
     tape, given, at = Tape(sum(map(math.prod, shapes))), [], 1
     for shape in shapes:

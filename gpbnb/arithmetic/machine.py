@@ -60,12 +60,7 @@ def takes_numbers(codes: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 class Addresses:
-    """Arrays and integers as compiled functions take them: their addresses, and the integers, in one array.
-
-    Parameters
-    ----------
-    given : arrays whose entries follow each other in memory, and integers.
-    """
+    """Arrays, contiguous, and integers as compiled functions take them: addresses and integers in one array."""
 
     def __init__(self, *given: Any) -> None:
         self._given = given
@@ -80,9 +75,7 @@ def _address(array: NDArray[Any]) -> int:
 def tables(formats: Sequence[Any], tag: Any = None) -> tuple[Any, Any]:
     """Return the kind of numbers of some formats of one base, None being double-double, and their columns.
 
-    Parameters
-    ----------
-    tag : the arithmetic of a run, from which all its parts draw random numbers.
+    All parts of a run draw random numbers from its `tag`.
     """
     from gpbnb.arithmetic.kernels import quick
 
@@ -295,13 +288,7 @@ def as_words(numbers: NDArray[Any]) -> NDArray[np.int64]:
 
 
 class Memory:
-    """Numbers and truth values of the machine.
-
-    Parameters
-    ----------
-    values : (places, [lanes], ...).
-    truths : (truths, [lanes]).
-    """
+    """Numbers (places, [lanes], ...) and truth values (truths, [lanes]) of the machine."""
 
     def __init__(self, values: NDArray[Any], truths: NDArray[np.uint8]) -> None:
         self.values, self.truths = values, truths
@@ -323,12 +310,9 @@ def is_far(numbers: NDArray[Any]) -> bool:
 
 
 def functions(kind: Any, far: bool, alone: bool) -> Iterator[int]:
-    """Yield the address of a kind's function, and of those that compute what it leaves.
+    """Yield the address of a kind's function for one lane or many, and of those that compute what it leaves.
 
-    Parameters
-    ----------
-    far : whether numbers may be too small or too large for quick computation.
-    alone : whether there is one lane.
+    Numbers that may be too small or too large for quick computation are `far`.
     """
     from gpbnb.arithmetic.kernels import machine
 

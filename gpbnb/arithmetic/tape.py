@@ -94,9 +94,7 @@ def depending(rows: NDArray[Any], numbers: NDArray[np.bool_], truths: NDArray[np
 class Tape:
     """Operations in the order in which they ran. Place 0 is the number zero; truth values 0 and 1 are false and true.
 
-    Parameters
-    ----------
-    inputs : number of numbers that each run takes; their places are 1 and following.
+    The places of the numbers that each run takes are 1 to `inputs`.
     """
 
     def __init__(self, inputs: int, one: bool = False) -> None:
@@ -155,12 +153,8 @@ class Tape:
     def record(self, name: str, *operands: Any, fmt: int = 0) -> Places:
         """Record an operation on places of one shape, entry by entry, and return the places of its results.
 
-        Products with zero and one and sums with zero are exact, and left out.
-
-        Parameters
-        ----------
-        operands : a third one, a choice or a table, may be an int.
-        fmt : number of the format in which the results are rounded.
+        Products with zero and one and sums with zero are exact, and left out. A third operand, a choice or a table, may
+        be an int. Results are rounded in format number `fmt`.
         """
         if name == "round":
             (a,) = operands
@@ -298,13 +292,7 @@ class Tape:
     # -- running ---------------------------------------------------------------------------------------
 
     def run(self, inputs: FloatArray, results: Places) -> FloatArray:
-        """Repeat the operations in the format of the inputs.
-
-        Parameters
-        ----------
-        inputs : (inputs,).
-        results : (m,), places.
-        """
+        """Repeat the operations in the format of the inputs, (inputs,); return the numbers at the places of results."""
         fmt: Any = inputs.format
         found = None
         if len(self._instructions) >= 5 * FEW_OPERATIONS and isinstance(fmt.backend, Compiled):

@@ -20,12 +20,7 @@ def number_text(value: Any) -> str:
 
 
 def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: str, prefix: str) -> str:
-    """Lay out an array of texts as NumPy lays out numbers, with the same omissions.
-
-    Parameters
-    ----------
-    texts : the text of the i-th entry, counted row after row.
-    """
+    """Lay out an array of texts, counted row after row, as NumPy lays out numbers, with the same omissions."""
     shown: dict[int, str] = {}
 
     def entry(place: Any) -> str:

@@ -60,14 +60,10 @@ class Taken(NamedTuple):
 
 
 class CarriedBound:
-    """The contraction bound of :mod:`gpbnb.filters.contraction`, computed along with a run.
+    """The contraction bound of :mod:`gpbnb.filters.contraction`, computed along with a run in a form.
 
-    Parameters
-    ----------
-    stored : the model as the run stores it, without known inputs.
-    form : the form whose covariances, or factors, and gains the steps have.
-    first : (n, n), the covariance from which the run starts, as Fractions, if factors represent it; otherwise None.
-    checkpoint_steps : steps after which bounds are saved.
+    The model is as the run stores it, without known inputs. If factors represent the covariance from which the run
+    starts, it is given as Fractions, (n, n).
     """
 
     def __init__(
@@ -93,15 +89,11 @@ class CarriedBound:
         self.now = self.now._replace(eta=np.inf, zeta=np.inf)
 
     def take(self, first: int, taken: Taken) -> None:
-        """Continue the bound over steps that a run has taken, and save it at checkpoint steps.
+        """Continue the bound over steps that a run has taken after the `first` ones, and save it at checkpoint steps.
 
         Each step is repeated in double-double from the run's state before that step, and its residuals enter the bound.
         Entries of the state below :data:`DECAYED` count as zero, so that this size is added to the bound. If a step
         cannot be repeated, there is no bound from there on.
-
-        Parameters
-        ----------
-        first : how many steps were taken before these.
         """
         try:
             taken = taken._replace(before=self._kept(taken.before), after=self._kept(taken.after))

@@ -20,15 +20,9 @@ from gpbnb.arithmetic.formats import FloatFormat
 
 
 class Packed(NamedTuple):
-    """Numbers as compiled loops compute them.
+    """Numbers as compiled loops compute them, in a format, or in double-double if that is None."""
 
-    Parameters
-    ----------
-    numbers : float64 in bases 2 and 16, pairs (..., 2) of int64 in base 10, pairs of float64 in double-double.
-    fmt : their format; None for double-double.
-    """
-
-    numbers: NDArray[Any]
+    numbers: NDArray[Any]  # float64 in bases 2 and 16, pairs (..., 2) of int64 in base 10, of float64 in double-double
     fmt: FloatFormat | FixedFormat | None
 
     def exactly(self) -> NDArray[Any]:
@@ -42,9 +36,7 @@ class Packed(NamedTuple):
 class Progress(ABC):
     """A run of a filter: how far it has come, which of its steps are saved, and why it has ended.
 
-    Parameters
-    ----------
-    checkpoint_steps : steps, 1 or more, whose results are saved, in ascending order.
+    Checkpoint steps are 1 or more, in ascending order.
     """
 
     model: Any
@@ -91,10 +83,7 @@ class Progress(ABC):
 class Checkpoints:
     """Exact values after some steps, object arrays of Fractions: x (c, n), K (c, n, m), P (c, n, n).
 
-    Parameters
-    ----------
-    steps : after which steps.
-    x, K, P : the values, as Fractions or as a run keeps them.
+    They are given as Fractions, or as a run keeps them.
     """
 
     def __init__(

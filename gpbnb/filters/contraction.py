@@ -91,12 +91,9 @@ class EvaluationErrors(NamedTuple):
 
 @np.errstate(all="ignore")
 def contraction_start(P: Array, de: Array, dE: Array) -> Contraction:
-    """Start the bound at the initial state and covariance.
+    """Start the bound at the initial state and covariance P (n, n), which defines the weights.
 
-    Parameters
-    ----------
-    P : (n, n), initial covariance, which defines the weights.
-    de, dE : (n,) and (n, n), componentwise bounds on the errors of the initial state and covariance; zero if exact.
+    Componentwise bounds of their errors are de (n,) and dE (n, n), zero if they are exact.
     """
     (found,), _ = recorded(_weights, P.shape).begin(BINARY64, ((P + P.T) / 2)[np.newaxis])
     L = found[0] if len(found) else np.full(P.shape, np.nan)
@@ -279,11 +276,7 @@ def gain_error_bound(bound: Contraction, K: Array, used: Array, dK: Array) -> Ar
 
     .. math:: \hat K_k - K_k = (\hat K_k - K^\circ_k) + F_k E_{k-1} \Phi^T H^T S^{\circ-1}
 
-    Parameters
-    ----------
-    bound : the bound after the step.
-    K, dK : as in :func:`contraction_step`.
-    used : (n, m), the program's gain.
+    The gain that was used is (n, m); K and dK are those of the repeated step.
     """
     up = 1 + _many(*K.shape[-2:])
     off = np.abs(used - K) + dK + _U * (np.abs(used) + np.abs(K)) + _outer(_rows(bound.L), bound.gain)

@@ -86,13 +86,9 @@ def repair_tolerance(values: Any) -> float | None:
 def repaired(
     letter: str, member: int, matrix: NDArray[Any], strictly: bool, tolerance: float = REPAIR_TOLERANCE
 ) -> tuple[NDArray[Any], Repair | None]:
-    """Return the covariance, repaired if necessary, and the change.
+    """Return an exact covariance (n, n), repaired if necessary by at most the tolerance, and the change.
 
-    Parameters
-    ----------
-    matrix : (n, n), exact.
-    strictly : whether it must be positive definite; its variances are then not raised.
-    tolerance : the largest change, relative to the variances.
+    Variances of one that must be positive definite, `strictly`, are not raised.
     """
     symmetric, asymmetry, shift = matrix, 0.0, 0.0
     try:
@@ -118,14 +114,8 @@ def raised_as_stored(
 ) -> tuple[NDArray[Any], Repair] | None:
     """Return a covariance as a format stores it, with variances raised until it is definite, and the change.
 
-    Parameters
-    ----------
-    matrix : (n, n), exact; indefinite as the format stores it.
-    strictly : whether it must be positive definite.
-
-    Returns
-    -------
-    stored : None if no change helps: a variance overflows, or becomes zero while a covariance does not.
+    None if no change helps: a variance overflows, or becomes zero while a covariance does not. It is exact, (n, n), and
+    indefinite as the format stores it; with `strictly` it must be positive definite.
     """
 
     def sound(candidate: NDArray[Any]) -> bool:
@@ -167,16 +157,8 @@ def raised_until(
 ) -> tuple[NDArray[Any], float] | None:
     """Raise the variances by a share δ of themselves, which is doubled until the matrix is sound.
 
-    Parameters
-    ----------
-    matrix : (n, n) or (p, n, n), exact; all members are raised alike.
-    sound : function that decides whether a raised matrix is acceptable.
-    least, largest : first and last δ.
-    store : applied to the raised matrix before it is judged and returned.
-
-    Returns
-    -------
-    raised : the matrix and δ; None if no δ is sufficient.
+    The matrix is exact, (n, n) or (p, n, n), whose members are raised alike; it is stored before it is judged and
+    returned, with δ. None if no δ from `least` to `largest` suffices.
     """
     variances = np.diagonal(matrix, axis1=-2, axis2=-1)
     i = np.arange(matrix.shape[-1])

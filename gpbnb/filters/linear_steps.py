@@ -15,15 +15,10 @@ from gpbnb.interrupts import slices
 
 
 class LinearSteps:
-    """A linear program in a format.
+    """A linear program in a format, None for double-double, from packed coefficients (c, ...) and states x (n, ...).
 
     Operations that do not need each other run together if they have one code, which takes half the time, unless each
-    draws a random number.
-
-    Parameters
-    ----------
-    fmt, tag : the format, None for double-double, and the arithmetic from which random numbers are drawn.
-    coefficients, x : (c, ...) and (n, ...), packed.
+    draws a random number, from `tag`.
     """
 
     def __init__(self, program: Program, fmt: Any, tag: Any, coefficients: NDArray[Any], x: NDArray[Any]) -> None:
@@ -51,11 +46,8 @@ class LinearSteps:
         """Take a step with each of the numbers z, (steps, m, ...).
 
         A number may be too small only because a state has decayed. Such a state becomes zero, and the run resumes.
-
-        Returns
-        -------
-        states : (steps, n, ...), of the steps that have results.
-        output : number of the first output that the next step cannot compute; -1 if all steps have results.
+        Return the states of steps that have results, (steps, n, ...), and the first output that the next step cannot
+        compute, or -1.
         """
         loop = self._loop
         loop.keep(loop.after)
@@ -78,9 +70,7 @@ class LinearSteps:
     def largest(self, z: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the largest size of each value over steps with the numbers z, (steps, m), in a format on float64.
 
-        Raises
-        ------
-        OverflowError : a step has no result.
+        A step that has no result raises OverflowError.
         """
         loop, sizes = self._loop, np.zeros(len(self._places))
         loop.keep(self._places)

@@ -167,11 +167,7 @@ class NonlinearRun(Progress):
     def program(self) -> tuple[Program, list[NDArray[Any]]]:
         """Return the operations of a step, and its coefficients but 1, which is the last, each with its cycle.
 
-        Inputs are the measurements, then the known inputs.
-
-        Raises
-        ------
-        ValueError : the step cannot be traced; the message says why.
+        Inputs are the measurements, then the known inputs. ValueError says why a step cannot be traced.
         """
         found = self._step.recorded(self._step.given(self._stored(np.zeros(self.model.m))))
         tape, taken = found.tape, (*found.states, *found.own, *found.cycles)

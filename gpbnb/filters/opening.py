@@ -58,13 +58,10 @@ class Opening(NamedTuple):
 
 
 def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -> Opening:
-    """Return what a filter starts with.
+    """Return what a filter starts with in a format, None for double-double.
 
-    Parameters
-    ----------
-    model : the model as given, not as stored, because the UD factors are computed from the variances as given.
-    fmt : None for double-double.
-    tag : arithmetic of the run, from which factors and inverses take their random numbers, too.
+    The model is as given, not as stored, because UD factors are computed from the variances as given. Factors and
+    inverses take their random numbers from the arithmetic of the run, too.
     """
     stored = model if fmt is None else model.definite_in(fmt)
     letters = dict(_double_doubles(stored) if fmt is None else _packed(stored, fmt))

@@ -101,13 +101,9 @@ class Program:
 
     @cached_property
     def operations(self) -> NDArray[np.int64]:
-        """Code and two operands of each operation, (o, 3).
+        """Code and two operands of each operation, (o, 3); ValueError if one is neither linear nor a limit.
 
         MULTIPLY, AT_LEAST and AT_MOST take a coefficient and a value, ADD and SUBTRACT two values.
-
-        Raises
-        ------
-        ValueError : an operation is neither linear nor a limit.
         """
         number = np.full(self.sizes[0], -1)
         number[self.coefficients] = np.arange(len(self.coefficients))
@@ -204,9 +200,7 @@ def recorded(
 ) -> Program:
     """Record a step of a filter with n states, m inputs, and a number of coefficients.
 
-    Parameters
-    ----------
-    stored : results of the step that are stored even if only sums use them; it may be filled by the step.
+    Results that are `stored`, even if only sums use them, may be added to that list by the step.
     """
     tape = Tape(n + m + coefficients)
     x, u, c = np.split(np.arange(1, 1 + tape.inputs), [n, n + m])
@@ -295,12 +289,8 @@ def sequential_program(n: int, m: int) -> Program:
 def without_exact(program: Program, coefficients: NDArray[Any]) -> Program:
     """Leave out operations that are exact and change nothing: a product with zero or one, and a sum with zero.
 
-    No digit changes. Place 0 is the number zero. A result that nothing uses any more remains if it may leave the range,
-    since its overflow ends a run of the step.
-
-    Parameters
-    ----------
-    coefficients : (p, c), exact stored coefficients of each step of a cycle.
+    The exact stored coefficients are (p, c), for each step of a cycle. No digit changes. Place 0 is the number zero. A
+    result that nothing uses any more remains if it may leave the range, since its overflow ends a run of the step.
     """
     zeros, ones = (program.coefficients[np.all(coefficients == each, axis=0)] for each in (0, 1))
     one = int(ones[0]) if len(ones) else -1

@@ -36,27 +36,17 @@ class Known(NamedTuple):
 
 
 class StepKind(NamedTuple):
-    """All that the operations of a step depend on.
-
-    Parameters
-    ----------
-    form, n, m : the form, and the numbers of states and measurements.
-    model : matrices of the model.
-    one : whether every format has the number one.
-    blocks : number of the format of state, gain, covariance, innovation covariance, and the model.
-    sums : fused, order and block of sums of products; then the number of the format that keeps them, or -1.
-    alike : whether a number that several formats have is stored alike in all of them.
-    """
+    """All that the operations of a step depend on."""
 
     form: Form
     n: int
     m: int
     model: tuple[Known, ...]
-    one: bool = True
-    blocks: tuple[int, ...] = (0, 0, 0, 0, 0)
-    sums: tuple[Any, ...] = (False, "left", 32, -1)
+    one: bool = True  # whether every format has the number one
+    blocks: tuple[int, ...] = (0, 0, 0, 0, 0)  # formats of state, gain, covariance, innovation covariance, model
+    sums: tuple[Any, ...] = (False, "left", 32, -1)  # fused, order, block; the format of sums, or -1
     compensated: bool = False
-    alike: bool = True
+    alike: bool = True  # whether a number that several formats have is stored alike in all of them
 
 
 def step_kind(
@@ -67,12 +57,9 @@ def step_kind(
     sums: tuple[Any, ...] = (False, "left", 32, -1),
     compensated: bool = False,
 ) -> StepKind:
-    """Return the kind of the steps of a filter.
+    """Return the kind of the steps of a filter whose first format is `fmt`, None for double-double.
 
-    Parameters
-    ----------
-    model : its matrices by their letters, (p, rows, columns, ...) or (p, rows, ...), packed.
-    fmt : the first format; None is double-double.
+    Its matrices by their letters are packed, (p, rows, columns, ...) or (p, rows, ...).
     """
     one = packed_one(fmt)
     m, n = model["H"].shape[1:3]
@@ -146,16 +133,10 @@ def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], Line
 
 
 def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
-    """Return a whole step of a Kalman filter, with its covariance.
+    """Return a whole step of a Kalman filter, whose states are those of :func:`program_states`.
 
-    Parameters
-    ----------
-    shapes : shapes of the matrices of the model by their letters, and of the known inputs u, which follow the
-        measurements. Coefficients are the entries of the matrices in this order, then 1.
-
-    Returns
-    -------
-    program : its states are x (n), then the entries of P, or in the UD form the upper triangle of U.
+    Given are shapes of the matrices of the model by their letters, and of the known inputs u, which follow the
+    measurements. Coefficients are the entries of the matrices in this order, then 1.
     """
     m, n = shapes["H"]
     unknown = (Known(letter, shape, bytes([2]) * math.prod(shape)) for letter, shape in shapes.items())
@@ -175,12 +156,9 @@ def filter_program(
 ) -> Program:
     """Return a recorded step of a filter as a program whose states are those of :func:`program_states`.
 
-    Parameters
-    ----------
-    places : those of x, P and z, of the known inputs u if there are any, and of matrices by their letters. Coefficients
-        are the entries of the matrices in this order, then the others, and 1.
-    others : places of other coefficients.
-    after, definite : places of x and P after the step, and of a truth value.
+    Places are those of x, P and z, of the known inputs u if there are any, and of matrices by their letters; `after`
+    those of x and P after the step. Coefficients are the entries of the matrices in this order, then those at other
+    places, and 1.
     """
     x, P, z = (places[letter] for letter in "xPz")
     matrices = {letter: each for letter, each in places.items() if letter not in ("x", "P", "z", "u")}
@@ -215,10 +193,8 @@ def block_algebra(
 ) -> BlockAlgebra:
     """Return how matrices of the formats of state, gain, covariance and innovation covariance are computed.
 
-    Parameters
-    ----------
-    fused, order, block : how products are added, see :func:`gpbnb.arithmetic.linalg.matmul`.
-    sums : the format that keeps a sum until it is stored; by default that of the block.
+    Products are added as :func:`gpbnb.arithmetic.linalg.matmul` does, in the format `sums` until they are stored, by
+    default that of the block.
     """
     state, gain, covariance, innovation = (_algebra(fmt, fused, order, block, sums) for fmt in formats)
     return BlockAlgebra(state, gain, covariance, innovation, BlockStorage(*(fmt.array for fmt in formats)))

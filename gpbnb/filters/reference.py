@@ -60,25 +60,15 @@ class PreciseSteps(NamedTuple):
 
 
 def precise_steps(model: LinearModel, z: Any) -> PreciseSteps:
-    """Return all steps in bits that agree with a run in fewer bits.
-
-    Parameters
-    ----------
-    model : also with known inputs and offsets.
-    z : (steps, m), measurements.
-    """
+    """Return all steps with measurements z, (steps, m), in bits that agree with a run in fewer bits."""
     measured = exact(z)
     return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
 
 
 def agreed(name: str, count: int, steps: Callable[[int], PreciseSteps | str]) -> PreciseSteps:
-    """Return steps in bits that agree with a run in fewer bits.
+    """Return steps of a named model in bits that agree with a run in fewer bits.
 
-    Parameters
-    ----------
-    name : name of the model.
-    count : number of steps.
-    steps : function that returns all steps in a number of bits, or why they cannot be computed in them.
+    A function returns all of them in a number of bits, or says why they cannot be computed in these.
     """
     if count > MOST_STEPS:
         raise ArithmeticError(

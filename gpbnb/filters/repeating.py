@@ -81,9 +81,7 @@ class RepeatedStep:
     def recorded(self, given: Sequence[FloatArray]) -> RecordedStep:
         """Return the operations of a step in one format, whose numbers are not looked at.
 
-        Raises
-        ------
-        ValueError : no tape can repeat the step; the message says why.
+        ValueError says why no tape can repeat the step.
         """
         found = self._recorded(given, [0] * (len(self.states) + len(given)), True)
         if isinstance(found, str):
@@ -190,10 +188,7 @@ class RepeatedStep:
 class _OneByOne:
     """A recorded step that runs on integers, or whose calls of functions stand between its operations.
 
-    Parameters
-    ----------
-    numbers : with what no step changes.
-    cycles : packed numbers of its cycles. each : operations and calls of a step.
+    Numbers hold what no step changes; cycles are packed.
     """
 
     def __init__(

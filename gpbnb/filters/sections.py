@@ -45,14 +45,10 @@ class _Factor(NamedTuple):
 def factored(
     b: Sequence[Fraction], a: Sequence[Fraction], pairing: str = "nearest", order: Any = "up"
 ) -> list[Coefficients]:
-    """Factor a filter into sections; the gain is in the first.
+    """Factor a filter b0 … bM and a1 … aN, without the leading 1, into sections; the gain is in the first.
 
-    Factors of first and second order over the rationals are exact; others have relative errors below 2**-250.
-
-    Parameters
-    ----------
-    b, a : b0 … bM and a1 … aN, without the leading 1.
-    pairing : one of :data:`PAIRINGS`; order : see :func:`ordered`.
+    Factors of first and second order over the rationals are exact; others have relative errors below 2**-250. For
+    pairing and order see :data:`PAIRINGS` and :func:`ordered`.
     """
     if not any(b):
         raise ValueError("got coefficients b that are all zero; needed one that is not, to factor the filter")
@@ -82,12 +78,7 @@ def repaired(sections: Sequence[Coefficients], pairing: str, order: Any) -> list
 
 
 def ordered(sections: list[Coefficients], order: Any) -> list[Coefficients]:
-    """Return sections in an order.
-
-    Parameters
-    ----------
-    order : one of :data:`ORDERS`, or the numbers of the sections from 0, each once.
-    """
+    """Return sections in one of :data:`ORDERS`, or in that of their numbers from 0, each once."""
     if isinstance(order, str):
         if _one_of("order", order, ORDERS) == "given":
             return sections
@@ -105,15 +96,11 @@ def ordered(sections: list[Coefficients], order: Any) -> list[Coefficients]:
 
 
 def scaled(sections: Sequence[Coefficients], form: str) -> list[Coefficients]:
-    """Multiply sections by powers of two, so that numbers between them stay within 1 for inputs within 1.
+    """Multiply sections in a direct form by powers of two, so that numbers between them stay within 1 for such inputs.
 
-    The peak gain from the input to the output of each section but the last is then at most 1 and more than 1/2. The
-    last section takes up the powers, so the whole filter stays the same.
-
-    Parameters
-    ----------
-    form : the direct form of the sections; in the direct form II, the gain to the delayed values of the next section
-        counts as well.
+    The peak gain from the input to the output of each section but the last is then at most 1 and more than 1/2; in the
+    direct form II, the gain to the delayed values of the next section counts as well. The last section takes up the
+    powers, so the whole filter stays the same.
     """
     found, moved = list[Coefficients](), 0
     response = np.zeros(_length(sections))

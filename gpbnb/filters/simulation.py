@@ -68,12 +68,9 @@ class Simulation:
     def block(
         self, number: int, truth: NDArray[np.float64], steps: int = BLOCK
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the measurements of block `number`, at most 4096 steps, given the truth before its first step.
+        """Return the measurements of block `number`, (steps, m), at most 4096 steps, and the truth after them, (n,).
 
-        Returns
-        -------
-        z : (steps, m), multiples of the resolution.
-        truth : (n,), the truth after these steps.
+        They start from the truth before the first step, and are multiples of the resolution.
         """
         rng = np.random.default_rng([self.seed, number])
         w = rng.standard_normal((BLOCK, self.model.n))
@@ -102,13 +99,8 @@ def measured(
 ) -> None:
     """Propagate the true state x by Phi plus a root of Q times w, and measure it by H plus a root of R times v.
 
-    Entries of z and x beyond the range of float64 become infinite.
-
-    Parameters
-    ----------
-    matrices : Phi, the root of Q, H and the root of R, each with an axis of members that take turns.
-    first : number of steps before.
-    x, z : (n,) and (steps, m), to be overwritten.
+    Matrices are Phi, the root of Q, H and the root of R, each with an axis of members that take turns; `first` steps
+    were taken before. x (n,) and z (steps, m) are overwritten; entries beyond the range of float64 become infinite.
     """
     n, (steps, m) = len(x), z.shape
     shapes = ((n,), (n,), (m,), *(each.shape[1:] for each in matrices))

@@ -78,13 +78,10 @@ class RootModel(NamedTuple):
 def filtered(
     algebra: Algebra, form: Form, model: StepModel, x: Matrix, P: Matrix, z: Matrix
 ) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-    """Take one step of the filter over numbers of any kind; return x, P, and what a smoother keeps of the step.
+    """Take one step of the filter, in the innovation form or Joseph's, over numbers of any kind.
 
-    Parameters
-    ----------
-    algebra : how numbers of this kind are computed.
-    form : Form.INNOVATION or Form.JOSEPH.
-    x (n, 1), P (n, n), z (m, 1) : estimate and covariance before the step, and its measurement.
+    From estimate x (n, 1) and covariance P (n, n) before the step, and its measurement z (m, 1), return x, P, and what
+    a smoother keeps of the step.
     """
     V = predicted(algebra, model.Phi, P, model.Q)
     K = gain(algebra, model.H, model.R, V).K
@@ -104,11 +101,9 @@ def smoothed(
 
 
 def filtered_root(model: RootModel, x: Matrix, S: Matrix, z: Matrix, identity: Matrix) -> tuple[Matrix, ...]:
-    """Take one step with square roots; return x and S, the prediction, and A, B and C of the triangle.
+    """Take one step with square roots, from an estimate x (n,) and a root S (n, n), with a measurement z (m,).
 
-    Parameters
-    ----------
-    x (n,), S (n, n), z (m,) : estimate and root before the step, and its measurement. identity : (n, n).
+    Return x and S, the prediction, and A, B and C of the triangle.
     """
     A, B, C = _joint_root(model, S, identity)
     ahead = model.Phi @ x

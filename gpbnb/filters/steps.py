@@ -142,9 +142,7 @@ def measured_in(
 ) -> Measured:
     """Return the gain, and the covariance after a measurement, each computed in its own block.
 
-    Parameters
-    ----------
-    about : takes the name of each quantity before it is computed.
+    The name of each quantity is told before it is computed.
     """
     stored = blocks.stored
     about("the innovation covariance")
@@ -243,15 +241,8 @@ def observe_ud(
 ) -> tuple[Matrix, Matrix, Matrix, Any]:
     """Update UD factors by Bierman's method, for one measurement z of h'x with variance r.
 
-    Parameters
-    ----------
-    h (n,), r : in the innovation block. z, x (n,) : in the state block. U (n, n) : in the covariance block.
-    stored : how a block takes numbers from another one.
-
-    Returns
-    -------
-    x, U, gain : values after the update.
-    definite : whether variances stay positive.
+    The innovation block has h (n,) and r, the state block z and x (n,), and the covariance block U (n, n). Return x, U
+    and gain after the update, and whether variances stay positive.
     """
     y = innovation_of_one(stored.state(h), z, x)
     seen = stored.innovation(U)
@@ -376,13 +367,9 @@ def observed(
     P: Matrix,
     stored: BlockStorage = ONE_FORMAT,
 ) -> FactoredStep:
-    """Update a predicted estimate and its factors or root by measurements, decorrelated and one by one.
+    """Update a predicted estimate (n,) and its factors or root P (n, n) by measurements z (m,), one by one.
 
-    Parameters
-    ----------
-    H (m, n), UR (m, m) : measurement matrix, and factors of R. z (m,), ahead (n,), P (n, n) : measurements, predicted
-        estimate, and its factors or root.
-    stored : how a block takes numbers from the model.
+    They are decorrelated by the factors of R, UR (m, m).
     """
     UR, of_state = stored.innovation(UR), stored.state(UR)
     rows, values, gains, x, definite = (
@@ -424,10 +411,7 @@ def _stacked(parts: list[Matrix]) -> Any:
 def combined_gain(K: Matrix, H: Matrix, UR: Matrix) -> Any:
     """Return the gain (n, m) for all measurements together, from those of decorrelated measurements one by one.
 
-    Parameters
-    ----------
-    K (n, m) : each column is the gain of one decorrelated measurement after the other.
-    H (m, n), UR (m, m) : measurement matrix, and factors of R.
+    Each column of K (n, m) is the gain of one of these; H (m, n) is the measurement matrix, and UR (m, m) factors of R.
     """
     m, rows = len(UR), decorrelated(UR, H)
     columns = [K[:, j] for j in range(m)]
@@ -484,11 +468,8 @@ class LinearTaken(NamedTuple):
 class LinearStep:
     """A step on arrays of any kind, also of those that record their operations.
 
-    Parameters
-    ----------
-    given : matrices and known inputs of the step, by their letters.
-    about : takes the name of each quantity before it is computed.
-    compensated : whether the estimate is updated by compensated summation in a form that usually is not.
+    Given are its matrices and known inputs, by their letters. The name of each quantity is told before it is computed.
+    Compensated summation may update the estimate in a form that usually has none.
     """
 
     def __init__(
@@ -569,25 +550,16 @@ class LinearStep:
 
 
 class UnscentedModel(NamedTuple):
-    r"""What one step uses.
+    """What one step uses."""
 
-    Parameters
-    ----------
-    f, h : functions of a state (n,).
-    difference : function of two measurements (m,).
-    scale : :math:`n + \lambda`.
-    means, covariances : weights, (2n + 1,).
-    Q, R : (n, n) and (m, m).
-    """
-
-    f: Callable[[Matrix], Matrix]
+    f: Callable[[Matrix], Matrix]  # of a state (n,), as h
     h: Callable[[Matrix], Matrix]
-    difference: Callable[[Matrix, Matrix], Matrix]
-    scale: Any
-    means: Matrix
-    covariances: Matrix
-    Q: Matrix
-    R: Matrix
+    difference: Callable[[Matrix, Matrix], Matrix]  # of two measurements (m,)
+    scale: Any  # n + λ
+    means: Matrix  # weights, (2n + 1,)
+    covariances: Matrix  # weights, (2n + 1,)
+    Q: Matrix  # (n, n)
+    R: Matrix  # (m, m)
 
 
 class UnscentedStep(NamedTuple):

@@ -54,16 +54,10 @@ LONGEST = 512
 
 
 class Cascade(NamedTuple):
-    """How the coefficients of a cascade belong to its sections.
+    """How the coefficients of a cascade belong to its sections."""
 
-    Parameters
-    ----------
-    form : the direct form of the sections.
-    lengths : for each section, the numbers of its coefficients b and of its coefficients a.
-    """
-
-    form: str
-    lengths: tuple[tuple[int, int], ...]
+    form: str  # the direct form of the sections
+    lengths: tuple[tuple[int, int], ...]  # for each section, numbers of its coefficients b and a
 
     def sections(self, coefficients: NDArray[Any]) -> list[tuple[list[Fraction], list[Fraction]]]:
         """Return b and a of each section, without the leading 1 of a."""
@@ -72,17 +66,10 @@ class Cascade(NamedTuple):
 
 
 class Structure(NamedTuple):
-    """One step of a filter in a structure.
+    """One step of a filter in a structure."""
 
-    Parameters
-    ----------
-    program : operations of the step; the outputs follow the states.
-    coefficients : (c,), the exact design values; they are rounded when a format stores them.
-    cascade : the sections of a cascade; None for another structure.
-    """
-
-    program: Program
-    coefficients: NDArray[Any]
+    program: Program  # its outputs follow the states
+    coefficients: NDArray[Any]  # (c,), the exact design values, which are rounded when a format stores them
     cascade: Cascade | None = None
 
 
@@ -226,9 +213,7 @@ def structure_named(name: Any, among: Sequence[str] = WITH_FIR) -> str:
 def transfer_function(b: Any, a: Any) -> tuple[list[Fraction], list[Fraction]]:
     """Check the coefficients of a filter, and return them exact, divided by a[0], without zeros at their end.
 
-    Returns
-    -------
-    b, a : b0 … bM, at least b0, and a1 … aN, without the leading 1.
+    These are b0 … bM, at least b0, and a1 … aN, without the leading 1.
     """
     rows = []
     for letter, given in (("b", b), ("a", a)):
@@ -256,9 +241,7 @@ def transfer_function(b: Any, a: Any) -> tuple[list[Fraction], list[Fraction]]:
 def sections_of(sos: Any) -> list[tuple[list[Fraction], list[Fraction]]]:
     """Check second-order sections, and return b and a of each as :func:`transfer_function` does.
 
-    Parameters
-    ----------
-    sos : (sections, 6), rows b0, b1, b2, a0, a1, a2, as in ``scipy.signal``.
+    They are (sections, 6), with rows b0, b1, b2, a0, a1, a2, as in ``scipy.signal``.
     """
     entries = exact(sos)
     if entries.ndim != 2 or entries.shape[1:] != (6,) or not len(entries):
@@ -354,9 +337,7 @@ def lattice(b: Sequence[Fraction], a: Sequence[Fraction]) -> Structure:
 def reflections(b: Sequence[Fraction], a: Sequence[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
     """Return the reflection coefficients (K,) and the taps (K + 1,) of a filter, by stepping down its order.
 
-    Parameters
-    ----------
-    b, a : (K + 1,), a with its leading 1.
+    Its coefficients b and a are (K + 1,), a with its leading 1.
     """
     a, b = [*a], [*b]
     k, v = [Fraction(0)] * (len(a) - 1), [Fraction(0)] * len(a)
@@ -517,23 +498,15 @@ class Controller(NamedTuple):
 
     .. math::
         i \leftarrow \lambda i + K_i e + K_b (u - v),\quad v = K_p e + i + K_d(e - e_{-1}),\quad u = v \text{ limited}
-
-    Parameters
-    ----------
-    Kp, Ki, Kd : gains per step.
-    leak : λ, the factor by which the integral decays in a step.
-    limits : lowest and highest output.
-    integral_limits : lowest and highest integral.
-    back : :math:`K_b`; this gain times the last output minus its value before limiting is added to the integral.
     """
 
-    Kp: Fraction
+    Kp: Fraction  # gains per step
     Ki: Fraction
     Kd: Fraction | None = None
-    leak: Fraction = Fraction(1)
-    limits: tuple[Fraction, Fraction] | None = None
-    integral_limits: tuple[Fraction, Fraction] | None = None
-    back: Fraction | None = None
+    leak: Fraction = Fraction(1)  # λ, the factor by which the integral decays in a step
+    limits: tuple[Fraction, Fraction] | None = None  # lowest and highest output
+    integral_limits: tuple[Fraction, Fraction] | None = None  # lowest and highest
+    back: Fraction | None = None  # the gain K_b
 
 
 def controller_structure(given: Controller) -> Structure:

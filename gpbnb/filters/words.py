@@ -116,22 +116,13 @@ class WordFormats:
 
 
 class IntegerProgram(NamedTuple):
-    """A program on integers, in some formats of words.
-
-    Parameters
-    ----------
-    program : the operations.
-    words : the formats.
-    factors : (o,), integer of the coefficient of each product, and of each limit in units of the data; else 0.
-    shifts : (o,), fraction bits that a product loses on its way to the accumulator, negative if it gains some.
-    coefficients : (c,), exact value of each stored coefficient.
-    """
+    """A program on integers, in some formats of words."""
 
     program: Program
     words: WordFormats
-    factors: tuple[int, ...]
-    shifts: tuple[int, ...]
-    coefficients: NDArray[Any]
+    factors: tuple[int, ...]  # (o,), of the coefficient of a product, and of a limit in units of the data; else 0
+    shifts: tuple[int, ...]  # (o,), fraction bits that a product loses before the accumulator, negative if it gains
+    coefficients: NDArray[Any]  # (c,), exact value of each stored coefficient
 
     @property
     def is_short(self) -> bool:
@@ -176,15 +167,9 @@ def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
 
 
 class IntegerRun(NamedTuple):
-    """States of a run on integers, and its outputs.
+    """States of a run on integers, and its outputs."""
 
-    Parameters
-    ----------
-    states : (steps, n), integers in units of the data after each step, outputs last.
-    unit : the unit.
-    """
-
-    states: NDArray[Any]
+    states: NDArray[Any]  # (steps, n), integers in units of the data after each step, outputs last
     unit: Fraction
 
     def outputs(self, p: int) -> NDArray[np.float64]:
@@ -199,12 +184,9 @@ class IntegerRun(NamedTuple):
 
 
 def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats) -> IntegerRun:
-    """Run a filter on integers.
+    """Run a filter, which starts from zeros, or a system, from its own x0, on integers.
 
-    Parameters
-    ----------
-    given : the filter, which starts from zeros; a system starts from its own x0.
-    u : (steps, m), inputs; each is rounded into the format of the data.
+    Inputs (steps, m) are rounded into the format of the data.
     """
     if isinstance(given, LinearSystem):
         start = np.concatenate([given.x0, exact([0] * given.p)])
@@ -287,9 +269,7 @@ def _code(made: IntegerProgram, dtype: Any = np.int64) -> WordCode:
 def run_integers(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -> NDArray[Any]:
     """Run a program on integers; return the states after each step, (steps, n).
 
-    Parameters
-    ----------
-    u, x : (steps, m) and (n,), inputs and first state in units of the data.
+    Inputs (steps, m) and first state (n,) are in units of the data.
     """
     short, count = made.is_short and u.dtype != object and x.dtype != object, len(made.program.operations)
     advance, dtype = _way(short, len(u) * count)
@@ -313,14 +293,12 @@ def successors(
 ) -> NDArray[np.int64]:
     """Return, for each state in a box of integers, the number of the state that follows it, (states,).
 
+    The input u (m,) is constant, in units of the data. The box has a lowest integer and a number of integers for each
+    state, both (n,). A state with a count of 0 is never read; it counts as one integer, and its own value does not
+    matter.
+
     States are numbered like the entries of an array of the shape `counts`. A state that leaves the box, or overflows in
     a format that neither saturates nor wraps, has the successor -1.
-
-    Parameters
-    ----------
-    u : (m,), the constant input in units of the data.
-    low, counts : (n,), the lowest integer and the number of integers of each state. A state with a count of 0 is never
-        read; it counts as one integer, and its own value does not matter.
     """
     if not made.is_short:
         raise ValueError(f"got words too long for compiled loops: {made.words}; needed products of up to {_FITS} bits")

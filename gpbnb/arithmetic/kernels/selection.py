@@ -98,9 +98,7 @@ def _stored(rules: Rules, number: Fraction, split: int) -> tuple[int, int, int]:
 def _float_tag(rules: Rules, fusing: bool = False) -> tags.Float | None:
     """Return the tag for float64 storage, or None if float64 cannot hold the digits that decide a rounding.
 
-    Parameters
-    ----------
-    fusing : for fused multiply-add, too, which tells no ties in 53 bits.
+    That of fused multiply-add, with `fusing`, tells no ties in 53 bits.
     """
     base, precision, rounding, limits, seed = rules
     random, bits = rounding is Rounding.STOCHASTIC, base.bit_length() - 1
