@@ -17,8 +17,8 @@ Curves have their names beside them; a legend has at most :data:`MOST_ENTRIES` e
 label have the same limits. :func:`defects` lists where a figure departs from the rule, and the figures of notebooks
 warn of it when they are drawn, which fails the build.
 
-The background is transparent. In dark mode the style sheet of the book inverts the lightness of a picture and keeps its
-hues, so a figure needs no second version.
+The background of the SVG is transparent. In dark mode the style sheet of the book inverts the lightness of a picture
+and keeps its hues, so a figure needs no second version.
 """
 
 from __future__ import annotations
@@ -69,8 +69,7 @@ TEXT = 11.0
 _STYLE: dict[Any, Any] = {
     "figure.dpi": 110,
     "savefig.dpi": 110,
-    "figure.facecolor": "none",
-    "savefig.facecolor": "none",
+    "figure.facecolor": "white",
     "axes.facecolor": "none",
     "figure.constrained_layout.use": True,
     "font.size": TEXT,

@@ -46,7 +46,7 @@ def svg(fig: Figure, size: float) -> str:
             line.set_rasterized(True)
     drawn = io.StringIO()
     with plt.rc_context({"svg.hashsalt": "gpbnb", "svg.fonttype": "none"}):
-        fig.savefig(drawn, format="svg", bbox_inches="tight", dpi=220, metadata={"Date": None})
+        fig.savefig(drawn, format="svg", facecolor="none", bbox_inches="tight", dpi=220, metadata={"Date": None})
     root = ElementTree.fromstring(drawn.getvalue())
     for each in [*root.iter(f"{_SVG}metadata")]:
         root.remove(each)
@@ -72,11 +72,10 @@ def svg(fig: Figure, size: float) -> str:
 def png(fig: Figure) -> str:
     """Return a figure that :func:`svg` laid out as PNG in base 64, which JupyterLab shows before it trusts SVG.
 
-    The figure is white and has no layout engine afterwards: another layout would take half of the time.
+    The figure has no layout engine afterwards: another layout would take half of the time.
     """
     made = io.BytesIO()
     fig.set_layout_engine("none")
-    fig.set_facecolor("white")
     FigureCanvasAgg(fig).print_png(made)
     return _with_palette(base64.b64encode(made.getvalue()).decode()).removeprefix(_PNG)
 
