@@ -94,6 +94,7 @@ def test_what_is_found_must_also_be_proved():
     assert found.fmt == FloatFormat(10, 8)
     assert dict(found.tried)[proved[0]] == 3.0
     assert found.why.endswith("not proved")
+    assert found.error(FloatFormat(10, 6)).ratio == 3.0
 
 
 @pytest.mark.parametrize("base", [2, 3, 10, 16])

@@ -69,7 +69,9 @@ def many_functions(fmt, z):
     small = np.logical_or(m < 0, m == m[0]) ^ (m != 1)
     chosen = np.select([m > 1, small], [m, -m], 0) + np.triu(m) / 2
     some = np.where(np.any(m > 1, axis=0), np.max(m, axis=0), np.min(m, axis=0))
-    held = np.where(np.all(m[0] < 1) & True, np.sign(m[0]), np.copysign(m[1], m[2]))
+    held = np.where(
+        np.all(m[0] < 1) & True & np.all(m[:0] < 1) & ~np.any(m[:0] < 1), np.sign(m[0]), np.copysign(m[1], m[2])
+    )
     return np.concatenate(
         [chosen.ravel(), some, held, np.diff(m, axis=0)[0], fmt.array([m[0, 1], 1]), np.tile(m[1], 2)]
     )

@@ -48,11 +48,11 @@ Z = simulated_measurements(MODEL, STEPS, 1)
 GAPS = np.where(np.random.default_rng(3).random(Z.shape) < 0.2, np.nan, Z)
 
 
-def in_pieces(model):
-    run = Run(model, FMT, Form.INNOVATION, range(1, STEPS + 1))
-    for piece in np.split(Z, [4, 5, 11]):
+def in_pieces(model, ends=(4, 5, 11), **options):
+    run = Run(model, FMT, Form.INNOVATION, range(1, STEPS + 1), **options)
+    for piece in np.split(Z, ends):
         run.take(piece)
-    return run.checkpoints().x
+    return run.bounds.state if options else run.checkpoints().x
 
 
 ANSWERS = {
@@ -63,6 +63,7 @@ ANSWERS = {
     "fixed": lambda model: emulate(model, Z, FixedFormat(8, 20)).x.to_float(),
     "blocks": lambda model: emulate(model.without_inputs(), Z, BlockFormats(FMT, SHORT, FMT, SHORT)).x.to_float(),
     "pieces": in_pieces,
+    "bound in pieces": lambda model: in_pieces(model, bounded=True),
     "reference": lambda model: reference(model, Z, range(1, STEPS + 1)).x,
     "smoother": lambda model: FixedIntervalSmoother(model.without_inputs(), Z).run(FMT).x.to_float(),
     "square-root smoother": lambda model: (
@@ -82,3 +83,8 @@ def test_a_cycle_is_its_members_one_after_the_other(name):
     assert np.array_equal(found, expected)
     assert np.any(found)
     assert np.isfinite(np.asarray(found, dtype=float)).all()
+
+
+@pytest.mark.parametrize("options", [{}, {"bounded": True}], ids=str)
+def test_pieces_of_a_run_go_on_in_the_cycles(options):
+    assert np.array_equal(in_pieces(MODEL, **options), in_pieces(MODEL, (), **options))

@@ -274,3 +274,14 @@ def test_an_overflow_is_named_with_the_place_of_the_first(
         for a, b, place in ((x, x, " at [1]"), (x[2], x, " at [1]"), (x, x[:, None], " at [1, 1]"), (x[1], x[2], "")):
             with pytest.raises(OverflowError, match=f"^{re.escape(name + place)}: (got|overflow)"):
                 operation(a, b)
+
+
+@pytest.mark.parametrize(
+    "y", [0x108A7BAF98BFC4591761C439A03AB, 0x11844F8AA41D370E71B70961B6AAC, 0x1107C655C58194001D2C262E4D0AF]
+)
+def test_the_first_guess_of_a_reciprocal_may_be_two_too_large(y: int) -> None:
+    """It is, if the second word of a divisor is its first plus a remainder of all bits by it, plus one."""
+    fmt, random = FloatFormat(2, 113, "chop"), Random(1)
+    tops = [y - 1 - random.randrange(2 ** random.randrange(1, 112)) for _ in range(200)]
+    found = fmt.array(tops) / fmt.array(y)
+    assert found.to_fractions().tolist() == [fmt.round(Fraction(x, y)) for x in tops]
