@@ -120,6 +120,8 @@ OPERATIONS = [
     lambda a, b, c: np.clip(a, -1, 2),
     lambda a, b, c: np.maximum(a, b) + 1,
     lambda a, b, c: np.where(~(a == b) | (c != a), abs(c), 0),
+    lambda a, b, c: np.where((a < b) == (b < c), a, b),
+    lambda a, b, c: np.where(((a > b) != (b > c)) & (a > c), c, -b),
 ]
 
 

@@ -102,7 +102,7 @@ def test_no_run_is_beyond_its_guarantee(structure, wide):
     """In formats whose guarantee exists, none overflows; and the errors come within a hundredth of the bounds."""
     rng = np.random.default_rng([wide, STRUCTURES.index(structure)])
     shares, proved = [], 0
-    for _ in range(6):
+    for _ in range(4):
         b, a = random_filter(rng, int(rng.integers(1, 5)))
         system = LinearSystem.from_coefficients(b, a, structure)
         u = np.clip(rng.uniform(-2, 2, (150, 1)), -1, 1)
@@ -118,7 +118,7 @@ def test_no_run_is_beyond_its_guarantee(structure, wide):
         assert error <= bound
         shares.append(error / bound)
         proved += 1
-    assert proved >= 3
+    assert proved >= 2
     assert max(shares) > 0.01
 
 

@@ -53,6 +53,18 @@ def test_operations_at_the_edge_of_the_range_are_exact(base: int, precision: int
         check_operations(*(made(fmt, [pair(random, fmt) for _ in range(count)]) for _ in range(2)))
 
 
+@pytest.mark.parametrize("rounding", [Rounding.NEAREST, Rounding.CHOP])
+@pytest.mark.parametrize(("base", "precision"), COMPILED)
+def test_a_power_of_the_base_less_a_far_number_has_a_digit_more(base: int, precision: int, rounding: Rounding) -> None:
+    """From each number of digits below, up to where only its sign matters."""
+    fmt, least = FloatFormat(base, precision, rounding), base ** (precision - 1)
+    far = {least, least + base // 2, base * least // 2, base * least // 2 + 1, base * least - 1}
+    pairs = [(m, -d) for d in range(precision + 4) for m in far if least <= m < base * least]
+    x, y = made(fmt, len(pairs) * [(least, 0)]), made(fmt, pairs)
+    for one, other in ((x, y), (x, -y), (-x, y)):
+        assert same(one + other, one.on_exact_backend() + other.on_exact_backend())
+
+
 def check_operations(x: FloatArray, y: FloatArray) -> None:
     p, q = x.on_exact_backend(), y.on_exact_backend()
     assert isinstance(p.backend, Exact)
