@@ -46,6 +46,10 @@ class Constants:
         found: FloatArray = fmt.array([]).operand(self.numbers) if self.exactly else fmt.array(self.numbers)
         return found
 
+    def in_double_double(self) -> NDArray[np.float64]:
+        """Return the numbers nearest to these in float64, (count, 2)."""
+        return np.array([[float(each), 0.0] for each in self.numbers])
+
 
 class Segment(NamedTuple):
     """Operations of a tape, (o, 5), the numbers of their formats, (o,), and the call after them, if any."""
@@ -91,7 +95,7 @@ class Numbers:
         fmt = self.formats[0]
         for each in constants:
             if each.places:
-                packed = machine.packed_constants(None, each) if fmt is None else self.packed(each.rounded(fmt))
+                packed = each.in_double_double() if fmt is None else self.packed(each.rounded(fmt))
                 if packed is None:
                     return False
                 self.hold(each.places, packed)
@@ -146,7 +150,7 @@ class Numbers:
 
     def evaluate(self, code: Any) -> int:
         """Run operations once in each lane; return how many have results, 0 if the machine does not tell."""
-        return machine.evaluate_in(self.memory, self.kind, self.tables, code)
+        return machine.evaluate(self.memory, self.kind, self.tables, code)
 
 
 class OnIntegers:

@@ -192,14 +192,6 @@ def packed_one(fmt: Any) -> Any:
     return array.backend.pack(array.components) if array.to_fractions() == 1 else None
 
 
-def packed_constants(fmt: Any, constants: Any) -> NDArray[Any]:
-    """Return the constants of a tape as the machine takes them."""
-    if fmt is None:
-        return np.array([[float(each), 0.0] for each in constants.numbers])
-    array = constants.rounded(fmt)
-    return np.asarray(array.backend.pack(array.components))
-
-
 class Code(NamedTuple):
     """Operations, and how many there are."""
 
@@ -282,11 +274,6 @@ def _divided(operands: NDArray[Any], begin: int) -> Iterator[tuple[int, int, boo
 _SKIP = CODES["skip"]
 
 
-def as_words(numbers: NDArray[Any]) -> NDArray[np.int64]:
-    """Return the memory of numbers as int64, flat."""
-    return numbers.reshape(-1).view(np.int64)
-
-
 class Memory:
     """Numbers (places, [lanes], ...) and truth values (truths, [lanes]) of the machine."""
 
@@ -323,13 +310,8 @@ def functions(kind: Any, far: bool, alone: bool) -> Iterator[int]:
         yield machine.address(tags.Careful(), alone)
 
 
-def evaluate(kind: Any, formats: Any, code: Any, values: NDArray[Any], truths: NDArray[np.uint8]) -> int:
-    """Run operations once for each lane; return how many have results, 0 if the machine does not tell."""
-    return evaluate_in(Memory(values, truths), kind, formats, code)
-
-
-def evaluate_in(memory: Memory, kind: Any, formats: Any, code: Any) -> int:
-    """Run operations as :func:`evaluate` does, on numbers that stay where they are."""
+def evaluate(memory: Memory, kind: Any, formats: Any, code: Any) -> int:
+    """Run operations once in each lane; return how many have results, 0 if the machine does not tell."""
     return _once(kind, formats, code, memory, isinstance(kind, tags.Quick) and is_far(memory.values))
 
 

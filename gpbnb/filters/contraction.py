@@ -29,7 +29,6 @@ from left to right. All that does not depend on the step before is computed for 
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterable
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -106,8 +105,14 @@ def contraction_start(P: Array, de: Array, dE: Array) -> Contraction:
     return Contraction(L, eta * up, zeta * up, 1.0, np.zeros(1))
 
 
-def contraction_step(before: Contraction, model: StepModel, repeated: Repeated, off: EvaluationErrors) -> Contraction:
-    r"""Propagate the bound through one step.
+def at_step(bounds: Contraction, k: int) -> Contraction:
+    """Return the bound after step k, counted from 0, of the bounds after some steps."""
+    return Contraction(bounds.L[k], float(bounds.eta[k]), float(bounds.zeta[k]), float(bounds.alpha[k]), bounds.gain[k])
+
+
+@np.errstate(all="ignore")
+def contraction_steps(before: Contraction, model: StepModel, repeated: Repeated, off: EvaluationErrors) -> Contraction:
+    r"""Propagate the bound through some steps, and return the bounds after each; see :func:`at_step`.
 
     .. math:: \zeta_k = \|T_k\|_k + \frac{\alpha^2\zeta}{1-g\zeta}, \qquad
         \eta_k = \|q_k\|_k + \frac{\alpha\,(\eta + \|y_k\|\zeta)}{1-g\zeta}, \qquad g\zeta < 1,
@@ -115,37 +120,7 @@ def contraction_step(before: Contraction, model: StepModel, repeated: Repeated, 
     with :math:`\alpha = \|L_k^{-1}A_kL_{k-1}\|_2`, :math:`g = \|L_{k-1}^TG_kL_{k-1}\|`,
     :math:`\|y_k\| = \|L_{k-1}^Ty_k\|`. The weights :math:`L_kL_k^T` follow Joseph's form with the gain K.
 
-    Parameters
-    ----------
-    before : the bound after the previous step.
-    model : this step's, nearest float64.
-    repeated : the exact step from the program's values, and its residuals.
-    off : errors of the repeated step, from :func:`evaluation_errors`.
-    """
-    of_one = StepModel(*_as_one(model)), Repeated(*_as_one(repeated)), EvaluationErrors(*_as_one(off))
-    return at_step(contraction_steps(before, *of_one), 0)
-
-
-def at_step(bounds: Contraction, k: int) -> Contraction:
-    """Return the bound after step k, counted from 0, of the bounds after some steps."""
-    return Contraction(bounds.L[k], float(bounds.eta[k]), float(bounds.zeta[k]), float(bounds.alpha[k]), bounds.gain[k])
-
-
-def _as_one(arrays: Iterable[Array]) -> list[Array]:
-    return [each[np.newaxis] for each in arrays]
-
-
-@np.errstate(all="ignore")
-def contraction_steps(before: Contraction, model: StepModel, repeated: Repeated, off: EvaluationErrors) -> Contraction:
-    """Propagate the bound through some steps as :func:`contraction_step` does, and return the bound after each.
-
-    Parameters
-    ----------
-    model, repeated, off : as for one step, each array with a first axis for the steps.
-
-    Returns
-    -------
-    bounds : those after each step, each quantity with a first axis for the steps; see :func:`at_step`.
+    Models, repeated steps and errors of their evaluation have a first axis for the steps, as the bounds have.
     """
     K, q, T = repeated.K, repeated.q, repeated.T
     many = _many(*K.shape[-2:])

@@ -449,9 +449,7 @@ def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
     return tuple(sorted({int(k) for k in grid if k <= steps} | {steps}))
 
 
-def reference(
-    model: LinearModel, z: Any, checkpoint_steps: Sequence[int], form: Form | str = Form.INNOVATION
-) -> Checkpoints:
+def reference(model: LinearModel, z: Any, checkpoint_steps: Sequence[int]) -> Checkpoints:
     """Run the filter in double-double, whose operations have relative errors below 2**-102.
 
     Where it would lose half of these digits, :mod:`gpbnb.filters.reference` computes the filter instead.
@@ -462,16 +460,12 @@ def reference(
     z : (steps, m), measurements; float64 or Fractions.
     checkpoint_steps : steps whose results are saved.
     """
-    run = Run(model, None, form, checkpoint_steps)
+    run = Run(model, None, Form.INNOVATION, checkpoint_steps)
     start = run.P.copy()
     run.take(z)
-    if run.form is not Form.UD:
-        count = run.saved
-        at = np.array([0, *run.checkpoint_steps[:count]])
-        if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C[:count]])):
-            return precise_steps(model, z).checkpoints(run.checkpoint_steps)
-    if run.stopped:
-        raise ArithmeticError(f"{model.name}: the reference stopped at step {run.stopped}; scale or correct the model")
+    at = np.array([0, *run.checkpoint_steps[: run.saved]])
+    if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C[: run.saved]])):
+        return precise_steps(model, z).checkpoints(run.checkpoint_steps)
     return run.checkpoints()
 
 

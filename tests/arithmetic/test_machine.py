@@ -18,6 +18,7 @@ from gpbnb.arithmetic.machine import (
     OVERFLOW,
     ZERO_DIVISOR,
     ZERO_PIVOT,
+    Memory,
     accumulate,
     code_of,
     evaluate,
@@ -102,7 +103,7 @@ def test_a_program_has_the_digits_of_fractions(fmt):
         values, truths = np.zeros((len(exact), *shape), packed.dtype), np.zeros((len(expected), *shape[:1]), np.uint8)
         values[: len(packed)] = packed if not shape else packed[:, np.newaxis]
         truths[1] = 1
-        assert evaluate(kind, formats, code_of(rows, np.zeros(ROWS, np.int64)), values, truths) == ROWS
+        assert evaluate(Memory(values, truths), kind, formats, code_of(rows, np.zeros(ROWS, np.int64))) == ROWS
         for lane in range(lanes):
             numbers = values if not shape else values[:, lane]
             found = fmt.backend.to_exact(fmt.backend.unpack(numbers))
@@ -120,7 +121,7 @@ def test_the_first_row_without_a_result_is_named(fmt, name, row, reason):
     values, truths = np.array([0.0, float(large), 1.0, 0.0, 0.0]), np.array([0, 1], np.uint8)
     rows = np.array([(CODES["add"], 2, 2, 0, 3), (CODES[name], *row, 0, 4)], np.int64)
     kind, formats = tables([fmt])
-    done = evaluate(kind, formats, code_of(rows, np.zeros(2, np.int64)), values, truths)
+    done = evaluate(Memory(values, truths), kind, formats, code_of(rows, np.zeros(2, np.int64)))
     fault = fault_of(rows, values, done)
     assert (fault.row, fault.reason) == (1, reason)
     assert values[3] == 2
@@ -134,7 +135,7 @@ def test_a_result_below_float64_is_no_zero_where_the_format_has_no_end(name, pow
     values[0], values[1] = (2.0**each for each in powers)
     rows = np.array([(CODES[name], 0, 1, 0, 2)], np.int64)
     kind, formats = tables([FloatFormat(2, 24)])
-    assert evaluate(kind, formats, code_of(rows, np.zeros(1, np.int64)), values, truths) == 0
+    assert evaluate(Memory(values, truths), kind, formats, code_of(rows, np.zeros(1, np.int64))) == 0
 
 
 def test_rows_are_left_out_where_a_truth_value_does_not_hold():
@@ -143,7 +144,7 @@ def test_rows_are_left_out_where_a_truth_value_does_not_hold():
     for truth, done, found in ((0, 4, [0, 0, 6]), (1, 1, None)):
         values, truths = np.array([0.0, 3.0, 0.0, 0.0, 0.0]), np.array([0, 1], np.uint8)
         rows = np.array([(skip, truth, 2, 0, 9), (divide, 1, 0, 0, 2), (add, 1, 1, 0, 3), (add, 1, 1, 0, 4)], np.int64)
-        assert evaluate(kind, formats, code_of(rows, np.zeros(4, np.int64)), values, truths) == done
+        assert evaluate(Memory(values, truths), kind, formats, code_of(rows, np.zeros(4, np.int64))) == done
         assert found is None or values[2:].tolist() == found
 
 
@@ -211,7 +212,7 @@ def computed(name: str, a: Any, b: Any) -> tuple[Any, Any] | None:
     values[0], values[1] = np.transpose(a), np.transpose(b)
     kind, formats = tables([None])
     row = code_of(np.array([[CODES[name], 0, 1, 0, 2]]), np.zeros(1, np.int64))
-    done = evaluate(kind, formats, row, values, np.zeros((2, len(a[0])), np.uint8))
+    done = evaluate(Memory(values, np.zeros((2, len(a[0])), np.uint8)), kind, formats, row)
     return (values[2, :, 0], values[2, :, 1]) if done else None
 
 
@@ -291,7 +292,7 @@ def test_powers_beyond_the_range_of_float64_have_no_result(fmt, factor):
     kind, formats = tables([fmt])
     rows = np.array([(CODES["multiply"], k, 0, 0, k + 1) for k in range(12)])
     powers, truths = np.full((13, 1), factor), np.array([[0], [1]], np.uint8)
-    assert evaluate(kind, formats, code_of(rows, np.zeros(12, np.int64)), powers, truths) == held - 1
+    assert evaluate(Memory(powers, truths), kind, formats, code_of(rows, np.zeros(12, np.int64))) == held - 1
     assert powers[:held, 0].tolist() == [factor**k for k in range(1, held + 1)]
 
 

@@ -38,6 +38,12 @@ def shortened(entries, digits=240):
     return np.array(flat, dtype=object).reshape(np.shape(entries))
 
 
+def one_step(before, model, repeated, off):
+    """The bound after one step."""
+    of_one = (type(each)(*(part[np.newaxis] for part in each)) for each in (model, repeated, off))
+    return contraction.at_step(contraction.contraction_steps(before, *of_one), 0)
+
+
 def trajectory(rng, n, m, size, steps=8, disturb="random"):
     """Errors and bounds of a filter disturbed at each step by about `size`, at random or so that it adds up."""
     *given, x, P = model(rng, n, m)
@@ -59,7 +65,7 @@ def trajectory(rng, n, m, size, steps=8, disturb="random"):
         K, S = floats(here.gain), floats(here.innovation_covariance)
         off = contraction.evaluation_errors(plain, floats(run[0]), floats(run[1]), floats(z), K, S, UNIT)
         repeated = contraction.Repeated(K, S, floats(here.innovation), floats(x - here.x), floats(P - here.P))
-        bound = contraction.contraction_step(bound, plain, repeated, off)
+        bound = one_step(bound, plain, repeated, off)
         used = shortened(here.gain * (1 + exact(size)))
         yield (
             (floats(x - true.x), contraction.state_error_bound(bound)),
@@ -96,7 +102,7 @@ def scalar_step(bound, q=0.0, T=0.0, d=0.0, P=1.0, R=1.0):
     one = np.ones((1, 1))
     S = one * (P + R)
     K = one * P / S if S[0, 0] else one
-    return contraction.contraction_step(
+    return one_step(
         bound,
         StepModel(one, one, one * 0, one * R),
         contraction.Repeated(K, S, np.ones(1), np.full(1, q), one * T),

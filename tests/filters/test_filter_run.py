@@ -28,8 +28,9 @@ from gpbnb.filters.simulation import Simulation
 def test_all_forms_are_one_filter(form):
     """In double-double each is the exact filter; in many digits, each comes near."""
     given, z = model(), measurements()
-    checkpoints = reference(given, z, (STEPS,), form)
-    step = exact_steps(given, z)[-1]
+    precise = Run(given, None, form, (STEPS,))
+    precise.take(z)
+    checkpoints, step = precise.checkpoints(), exact_steps(given, z)[-1]
     for found, true in ((checkpoints.x[0], step.x), (checkpoints.P[0], step.P)):
         assert np.abs(found - true).max() < Fraction(1, 2**85)
     if form is not Form.HUNG_SECOND_GAIN:  # whose own gain is P H' R^-1 as well, but by another rounding
@@ -157,8 +158,6 @@ def test_a_run_is_compared_at_its_own_steps_with_a_reference_that_reached_them()
     with pytest.raises(ValueError, match="needed equal steps"):
         compare_runs(run(FloatFormat(2, 24), Form.HUNG), reference(model(), measurements(), (2, 4)))
     huge = LinearModel([["1e200"]], [[1]], [[0]], [[1]], [1], [[1]])
-    with pytest.raises(ArithmeticError, match="the reference stopped at step 1"):
-        reference(huge, np.ones((3, 1)), (1,), Form.UD)
     assert float(reference(huge, np.ones((3, 1)), (3,)).x[0, 0]) == 1
 
 

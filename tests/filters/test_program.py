@@ -7,7 +7,7 @@ import pytest
 
 from gpbnb import FloatFormat
 from gpbnb.arithmetic.kernels.tags import CHOOSE, COMBINE, COMPARE
-from gpbnb.arithmetic.machine import NAMES, code_of, evaluate, operands_of, tables
+from gpbnb.arithmetic.machine import NAMES, Memory, code_of, evaluate, operands_of, tables
 from gpbnb.arithmetic.tape import Tape
 from gpbnb.filters.program import Program, without_exact
 
@@ -52,7 +52,8 @@ def run(program, x, c):
     values, truths = np.zeros((program.sizes[0], 1)), np.zeros((program.sizes[1], 1), np.uint8)
     values[program.states, 0], values[program.coefficients, 0], truths[1] = x, c, 1
     rows = program.rows
-    done = evaluate(kind, formats, code_of(rows, np.zeros(len(rows), np.int64)), values, truths) if len(rows) else 0
+    code = code_of(rows, np.zeros(len(rows), np.int64))
+    done = evaluate(Memory(values, truths), kind, formats, code) if len(rows) else 0
     return (values[program.after, 0].tolist(), bool(truths[program.definite, 0])) if done == len(rows) else "stops"
 
 

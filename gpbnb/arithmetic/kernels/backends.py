@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -168,6 +168,9 @@ _NAMES = {
 }
 
 
+_USED = set[str]()
+"""Modules whose compiled loops have been used."""
+
 _DONE: Counter[type[Tag]] = Counter()
 """Operations of each kind of numbers so far."""
 
@@ -222,10 +225,10 @@ class Looped(Backend):
         out, (kind, formats) = self._empty(size), self._machine
         try:
             if name == "fused":
-                _along(_loops().fused, (kind, formats.address), size, *flat, out)
+                _along(_loops("elementwise").fused, (kind, formats.address), size, *flat, out)
             else:
                 code = machine.CODES[_CODED.get(name, name)]
-                _along(_loops().ALONG[code], (kind, formats.address, code), size, flat[0], flat[-1], out)
+                _along(_loops("elementwise").ALONG[code], (kind, formats.address, code), size, flat[0], flat[-1], out)
         except OverflowError:
             return None
         return tuple(part.reshape(shape) for part in out)
@@ -263,7 +266,7 @@ class Looped(Backend):
         triples = tuple(_flat(part, shape) for part in other.in_two_words(components))
         out, states = tuple(np.empty(triples[0].size, np.int64) for _ in triples), np.empty(triples[0].size, np.int8)
         try:
-            _along(_wide().converted, (other.wide, self.wide), out[0].size, triples, out, states)
+            _along(_loops("wide").converted, (other.wide, self.wide), out[0].size, triples, out, states)
         except OverflowError:
             return None
         hard = np.flatnonzero(states == 2)
@@ -303,7 +306,7 @@ class Looped(Backend):
         order = np.empty(math.prod(shape), np.int8)
         x, y = (tuple(_flat(part, shape) for part in components) for components in (a, b))
         kind, formats = self._machine
-        _along(_loops().compared, (kind, formats.address), order.size, x, y, order)
+        _along(_loops("elementwise").compared, (kind, formats.address), order.size, x, y, order)
         return order.reshape(shape)
 
     def matmul(self, a: Components, b: Components) -> Components | None:
@@ -311,12 +314,13 @@ class Looped(Backend):
         (rows, count), columns = a[0].shape, b[0].shape[1]
         if self._early(2 * rows * count * columns):
             return None
+        product = _loops("matrices").product
         for kind, (x, y) in self._attempts([a, b], rows * count * columns, copy=None):
             c = np.empty((rows, columns, *x.shape[2:]), x.dtype)
             given = kind, *self._of_loops, *map(_fixed, (x, y)), c.reshape(-1)
             with contextlib.suppress(OverflowError):
                 parts = slices(rows, count * columns)
-                if not any(_matrices().product(*given, part.start, part.stop, count, columns) for part in parts):
+                if not any(product(*given, part.start, part.stop, count, columns) for part in parts):
                     return self.unpack(c)
         return None
 
@@ -325,7 +329,7 @@ class Looped(Backend):
         n = len(a[0])
         if self._early(n**3):
             return None
-        loops = _matrices()
+        loops = _loops("matrices")
         for kind, (x,) in self._attempts([a]):
             order, column = np.arange(n), loops.NONE
             with contextlib.suppress(OverflowError):
@@ -347,7 +351,7 @@ class Looped(Backend):
             with contextlib.suppress(OverflowError):
                 for part in slices(p, n * n):
                     some = np.ascontiguousarray(y[:, part])
-                    gone |= _matrices().solved(*given, some.reshape(-1), n, some.shape[1])
+                    gone |= _loops("matrices").solved(*given, some.reshape(-1), n, some.shape[1])
                     y[:, part] = some
                 if not gone:
                     return self.unpack(y)
@@ -356,7 +360,7 @@ class Looped(Backend):
     @property
     def _of_loops(self) -> tuple[int, Array]:
         """The address of the format, and room, as loops over matrices take them."""
-        return self._machine[1].address, np.empty(_matrices().ROOM)
+        return self._machine[1].address, np.empty(_loops("matrices").ROOM)
 
     def _attempts(
         self, given: Sequence[Components], products: int = 0, copy: bool | None = True
@@ -451,10 +455,10 @@ class Floats(Compiled):
 
     def _applied(self, name: str, shape: tuple[int, ...], flat: Sequence[Components]) -> Components | None:
         size, numbers = math.prod(shape), [each[0] for each in flat]
-        if name == "round_" and 0 < size <= _FEW and not (_floats.cache_info().currsize or self._random):
+        if name == "round_" and 0 < size <= _FEW and not ("floats" in _USED or self._random):
             found = machine.rounded(*self._machine, numbers[0])
             return None if found is None else (found.reshape(shape),)
-        code, (_, formats), loops = machine.CODES[_CODED.get(name, name)], self._machine, _floats()
+        code, (_, formats), loops = machine.CODES[_CODED.get(name, name)], self._machine, _loops("floats")
         out, given, gone = np.empty(size), (*numbers, numbers[0], numbers[0])[:3], False
         for part in slices(size):
             here = formats.address, code, part.stop - part.start, *(each[part] for each in given), out[part]
@@ -463,7 +467,7 @@ class Floats(Compiled):
 
     def _accumulate(self, name: str, numbers: Array) -> bool:
         width, flat, gone = math.prod(numbers.shape[1:]), numbers.reshape(-1), False
-        code, (_, formats), loops = machine.CODES[name], self._machine, _floats()
+        code, (_, formats), loops = machine.CODES[name], self._machine, _loops("floats")
         for part in slices(len(numbers) - 1, width):
             gone |= bool(loops.accumulate(formats.address, code, (part.start + 1, part.stop + 1), width, flat))
         return not gone
@@ -494,7 +498,7 @@ class Floats(Compiled):
 
     def _proved(self, a: Components, b: Components) -> Any:
         """Return the fastest kind of numbers if the sizes of two matrices prove that their product is in its range."""
-        (low, high), (low_b, high_b) = _matrices().extents(*(_flat(each[0], each[0].shape) for each in (a, b)))
+        (low, high), (low_b, high_b) = _loops("matrices").extents(*(_flat(each[0], each[0].shape) for each in (a, b)))
         n, smallest, largest = a[0].shape[1], (low, low_b), (high, high_b)
         tag = cast(Float, self.tag)
         gradual, even = tag.gradual, tag.mode == EVEN and self.base == 2
@@ -551,7 +555,7 @@ class Pairs(Compiled):
     def _from_floats(self, x: Array, exactly: bool) -> Components | None:
         out, states = self._empty(x.size), np.empty(x.size, np.int8)
         try:
-            _along(_radix().from_floats, (self.tag,), x.size, _flat(x, x.shape), out, states)
+            _along(_loops("radix").from_floats, (self.tag,), x.size, _flat(x, x.shape), out, states)
         except OverflowError:
             return None
         if exactly and states.any():
@@ -601,7 +605,7 @@ class Pairs(Compiled):
             return self.exact.to_float(self.to_exact(components))
         m, e = (_flat(part, components[0].shape) for part in components)
         x, states = np.empty(m.size), np.empty(m.size, np.int8)
-        _along(_radix().to_floats, (), m.size, m, e, x, states)
+        _along(_loops("radix").to_floats, (), m.size, m, e, x, states)
         if (hard := states == 2).any():
             x[hard] = self.exact.to_float((m[hard].astype(object), e[hard].astype(object)))
         return x.reshape(components[0].shape)
@@ -642,7 +646,8 @@ class TwoWords(Looped):
     def _from_integers(self, m: Array, e: Array, twos: bool, exactly: bool) -> Components | None:
         out, states = self._empty(m.size), np.empty(m.size, np.int8)
         try:
-            _along(_wide().from_integers, (self.tag,), m.size, _flat(m, m.shape), _flat(e, m.shape), twos, out, states)
+            given = _flat(m, m.shape), _flat(e, m.shape), twos
+            _along(_loops("wide").from_integers, (self.tag,), m.size, *given, out, states)
         except OverflowError:
             return None
         if (exactly and states.any()) or (hard := np.flatnonzero(states == 2)).size > m.size // 2:
@@ -679,7 +684,7 @@ class TwoWords(Looped):
             return self.exact.to_float(self.to_exact(components))
         x, states = np.empty(math.prod(shape)), np.empty(math.prod(shape), np.int8)
         parts = tuple(_flat(part, shape) for part in components)
-        _along(_wide().to_floats, (self.tag,), x.size, parts, x, states)
+        _along(_loops("wide").to_floats, (self.tag,), x.size, parts, x, states)
         if (hard := states == 2).any():
             x[hard] = self.exact.to_float(self.to_exact(tuple(part[hard] for part in parts)))
         return x.reshape(shape)
@@ -750,37 +755,10 @@ def _shape(*operands: Components) -> tuple[int, ...]:
     return np.broadcast_shapes(*(components[0].shape for components in operands))
 
 
-@lru_cache(maxsize=1)
-def _floats() -> Any:
-    from gpbnb.arithmetic.kernels import floats
+@cache
+def _loops(name: str) -> Any:
+    """Return a module of compiled loops; numba takes a second to import, and exact arithmetic does not need it."""
+    from gpbnb.arithmetic.kernels import elementwise, floats, matrices, radix, wide
 
-    return floats
-
-
-@lru_cache(maxsize=1)
-def _loops() -> Any:
-    # Imported here because numba takes a second to import and exact arithmetic does not need it.
-    from gpbnb.arithmetic.kernels import elementwise
-
-    return elementwise
-
-
-@lru_cache(maxsize=1)
-def _matrices() -> Any:
-    from gpbnb.arithmetic.kernels import matrices
-
-    return matrices
-
-
-@lru_cache(maxsize=1)
-def _radix() -> Any:
-    from gpbnb.arithmetic.kernels import radix
-
-    return radix
-
-
-@lru_cache(maxsize=1)
-def _wide() -> Any:
-    from gpbnb.arithmetic.kernels import wide
-
-    return wide
+    _USED.add(name)
+    return {"elementwise": elementwise, "floats": floats, "matrices": matrices, "radix": radix, "wide": wide}[name]
