@@ -148,7 +148,7 @@ class LinearModel:
     def __repr__(self) -> str:
         """Describe the model in three lines: its sizes, its matrices with the sizes of their entries, and its start."""
         inputs = f"; {sized(self.p, 'input', self.input_names)}" if self.p else ""
-        steps = "" if self.steps is None else f"; at most {self.steps} steps"
+        steps = "" if self.steps is None else f"; at most {sized(self.steps, 'step', ())}"
         matrices = [
             f"{letter} {_of_one(given) if letter in _CYCLES else given.shape} {range_text(given.flat)}"
             + (f" in a cycle of {len(given)}" if letter in _CYCLES and len(given) > 1 else "")

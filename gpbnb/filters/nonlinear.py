@@ -248,7 +248,7 @@ class NonlinearModel:
     def __repr__(self) -> str:
         """Describe the model in three lines: its sizes and method, its noise, and its start."""
         kind = f"{self.method}, iterated {self.iterations} times" if self.iterations > 1 else self.method
-        steps = "" if self.steps is None else f"; at most {self.steps} steps"
+        steps = "" if self.steps is None else f"; at most {sized(self.steps, 'step', ())}"
         Q, R, x0, P0 = (f"{each} {range_text(getattr(self.noise, each).flat)}" for each in ("Q", "R", "x0", "P0"))
         return (
             f"NonlinearModel {self.name!r}, {kind}, {sized(self.n, 'state', self.state_names)}; "

@@ -151,6 +151,12 @@ def test_sums_by_squares_are_those_of_balls(radius: float, steps: int | None, la
     assert (found <= gain.high * (1.5 if steps is None else 1.15)).all()
 
 
+def test_a_sum_over_all_steps_is_the_geometric_one() -> None:
+    """In blocks of 16 steps, each of which leaves 0.85 of the last."""
+    (found,) = gains(np.full((1, 1), 0.99), np.ones((1, 1)), np.zeros((0, 1)), None, 16)
+    assert found == pytest.approx(100, rel=1e-12)
+
+
 # -- the guarantee ----------------------------------------------------------------------------------------------------
 
 
@@ -323,3 +329,8 @@ def test_an_input_that_is_always_zero_is_bounded():
     found = gpbnb.guarantee(LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 24), limits(measurement=0))
     assert found.steps is None
     assert 0 <= found.bound[0] < 2.0**-24
+
+
+def test_random_errors_are_finite_if_one_measurement_has_a_limit() -> None:
+    found = guarantee(rolling(), FloatFormat(2, 24), limits(state=100, innovation=100, measurement=[50, math.inf]))
+    assert 0 < np.abs(random_errors(found, 20)).max() < found.bound.max()
