@@ -12,11 +12,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic import machine
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.kernels.exact import ExactKernel
-from gpbnb.arithmetic.machine import CODES
-
-_DIVIDE, _SQRT, _CHOOSE, _COMPARE, _COMBINE, _NONZERO, _SKIP = (
-    CODES[name] for name in ("divide", "sqrt", "choose", "compare", "combine", "nonzero", "skip")
-)
+from gpbnb.arithmetic.kernels.tags import CHOOSE, COMBINE, COMPARE, DIVIDE, NONZERO, ROOT, SKIP
 
 
 class Call(NamedTuple):
@@ -215,21 +211,21 @@ def _run_exactly(
     for o, (code, a, b, c, out) in enumerate(rows):
         if o < after:
             continue
-        if code <= _DIVIDE or code == _NONZERO:
-            if code >= _DIVIDE and m[b if code == _DIVIDE else a] == 0:
+        if code <= DIVIDE or code == NONZERO:
+            if code >= DIVIDE and m[b if code == DIVIDE else a] == 0:
                 raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
-            if code <= _DIVIDE:
+            if code <= DIVIDE:
                 m[out], e[out] = of_two[code](m[a], e[a], m[b], e[b])
-        elif code == _CHOOSE:
+        elif code == CHOOSE:
             chosen = b if truths[a] else c
             m[out], e[out] = m[chosen], e[chosen]
-        elif code == _COMPARE:
+        elif code == COMPARE:
             truths[out] = bool(c >> (compare(m[a], e[a], m[b], e[b]) + 1) & 1)
-        elif code == _COMBINE:
+        elif code == COMBINE:
             truths[out] = bool(c >> (2 * truths[a] + truths[b]) & 1)
-        elif code == _SKIP:
+        elif code == SKIP:
             after = 0 if truths[a] else o + 1 + b
         else:
-            if code == _SQRT and m[a] < 0:
+            if code == ROOT and m[a] < 0:
                 raise NegativeRootError("got the square root of a negative number; needed x >= 0")
-            m[out], e[out] = of_one[code - _SQRT](m[a], e[a])
+            m[out], e[out] = of_one[code - ROOT](m[a], e[a])

@@ -202,7 +202,7 @@ class Code(NamedTuple):
 def code_of(rows: NDArray[Any], formats: NDArray[np.int64]) -> Code:
     """Return operations, and the number of the format of each, as the machine takes them."""
     how = _together(rows)
-    skips = np.flatnonzero(rows[:, 0] == _SKIP)
+    skips = np.flatnonzero(rows[:, 0] == tags.SKIP)
     edges = np.zeros(len(rows) + 1, np.bool_)
     edges[1:-1] = (np.diff(rows[:, 0]) != 0) | (np.diff(formats) != 0) | (np.diff(how) != 0)
     for each in (skips, skips + 1, skips + 1 + rows[skips, 2]):
@@ -269,9 +269,6 @@ def _divided(operands: NDArray[Any], begin: int) -> Iterator[tuple[int, int, boo
         waiting = last
     if waiting < len(operands):
         yield begin + waiting, begin + len(operands), False
-
-
-_SKIP = CODES["skip"]
 
 
 class Memory:

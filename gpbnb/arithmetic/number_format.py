@@ -84,18 +84,9 @@ class NumberFormat(ABC, Generic[Made]):
     ) -> Tag:
         """Return the tag of the arithmetic from which a run draws random numbers, if it has any.
 
+        Sums of products use fused multiply-add and an order as :func:`gpbnb.arithmetic.linalg.matmul` does, in the
+        format `sums` before they are stored, by default this one; ValueError says what has no compiled loops.
         Stochastic rounding restarts its random numbers from the seed.
-
-        Parameters
-        ----------
-        fused : whether sums of products use fused multiply-add.
-        sums : the format in which sums of products are computed before they are stored; by default this format.
-        order, block : order of the additions in sums of products, as in :func:`gpbnb.arithmetic.linalg.matmul`.
-
-        Raises
-        ------
-        ValueError : the format has no compiled loops, or these do not support the given `fused`, `sums` or `order`; an
-            unknown order.
         """
         if sums is None:
             return run_tag(self.rules, fused, order, block)
@@ -112,10 +103,7 @@ class NumberFormat(ABC, Generic[Made]):
     def check_compiled(self) -> None:
         """Reject a format without compiled loops.
 
-        Raises
-        ------
-        ValueError : the format has no compiled loops; the message names the setting that prevents them, and what to set
-            instead.
+        The message names the setting that prevents them, and what to set instead.
         """
         compiled_tag(self.rules)
 

@@ -18,18 +18,12 @@ from gpbnb.filters.run import Run, log_spaced, reference
 
 @dataclass(frozen=True, eq=False)
 class BoundedHistory:
-    """A history, and the contraction bound for each entry of its errors, infinite if there is none.
-
-    Parameters
-    ----------
-    state, gain, covariance : (c, n), (c, n, m) and (c, n, n), in the units of the errors; of the covariance's
-        symmetric part.
-    """
+    """A history, and the contraction bound for each entry of its errors, infinite if there is none."""
 
     history: History
-    state: NDArray[np.float64]
-    gain: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    state: NDArray[np.float64]  # (c, n), in the units of the errors
+    gain: NDArray[np.float64]  # (c, n, m), likewise
+    covariance: NDArray[np.float64]  # (c, n, n), likewise; of its symmetric part
 
     def ratios(self) -> NDArray[np.float64]:
         """Largest error over bound of state, gain and covariance, after each step, (c, 3); above 1 if violated."""

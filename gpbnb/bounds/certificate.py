@@ -107,10 +107,8 @@ def of_operations(
 ) -> str:
     """Return the certificate of a filter with fixed coefficients as JSON.
 
-    Parameters
-    ----------
-    measurement : (m,), limits on the inputs as given.
-    exact : what its states are compared with, "as stored" or "as given".
+    Limits of the inputs (m,) are those as given; the states are compared with an exact filter "as stored" or "as
+    given".
     """
     program = made.program
     if not {*program.operations[:, 0].tolist()} <= {*_KINDS}:
@@ -140,14 +138,7 @@ def of_operations(
 
 
 def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | None, F: NDArray[np.float64]) -> str:
-    """Return the certificate of a Kalman filter as JSON.
-
-    Parameters
-    ----------
-    given : its coefficients.
-    asked : limits as given.
-    F : (steps, n, n), closed loops.
-    """
+    """Return the certificate of a Kalman filter, for limits as given and closed loops F (steps, n, n), as JSON."""
     model = given.origin
     if not isinstance(model, LinearModel) or given.form is None:
         raise ValueError("got a schedule without a Kalman filter; needed both the model and its form")

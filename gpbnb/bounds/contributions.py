@@ -23,18 +23,11 @@ _NEGLIGIBLE = 1e-9
 
 
 class Contributions(NamedTuple):
-    """What the roundings of a step add to the error of each state.
+    """What the roundings of a step add to the error of each state."""
 
-    Parameters
-    ----------
-    errors : (o,), the largest rounding error of each operation; zero if its result is always exact.
-    effects : (n, o), the effect of such an error on each state after the step, as a factor.
-    sums : (n, o), the largest error of each state that the roundings of an operation cause in all steps together.
-    """
-
-    errors: NDArray[np.float64]
-    effects: NDArray[np.float64]
-    sums: NDArray[np.float64]
+    errors: NDArray[np.float64]  # (o,), the largest of each operation; zero if its result is always exact
+    effects: NDArray[np.float64]  # (n, o), of such an error on each state after the step, as a factor
+    sums: NDArray[np.float64]  # (n, o), the largest errors of states by an operation in all steps together
 
 
 def contributions(found: FilterGuarantee) -> Contributions:

@@ -206,11 +206,9 @@ def _emulated(
 
 
 def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> tuple[Program, NDArray[Any]]:
-    """Return the program of a run and its coefficients, row by row.
+    """Return the program of a run and its coefficients, row by row, at some of the run's checkpoints.
 
-    Parameters
-    ----------
-    rows : indices of the run's checkpoints; the first checkpoint is for step `before` + 1.
+    The first checkpoint is for step `before` + 1.
     """
     n, m, last = run.model.n, run.model.m, int(rows.max()) + 1
     Phi, H = run.letters["Phi"], run.letters["H"]

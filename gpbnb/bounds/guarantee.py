@@ -164,9 +164,7 @@ def _check_numbers(within: FilterLimits) -> None:
 def sized_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] = ()) -> FilterLimits:
     """Return limits with one entry for each of n states, m innovations and m measurements.
 
-    Parameters
-    ----------
-    x0 : (n,), the exact first estimate; the exact filter must be within its limits from the beginning.
+    The exact filter must be within its limits from the beginning, at its first estimate (n,).
     """
     if not isinstance(within, FilterLimits):
         raise TypeError(f"got within={within!r}; needed the result of limits(...)")

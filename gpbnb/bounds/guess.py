@@ -64,48 +64,28 @@ class FilterLimits(NamedTuple):
 
 
 class Guess(NamedTuple):
-    """What the checker is asked to prove.
+    """What the checker is asked to prove."""
 
-    Parameters
-    ----------
-    bound : (n,), bound of the error of each state; infinite if there is none.
-    state, innovation : limits of the exact filter, given or derived.
-    parts : (n, 3), parts of each bound, where it is largest.
-    lags : how many earlier steps are summed one by one, for fixed coefficients.
-    why : why there is no bound, if more is known than that.
-    """
-
-    bound: Array
-    state: Array
-    innovation: Array
-    parts: Array
-    lags: int = 1
-    why: str = ""
+    bound: Array  # (n,), of the error of each state; infinite if there is none
+    state: Array  # (n,), limits of the exact filter, given or derived
+    innovation: Array  # (m,), likewise
+    parts: Array  # (n, 3), of each bound, where it is largest
+    lags: int = 1  # how many earlier steps are summed one by one, for fixed coefficients
+    why: str = ""  # why there is no bound, if more is known than that
 
 
 class Steps(NamedTuple):
-    """Some steps of a program as linear functions, in float64.
+    """Some steps of a program as linear functions, in float64."""
 
-    Parameters
-    ----------
-    factors : (operations, steps), size of the coefficient of each product.
-    rows : (values, steps, n + m), each value as a function of states and measurements.
-    effects : (values, steps, n), effect of an error of each value on the states after the step.
-    exact : (values, steps), whether the operation of a value never rounds.
-    F, K : (steps, n, n) and (steps, n, m), what the program computes.
-    loop, gain : their differences from the exact filter.
-    HPhi : (steps, m, n), what a measurement is expected to be.
-    """
-
-    factors: Array
-    rows: Array
-    effects: Array
-    exact: NDArray[np.bool_]
-    F: Array
-    K: Array
-    loop: Array
-    gain: Array
-    HPhi: Array
+    factors: Array  # (operations, steps), size of the coefficient of each product
+    rows: Array  # (values, steps, n + m), each value as a function of states and measurements
+    effects: Array  # (values, steps, n), of an error of each value on the states after the step
+    exact: NDArray[np.bool_]  # (values, steps), whether the operation of a value never rounds
+    F: Array  # (steps, n, n), what the program computes
+    K: Array  # (steps, n, m), likewise
+    loop: Array  # F minus that of the exact filter
+    gain: Array  # K minus that of the exact filter
+    HPhi: Array  # (steps, m, n), what a measurement is expected to be
 
 
 def linear_steps(given: Schedule, at: NDArray[np.int64]) -> Steps:
@@ -162,10 +142,8 @@ def rounding_errors(
 ) -> Array:
     """Return the largest rounding error of each operation, (operations, steps).
 
-    Parameters
-    ----------
-    sizes : (values, steps), sizes without the errors b of the states.
-    ends : (n,), largest size of each state after the step, with its error.
+    Sizes, (values, steps), are those without the errors b of the states; `ends`, (n,), those of states after the step
+    with their errors.
     """
     n, first, table = program.n, program.n + program.m, units(fmt)
     moved = np.abs(steps.rows[..., :n]) @ b
@@ -271,24 +249,16 @@ def raised(bounded: Any, n: int) -> Array:
 
 
 class Loops(NamedTuple):
-    """Matrices of a filter with fixed coefficients, as stored and as given, in float64.
+    """Matrices of a filter with fixed coefficients, as stored and as given, in float64."""
 
-    Parameters
-    ----------
-    F, K : (n, n) and (n, m), as stored.
-    A, B : (n, n) and (n, m), of the exact filter.
-    of_state, of_input : (n, n) and (n, m), F - A and K - B.
-    storing, kept : (m,), largest error of storing an input, and largest size of a stored one.
-    """
-
-    F: Array
-    K: Array
-    A: Array
-    B: Array
-    of_state: Array
-    of_input: Array
-    storing: Array
-    kept: Array
+    F: Array  # (n, n), as stored
+    K: Array  # (n, m), as stored
+    A: Array  # (n, n), of the exact filter
+    B: Array  # (n, m), of the exact filter
+    of_state: Array  # (n, n), F - A
+    of_input: Array  # (n, m), K - B
+    storing: Array  # (m,), largest error of storing an input
+    kept: Array  # (m,), largest size of a stored input
 
 
 def loops(program: Program, stored: Any, given: Any, storing: Array, kept: Array) -> Loops:
@@ -299,18 +269,11 @@ def loops(program: Program, stored: Any, given: Any, storing: Array, kept: Array
 
 
 class Inputs(NamedTuple):
-    """What inputs do to a filter with fixed coefficients, whatever is rounded.
+    """What inputs do to a filter with fixed coefficients, whatever is rounded."""
 
-    Parameters
-    ----------
-    state : (n,), largest size of each state of the exact filter.
-    values : (rows,), largest size of functions of state and input.
-    errors : (n,), error of each state due to storing coefficients and inputs.
-    """
-
-    state: Array
-    values: Array
-    errors: Array
+    state: Array  # (n,), largest size of each state of the exact filter
+    values: Array  # (rows,), largest size of functions of state and input
+    errors: Array  # (n,), of each state due to storing coefficients and inputs
 
 
 def of_inputs(given: Loops, Z: Array, rows: Array, steps: int | None, lags: int) -> Inputs:
@@ -331,12 +294,9 @@ def of_inputs(given: Loops, Z: Array, rows: Array, steps: int | None, lags: int)
 def constant_guess(
     made: LinearFilter, fmt: FloatFormat | FixedFormat, measurement: Array, steps: int | None, as_given: bool = False
 ) -> Guess:
-    """Guess the bound of a filter with fixed coefficients.
+    """Guess the bound of a filter with fixed coefficients, within limits (m,) of the inputs before they are stored.
 
-    Parameters
-    ----------
-    measurement : (m,), limits on the inputs before they are stored.
-    as_given : whether to compare with the filter and the inputs as given, and not as stored.
+    It is compared with the filter and the inputs as stored or as given.
     """
     program, schedule = made.program, filter_schedule(made, fmt)
     n, stored = program.n, made.stored(fmt)
@@ -370,19 +330,12 @@ def constant_guess(
 
 
 class Course(NamedTuple):
-    """Which steps a guess looks at.
+    """Which steps a guess looks at."""
 
-    Parameters
-    ----------
-    at : rows of the schedule whose steps are taken as different; those from `first` on repeat.
-    ends : numbers of steps after which the errors are guessed.
-    lags : the largest number of earlier steps that count.
-    """
-
-    at: NDArray[np.int64]
-    first: int
-    ends: NDArray[np.int64]
-    lags: int
+    at: NDArray[np.int64]  # rows of the schedule whose steps are taken as different
+    first: int  # the rows from this one on repeat
+    ends: NDArray[np.int64]  # numbers of steps after which the errors are guessed
+    lags: int  # the largest number of earlier steps that count
 
     def rows(self, k: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the place in `at` of some steps, counted from 0."""
@@ -415,9 +368,7 @@ def course(given: Schedule, steps: int | None, radius: float, dense: bool) -> Co
 def summed(chosen: Course, F: Array, G: Array, part: NDArray[np.int64], starts: Array | None = None) -> Array:
     """Sum the effects of the columns of all earlier steps after each end, part by part, (ends, rows, parts).
 
-    Parameters
-    ----------
-    starts : (ends, rows, n), functions of the state; by default each state.
+    They are those on functions of the state, (ends, rows, n), by default on each state.
     """
     n, parts = F.shape[1], np.eye(int(part.max(initial=0)) + 1)[part]
     C = np.broadcast_to(np.eye(n), (len(chosen.ends), n, n)) if starts is None else starts

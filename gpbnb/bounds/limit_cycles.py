@@ -31,16 +31,10 @@ MOST_STATES, LARGEST_SEARCH = 2**24, 2**28
 
 @dataclass(frozen=True, eq=False)
 class LimitCycle:
-    """States that follow each other for ever with a constant input.
+    """States that follow each other for ever with a constant input."""
 
-    Parameters
-    ----------
-    states : (period, n), integers in units of the data.
-    outputs : (period, p), likewise.
-    """
-
-    states: NDArray[np.int64]
-    outputs: NDArray[np.int64]
+    states: NDArray[np.int64]  # (period, n), integers in units of the data
+    outputs: NDArray[np.int64]  # (period, p), likewise
 
     @property
     def period(self) -> int:

@@ -34,12 +34,9 @@ _Step = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 def limited_errors(
     system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: NDArray[np.float64], count: int | None = None
 ) -> NDArray[np.float64]:
-    """Bound the error of each output, (p,), from the system as given, for all inputs within limits.
+    """Bound the error of each output, (p,), from the system as given, for all inputs within limits of their size, (m,).
 
-    Parameters
-    ----------
-    largest : (m,), limits on the size of the inputs. The system starts from rest.
-    count : number of steps for which the bound holds; by default all time.
+    The system starts from rest, and the bound holds for a number of steps, by default for all time.
     """
     made, steps = system.as_filter(), _Steps(system, fmt, largest)
     n = made.program.n

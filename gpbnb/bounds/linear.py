@@ -204,15 +204,9 @@ def error_coefficients(A: Any, B: Any, C: Any, D: Any, largest_input: float) -> 
 
     .. math:: E_j = \mathrm{WCPG}(\text{error in } x_j \to y)\cdot 2^{\lceil\log_2\max|x_j|\rceil}
 
-    The output error is at most the sum of :math:`E_j 2^{-w_j}` for w_j bits, up to factors due to the rounding.
-
-    Returns
-    -------
-    coefficients : (n + 1,), the output last.
-
-    References
-    ----------
-    Volkova, Hilaire and Lauter, IEEE Trans. Computers 69 (2020); FixIF's example files.
+    The output error is at most the sum of :math:`E_j 2^{-w_j}` for w_j bits, up to factors due to the rounding. There
+    are n + 1 of them, that of the output last. Source: Volkova, Hilaire and Lauter, IEEE Trans. Computers 69 (2020);
+    FixIF's example files.
     """
     n = len(exact(A))
     unit = exact(np.eye(n, dtype=np.int64))

@@ -24,18 +24,11 @@ from gpbnb.filters.system import LinearSystem
 
 
 class StepRoundings(NamedTuple):
-    """Roundings of the steps of a period.
+    """Roundings of the steps of a period."""
 
-    Parameters
-    ----------
-    F : (steps, n, n), closed loops.
-    effects : (steps, n, o), effect of an error of each operation on the states after the step.
-    errors : (steps, o), the largest error of each operation.
-    """
-
-    F: NDArray[np.float64]
-    effects: NDArray[np.float64]
-    errors: NDArray[np.float64]
+    F: NDArray[np.float64]  # (steps, n, n), closed loops
+    effects: NDArray[np.float64]  # (steps, n, o), of an error of each operation on the states after the step
+    errors: NDArray[np.float64]  # (steps, o), the largest of each operation
 
 
 def separate_roundings(found: FilterGuarantee) -> StepRoundings:

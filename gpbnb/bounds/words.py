@@ -96,37 +96,22 @@ def _effects(made: IntegerProgram) -> NDArray[np.float64]:
 
 
 class _Sums(NamedTuple):
-    """What does not depend on the unit of the data: sums for certain stored coefficients.
+    """What does not depend on the unit of the data: sums for certain stored coefficients."""
 
-    Parameters
-    ----------
-    state : (n + p, m), from inputs to states and outputs.
-    rows : (values, n + m), linear function of states and inputs that each value approximates.
-    values : (values, m), from inputs to values.
-    errors, storing : (n + p, m), from inputs, and from errors of storing them, to errors.
-    rounding : (n + p, o), from roundings of operations to errors.
-    lags : how many earlier steps are summed one by one.
-    """
-
-    state: NDArray[np.float64]
-    rows: NDArray[np.float64]
-    values: NDArray[np.float64]
-    errors: NDArray[np.float64]
-    storing: NDArray[np.float64]
-    rounding: NDArray[np.float64]
-    lags: int
+    state: NDArray[np.float64]  # (n + p, m), from inputs to states and outputs
+    rows: NDArray[np.float64]  # (values, n + m), function of states and inputs that each value approximates
+    values: NDArray[np.float64]  # (values, m), from inputs to values
+    errors: NDArray[np.float64]  # (n + p, m), from inputs to errors
+    storing: NDArray[np.float64]  # (n + p, m), from errors of storing inputs to errors
+    rounding: NDArray[np.float64]  # (n + p, o), from roundings of operations to errors
+    lags: int  # how many earlier steps are summed one by one
 
 
 class WordGuarantee:
-    """Bounds of the errors of a linear system in fixed-point words, for all inputs within limits.
+    """Bounds of the errors of a linear system in fixed-point words, for all inputs within limits of their size, (m,).
 
-    Sums are computed once for the same stored coefficients, so that a search over units of the data is fast.
-
-    Parameters
-    ----------
-    system : a linear system that starts from rest.
-    largest : (m,), limits on the size of the inputs.
-    steps : number of steps for which the bounds hold; by default all time.
+    The system starts from rest, and the bounds hold for a number of steps, by default for all time. Sums are computed
+    once for the same stored coefficients, so that a search over units of the data is fast.
     """
 
     def __init__(self, system: LinearSystem, largest: Any, steps: int | None = None) -> None:

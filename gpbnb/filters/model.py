@@ -334,12 +334,7 @@ class LinearModel:
         return state, measurement if self.d is None else self.d[k % len(self.d)]
 
     def refuse_inputs(self, what: str) -> None:
-        """Reject a model with known inputs or offsets where they would be ignored.
-
-        Raises
-        ------
-        ValueError : the model has inputs or offsets.
-        """
+        """Reject a model with known inputs or offsets where they would be ignored."""
         if self.has_inputs:
             raise ValueError(
                 f"got {self.name} with known inputs or offsets; needed none for {what}, which does not cover them; use "
@@ -349,13 +344,7 @@ class LinearModel:
     def check_measurements(self, z: Any, first: int) -> None:
         """Reject measurements whose shape is not (steps, m), or that have more steps than the model describes.
 
-        Parameters
-        ----------
-        first : number of steps before the first of these measurements.
-
-        Raises
-        ------
-        ValueError : the shape is not (steps, m), or there are more than `steps` steps altogether.
+        A number of `first` steps were taken before them.
         """
         shape = z.shape if hasattr(z, "shape") else np.shape(z)
         if len(shape) != 2 or shape[1] != self.m:
@@ -363,22 +352,12 @@ class LinearModel:
         self.check_steps(first + len(z))
 
     def check_steps(self, count: int) -> None:
-        """Reject a run that is longer than the model describes.
-
-        Raises
-        ------
-        ValueError : more than `steps` steps.
-        """
+        """Reject a run that is longer than the model describes."""
         if self.steps is not None and count > self.steps:
             raise ValueError(f"got {count} steps; needed at most {self.steps}: {self.name} describes no more")
 
     def check_sizes(self) -> None:
-        """Reject entries whose products would leave the exponent range of float64, in which the compiled loops compute.
-
-        Raises
-        ------
-        OverflowError : the absolute value of an entry is not between 2**-450 and 2**450.
-        """
+        """Reject entries whose products would leave the exponents of float64, in which the compiled loops compute."""
         for letter, (values, _) in different_entries(self).items():
             for entry in filter(None, abs(values)):
                 exponent = entry.numerator.bit_length() - entry.denominator.bit_length()

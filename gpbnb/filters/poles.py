@@ -34,21 +34,13 @@ def eigenvalues(A: NDArray[np.float64]) -> NDArray[np.complex128]:
 
 
 class StoredResponse(NamedTuple):
-    """What storing its coefficients in a format does to a stable filter.
+    """What storing its coefficients in a format does to a stable filter."""
 
-    Parameters
-    ----------
-    format : the format in words.
-    pole, stored_pole : size of the pole nearest to the unit circle, as given and as stored.
-    change : largest change of the frequency response in dB, where it is at most 60 dB below its peak.
-    frequency : where that change is, in cycles per sample.
-    """
-
-    format: str
-    pole: float
-    stored_pole: float
-    change: float
-    frequency: float
+    format: str  # in words
+    pole: float  # size of the pole nearest to the unit circle, as given
+    stored_pole: float  # the same, as stored
+    change: float  # largest of the frequency response in dB, where it is at most 60 dB below its peak
+    frequency: float  # where that change is, in cycles per sample
 
     def __str__(self) -> str:
         return (

@@ -45,33 +45,20 @@ _LIMITS = {1: AT_MOST, 4: AT_LEAST}
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Operations of one step.
+    """Operations of one step."""
 
-    Parameters
-    ----------
-    rows : (o, 5), operations of the machine: a code, three operands and the place of the result.
-    sizes : numbers of places, and of truth values.
-    states, inputs, coefficients : (n,), (m,) and (c,), their places; -1 for an output of the step before.
-    after : (n,), places of the next states. The last p are the outputs of the system, and no operation reads these.
-    p : number of outputs of the system.
-    state_names, coefficient_names : (n,) and (c,), names for generated code.
-    stored : places of results that are stored even if only sums use them: the outputs of sections.
-    calls : functions that are called between operations.
-    definite : the truth value that holds while a covariance is definite.
-    """
-
-    rows: NDArray[np.int64]
-    sizes: tuple[int, int]
-    states: NDArray[np.int64]
-    inputs: NDArray[np.int64]
-    coefficients: NDArray[np.int64]
-    after: NDArray[np.int64]
-    p: int = 0
-    state_names: tuple[str, ...] = ()
+    rows: NDArray[np.int64]  # (o, 5), operations of the machine: a code, three operands and the place of the result
+    sizes: tuple[int, int]  # numbers of places, and of truth values
+    states: NDArray[np.int64]  # (n,), places; -1 for an output of the step before
+    inputs: NDArray[np.int64]  # (m,), places
+    coefficients: NDArray[np.int64]  # (c,), places
+    after: NDArray[np.int64]  # (n,), places of the next states; the last p are outputs, which no operation reads
+    p: int = 0  # number of outputs of the system
+    state_names: tuple[str, ...] = ()  # (n,), for generated code
     coefficient_names: tuple[str, ...] = ()
-    stored: frozenset[int] = frozenset()
-    calls: Sequence[Call] = ()
-    definite: int = 1
+    stored: frozenset[int] = frozenset()  # places of results stored even if only sums use them: outputs of sections
+    calls: Sequence[Call] = ()  # of functions between operations
+    definite: int = 1  # the truth value that holds while a covariance is definite
 
     @property
     def n(self) -> int:

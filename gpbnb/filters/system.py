@@ -66,20 +66,12 @@ MOST_INPUTS = 100_000
 
 @dataclass(frozen=True, eq=False)
 class LinearFilter:
-    """A linear filter: the operations of a step, and its coefficients, exact.
-
-    Parameters
-    ----------
-    program : operations of a step.
-    coefficients : (c,), the exact design values; they are rounded when a format stores them.
-    name : name in tables.
-    cascade : its sections, if it is a cascade.
-    """
+    """A linear filter: the operations of a step, and its coefficients, exact."""
 
     program: Program
-    coefficients: NDArray[Any]
-    name: str = "a linear filter"
-    cascade: Cascade | None = None
+    coefficients: NDArray[Any]  # (c,), the exact design values, which are rounded when a format stores them
+    name: str = "a linear filter"  # in tables
+    cascade: Cascade | None = None  # its sections, if it is a cascade
 
     def __post_init__(self) -> None:
         checked_name(self.name)
