@@ -10,6 +10,7 @@ here a change of any file in these folders counts as well.
 from __future__ import annotations
 
 import contextlib
+import gc
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
@@ -51,6 +52,16 @@ class Compiler(CompilerBase):  # type: ignore[misc]
 
     It takes three quarters of the time.
     """
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile without looking for cyclic garbage, which takes a tenth of the time and finds little."""
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super().compile_extra(func)
+        finally:
+            if collects:
+                gc.enable()
 
     def define_pipelines(self) -> list[Any]:
         """Return the passes."""
