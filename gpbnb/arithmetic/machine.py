@@ -210,7 +210,7 @@ def code_of(rows: NDArray[Any], formats: NDArray[np.int64]) -> Code:
     edges[[0, -1]] = True
     begins = np.flatnonzero(edges) if len(rows) else np.zeros(1, np.int64)
     columns = np.ascontiguousarray(rows.T[1:], np.uint32)
-    gathered = np.empty(2 * max(np.diff(begins), default=0))
+    gathered = np.empty(4 * max(np.diff(begins), default=0))
     segments = (each[begins[:-1]].astype(np.int64) for each in (rows[:, 0], formats, how & 3))
     return Code(Addresses(*columns, begins, *segments, gathered, len(begins) - 1, len(rows)), len(rows))
 

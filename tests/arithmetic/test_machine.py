@@ -207,12 +207,18 @@ def operands(rng: np.random.Generator, cancelling: bool) -> tuple[Any, Any]:
 
 
 def computed(name: str, a: Any, b: Any) -> tuple[Any, Any] | None:
-    """Compute one operation on many numbers; None if one of them has no result."""
-    values = np.zeros((3, len(a[0]), 2))
+    """Compute one operation on many numbers, in lanes and in rows; None if one of them has no result."""
+    count = len(a[0])
+    values = np.zeros((3, count, 2))
     values[0], values[1] = np.transpose(a), np.transpose(b)
     kind, formats = tables([None])
     row = code_of(np.array([[CODES[name], 0, 1, 0, 2]]), np.zeros(1, np.int64))
-    done = evaluate(Memory(values, np.zeros((2, len(a[0])), np.uint8)), kind, formats, row)
+    done = evaluate(Memory(values, np.zeros((2, count), np.uint8)), kind, formats, row)
+    alone, at = np.concatenate([values[0], values[1, ::-1], 0 * values[2]])[:, np.newaxis], np.arange(count)
+    rows = np.stack([np.full(count, CODES[name]), at, 2 * count - 1 - at, 0 * at, 2 * count + at], axis=1)
+    memory = Memory(alone, np.zeros((2, 1), np.uint8))
+    assert (evaluate(memory, kind, formats, code_of(rows, 0 * at)) == count) == bool(done)
+    assert not done or np.array_equal(alone[2 * count :, 0], values[2])
     return (values[2, :, 0], values[2, :, 1]) if done else None
 
 
@@ -253,11 +259,7 @@ def test_relative_errors_stay_below_the_bound(name: str, cancelling: bool) -> No
 
 
 def test_range_and_zero() -> None:
-    zero, tiny, huge = (
-        (np.zeros(1), np.zeros(1)),
-        (np.array([2.0**-500]), np.zeros(1)),
-        (np.array([2.0**600]), np.zeros(1)),
-    )
+    zero, tiny, huge = ((np.full(5, each), np.zeros(5)) for each in (0.0, 2.0**-500, 2.0**600))
     for name, operands_of in (("multiply", (zero, huge)), ("subtract", (huge, huge))):
         out = computed(name, *operands_of)
         assert out is not None

@@ -371,11 +371,39 @@ def _two_words(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     return o
 
 
+@borrowing(forceinline=True)
+def _double_doubles_along(operation: Any, a: Any, b: Any, c: Any, count: Any) -> Any:
+    """Compute c, pairs, from a and b, high parts before low ones; return whether a result left the range."""
+    any_gone = False
+    for i in range(count):
+        c[2 * i], c[2 * i + 1] = doubledouble.operate(operation, (a[i], a[count + i]), (b[i], b[count + i]))
+        any_gone |= c[2 * i] != c[2 * i]
+    return any_gone
+
+
+@borrowing
+def _double_doubles_together(operation: Any, code: Any, o: Any, count: Any, values: Any) -> Any:
+    """Run rows of one lane together, from row o on; return whether a result left the range."""
+    a, b = at(entries(code, A, np.uint32), o), at(entries(code, B, np.uint32), o)
+    first, sign = entries(code, ROOM, np.float64), -1.0 if operation == SUBTRACT else 1.0
+    second, c = at(first, 2 * count), at(values, 2 * np.int64(entries(code, OUT, np.uint32)[o]))
+    for i in range(count):
+        first[i], first[count + i] = values[2 * a[i]], values[2 * a[i] + 1]
+    for i in range(count):
+        second[i], second[count + i] = sign * values[2 * b[i]], sign * values[2 * b[i] + 1]
+    if operation == MULTIPLY:
+        return _double_doubles_along(_MULTIPLY, first, second, c, count)
+    return _double_doubles_along(_ADD, first, second, c, count)
+
+
 @addressed
 def _double_doubles(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
         _, operation, end = _segment(formats, code, s)
+        together = lanes == 1 and o < end and entries(code, TOGETHER, np.int64)[s] != ONE_BY_ONE
+        if together and not _double_doubles_together(operation, code, o, end - o, values):
+            o = end
         o = _run_double_doubles(DoubleDouble(), operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
