@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,7 @@ WITHOUT_CELLS = ("reports", "story", "notation", "errata", "ledger", "api", "REA
 """Pages that print nothing: each numeral is computed here, or given. Seconds in CONTRIBUTING are measured by hand."""
 
 
+@cache
 def cells(page: str) -> list[dict]:
     return json.loads((BOOK / f"{page}.ipynb").read_text(encoding="utf-8"))["cells"]
 
@@ -85,6 +87,7 @@ def source(page: str) -> str:
     )
 
 
+@cache
 def prose(page: str) -> str:
     """Text and captions without what is no prose; white space as single blanks."""
     return " ".join(NOT_PROSE.sub(" · ", source(page)).split())

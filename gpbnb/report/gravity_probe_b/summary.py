@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cache
 from typing import NamedTuple
 
 from gpbnb.arithmetic.formats import FloatFormat
@@ -40,6 +41,7 @@ class YearAnswer(NamedTuple):
     deviation: int | None = None
 
 
+@cache
 def find() -> tuple[YearAnswer, ...]:
     """Collect the answers from the printed example, the stored years and the stored guarantee."""
     printed = tuple(int(report_bounds.PRINTED[f"{term} digits"]) for term in ("first", "second"))
