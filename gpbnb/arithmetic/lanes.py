@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.interpreting import Constants, Numbers
 from gpbnb.arithmetic.loop import Loop
 from gpbnb.arithmetic.machine import code_of, fault_of
-from gpbnb.arithmetic.tape import Tape
+from gpbnb.arithmetic.tape import Tape, laid_out
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
 
 _NUMBERS = 1 << 19  # that are computed at once
@@ -117,10 +117,7 @@ def repeatable(
     For each array, `nonzero` tells which entries are ever other than zero, as the bytes of truth values; all by
     default.
     """
-    tape, given, at = Tape(sum(map(math.prod, shapes))), [], 1
-    for shape in shapes:
-        given.append(np.arange(at, at + math.prod(shape)).reshape(shape))
-        at += math.prod(shape)
+    tape, given = Tape(sum(map(math.prod, shapes))), laid_out(shapes)
     masks = [np.frombuffer(each, np.bool_) for each in nonzero] or [each > 0 for each in given]
     read = [np.where(mask.reshape(each.shape), each, 0) for mask, each in zip(masks, given, strict=True)]
     returned = function(*map(TracedFormat(tape).made, read))

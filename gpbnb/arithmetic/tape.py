@@ -7,8 +7,9 @@ where the format has it.
 
 from __future__ import annotations
 
+import math
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from typing import Any, NoReturn
 
@@ -56,15 +57,27 @@ def known_truth(name: str, a: Places, b: Places, table: Any) -> Places:
     return np.where(a == b, table >> 1 & 1, -1) if name == "compare" else _combined(a, b, table)
 
 
+def _exact_cases(name: str, a: Any, b: Any, one: int) -> list[tuple[Any, Any]]:
+    """Return when an operation gives a number back, place 0 being zero, and which; the first case that holds counts."""
+    if name == "divide":
+        return [(a == 0, a), (b == one, a)]
+    if name == "multiply":
+        return [(a == 0, a), (b == 0, b), (a == one, b), (b == one, a)]
+    return {"add": [(b == 0, a), (a == 0, b)], "subtract": [(b == 0, a)]}.get(name, [])
+
+
 def exact_result(name: str, a: int, b: int, one: int) -> int:
     """Return the place of the number that an exact operation gives back, or -1; place 0 is zero, `one` is 1."""
-    if name == "divide":
-        return 0 if a == 0 else a if b == one else -1
-    if name == "multiply":
-        return 0 if a == 0 or b == 0 else b if a == one else a if b == one else -1
-    if name in ("add", "subtract"):
-        return a if b == 0 else b if a == 0 and name == "add" else -1
-    return -1
+    return next((place for holds, place in _exact_cases(name, a, b, one) if holds), -1)
+
+
+def laid_out(shapes: Iterable[tuple[int, ...]]) -> list[Places]:
+    """Return places for arrays of some shapes, which follow each other from place 1 on."""
+    found, at = list[Places](), 1
+    for shape in shapes:
+        found.append(np.arange(at, at + math.prod(shape)).reshape(shape))
+        at += found[-1].size
+    return found
 
 
 def depending(rows: NDArray[Any], numbers: NDArray[np.bool_], truths: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -178,19 +191,11 @@ class Tape:
                 self.check(b.item())
             same = exact_result(name, a.item(), b.item(), self.one)
             return self._append(name, operands, fmt) if same < 0 else np.full(a.shape, same)
-        found = np.full(a.shape, -1)
         if name == "divide":
-            for each in np.unique(b[(a == 0)]).tolist():
+            for each in np.unique(b[a == 0]).tolist():
                 self.check(each)
-            found[a == 0] = 0
-        elif name != "subtract":
-            found = np.where(a == 0, b if name == "add" else 0, found)
-        if name in ("multiply", "divide"):
-            found = np.where((b == self.one) & (found < 0), a, found)
-        if name == "multiply":
-            found = np.where(a == self.one, b, np.where(b == 0, 0, found))
-        elif name != "divide":
-            found = np.where(b == 0, a, found)
+        holds, places = map(list, zip(*_exact_cases(name, a, b, self.one), strict=True))
+        found = np.select(holds, places, -1)
         left = found < 0
         if left.all():
             return self._append(name, operands, fmt)

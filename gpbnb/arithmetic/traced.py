@@ -25,7 +25,7 @@ from gpbnb.arithmetic.exits import unseen
 from gpbnb.arithmetic.kernels.backends import Backend
 from gpbnb.arithmetic.protocols import broadcast
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.tape import Places, Tape
+from gpbnb.arithmetic.tape import Places, Tape, laid_out
 
 _PLAIN = (int, float, str)
 _ORDERS, _BITS = np.array([-1, 0, 1]), np.array([1, 2, 4])
@@ -118,11 +118,8 @@ class TracedFunction:
     def _traced(self, shapes: Sequence[tuple[int, ...]]) -> _Trace | str:
         """Run the function on arrays without numbers; return what it did, or why it cannot be repeated."""
         tape = Tape(sum(math.prod(shape) for shape in shapes))
-        fmt, arrays, first = TracedFormat(tape), [], 1
-        for shape in shapes:
-            places = np.arange(first, first + math.prod(shape)).reshape(shape)
-            arrays.append(fmt.made(places))
-            first += places.size
+        fmt = TracedFormat(tape)
+        arrays = map(fmt.made, laid_out(shapes))
         try:
             with unseen(fmt) as shown:
                 returned = self.__wrapped__(fmt, *arrays)

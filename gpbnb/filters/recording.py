@@ -19,7 +19,7 @@ from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
 from gpbnb.arithmetic.machine import packed_one
 from gpbnb.arithmetic.rounding import Order
-from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
+from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError, laid_out
 from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.program import Program, entries
@@ -104,12 +104,9 @@ def kalman_step(kind: StepKind) -> tuple[RecordedStep, LinearTaken]:
 def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], LinearTaken]:
     """Record a step of a filter; return its tape, the places of what it takes, and what it gives."""
     n, m = kind.n, kind.m
-    sizes = [("x", (n,)), ("P", (n, n)), ("carried", (n,)), ("z", (m,)), *((e.letter, e.shape) for e in kind.model)]
-    places, at = dict[str, NDArray[np.int64]](), 1
-    for letter, shape in sizes:
-        places[letter] = np.arange(at, at + int(np.prod(shape))).reshape(shape)
-        at += places[letter].size
-    tape = Tape(at - 1, one=kind.one)
+    shapes = {"x": (n,), "P": (n, n), "carried": (n,), "z": (m,), **{each.letter: each.shape for each in kind.model}}
+    places = dict(zip(shapes, laid_out(shapes.values()), strict=True))
+    tape = Tape(sum(each.size for each in places.values()), one=kind.one)
     tape.fuses, tape.alike, tape.most = True, kind.alike, 2 * MOST_OPERATIONS
     formats = [TracedFormat(tape, i) for i in range(max(*kind.blocks, kind.sums[-1]) + 1)]
     state, gain, covariance, innovation, stored = (formats[i] for i in kind.blocks)

@@ -19,7 +19,7 @@ from gpbnb.arithmetic.interpreting import Numbers, OnIntegers, Segment
 from gpbnb.arithmetic.kernels.backends import Looped
 from gpbnb.arithmetic.loop import steps_at_once
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.tape import FEW_OPERATIONS, Tape
+from gpbnb.arithmetic.tape import FEW_OPERATIONS, Tape, laid_out
 from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.stepping import RecordedStep, RunningStep, StepsTaken, StepTaken, divided, truth_of
 
@@ -137,12 +137,8 @@ class RepeatedStep:
         tape = Tape(sum(each.size for each in arrays), one=True)
         tape.alike = alike
         formats = [TracedFormat(tape, i) for i in range(len(self._formats))]
-        places, made = [], []
-        at = 1
-        for each, number in zip(arrays, numbers, strict=True):
-            places.append(np.arange(at, at + each.size).reshape(each.shape))
-            made.append(formats[number].made(places[-1]))
-            at += each.size
+        places = laid_out(each.shape for each in arrays)
+        made = [formats[number].made(at) for number, at in zip(numbers, places, strict=True)]
         count = len(self.states)
         try:
             with unseen(formats[0]) as shown:

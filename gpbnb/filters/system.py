@@ -145,19 +145,19 @@ def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a sta
     return _named(state_space_structure(A, B, *(() if C is None else (exact(C), exact(D)))), name)
 
 
-def biquad(b0: Any, b1: Any, b2: Any, a1: Any, a2: Any, name: str = "a second-order section") -> LinearFilter:
+def biquad(b0: Any, b1: Any, b2: Any, a1: Any, a2: Any) -> LinearFilter:
     """Return a second-order section (b0 + b1/z + b2/z²)/(1 + a1/z + a2/z²), transposed form II; output is state 2."""
     b, a = exact([b0, b1, b2]).tolist(), exact([a1, a2]).tolist()
-    return _named(cascade([(b, a)], "direct form II transposed"), name)
+    return _named(cascade([(b, a)], "direct form II transposed"), "a second-order section")
 
 
-def controller(leak: Any, Ki: Any, Kp: Any, Kd: Any, name: str = "a PID controller") -> LinearFilter:
+def controller(leak: Any, Ki: Any, Kp: Any, Kd: Any) -> LinearFilter:
     """Return a PID controller whose integral decays by the factor `leak` per step; input is the error, output state 2.
 
     With leak = 1 the integral keeps every rounding error, and there is no bound that holds for ever.
     """
     leak, Ki, Kp, Kd = exact([leak, Ki, Kp, Kd])
-    return _named(controller_structure(Controller(Kp, Ki, Kd, leak)), name)
+    return _named(controller_structure(Controller(Kp, Ki, Kd, leak)), "a PID controller")
 
 
 def _named(made: Structure, name: str) -> LinearFilter:
@@ -665,12 +665,12 @@ def _ascending(name: str, given: Any) -> tuple[Fraction, Fraction] | None:
     return entries[0], entries[1]
 
 
-def system_inputs(system: LinearSystem, u: Any, steps: int | None = None) -> NDArray[Any]:
+def system_inputs(system: LinearSystem, u: Any) -> NDArray[Any]:
     """Check the inputs of a system, (steps, m), and return them."""
     given = real_numbers(u)
-    if given.ndim != 2 or given.shape[1] != system.m or not len(given) or steps not in (None, len(given)):
+    if given.ndim != 2 or given.shape[1] != system.m or not len(given):
         column = "; write u.reshape(-1, 1)" if given.ndim == system.m == 1 else ""
-        raise ValueError(f"got inputs of shape {given.shape}; needed ({steps or 'steps'}, {system.m}){column}")
+        raise ValueError(f"got inputs of shape {given.shape}; needed (steps, {system.m}){column}")
     if given.dtype.kind != "f":
         return exact(given)
     for k, i in np.argwhere(~np.isfinite(given)):
