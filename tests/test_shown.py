@@ -8,11 +8,13 @@ from __future__ import annotations
 import contextlib
 import html
 import io
+import math
 import os
 import re
 import shlex
 import subprocess
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
@@ -21,7 +23,7 @@ from gpbnb.bounds.check import main as check
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.poles import stored_response
 from gpbnb.filters.settled import settled_filter
-from gpbnb.report.ledger.command import main as ledger
+from gpbnb.report.ledger import command
 from gpbnb.report.stored import main as sweeps
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.required import judge
@@ -43,16 +45,16 @@ FILES = test_refused.FILES | {
     "own.py": "def step(fmt, x, u):\n    return [x[0] + u[0] / 8], [x[0]]\n",
     "own.toml": 'step = "own.py:step"\nx0 = [0]\n',
 }
-COMMANDS = {"wordlength": main, "gpbnb": top, "ledger": ledger, "sweeps": sweeps, "check": check}
+COMMANDS = {"wordlength": main, "gpbnb": top, "ledger": command.main, "sweeps": sweeps, "check": check}
 
 
-def ran(command):
+def ran(line):
     """What a command prints, an error after "! ", and its exit status unless it is 0."""
-    name, *words = re.findall(r"'[^']*'|\S+", command)
+    name, *words = shlex.split(line)
     out = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", newline="")
     with contextlib.redirect_stderr(io.StringIO()) as err, contextlib.redirect_stdout(out):
         try:
-            status = COMMANDS[name]([word.strip("'") for word in words])
+            status = COMMANDS[name](words)
         except SystemExit as end:
             status = end.code
     out.flush()
@@ -75,9 +77,9 @@ def files(folder, *names):
 def made(words):
     """The commands that make would run, with what few targets need installed."""
     ready = [word for each in ("made-for", "with-dev", "with-pages", "with-bench") for word in ("-o", f".venv/{each}")]
-    command = ["make", "--no-print-directory", "-n", *ready, *shlex.split(words)]
+    asked = ["make", "--no-print-directory", "-n", *ready, *shlex.split(words)]
     env = {"PATH": os.environ["PATH"], "HOME": os.environ.get("HOME", "/")}
-    done = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=True)
+    done = subprocess.run(asked, cwd=ROOT, env=env, capture_output=True, text=True, check=True)
     return (done.stdout + done.stderr).replace(str(ROOT), ".").replace("\\\n", "\n")
 
 
@@ -105,7 +107,8 @@ def indented(text):
 
 @contextlib.contextmanager
 def folder(path):
-    with contextlib.chdir(path):
+    """The files, in the current folder; a slow ledger does not say how far it is."""
+    with contextlib.chdir(path), mock.patch.object(command, "_PAUSE", math.inf):
         for name, text in FILES.items():
             Path(name).write_text(text, encoding="utf-8")
         yield

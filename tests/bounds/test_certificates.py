@@ -821,3 +821,30 @@ def test_a_claim_that_is_too_small_is_raised_to_one_that_is_proved() -> None:
     found = first_proved(small, lambda each: of_operations(made, fmt, inputs, each, None, "as given"))
     assert not found.why
     np.testing.assert_allclose(found.bound, near.bound, rtol=4e-3)  # the factors that are tried
+
+
+@pytest.mark.parametrize("back", [0, 2**20 + 1])
+def test_steps_back_are_counted_before_anything_is_summed(back: int) -> None:
+    with pytest.raises(NotProvedError, match="no step back, or too many"):
+        prove(json.loads(original("section")) | {"back": back})
+
+
+def test_rows_that_are_rounded_down_lose_no_more_than_is_counted() -> None:
+    """Rows in units of 1/16, through steps that keep every vector within its sizes."""
+    random, size, worst = np.random.default_rng(4), 9, Fraction(0)
+    for _ in range(50):
+        loops = [random.integers(-8, 9, (2, 2)).tolist() for _ in range(3)]
+        row = random.integers(-16, 17, 2).tolist()
+        (effect,), (far,) = check.ErrorSet([size, size], [], 4, "").effects(
+            [row], [(F, [], [0, 0], None) for F in loops]
+        )
+        exactly = [Fraction(x) for x in row]
+        for F in reversed(loops):
+            exactly = [
+                sum(x * Fraction(f, 16) for x, f in zip(exactly, column, strict=True))
+                for column in zip(*F, strict=True)
+            ]
+        lost = sum(abs(x - y) * size for x, y in zip(exactly, far, strict=True))
+        assert lost <= effect
+        worst = max(worst, lost)
+    assert worst > size

@@ -15,6 +15,7 @@ from gpbnb import (
     required_precision,
 )
 from gpbnb.wordlength.answer import judgement, share_text
+from gpbnb.wordlength.judges import Judge
 
 WALK = LinearModel([["0.9"]], [[1]], [["0.01"]], [[1]], [0], [[1]])
 
@@ -30,6 +31,12 @@ def test_a_judgement_is_a_sentence():
 
 def test_an_error_of_the_whole_tolerance_is_within_it():
     assert (share_text(1.0), share_text(1.01)) == ("1 of the tolerance", "1.01 times the tolerance")
+
+
+@pytest.mark.parametrize(("error", "what"), [(1e300, "an error over its tolerance"), (np.inf, "an output or a bound")])
+def test_what_is_beyond_float64_is_named(error, what):
+    judge = Judge(lambda fmt: np.zeros(2), tolerances=np.array([1e-300, 1]))
+    assert judge.outcome(np.array([error, 1])).why == f"{what} is beyond the range of float64"
 
 
 @pytest.mark.parametrize(("z", "leaves"), [([0.5, 0.5, 5], ""), ([0.5, 7, 0.5], "step 2: innovation 0 is 6.")])
