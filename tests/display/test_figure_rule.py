@@ -58,6 +58,10 @@ def small(ax):
     ax.text(2, 2.5, "small", fontsize=8.5)
 
 
+def small_on_the_right(ax):
+    ax.tick_params(axis="y", labelright=True, labelleft=False, labelsize=8)
+
+
 def faint(ax):
     ax.text(2, 2.5, "faint", color="#3E93C8", fontsize=style.TEXT)
 
@@ -131,6 +135,7 @@ def other_limits(ax):
     ("spoil", "words"),
     [
         (small, "8.5 points; needed 11"),
+        (small_on_the_right, "8 points; needed 11"),
         (faint, "has a contrast of 3.4; needed 4.5"),
         (hyphen, "has a hyphen for a minus sign"),
         (solid, "a refuted formula has the line style '-'"),

@@ -47,3 +47,9 @@ def test_words_and_table_name_every_event():
     html = timeline.picture()
     assert html == timeline.picture()
     assert html.startswith('<figure><img alt="A timeline')
+
+
+def test_the_earliest_year_is_above():
+    (ax,) = timeline.figure().axes
+    heights = {text.get_text(): ax.transData.transform(text.get_position())[1] for text in ax.texts}
+    assert heights["1960"] > heights["2000"]
