@@ -157,6 +157,12 @@ def of_the_report() -> str:
     return next(row for row in summary.table().body if row[0] == "Report, own criterion")[2]
 
 
+def beyond_first_order() -> int:
+    """The lowest power of β in what the strict bound of n roundings has beyond the first-order one."""
+    n, beta = sp.symbols("n beta", positive=True)
+    return sp.degree(sp.series(n * beta / (1 - n * beta) - n * beta, beta, 0, 3).removeO(), beta)
+
+
 def limit_of(base: int) -> int:
     """The most digits that run in loops."""
     return max(t for t in range(1, 130) if wide_tag(FloatFormat(base, t).rules) is not None)
@@ -195,6 +201,7 @@ COMPUTED: dict[tuple[str, str], Callable[[], Any]] = {
     ("notation", "A year has 365 days"): lambda: rolling.YEAR == 365 * 86400,
     ("notation", "with 24 and 53 bits"): lambda: (BINARY32.precision, BINARY64.precision) == (24, 53),
     ("notation", "with 11, 24 and 53 binary digits"): lambda: BINARY16.precision == 11,
+    ("notation", r"\beta^2"): lambda: beyond_first_order() == 2,
     ("notation", "about 31 decimal digits"): lambda: math.floor(106 * math.log10(2)) == 31,
     ("notation", "about 0.04 arcseconds"): lambda: round(DRIFTS[1] / 1e3, 2) == 0.04,
     ("notation", "6.6 arcseconds"): lambda: round(DRIFTS[0] / 1e3, 1) == 6.6,

@@ -63,8 +63,7 @@ def read_address(app: Sphinx, config: Config) -> None:
     parts = urlsplit(given)
     if parts.scheme not in ("http", "https") or not parts.netloc or parts.query or parts.fragment:
         raise ConfigError(f"got the address {given!r} for the book; needed one such as https://example.org/gpbnb/")
-    # Sphinx joins addresses: without the last slash it would drop the last folder.
-    config.html_baseurl = given.rstrip("/") + "/"
+    config.html_baseurl = given
 
 
 def address(app: Sphinx, place: str) -> str:
