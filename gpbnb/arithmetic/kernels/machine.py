@@ -85,7 +85,7 @@ lanes take the same; and an address."""
 
 # -- float64 with masks ------------------------------------------------------------------------------------------------
 
-_ADD, _MULTIPLY, _SHORT, _LONG = map(np.int64, (ADD, MULTIPLY, SHORT, LONG))
+_ADD, _MULTIPLY, _SHORT, _LONG, _ONE = map(np.int64, (ADD, MULTIPLY, SHORT, LONG, 1))
 
 
 @borrowing(forceinline=True)
@@ -270,7 +270,7 @@ def _double_double(fmt: Any, operation: Any, x: Any, y: Any) -> Any:
 
 def _loop(kind: Any, operate: Any, parts: int) -> Any:
     """Return the function that runs rows of one operation in an arithmetic whose numbers have some parts."""
-    load, put, compare, alone = kind.load, kind.put, kind.compare, kind is shortdecimal
+    load, put, compare = kind.load, kind.put, kind.compare
 
     @borrowing(forceinline=True)
     def run(fmt: Any, operation: Any, code: Any, o: Any, end: Any, values: Any, truths: Any, lanes: Any) -> Any:
@@ -314,14 +314,13 @@ def _loop(kind: Any, operate: Any, parts: int) -> Any:
             o += 1 if holds else 1 + np.int64(second[o])
         return o
 
-    @borrowing
+    @borrowing(forceinline=True)
     def in_copies(fmt: Any, operation: Any, code: Any, o: Any, end: Any, values: Any, truths: Any, lanes: Any) -> Any:
         """The same; copies of the loop serve products and sums, so that what depends on the format is computed once."""
-        width = 1 if alone else lanes
-        if operation == MULTIPLY and lanes == width:
-            return run(fmt, _MULTIPLY, code, o, end, values, truths, width)
-        if operation <= SUBTRACT and lanes == width:
-            return run(fmt, operation & SUBTRACT, code, o, end, values, truths, width)
+        if operation == MULTIPLY:
+            return run(fmt, _MULTIPLY, code, o, end, values, truths, lanes)
+        if operation <= SUBTRACT:
+            return run(fmt, operation & SUBTRACT, code, o, end, values, truths, lanes)
         return run(fmt, operation, code, o, end, values, truths, lanes)
 
     return run if kind is doubledouble else in_copies
@@ -338,7 +337,7 @@ _run_pairs, _run_short = (_loop(kind, operations_of(kind).any, 2) for kind in (d
 _run_two_words, _run_double_doubles = _loop(wide, operations_of(wide).any, 3), _loop(doubledouble, _double_double, 2)
 
 
-@addressed
+@borrowing(forceinline=True)
 def _pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
@@ -349,7 +348,7 @@ def _pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     return o
 
 
-@addressed
+@borrowing(forceinline=True)
 def _short_pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
@@ -358,6 +357,26 @@ def _short_pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
         if o < 0:
             return ~o
     return o
+
+
+@addressed
+def _pairs_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
+    return _pairs(formats, code, held, _ONE)
+
+
+@addressed
+def _pairs_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
+    return _pairs(formats, code, held, lanes)
+
+
+@addressed
+def _short_pairs_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
+    return _short_pairs(formats, code, held, _ONE)
+
+
+@addressed
+def _short_pairs_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
+    return _short_pairs(formats, code, held, lanes)
 
 
 @addressed
@@ -412,17 +431,16 @@ def _double_doubles(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 
 def address(kind: Any, alone: bool) -> int:
     """Return the address of a kind's function, for one lane alone or for any number of them."""
-    if isinstance(kind, Quick):
-        return _address(_quick_lane if alone else _quick_lanes)
-    return _address(_FUNCTIONS[type(kind)])
+    return _address(_FUNCTIONS[type(kind)][not alone])
 
 
 _FUNCTIONS = {
-    Careful: _careful_lanes,
-    InPairs: _pairs,
-    InShortPairs: _short_pairs,
-    InTwoWords: _two_words,
-    DoubleDouble: _double_doubles,
+    Quick: (_quick_lane, _quick_lanes),
+    Careful: (_careful_lanes, _careful_lanes),
+    InPairs: (_pairs_lane, _pairs_lanes),
+    InShortPairs: (_short_pairs_lane, _short_pairs_lanes),
+    InTwoWords: (_two_words, _two_words),
+    DoubleDouble: (_double_doubles, _double_doubles),
 }
 
 
