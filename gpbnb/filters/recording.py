@@ -75,9 +75,9 @@ def step_kind(
 
 
 @lru_cache(maxsize=64)
-def recorded_step(kind: StepKind) -> DividedStep:
-    """Return a step of a filter, divided into what depends on the measurements and what does not."""
-    return divided(kalman_step(kind)[0])
+def recorded_step(kind: StepKind, together: bool = False) -> DividedStep:
+    """Return a step of a filter, divided into what depends on the measurements and what does not, unless together."""
+    return divided(kalman_step(kind)[0], together)
 
 
 @lru_cache(maxsize=64)

@@ -16,7 +16,7 @@ from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.arithmetic.loop import drop_decayed
 from gpbnb.arithmetic.machine import OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT
 from gpbnb.arithmetic.named import format_text
-from gpbnb.arithmetic.rounding import Limits, Order
+from gpbnb.arithmetic.rounding import Limits, Order, Rounding
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Packed, Progress
@@ -359,7 +359,8 @@ class Run(Progress):
         """Record a step, and load it in the formats of the run."""
         model, (formats, blocks, sums) = self.letters, self._formats()
         kind = step_kind(self.form, model, formats[0], blocks, sums, "increment" in model)
-        parts = recorded_step(kind)
+        draws = any(each is not None and each.rounding is Rounding.STOCHASTIC for each in formats)
+        parts = recorded_step(kind, together=draws and self.records == 1)
         cycles = zip(model.values(), parts.step.cycles, strict=True)
         tables = [each.reshape(len(each), at.size, *each.shape[1 + at.ndim :]) for each, at in cycles]
         return RunningStep(parts, formats, tables, self.records, self.tag)

@@ -116,8 +116,13 @@ class DividedStep(NamedTuple):
     shared: Places
 
 
-def divided(step: RecordedStep) -> DividedStep:
-    """Divide the operations of a step into those that depend on its own numbers and those that do not."""
+def divided(step: RecordedStep, together: bool = False) -> DividedStep:
+    """Divide the operations of a step into those that depend on its own numbers and those that do not.
+
+    Parameters
+    ----------
+    together : whether all operations are to run in the second part, in the order in which two parts take a step.
+    """
     rows, (values, truths) = step.rows, step.tape.sizes
     given, before = [*step.after, *step.results], list[bool]()
     changes = [bool(np.isin(each, step.late).any()) for each in step.states]
@@ -129,8 +134,11 @@ def divided(step: RecordedStep) -> DividedStep:
         is_late = [bool(marks[0][each].any()) for each in given]
         changes = [one or other for one, other in zip(is_late, before, strict=False)]
     is_late[: len(changes)] = changes
-    early = ~late
-    if OPERANDS[1][rows[late, 0]].any():  # truth values are not shared: each part computes its own
+    order, early = np.argsort(late, kind="stable"), ~late
+    if together:
+        changes, is_late = [True] * len(changes), [True] * len(is_late)
+        early[:], marks[1][step.definite] = False, True
+    elif OPERANDS[1][rows[late, 0]].any():  # truth values are not shared: each part computes its own
         late |= _GIVES_TRUTH[rows[:, 0]]
     made, used = np.zeros(values, np.bool_), np.zeros(values, np.bool_)
     made[rows[early & _GIVES_NUMBER[rows[:, 0]], 4]] = True
@@ -143,7 +151,7 @@ def divided(step: RecordedStep) -> DividedStep:
     moved = np.arange(values)
     moved[shared] = values + np.arange(len(shared))
 
-    def part(own: bool, chosen: NDArray[np.bool_]) -> StepPart:
+    def part(own: bool, chosen: NDArray[np.int64]) -> StepPart:
         mine, gives = ([i for i, each in enumerate(some) if each == own] for some in (changes, is_late))
         states, after, kept = (
             np.concatenate([NONE, *(each[i].ravel() for i in some)])
@@ -154,9 +162,10 @@ def divided(step: RecordedStep) -> DividedStep:
             taken = takes_numbers(part[:, 0])
             part[:, 1:4][taken] = moved[part[:, 1:4][taken]]
             after, kept = moved[after], moved[kept]
-        return StepPart(part, np.flatnonzero(chosen), mine, gives, states, after, kept, truth)
+        return StepPart(part, chosen, mine, gives, states, after, kept, truth)
 
-    return DividedStep(step, part(False, early), part(True, late), shared)
+    chosen = order if together else np.flatnonzero(late)
+    return DividedStep(step, part(False, np.flatnonzero(early)), part(True, chosen), shared)
 
 
 class Stop(NamedTuple):
@@ -230,8 +239,8 @@ class RunningStep:
         self._cycle = int(np.lcm.reduce([1, *(len(table) for _, table in of_early)])) if repeats else 0
         kept = len(self._kept_at) + records * len(parts.rest.kept)
         work = len(parts.early.rows) + records * len(parts.rest.rows)
-        #: The largest number of steps taken at once; random numbers are drawn step by step.
-        self.longest = steps_at_once(kept, work) if repeats else 1
+        #: The largest number of steps taken at once; two parts draw random numbers step by step.
+        self.longest = steps_at_once(kept, work) if repeats or not len(parts.early.rows) else 1
         self._repeated: tuple[int, NDArray[Any], NDArray[np.bool_]] | None = None
         self._last: NDArray[Any] | None = None
 

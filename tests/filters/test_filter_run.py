@@ -72,7 +72,7 @@ def test_compensation_keeps_what_a_step_rounds_away():
 
 
 @pytest.mark.parametrize("form", [Form.HUNG, Form.UD])
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8), None])
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(2, 24, "stochastic"), FloatFormat(10, 8), None])
 def test_a_run_in_pieces_is_the_run_in_one(fmt, form):
     given, z = model(), measurements(20)
     whole, parts = run(fmt, form, given, z), Run(given, fmt, form, range(1, 21))
