@@ -26,6 +26,7 @@ from gpbnb.filters.settled import settled_filter
 from gpbnb.report.ledger import command
 from gpbnb.report.stored import main as sweeps
 from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.code import format_words
 from gpbnb.wordlength.required import judge
 from tests import test_refused
 
@@ -83,9 +84,8 @@ def made(words):
     return (done.stdout + done.stderr).replace(str(ROOT), ".").replace("\\\n", "\n")
 
 
-NAMES = test_refused.NAMES | {
-    each.__name__: each for each in (ran, read, files, made, Path, judge, settled_filter, stored_response, FilterDesign)
-}
+USED = (ran, read, files, made, format_words, Path, judge, settled_filter, stored_response, FilterDesign)
+NAMES = test_refused.NAMES | {each.__name__: each for each in USED}
 
 
 def texts():

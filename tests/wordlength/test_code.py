@@ -35,7 +35,7 @@ from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.c_files import FLAGS
 from gpbnb.wordlength.c_integers import Integers, Needs
 from gpbnb.wordlength.c_source import places
-from gpbnb.wordlength.code import format_words, prepared
+from gpbnb.wordlength.code import prepared
 from tests.corpus import conformance
 
 needs_compiler = pytest.mark.skipif(not installed(), reason="no gcc and no clang")
@@ -277,16 +277,6 @@ def test_two_filters_in_one_folder_do_not_share_a_name(tmp_path):
 
 
 # -- the command -----------------------------------------------------------------------------------------------------
-
-
-def test_a_header_says_what_each_word_is():
-    data, sums = FixedFormat(0, 15, overflow="saturate"), FixedFormat(8, 23, overflow="wrap")
-    of_data = "fixed point, data of 16 bits with 15 after the point (ties away from zero, saturated); "
-    of_data += "a number n stands for n / 2**15"
-    of_sums = "; sums of 32 bits with 23 after the point (ties away from zero, wrapped around)"
-    coefficients = "; coefficients of 16 bits with 14 after the point (rounded down, which must not overflow)"
-    assert format_words(WordFormats(data, FixedFormat(1, 14, "down"), sums)) == of_data + coefficients + of_sums
-    assert format_words(WordFormats(data, 12)) == f"{of_data}; coefficients of 12 significant bits"
 
 
 @pytest.fixture

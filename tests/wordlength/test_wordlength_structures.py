@@ -109,20 +109,6 @@ def test_a_design_passes_on_what_it_is_asked_for(scale):
         assert {each.name for each in design.systems("all").values()} == {"mine"}
 
 
-@pytest.mark.parametrize(
-    ("structure", "names"),
-    [
-        ("direct form I", "u1 u2 u3 y1"),
-        ("direct form II", "w1 w2 w3"),
-        ("direct form I transposed", "t1 s1 s2 s3"),
-        ("direct form II transposed", "s1 s2 s3"),
-    ],
-)
-def test_states_are_named_by_their_delays(structure, names):
-    made = LinearSystem.from_coefficients([1, 2, 3, 4], [1, "0.5"], structure).as_filter()
-    assert " ".join(made.program.state_names) == f"{names} y"
-
-
 # -- fraction bits ----------------------------------------------------------------------------------------------------
 
 
