@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from functools import partial
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +31,10 @@ from gpbnb.filters.stepping import StepTaken
 from gpbnb.filters.steps import (
     FACTORED,
     BlockAlgebra,
+    ExtendedModel,
     UnscentedModel,
     combined_gain,
-    corrected_by,
-    measured_in,
-    observed,
-    predicted_in,
+    extended_step,
     root_of_factors,
     unscented_step,
 )
@@ -50,13 +47,6 @@ BLOCK_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 
 
 _WEIGHTS = ("scale", "means", "covariances")
-
-
-class _Ahead(NamedTuple):
-    """A predicted estimate (n,), and its covariance, factors or root (n, n)."""
-
-    x: Any
-    P: Any
 
 
 class NonlinearRun(Progress):
@@ -188,35 +178,18 @@ class NonlinearRun(Progress):
         return taken._replace(states=(self.model.normalized(x), P))
 
     def _extended(self, blocks: BlockAlgebra, x: Any, P: Any, given: dict[str, Any]) -> StepTaken:
-        """Predict, then update once or several times, each time with h and H at the last estimate."""
         model, u = self.model, given.get("u")
-        x, F = model.moved(x, u)
-        predicted, definite = self._predicted(blocks, F, P, given["Q"])
-        ahead, K, positive = _Ahead(x, predicted), (), True
-        for _ in range(model.iterations):
-            expected, H = model.measured(x, u)
-            y = model.difference(given["z"], expected)
-            if x is not ahead.x:
-                y = y - H @ (ahead.x - x)
-            x, P, K, positive = self._updated(blocks, _seen(given, H), given["R"], _seen(given, y), ahead)
-        return StepTaken((x, P), K, definite & positive)
-
-    def _predicted(self, blocks: BlockAlgebra, F: Any, P: Any, Q: Any) -> tuple[Any, Any]:
-        if self.form in FACTORED:
-            taken = blocks.stored.covariance
-            return FACTORED[self.form].predict(taken(F), P, taken(Q))
-        return predicted_in(blocks, F, P, Q), True
-
-    def _updated(self, blocks: BlockAlgebra, H: Any, R: Any, y: Any, ahead: _Ahead) -> tuple[Any, ...]:
-        """Return estimate, covariance, gain, and whether all variances and pivots are positive."""
-        stored = blocks.stored
-        if self.form in FACTORED:  # what the measurements correct is zero before them
-            observe = FACTORED[self.form].observe
-            observe = partial(observe, stored=stored) if self.form is Form.UD else observe
-            step = observed(observe, H, R, y, ahead.x * 0, ahead.P, stored)
-            return ahead.x + step.x, step.P, (np.stack(step.gains, axis=1), H, R), step.definite
-        found = measured_in(blocks, self.form, H, R, ahead.P)
-        return corrected_by(blocks.state, stored.state(found.K), ahead.x, y), found.P, (found.K,), found.definite
+        step = ExtendedModel(
+            lambda x: model.moved(x, u),
+            lambda x: model.measured(x, u),
+            model.difference,
+            lambda numbers: _seen(given, numbers),
+            model.iterations,
+            given["Q"],
+            given["R"],
+        )
+        found = extended_step(blocks, self.form, step, x, P, given["z"])
+        return StepTaken((found.x, found.P), found.gain, found.definite)
 
     def _unscented(self, blocks: BlockAlgebra, x: Any, P: Any, given: dict[str, Any]) -> StepTaken:
         model, u = self.model, given.get("u")

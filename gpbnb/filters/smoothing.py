@@ -30,7 +30,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from gpbnb.arithmetic.algebra import Algebra, Matrix, inverse_in_order
+from gpbnb.arithmetic.algebra import Algebra
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.fixed import FixedFormat
@@ -44,15 +44,13 @@ from gpbnb.filters.model import LinearModel, identity_in, in_columns
 from gpbnb.filters.repeating import RepeatedStep
 from gpbnb.filters.stepping import StepTaken
 from gpbnb.filters.steps import (
+    RootModel,
     StepModel,
-    corrected,
-    gain,
-    observe_carlson,
-    observed,
-    predict_root,
-    predicted,
+    filtered,
+    filtered_root,
     root_of_factors,
-    updated,
+    smoothed,
+    smoothed_root,
 )
 
 SMOOTHER_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.CARLSON)
@@ -64,68 +62,6 @@ class SmoothedRecord(NamedTuple):
 
     x: FloatArray
     P: FloatArray
-
-
-class RootModel(NamedTuple):
-    """The matrices of one step with roots: Phi (n, n), H (m, n), a root of Q (n, n), factors of R (m, m)."""
-
-    Phi: Matrix
-    H: Matrix
-    SQ: Matrix
-    UR: Matrix
-
-
-def filtered(
-    algebra: Algebra, form: Form, model: StepModel, x: Matrix, P: Matrix, z: Matrix
-) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-    """Take one step of the filter, in the innovation form or Joseph's, over numbers of any kind.
-
-    From estimate x (n, 1) and covariance P (n, n) before the step, and its measurement z (m, 1), return x, P, and what
-    a smoother keeps of the step.
-    """
-    V = predicted(algebra, model.Phi, P, model.Q)
-    K = gain(algebra, model.H, model.R, V).K
-    P = updated(algebra, form, model, V, K)
-    ahead = algebra.times(model.Phi, x)
-    return corrected(algebra, model.H, K, ahead, z), P, ahead, V
-
-
-def smoothed(
-    algebra: Algebra, Phi: Matrix, before: Sequence[Matrix], ahead: Matrix, V: Matrix, x: Matrix, P: Matrix
-) -> tuple[Matrix, Matrix]:
-    """Smooth a step of the filter, x and P of which are given before the next step, by the next smoothed ones."""
-    times, rounded = algebra.times, algebra.rounded
-    G = times(times(before[1], Phi.T), algebra.invert(V, algebra.identity(len(P))).matrix)
-    x = rounded(before[0] + times(G, rounded(x - ahead)))
-    return x, rounded(before[1] + times(times(G, rounded(P - V)), G.T))
-
-
-def filtered_root(model: RootModel, x: Matrix, S: Matrix, z: Matrix, identity: Matrix) -> tuple[Matrix, ...]:
-    """Take one step with square roots, from an estimate x (n,) and a root S (n, n), with a measurement z (m,).
-
-    Return x and S, the prediction, and A, B and C of the triangle.
-    """
-    A, B, C = _joint_root(model, S, identity)
-    ahead = model.Phi @ x
-    x, S, _, _ = observed(observe_carlson, model.H, model.UR, z, ahead, C)
-    return x, S, ahead, A, B, C
-
-
-def smoothed_root(
-    before: Matrix, ahead: Matrix, A: Matrix, B: Matrix, C: Matrix, x: Matrix, S: Matrix
-) -> tuple[Matrix, Matrix]:
-    """Smooth as :func:`smoothed` does, with the estimate before the next step, and its triangle."""
-    solved = inverse_in_order(C, np.concatenate([(x - ahead)[:, None], S], axis=1)).matrix
-    return before + B @ solved[:, 0], predict_root(B, solved[:, 1:], A)[0]
-
-
-def _joint_root(model: RootModel, S: Matrix, identity: Matrix) -> tuple[Matrix, Matrix, Matrix]:
-    """Return A, B and C of the triangle; the root of the prediction, C, has the digits of the filter alone."""
-    n, zero = len(S), identity * 0
-    Phi = np.concatenate([np.concatenate([identity, zero], axis=1), np.concatenate([model.Phi, identity], axis=1)])
-    joint = np.concatenate([np.concatenate([S, zero], axis=1), np.concatenate([zero, model.SQ], axis=1)])
-    root, _ = predict_root(Phi, joint, joint[:, :0])
-    return root[:n, :n], root[:n, n:], root[n:, n:]
 
 
 @dataclass(frozen=True, eq=False)

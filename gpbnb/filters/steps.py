@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gpbnb.arithmetic.algebra import Algebra, Matrix, as_computed
+from gpbnb.arithmetic.algebra import Algebra, Matrix, as_computed, inverse_in_order
 from gpbnb.filters.forms import Form
 
 
@@ -547,6 +547,129 @@ class LinearStep:
         found = observed(observe, given["H"], given["UR"], z, ahead, P, stored)
         K: Any = np.stack(found.gains, axis=1)
         return LinearTaken(found.x, carried, found.P, K, None, definite & found.definite)
+
+
+# -- smoothing ---------------------------------------------------------------------------------------------------------
+
+
+class RootModel(NamedTuple):
+    """The matrices of one step with roots: Phi (n, n), H (m, n), a root of Q (n, n), factors of R (m, m)."""
+
+    Phi: Matrix
+    H: Matrix
+    SQ: Matrix
+    UR: Matrix
+
+
+def filtered(
+    algebra: Algebra, form: Form, model: StepModel, x: Matrix, P: Matrix, z: Matrix
+) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+    """Take one step of the filter, in the innovation form or Joseph's, over numbers of any kind.
+
+    From estimate x (n, 1) and covariance P (n, n) before the step, and its measurement z (m, 1), return x, P, and what
+    a smoother keeps of the step.
+    """
+    V = predicted(algebra, model.Phi, P, model.Q)
+    K = gain(algebra, model.H, model.R, V).K
+    P = updated(algebra, form, model, V, K)
+    ahead = algebra.times(model.Phi, x)
+    return corrected(algebra, model.H, K, ahead, z), P, ahead, V
+
+
+def smoothed(
+    algebra: Algebra, Phi: Matrix, before: Sequence[Matrix], ahead: Matrix, V: Matrix, x: Matrix, P: Matrix
+) -> tuple[Matrix, Matrix]:
+    """Smooth a step of the filter, x and P of which are given before the next step, by the next smoothed ones."""
+    times, rounded = algebra.times, algebra.rounded
+    G = times(times(before[1], Phi.T), algebra.invert(V, algebra.identity(len(P))).matrix)
+    x = rounded(before[0] + times(G, rounded(x - ahead)))
+    return x, rounded(before[1] + times(times(G, rounded(P - V)), G.T))
+
+
+def filtered_root(model: RootModel, x: Matrix, S: Matrix, z: Matrix, identity: Matrix) -> tuple[Matrix, ...]:
+    """Take one step with square roots, from an estimate x (n,) and a root S (n, n), with a measurement z (m,).
+
+    Return x and S, the prediction, and A, B and C of the triangle.
+    """
+    A, B, C = _joint_root(model, S, identity)
+    ahead = model.Phi @ x
+    x, S, _, _ = observed(observe_carlson, model.H, model.UR, z, ahead, C)
+    return x, S, ahead, A, B, C
+
+
+def smoothed_root(
+    before: Matrix, ahead: Matrix, A: Matrix, B: Matrix, C: Matrix, x: Matrix, S: Matrix
+) -> tuple[Matrix, Matrix]:
+    """Smooth as :func:`smoothed` does, with the estimate before the next step, and its triangle."""
+    solved = inverse_in_order(C, np.concatenate([(x - ahead)[:, None], S], axis=1)).matrix
+    return before + B @ solved[:, 0], predict_root(B, solved[:, 1:], A)[0]
+
+
+def _joint_root(model: RootModel, S: Matrix, identity: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    """Return A, B and C of the triangle; the root of the prediction, C, has the digits of the filter alone."""
+    n, zero = len(S), identity * 0
+    Phi = np.concatenate([np.concatenate([identity, zero], axis=1), np.concatenate([model.Phi, identity], axis=1)])
+    joint = np.concatenate([np.concatenate([S, zero], axis=1), np.concatenate([zero, model.SQ], axis=1)])
+    root, _ = predict_root(Phi, joint, joint[:, :0])
+    return root[:n, :n], root[:n, n:], root[n:, n:]
+
+
+# -- nonlinear ---------------------------------------------------------------------------------------------------------
+
+
+class ExtendedModel(NamedTuple):
+    """What one step of an extended filter uses."""
+
+    f: Callable[[Matrix], tuple[Matrix, Matrix]]  # of a state (n,): its value and derivatives (n, n); so does h
+    h: Callable[[Matrix], tuple[Matrix, Matrix]]
+    difference: Callable[[Matrix, Matrix], Matrix]  # of two measurements (m,)
+    seen: Callable[[Matrix], Matrix]  # of what belongs to measurements: zero where they are missing
+    iterations: int
+    Q: Matrix  # (n, n), or its factors or root
+    R: Matrix  # (m, m), or its factors
+
+
+class ExtendedStep(NamedTuple):
+    """Estimate (n,) and covariance, factors or root (n, n) after a step, and whether variances and pivots are positive.
+
+    The gain is K (n, m); with factors, the gain of each measurement, H, and the factors of R.
+    """
+
+    x: Matrix
+    P: Matrix
+    gain: tuple[Matrix, ...]
+    definite: Any
+
+
+def extended_step(
+    blocks: BlockAlgebra, form: Form, model: ExtendedModel, x: Matrix, P: Matrix, z: Matrix
+) -> ExtendedStep:
+    """Predict, then update once or several times, each time with h and its derivatives at the last estimate."""
+    stored = blocks.stored
+    ahead, F = model.f(x)
+    if form in FACTORED:
+        V, definite = FACTORED[form].predict(stored.covariance(F), P, stored.covariance(model.Q))
+    else:
+        V, definite = predicted_in(blocks, F, P, model.Q), True
+    K: tuple[Any, ...] = ()
+    x, positive = ahead, True
+    for _ in range(model.iterations):
+        expected, H = model.h(x)
+        y = model.difference(z, expected)
+        if x is not ahead:
+            y = y - H @ (ahead - x)
+        H, y = model.seen(H), model.seen(y)
+        if form in FACTORED:  # what the measurements correct is zero before them
+            observe = FACTORED[form].observe
+            observe = partial(observe, stored=stored) if form is Form.UD else observe
+            step = observed(observe, H, model.R, y, ahead * 0, V, stored)
+            x, P, positive = ahead + step.x, step.P, step.definite
+            K = (np.stack(step.gains, axis=1), H, model.R)
+        else:
+            found = measured_in(blocks, form, H, model.R, V)
+            x = corrected_by(blocks.state, stored.state(found.K), ahead, y)
+            P, K, positive = found.P, (found.K,), found.definite
+    return ExtendedStep(x, P, K, definite & positive)
 
 
 class UnscentedModel(NamedTuple):

@@ -14,8 +14,7 @@ from gpbnb.arithmetic.algebra import EXACT
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
 from gpbnb.filters.simulation import simulated_measurements
-from gpbnb.filters.smoothing import filtered, smoothed
-from gpbnb.filters.steps import StepModel
+from gpbnb.filters.steps import StepModel, filtered, smoothed
 
 FORMS = ("innovation", "Joseph", "square root")
 
