@@ -153,7 +153,7 @@ class Loop(Numbers):
         far = any(self._distant.values()) or any(map(self._far, (self.states, *(numbers for _, numbers in own))))
         self._notes[machine.DONE] = 0
         with contextlib.suppress(OverflowError, ZeroDivisionError):
-            row = self._advance(steps, run, functions(self.kind, far, memory.lanes == 1))
+            row = self._advance(steps, run, functions(self.kind, far, memory))
         done = int(self._notes[machine.DONE])
         if row == 0:  # operations on integers do not tell which one it was
             row = self.first_without_result(self.rows, self._numbers)

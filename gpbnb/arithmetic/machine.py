@@ -293,14 +293,19 @@ def is_far(numbers: NDArray[Any]) -> bool:
     return bool((((sizes < tags.QUICK_LEAST) & (sizes > 0)) | (sizes > 1 / tags.QUICK_LEAST)).any())
 
 
-def functions(kind: Any, far: bool, alone: bool) -> Iterator[int]:
+_FEW_PLACES = 300
+"""Places of a short program, for which no loop is compiled that runs rows of double-double together."""
+
+
+def functions(kind: Any, far: bool, memory: Memory) -> Iterator[int]:
     """Yield the address of a kind's function for one lane or many, and of those that compute what it leaves.
 
     Numbers that may be too small or too large for quick computation are `far`.
     """
     from gpbnb.arithmetic.kernels import machine
 
-    quick = isinstance(kind, tags.Quick)
+    quick, short = isinstance(kind, tags.Quick), len(memory.values) < _FEW_PLACES
+    alone = memory.lanes == 1 and not (short and isinstance(kind, tags.DoubleDouble))
     if not (quick and far):
         yield machine.address(kind, alone)
     if quick:
@@ -317,7 +322,7 @@ def _once(kind: Any, formats: Any, code: Any, memory: Memory, far: bool) -> int:
 
     done = 0
     with contextlib.suppress(OverflowError, ZeroDivisionError):
-        for execute in functions(kind, far, memory.lanes == 1):
+        for execute in functions(kind, far, memory):
             done = machine.once(execute, formats.address, code.table.address, memory.table.address, memory.lanes)
             if done == code.rows:
                 break

@@ -416,13 +416,24 @@ def _double_doubles_together(operation: Any, code: Any, o: Any, count: Any, valu
 
 
 @addressed
+def _double_doubles_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
+    values, truths, o = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8), np.int64(0)
+    for s in range(code[SEGMENTS]):
+        _, operation, end = _segment(formats, code, s)
+        together = o < end and entries(code, TOGETHER, np.int64)[s] != ONE_BY_ONE
+        if together and not _double_doubles_together(operation, code, o, end - o, values):
+            o = end
+        o = _run_double_doubles(DoubleDouble(), operation, code, o, end, values, truths, _ONE)
+        if o < 0:
+            return ~o
+    return o
+
+
+@addressed
 def _double_doubles(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
     values, truths, o = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
         _, operation, end = _segment(formats, code, s)
-        together = lanes == 1 and o < end and entries(code, TOGETHER, np.int64)[s] != ONE_BY_ONE
-        if together and not _double_doubles_together(operation, code, o, end - o, values):
-            o = end
         o = _run_double_doubles(DoubleDouble(), operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
@@ -440,7 +451,7 @@ _FUNCTIONS = {
     InPairs: (_pairs_lane, _pairs_lanes),
     InShortPairs: (_short_pairs_lane, _short_pairs_lanes),
     InTwoWords: (_two_words, _two_words),
-    DoubleDouble: (_double_doubles, _double_doubles),
+    DoubleDouble: (_double_doubles_lane, _double_doubles),
 }
 
 
