@@ -263,6 +263,11 @@ def _careful_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 # -- other numbers -----------------------------------------------------------------------------------------------------
 
 
+@borrowing(forceinline=True)
+def _no_format(columns: Any) -> Any:
+    return DoubleDouble()
+
+
 @inner(forceinline=True)
 def _double_double(fmt: Any, operation: Any, x: Any, y: Any) -> Any:
     return doubledouble.operate(operation, x, y)
@@ -338,22 +343,12 @@ _run_two_words, _run_double_doubles = _loop(wide, operations_of(wide).any, 3), _
 
 
 @borrowing(forceinline=True)
-def _pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
+def _rows(run: Any, format_of: Any, values: Any, formats: Any, code: Any, held: Any, lanes: Any) -> Any:
+    """Run all rows; return the number of those that have a result, counted from the first."""
+    truths, o = entries(held, TRUTHS, np.uint8), np.int64(0)
     for s in range(code[SEGMENTS]):
         given, operation, end = _segment(formats, code, s)
-        o = _run_pairs(pair_format(given), operation, code, o, end, values, truths, lanes)
-        if o < 0:
-            return ~o
-    return o
-
-
-@borrowing(forceinline=True)
-def _short_pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
-    for s in range(code[SEGMENTS]):
-        given, operation, end = _segment(formats, code, s)
-        o = _run_short(short_format(given), operation, code, o, end, values, truths, lanes)
+        o = run(format_of(given), operation, code, o, end, values, truths, lanes)
         if o < 0:
             return ~o
     return o
@@ -361,33 +356,27 @@ def _short_pairs(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 
 @addressed
 def _pairs_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    return _pairs(formats, code, held, _ONE)
+    return _rows(_run_pairs, pair_format, entries(held, VALUES, np.int64), formats, code, held, _ONE)
 
 
 @addressed
 def _pairs_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    return _pairs(formats, code, held, lanes)
+    return _rows(_run_pairs, pair_format, entries(held, VALUES, np.int64), formats, code, held, lanes)
 
 
 @addressed
 def _short_pairs_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    return _short_pairs(formats, code, held, _ONE)
+    return _rows(_run_short, short_format, entries(held, VALUES, np.int64), formats, code, held, _ONE)
 
 
 @addressed
 def _short_pairs_lanes(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    return _short_pairs(formats, code, held, lanes)
+    return _rows(_run_short, short_format, entries(held, VALUES, np.int64), formats, code, held, lanes)
 
 
 @addressed
 def _two_words(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths, o = entries(held, VALUES, np.int64), entries(held, TRUTHS, np.uint8), np.int64(0)
-    for s in range(code[SEGMENTS]):
-        given, operation, end = _segment(formats, code, s)
-        o = _run_two_words(word_format(given), operation, code, o, end, values, truths, lanes)
-        if o < 0:
-            return ~o
-    return o
+    return _rows(_run_two_words, word_format, entries(held, VALUES, np.int64), formats, code, held, lanes)
 
 
 @borrowing(forceinline=True)
@@ -431,13 +420,7 @@ def _double_doubles_lane(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
 
 @addressed
 def _double_doubles(formats: Any, code: Any, held: Any, lanes: Any) -> Any:
-    values, truths, o = entries(held, VALUES, np.float64), entries(held, TRUTHS, np.uint8), np.int64(0)
-    for s in range(code[SEGMENTS]):
-        _, operation, end = _segment(formats, code, s)
-        o = _run_double_doubles(DoubleDouble(), operation, code, o, end, values, truths, lanes)
-        if o < 0:
-            return ~o
-    return o
+    return _rows(_run_double_doubles, _no_format, entries(held, VALUES, np.float64), formats, code, held, lanes)
 
 
 def address(kind: Any, alone: bool) -> int:
