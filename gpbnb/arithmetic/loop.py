@@ -181,6 +181,7 @@ class Loop(Numbers):
     @staticmethod
     def _fed(begin: int, place: int, numbers: NDArray[Any]) -> tuple[int, ...]:
         """Return the columns of a feed; see :data:`gpbnb.arithmetic.kernels.machine.PLACE`."""
+        assert numbers[:1].flags.c_contiguous  # the machine reads those of a member one after the other
         (members, count), parts = numbers.shape[:2], math.prod(numbers.shape[2:])
         between = numbers.strides[0] // numbers.itemsize
         return place, count, members, begin, between, parts, numbers.__array_interface__["data"][0]
