@@ -81,3 +81,17 @@ def test_loops_have_the_digits_of_the_exact_backend(fmt, monkeypatch):
             assert outcome(function, arrays) == expected
             numbers += isinstance(expected, list)
     assert numbers > 18
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 11, "stochastic"), FixedFormat(6, 10, "stochastic")], ids=str)
+def test_a_product_draws_random_numbers_in_the_order_of_its_operations(fmt):
+    columns, rng = 520, np.random.default_rng(20261129)  # more than run together
+    a, b = (fmt.array(rng.uniform(-1, 1, shape)) for shape in ((1, 2), (2, columns)))
+    fmt.restart()
+    product, *sums = a @ b, b[:1] + b[1:]
+    fmt.restart()
+    single = [a[0, 0] * b[0, j] for j in range(columns)]
+    single = [single[j] + a[0, 1] * b[1, j] for j in range(columns)]
+    sums += [b[0, j] + b[1, j] for j in range(columns)]
+    assert product.to_fractions()[0].tolist() == [each.to_fractions() for each in single]
+    assert sums[0].to_fractions()[0].tolist() == [each.to_fractions() for each in sums[1:]]

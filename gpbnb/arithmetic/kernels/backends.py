@@ -462,7 +462,7 @@ class Floats(Compiled):
         out, given, gone = np.empty(size), (*numbers, numbers[0], numbers[0])[:3], False
         for part in slices(size):
             here = formats.address, code, part.stop - part.start, *(each[part] for each in given), out[part]
-            gone |= bool((self._random or loops.along(*here)) and loops.carefully_along(*here))
+            gone |= bool(loops.along(*here) and loops.carefully_along(*here))
         return None if gone else (out.reshape(shape),)
 
     def _accumulate(self, name: str, numbers: Array) -> bool:

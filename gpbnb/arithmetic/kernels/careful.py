@@ -34,7 +34,7 @@ from gpbnb.arithmetic.rounding import DRAW_BITS
 _ONE = np.int64(1)
 _EXPONENT, _HALF_ULP = np.int64(0x7FF << 52), np.int64(53 << 52)
 _GOLDEN, _FIRST, _SECOND = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
-_DRAWN = np.uint64(64 - DRAW_BITS)
+_DRAWN, _NEXT = np.uint64(64 - DRAW_BITS), np.uint64(1)
 
 
 @borrowing
@@ -45,11 +45,10 @@ def masked(whole: Any, numbers: Any) -> Any:
     return Float(bits, precision, mode, gradual, least, below, lowest, largest, numbers[5], numbers[6], 0)
 
 
-@borrowing
-def _draw(random: Any) -> Any:
-    # The same random numbers as gpbnb.arithmetic.kernels.exact.draw.
-    random[1] += np.uint64(1)
-    z = random[0] + random[1] * _GOLDEN
+@inner(forceinline=True)
+def drawn(seed: Any, count: Any) -> Any:
+    """Random bits for a rounding, the same as those of :func:`gpbnb.arithmetic.kernels.exact.draw`."""
+    z = seed + count * _GOLDEN
     z = (z ^ (z >> np.uint64(30))) * _FIRST
     z = (z ^ (z >> np.uint64(27))) * _SECOND
     return np.int64((z ^ (z >> np.uint64(31))) >> _DRAWN)
@@ -65,7 +64,8 @@ def _rounded_magnitude(fmt: Any, random: Any, u: Any, k: Any, sticky: Any, negat
     if mode == HALF_UP:
         return (u + (unit >> 1) - np.int64(negative & (not sticky))) & -unit
     if mode == RANDOM:
-        scaled = _draw(random) << (k - DRAW_BITS)
+        random[1] += _NEXT
+        scaled = drawn(random[0], random[1]) << (k - DRAW_BITS)
         up = (scaled < rest) | ((scaled == rest) & sticky)
         return (u & -unit) + (np.int64(up) << k)
     outward = ((mode == UP) & (not negative)) | ((mode == DOWN) & negative)
@@ -75,7 +75,7 @@ def _rounded_magnitude(fmt: Any, random: Any, u: Any, k: Any, sticky: Any, negat
 
 
 @inner
-def _within(fmt: Any, y: Any, exact_zero: Any) -> Any:
+def within(fmt: Any, y: Any, exact_zero: Any) -> Any:
     """Apply the limits to a rounded number."""
     y = fmt.below if (abs(y) < fmt.least) & ((y != 0.0) | (not exact_zero)) else y
     y = fmt.over if y > fmt.largest else y
@@ -97,7 +97,7 @@ def _fit_53(fmt: Any, p: Any, r: Any, exact_zero: Any) -> Any:
     s = s + unit if (twice == unit) & (rest > 0.0) else s
     s = s - unit if (twice == -unit) & (rest < 0.0) else s
     y = s - base
-    return _within(fmt, 0.0 - y if p < 0.0 else y, exact_zero)
+    return within(fmt, 0.0 - y if p < 0.0 else y, exact_zero)
 
 
 @borrowing
@@ -111,7 +111,7 @@ def _fit(fmt: Any, random: Any, p: Any, r: Any, exact_zero: Any) -> Any:
         if fmt.mode == AWAY:  # only the residual tells a tie, which the processor has rounded to even
             half = from_bits((bits(p) & _EXPONENT) - _HALF_ULP)
             tie = r == (half if p > 0.0 else -half)
-            return _within(fmt, from_bits(bits(p) + np.int64(tie)) + 0.0, exact_zero)
+            return within(fmt, from_bits(bits(p) + np.int64(tie)) + 0.0, exact_zero)
     negative = p < 0.0
     a = abs(p)
     base = fmt.gradual if a < fmt.gradual else 0.0
@@ -123,7 +123,7 @@ def _fit(fmt: Any, random: Any, p: Any, r: Any, exact_zero: Any) -> Any:
     if fmt.bits == 4:  # the first hexadecimal digit of 2**e * 1.f has 1 + e mod 4 bits
         k = np.int64(56) - np.int64(4) * fmt.precision - (((u >> 52) + 1) & 3)
     y = from_bits(_rounded_magnitude(fmt, random, u, k, rest != 0.0, negative)) - base
-    return _within(fmt, 0.0 - y if negative else y, exact_zero)
+    return within(fmt, 0.0 - y if negative else y, exact_zero)
 
 
 @inner(forceinline=True)

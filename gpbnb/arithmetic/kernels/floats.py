@@ -13,7 +13,7 @@ import numpy as np
 
 from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.kernels.bits import at, bits, entries, fma, from_bits, select, start, words
-from gpbnb.arithmetic.kernels.careful import carefully, fused_sum, masked
+from gpbnb.arithmetic.kernels.careful import carefully, drawn, fused_sum, masked, within
 from gpbnb.arithmetic.kernels.compiling import borrowing, compiled, inner
 from gpbnb.arithmetic.kernels.quick import (
     DIRECTED,
@@ -30,6 +30,7 @@ from gpbnb.arithmetic.kernels.quick import (
     rounded,
     rule_of,
 )
+from gpbnb.arithmetic.rounding import DRAW_BITS
 
 TOGETHER = 512  # entries whose intermediate results stay in the processor's nearest memory
 TINY = 2.0**-1022  # stands for a result that underflowed to zero, in formats which do not have it
@@ -99,8 +100,8 @@ def _rounded(how: Any, rule: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
 
 
 @inner(forceinline=True)
-def _fit(fmt: Any, digits: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
-    """Round in any mode but the random one, to at most 52 bits, within any limits; return whether a format has none.
+def _fit(fmt: Any, digits: Any, random: Any, draws: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
+    """Round to at most 52 bits, within any limits, at random or else in another mode; return whether a format has none.
 
     As :func:`gpbnb.arithmetic.kernels.careful.carefully`, without branches.
     """
@@ -122,8 +123,11 @@ def _fit(fmt: Any, digits: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
         half = ((unit >> 1) & near) - even
         added = select(below, half + (unit & -down) - (down | ties_up), half + (unit & -up) - up)
         added += (even & ((u >> k) | more)) + (more & select(below, down | ties_up, up))
-        inexact = ((u & (unit - 1)) | more) != 0
-        y = from_bits(((u + added) & -unit) | select(inexact, odd << k, np.int64(0))) - base
+        cut = u & (unit - 1)
+        if random:
+            limit = bits(draws[i]) << (k - DRAW_BITS)
+            added += select((limit < cut) | ((limit == cut) & (more != 0)), unit, np.int64(0))
+        y = from_bits(((u + added) & -unit) | select((cut | more) != 0, odd << k, np.int64(0))) - base
         y = y if (y >= fmt.least) | (a == 0.0) else fmt.below
         y = 0.0 - y if below else y
         y = fmt.over if y > fmt.largest else y
@@ -134,10 +138,23 @@ def _fit(fmt: Any, digits: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
 
 
 @borrowing
-def fitted(fmt: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
+def draw(random: Any, operations: Any, draws: Any, count: Any) -> None:
+    """Draw for some results of one or two operations that take turns; as bits, those of the second after the first."""
+    seed, done = random[0], random[1] + np.uint64(1)
+    for k in range(operations):
+        for i in range(count):
+            draws[k * count + i] = from_bits(drawn(seed, done + np.uint64(operations * i + k)))
+    random[1] += np.uint64(operations * count)
+
+
+@borrowing
+def fitted(fmt: Any, draws: Any, p: Any, r: Any, out: Any, count: Any) -> Any:
+    """Round to at most 52 bits in any format; return whether it does not have one of the results."""
+    if fmt.mode == tags.RANDOM:
+        return _fit(fmt, _BINARY, True, draws, p, r, out, count)
     if fmt.bits == 1:
-        return _fit(fmt, _BINARY, p, r, out, count)
-    return _fit(fmt, _BASE_16, p, r, out, count)
+        return _fit(fmt, _BINARY, False, draws, p, r, out, count)
+    return _fit(fmt, _BASE_16, False, draws, p, r, out, count)
 
 
 @inner(forceinline=True)
@@ -181,7 +198,7 @@ def _along(formats: Any, operation: Any, a: Any, b: Any, c: Any, out: Any, room:
     together = (how == SHORT and operation <= tags.ROOT) or (how == LONG and operation == tags.ROOT)
     if together and not _at_once(operation, how, rule, fmt.below != fmt.below, a, b, out, count):
         return False
-    p, r, exact = room, at(room, TOGETHER), (how == SHORT) & (fmt.precision == 53)
+    p, r, draws, exact = room, at(room, TOGETHER), at(room, 2 * TOGETHER), (how == SHORT) & (fmt.precision == 53)
     if operation == tags.ROUND:
         p = a
         for i in range(count):
@@ -194,13 +211,15 @@ def _along(formats: Any, operation: Any, a: Any, b: Any, c: Any, out: Any, room:
     chosen = LONG if operation == tags.FUSED and how == SHORT and not exact else how
     if how != NONE and not _rounded(chosen, rule, p, r, out, count):
         return False
-    return fmt.precision == 53 or fmt.mode == tags.RANDOM or fitted(fmt, p, r, out, count)
+    if fmt.mode == tags.RANDOM:
+        draw(entries(formats, RANDOM, np.uint64), 1, draws, count)
+    return fmt.precision == 53 or fitted(fmt, draws, p, r, out, count)
 
 
 @compiled
 def along(formats: int, operation: int, n: int, a: Any, b: Any, c: Any, out: Any) -> Any:
     """out = the results of an operation, entry by entry; return whether :func:`carefully_along` has to compute them."""
-    table, any_gone, room = words(formats), False, start(np.empty(2 * TOGETHER))
+    table, any_gone, room = words(formats), False, start(np.empty(3 * TOGETHER))
     for begin in range(0, n, TOGETHER):
         x, y, z, found = at(start(a), begin), at(start(b), begin), at(start(c), begin), at(start(out), begin)
         any_gone |= _along(table, operation, x, y, z, found, room, min(n - begin, TOGETHER))
@@ -227,12 +246,16 @@ def accumulate(formats: int, operation: int, rows: Any, width: int, numbers: Any
     fmt = masked(entries(table, WHOLE, np.int64), entries(table, NUMBER, np.float64))
     random, found = entries(table, RANDOM, np.uint64), start(numbers)
     how, rule = rule_of(table, 0)
+    exact = (fmt.gradual > fmt.largest) & (operation <= tags.SUBTRACT) & (fmt.mode != tags.RANDOM)
     for j in range(width):
         x = found[(rows[0] - 1) * width + j]
         for i in range(rows[0], rows[1]):
             y = found[i * width + j]
-            z, gone = x, True
-            if how != NONE:
+            z, gone = x, not exact
+            if exact:  # in fixed point
+                z = within(fmt, x + y if operation == tags.ADD else x - y, True)
+                any_gone |= z != z
+            elif how != NONE:
                 z, gone = basic(operation, how, rule, x, y)
                 gone |= (operation == tags.MULTIPLY) & (z == 0.0)  # it may have underflowed
             if gone:

@@ -18,7 +18,7 @@ from gpbnb.arithmetic.kernels import decimal, shortdecimal, wide
 from gpbnb.arithmetic.kernels.bits import at, entries, fma
 from gpbnb.arithmetic.kernels.careful import carefully, masked
 from gpbnb.arithmetic.kernels.compiling import INLINE, borrowing, inner
-from gpbnb.arithmetic.kernels.floats import TINY, TOGETHER, fitted
+from gpbnb.arithmetic.kernels.floats import TINY, TOGETHER, draw, fitted
 from gpbnb.arithmetic.kernels.quick import (
     DIRECTED,
     EVENLY,
@@ -320,25 +320,22 @@ def _sums(sign: Any, out: Any, products: Any, p: Any, r: Any, count: Any) -> Non
         p[k], r[k] = s, (x - (s - t)) + (y - t)
 
 
-@inner(forceinline=True)
-def _one_by_one(fmt: Any) -> Any:
-    return (fmt.precision == 53) | (fmt.mode == RANDOM_MODE)
-
-
 @borrowing
 def _careful_scale(fmt: Any, factor: Any, row: Any, i: Any, out: Any, j: Any, count: Any) -> Any:
     masks, random, room = fmt
     gone = False
-    if _one_by_one(masks):
+    if masks.precision == 53:
         for k in range(count):
             out[j + k] = carefully(masks, random, MULTIPLY, factor, row[i + k], factor)
             gone |= out[j + k] != out[j + k]
         return gone
-    p, r = room, at(room, TOGETHER)
+    p, r, draws = room, at(room, TOGETHER), at(room, 3 * TOGETHER)
     for begin in range(0, count, TOGETHER):
         some = min(count - begin, TOGETHER)
+        if masks.mode == RANDOM_MODE:
+            draw(random, 1, draws, some)
         _products(factor, at(row, i + begin), p, r, some)
-        gone |= fitted(masks, p, r, at(out, j + begin), some)
+        gone |= fitted(masks, draws, p, r, at(out, j + begin), some)
     return gone
 
 
@@ -346,19 +343,21 @@ def _careful_scale(fmt: Any, factor: Any, row: Any, i: Any, out: Any, j: Any, co
 def _careful_add(fmt: Any, sign: Any, factor: Any, row: Any, i: Any, out: Any, j: Any, count: Any) -> Any:
     masks, random, room = fmt
     gone = False
-    if _one_by_one(masks):
+    if masks.precision == 53:
         for k in range(count):
             p = carefully(masks, random, MULTIPLY, factor, row[i + k], factor)
             out[j + k] = carefully(masks, random, ADD, out[j + k], sign * p, p)
             gone |= (p != p) | (out[j + k] != out[j + k])
         return gone
-    p, r, products = room, at(room, TOGETHER), at(room, 2 * TOGETHER)
+    p, r, products, draws = room, at(room, TOGETHER), at(room, 2 * TOGETHER), at(room, 3 * TOGETHER)
     for begin in range(0, count, TOGETHER):
         some, found = min(count - begin, TOGETHER), at(out, j + begin)
+        if masks.mode == RANDOM_MODE:
+            draw(random, 2, draws, some)
         _products(factor, at(row, i + begin), p, r, some)
-        gone |= fitted(masks, p, r, products, some)
+        gone |= fitted(masks, draws, p, r, products, some)
         _sums(sign, found, products, p, r, some)
-        gone |= fitted(masks, p, r, found, some)
+        gone |= fitted(masks, at(draws, some), p, r, found, some)
     return gone
 
 

@@ -32,7 +32,7 @@ from gpbnb.arithmetic.kernels.kinds import (
     sign,
 )
 
-ROOM = 3 * TOGETHER
+ROOM = 5 * TOGETHER
 _MOST = np.int64(2**63 - 1)
 
 
