@@ -88,49 +88,38 @@ class FilterDesign:
         return self._built(chosen)
 
     def _built(self, structure: str) -> LinearSystem:
-        found = self._system(structure)
+        is_cascade = structure in CASCADES
+        if self.scale and is_cascade and self.sos is None:
+            raise ValueError("got scale for b and a; needed sections in sos, which it scales")
+        pairing, order = (self.pairing, self.order) if is_cascade else (None, None)
+        if self.sos is not None and is_cascade:
+            found = LinearSystem.from_sections(self.sos, structure, pairing, order, self.scale, self.name)
+        else:
+            b, a = (self.b, (1,) if self.a is None else self.a) if self.sos is None else expanded(sections_of(self.sos))
+            found = LinearSystem.from_coefficients(b, a, structure, pairing, order, self.name)
         inputs, outputs = (checked_names(f"{kind}_names", getattr(self, f"{kind}_names"), 1) for kind in _NAMED)
         return replace(found, input_names=inputs, output_names=outputs) if inputs or outputs else found
 
-    def _system(self, found: str) -> LinearSystem:
-        if self.sos is None:
-            b, a = self.b, (1,) if self.a is None else self.a
-            if not (self.scale and found in CASCADES):
-                pairing, order = (self.pairing, self.order) if found in CASCADES else (None, None)
-                return LinearSystem.from_coefficients(b, a, found, pairing, order, self.name)
-            raise ValueError("got scale for b and a; needed sections in sos, which it scales")
-        if found in CASCADES:
-            return LinearSystem.from_sections(self.sos, found, self.pairing, self.order, self.scale, self.name)
-        b, a = expanded(sections_of(self.sos))
-        return LinearSystem.from_coefficients(b, a, found, name=self.name)
-
     def systems(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> dict[str, LinearSystem]:
-        """Return the filter in several structures, by their names; :meth:`lacking` names those that it does not have.
+        """Return the filter in several structures, by their names, as :meth:`compared` does."""
+        return self.compared(structures).systems
+
+    def compared(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> Structures:
+        """Return the filter in several structures, and why it does not have others of them.
 
         Parameters
         ----------
         structures : names, or "all".
-        """
-        return self.compared(structures).systems
 
-    def lacking(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> dict[str, str]:
-        """Return the structures that the filter does not have, by their names, each with the reason.
+        Raises
+        ------
+        ValueError : an unknown structure, or the filter has none of those named; the message says why for each.
 
         Examples
         --------
-        >>> list(FilterDesign(b=[1], a=[1, 0, 1]).lacking("all"))
+        >>> list(FilterDesign(b=[1], a=[1, 0, 1]).compared("all").lacking)
         ['lattice', 'balanced state space']
         """
-        return self._tried(structures).lacking
-
-    def compared(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> Structures:
-        """Return what :meth:`systems` and :meth:`lacking` return, each structure tried once."""
-        found = self._tried(structures)
-        if not found.systems:
-            raise ValueError("; ".join(f"{name}: {reason}" for name, reason in found.lacking.items()))
-        return found
-
-    def _tried(self, structures: Sequence[str] | str) -> Structures:
         names = STRUCTURES if structures == "all" else [structures] if isinstance(structures, str) else structures
         found, why = dict[str, LinearSystem](), dict[str, str]()
         chosen = [structure_named(name) for name in names]
@@ -140,4 +129,6 @@ class FilterDesign:
                 found[name] = build(name)
             except ValueError as error:
                 why[name] = str(error)
+        if not found:
+            raise ValueError("; ".join(f"{name}: {reason}" for name, reason in why.items()))
         return Structures(found, why)

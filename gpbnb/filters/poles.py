@@ -43,10 +43,13 @@ class StoredResponse(NamedTuple):
     frequency: float  # where that change is, in cycles per sample
 
     def __str__(self) -> str:
+        before, after = f"{self.pole:.9g}", f"{self.stored_pole:.9g}"
+        moved = f"move the largest pole from size {before} to {after}, and the response"
+        if before == after:
+            moved = f"keep the largest pole at size {before}, to nine digits, and move the response"
         return (
-            f"coefficients stored in {self.format} move the largest pole from size {self.pole:.9g} to "
-            f"{self.stored_pole:.9g}, and the response by up to {self.change:.2g} dB, at {self.frequency:.4g} of the "
-            f"sampling rate, down to {_FLOOR:.0f} dB below its peak"
+            f"coefficients stored in {self.format} {moved} by up to {self.change:.2g} dB, at {self.frequency:.4g} of "
+            f"the sampling rate, down to {_FLOOR:.0f} dB below its peak"
         )
 
 

@@ -57,7 +57,7 @@ def factored(
     return _arranged(zeros, _factors([Fraction(1), *a]), b[delay], pairing, order)
 
 
-def sections_from_zeros(z: Any, p: Any, k: Any, pairing: str = "nearest", order: Any = "up") -> list[Coefficients]:
+def sections_from_zeros(z: Any, p: Any, k: Any, pairing: str, order: Any) -> list[Coefficients]:
     """Sections from zeros, poles and gain, as in ``scipy.signal``; for pairing and order see :func:`factored`."""
     gain = exact([k])[0]
     zeros, poles = (_factors_from_roots(given, name) for name, given in (("zeros", z), ("poles", p)))

@@ -387,14 +387,14 @@ class LinearSystem:
 
     @classmethod
     def from_zeros(
-        cls, z: Any, p: Any, k: Any, structure: str = "cascade", pairing: str = "nearest", order: Any = "up"
+        cls, z: Any, p: Any, k: Any, structure: str = "cascade", pairing: str | None = None, order: Any = None
     ) -> LinearSystem:
         """Return a digital filter in a given structure from its zeros, poles and gain, as in ``scipy.signal``.
 
         Parameters
         ----------
         z, p, k : zeros, poles and gain; each complex number comes with its conjugate.
-        structure, pairing, order : as in :meth:`from_coefficients`.
+        structure, pairing, order : as in :meth:`from_coefficients`; by default a cascade.
 
         Raises
         ------
@@ -402,7 +402,8 @@ class LinearSystem:
             :meth:`from_coefficients`.
         """
         found = structure_named(structure)
-        sections = sections_from_zeros(z, p, k, pairing, order)
+        check_of_cascade(found, pairing=pairing, order=order)
+        sections = sections_from_zeros(z, p, k, pairing or "nearest", "up" if order is None else order)
         if found in CASCADES:
             return cls.from_filter(_named(cascade(sections, found.removeprefix("cascade of ")), found))
         b, a = expanded(sections)
