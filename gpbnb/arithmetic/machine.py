@@ -226,7 +226,7 @@ def _together(rows: NDArray[Any]) -> NDArray[np.int64]:
     found, number = np.zeros(len(rows), np.int64), 0
     for begin, end in independent(rows):
         if end - begin >= _FEWEST and rows[begin, 0] <= CODES["multiply"]:
-            for first, last, along in _divided(rows[begin:end, 1:3], begin):
+            for first, last, along in _stretches(rows[begin:end, 1:3], begin):
                 number += 1
                 found[first:last] = 4 * number + (machine.NEIGHBOURS if along else machine.GATHERED)
     return found
@@ -253,7 +253,7 @@ def independent(rows: NDArray[Any]) -> Iterator[tuple[int, int]]:
             begin = last
 
 
-def _divided(operands: NDArray[Any], begin: int) -> Iterator[tuple[int, int, bool]]:
+def _stretches(operands: NDArray[Any], begin: int) -> Iterator[tuple[int, int, bool]]:
     """Yield first and last of parts of a run, and whether their operands are neighbours."""
     along = (operands[1:] - operands[:-1] == 1).all(axis=1)
     if len(operands) < _MANY or along.all():

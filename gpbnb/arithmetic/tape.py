@@ -326,8 +326,8 @@ class Tape:
             Segment(rows[begin:end], formats[begin:end], call) for begin, (end, call) in zip(begins, ends, strict=False)
         ]
 
-    def divided(self, varying: Places) -> tuple[list[Segment], list[Segment]]:
-        """Return the operations and calls that depend on no number at some places, and the others."""
+    def once_and_each(self, varying: Places) -> tuple[list[Segment], list[Segment]]:
+        """Return the operations and calls that depend on no number at some places, to run once, and all others."""
         marks = np.zeros(self._values, np.bool_), np.zeros(self._truths, np.bool_)
         marks[0][varying] = True
         once, each = list[Segment](), list[Segment]()

@@ -152,10 +152,10 @@ class CarriedBound:
 
 def _repetition(exact: dict[str, Array]) -> Lanes:
     """Return a step in double-double from a given state; it takes the arrays x, P, z, Phi, H, Q and R."""
-    step, found = kalman_step(step_kind(Form.INNOVATION, exact, None))
+    step = kalman_step(step_kind(Form.INNOVATION, exact, None))
+    (x, P), (K, S) = step.after, step.results
     given = [*step.states, *step.own, *step.cycles]
-    returned = [each.components[0] for each in (found.x, found.K, found.P, found.S) if each is not None]
-    return Lanes(step.rows, step.tape.sizes, step.tape.all_constants, given, returned)
+    return Lanes(step.rows, step.tape.sizes, step.tape.all_constants, given, [x, K, P, S])
 
 
 def _symmetric(P: Any) -> Any:

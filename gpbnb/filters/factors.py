@@ -38,7 +38,7 @@ def factors(a: Matrix) -> tuple[Matrix, Any]:
         definite = definite & (d >= 0)
         for each in above:
             definite = definite & ((d != 0) | (each == 0))
-        column = if_holds(d != 0, _divided(above, d), [each * 0 for each in above])
+        column = if_holds(d != 0, _quotients(above, d), [each * 0 for each in above])
         for i in range(j):
             found[i][j] = column[i]
             for k in range(i + 1):
@@ -46,7 +46,7 @@ def factors(a: Matrix) -> tuple[Matrix, Any]:
     return np.stack([np.stack(row) for row in found]), definite
 
 
-def _divided(above: list[Matrix], d: Matrix) -> Callable[[], list[Matrix]]:
+def _quotients(above: list[Matrix], d: Matrix) -> Callable[[], list[Matrix]]:
     return lambda: [each / d for each in above]
 
 

@@ -160,12 +160,11 @@ class NonlinearRun(Progress):
         Inputs are the measurements, then the known inputs. ValueError says why a step cannot be traced.
         """
         found = self._step.recorded(self._step.given(self._stored(np.zeros(self.model.m))))
-        tape, taken = found.tape, (*found.states, *found.own, *found.cycles)
-        places = dict(zip(("x", "P", "z", *self.given), taken, strict=True))
+        tape, (x, P) = found.tape, found.states
         constants = {at: value for at, value in tape.constants_in(self.fmt).items() if at not in (0, tape.one)}
-        states = program_states(self.form, places["x"][None], places["P"][None])[0]
-        constants |= dict.fromkeys({*places["P"].ravel().tolist()} - {*states.tolist()}, Fraction(0))
-        program = filter_program(self.form, tape, places, [*constants], found.after, found.definite)
+        states = program_states(self.form, x[None], P[None])[0]
+        constants |= dict.fromkeys({*P.ravel().tolist()} - {*states.tolist()}, Fraction(0))
+        program = filter_program(self.form, found, self.given, [*constants])
         cycles = (each.reshape(len(each), -1).to_fractions() for name, each in self.given.items() if name != "u")
         return program, [*cycles, np.array([list(constants.values())], dtype=object)]
 

@@ -8,7 +8,7 @@ program of its own, which runs once for all records and whose results may repeat
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -19,12 +19,12 @@ from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
 from gpbnb.arithmetic.machine import packed_one
 from gpbnb.arithmetic.rounding import Order
-from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError, laid_out
+from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.program import Program, entries
-from gpbnb.filters.stepping import DividedStep, RecordedStep, divided, truth_of
-from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep, LinearTaken
+from gpbnb.filters.stepping import DividedStep, RecordedStep, StepTaken, divided, recorded
+from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep
 
 
 class Known(NamedTuple):
@@ -77,56 +77,55 @@ def step_kind(
 @lru_cache(maxsize=64)
 def recorded_step(kind: StepKind, together: bool = False) -> DividedStep:
     """Return a step of a filter, divided into what depends on the measurements and what does not, unless together."""
-    return divided(kalman_step(kind)[0], together)
+    step = kalman_step(kind)
+    return divided(step._replace(results=step.results[:1]), together)
 
 
 @lru_cache(maxsize=64)
-def kalman_step(kind: StepKind) -> tuple[RecordedStep, LinearTaken]:
-    """Record a step of a filter, whose states are x and P, then what compensated summation carries; it gives K."""
-    tape, places, found = whole_step(kind)
-    states = ("x", "P", "carried") if kind.compensated or kind.form is Form.COMPENSATED else ("x", "P")
-    late = [places[letter].ravel() for letter in (*states[::2], "u", "b", "d", "B") if letter in places]
-    recorded = RecordedStep(
-        tape,
-        tape.instructions,
-        tape.formats,
-        [places[letter] for letter in states],
-        [places["z"]],
-        [places[known.letter] for known in kind.model],
-        [getattr(found, letter).components[0] for letter in states],
-        [found.K.components[0]],
-        truth_of(found.definite),
-        np.concatenate(late),
-    )
-    return recorded, found
+def kalman_step(kind: StepKind) -> RecordedStep:
+    """Record a step of a filter, whose states are x and P, then what compensated summation carries.
 
-
-def whole_step(kind: StepKind) -> tuple[Tape, dict[str, NDArray[np.int64]], LinearTaken]:
-    """Record a step of a filter; return its tape, the places of what it takes, and what it gives."""
+    It gives the gain and, unless it has factors or roots, the innovation covariance.
+    """
     n, m = kind.n, kind.m
-    shapes = {"x": (n,), "P": (n, n), "carried": (n,), "z": (m,), **{each.letter: each.shape for each in kind.model}}
-    places = dict(zip(shapes, laid_out(shapes.values()), strict=True))
-    tape = Tape(sum(each.size for each in places.values()), one=kind.one)
+    compensated = kind.compensated or kind.form is Form.COMPENSATED
+    shapes = [(n,), (n, n), *([(n,)] if compensated else []), (m,), *(each.shape for each in kind.model)]
+    tape = Tape(sum(map(math.prod, shapes)), one=kind.one)
     tape.fuses, tape.alike, tape.most = True, kind.alike, 2 * MOST_OPERATIONS
     formats = [TracedFormat(tape, i) for i in range(max(*kind.blocks, kind.sums[-1]) + 1)]
-    state, gain, covariance, innovation, stored = (formats[i] for i in kind.blocks)
-    given = dict[str, Any]()
-    for known in kind.model:
-        exact = np.frombuffer(known.entries, np.uint8).reshape(known.shape)
-        seen = np.where(exact == 0, 0, np.where((exact == 1) & (tape.one > 0), tape.one, places[known.letter]))
-        given[known.letter] = stored.made(seen)
-    P = np.triu(places["P"]) if kind.form in (Form.UD, Form.CARLSON) else places["P"]
-    x, z, carried = (state.made(places[letter]) for letter in ("x", "z", "carried"))
-    fused, order, block, number = kind.sums
-    sums = formats[number] if number >= 0 else None
-    blocks = block_algebra((state, gain, covariance, innovation), fused, order, block, sums)
-    step = LinearStep(kind.form, blocks, given, tape.about, kind.compensated)
+    of_state, _, of_covariance, _, of_model = kind.blocks
+    own = 3 if compensated else 2
+    numbers = [of_state, of_covariance, *[of_state] * (own - 1), *[of_model] * len(kind.model)]
     try:
-        return tape, places, step.taken(x, covariance.made(P), carried, z)
+        arrays = list(zip(numbers, shapes, strict=True))
+        step, _ = recorded(partial(_kalman_taken, kind), formats, arrays, (own, own + 1))
     except UntraceableError:
         raise ValueError(
             f"got a filter with n = {n} and m = {m}; needed a step of at most {tape.most} operations: about 100 states"
         ) from None
+    driven = (at for known, at in zip(kind.model, step.cycles, strict=True) if known.letter in "ubdB")
+    return step._replace(late=np.concatenate([each.ravel() for each in (*step.states[::2], *driven)]))
+
+
+def _kalman_taken(
+    kind: StepKind, formats: Sequence[TracedFormat], states: tuple[Any, ...], given: Sequence[Any]
+) -> StepTaken:
+    """Take a step on arrays of places, in which the entries of the model that are known stand as constants."""
+    (z, *model), tape, known = given, formats[0].tape, dict[str, Any]()
+    for each, array in zip(kind.model, model, strict=True):
+        exact = np.frombuffer(each.entries, np.uint8).reshape(each.shape)
+        places = np.where((exact == 1) & (tape.one > 0), tape.one, array.components[0])
+        known[each.letter] = array.format.made(np.where(exact == 0, 0, places))
+    x, P, *carried = states
+    if kind.form in (Form.UD, Form.CARLSON):
+        P = P.format.made(np.triu(P.components[0]))
+    fused, order, block, number = kind.sums
+    sums = formats[number] if number >= 0 else None
+    blocks = block_algebra([formats[i] for i in kind.blocks[:4]], fused, order, block, sums)
+    step = LinearStep(kind.form, blocks, known, tape.about, kind.compensated)
+    found = step.taken(x, P, carried[0] if carried else None, z)
+    after = (found.x, found.P, *([found.carried] if carried else []))
+    return StepTaken(after, (found.K,) if found.S is None else (found.K, found.S), found.definite)
 
 
 def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
@@ -137,44 +136,34 @@ def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
     """
     m, n = shapes["H"]
     unknown = (Known(letter, shape, bytes([2]) * math.prod(shape)) for letter, shape in shapes.items())
-    tape, places, found = whole_step(StepKind(form, n, m, tuple(unknown)))
-    del places["carried"]
-    after = [found.x.components[0], found.P.components[0]]
-    return filter_program(form, tape, places, [], after, truth_of(found.definite))
+    return filter_program(form, kalman_step(StepKind(form, n, m, tuple(unknown))), shapes, [])
 
 
-def filter_program(
-    form: Form,
-    tape: Tape,
-    places: dict[str, NDArray[np.int64]],
-    others: Sequence[int],
-    after: Sequence[NDArray[np.int64]],
-    definite: int,
-) -> Program:
+def filter_program(form: Form, step: RecordedStep, letters: Iterable[str], others: Sequence[int]) -> Program:
     """Return a recorded step of a filter as a program whose states are those of :func:`program_states`.
 
-    Places are those of x, P and z, of the known inputs u if there are any, and of matrices by their letters; `after`
-    those of x and P after the step. Coefficients are the entries of the matrices in this order, then those at other
-    places, and 1.
+    Letters name its cycles: matrices, and the known inputs u if there are any. Coefficients are the entries of the
+    matrices in this order, then those at other places, and 1.
     """
-    x, P, z = (places[letter] for letter in "xPz")
-    matrices = {letter: each for letter, each in places.items() if letter not in ("x", "P", "z", "u")}
+    (x, P, *_), (z,), tape = step.states, step.own, step.tape
+    matrices = dict(zip(letters, step.cycles, strict=True))
+    u = matrices.pop("u", np.zeros(0, np.int64))
     names = [each for letter, at in matrices.items() for each in entries(letter, *at.shape)]
     letter = "U" if form is Form.UD else "S" if form in ROOTS else "P"
     named = (np.array(entries(each, *at.shape)).reshape(1, *at.shape) for each, at in (("x", x), (letter, P)))
-    ends = (each[None] for each in after)
+    ends = (each[None] for each in step.after[:2])
     return Program(
         tape.instructions.astype(np.int64),
         tape.sizes,
         program_states(form, x[None], P[None])[0],
-        np.concatenate([z, places.get("u", np.zeros(0, np.int64))]),
+        np.concatenate([z, u]),
         np.array([*(at for each in matrices.values() for at in each.ravel().tolist()), *others, tape.one]),
         program_states(form, *ends)[0],
         0,
         tuple(program_states(form, *named)[0].tolist()),
         (*names, *(f"c{i}" for i in range(len(others))), "one"),
         calls=tape.calls,
-        definite=definite,
+        definite=step.definite,
     )
 
 

@@ -6,7 +6,7 @@ arguments, runs operation by operation. So does a single step in which the recor
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -19,12 +19,18 @@ from gpbnb.arithmetic.interpreting import Numbers, OnIntegers, Segment
 from gpbnb.arithmetic.kernels.backends import Looped
 from gpbnb.arithmetic.loop import steps_at_once
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.tape import FEW_OPERATIONS, Tape, laid_out
+from gpbnb.arithmetic.tape import FEW_OPERATIONS, Tape
 from gpbnb.arithmetic.traced import TracedFormat
-from gpbnb.filters.stepping import RecordedStep, RunningStep, StepsTaken, StepTaken, divided, truth_of
-
-StepFunction = Callable[[Sequence[Any], tuple[Any, ...], Sequence[Any]], StepTaken]
-"""A function of formats, of states, and of what a step is given, that takes a step on arrays of any kind."""
+from gpbnb.filters.stepping import (
+    RecordedStep,
+    RunningStep,
+    StepFunction,
+    StepsTaken,
+    StepTaken,
+    divided,
+    leaves,
+    recorded,
+)
 
 
 class RepeatedStep:
@@ -105,7 +111,7 @@ class RepeatedStep:
             return None
         tape, tables = step.tape, list(zip(step.cycles, self._cycles, strict=True))
         changing = (places for places, table in tables if len(table) > 1)
-        once, each = tape.divided(np.concatenate([at.ravel() for at in (*step.states, *step.own, *changing)]))
+        once, each = tape.once_and_each(np.concatenate([at.ravel() for at in (*step.states, *step.own, *changing)]))
         few = len(formats) == 1 and steps * len(tape.instructions) < FEW_OPERATIONS
         exactly = few or not isinstance(formats[0].backend, Looped)
         numbers = OnIntegers(formats[0], tape.sizes) if exactly else Numbers(formats, tape.sizes)
@@ -137,29 +143,17 @@ class RepeatedStep:
         tape = Tape(sum(each.size for each in arrays), one=True)
         tape.alike = alike
         formats = [TracedFormat(tape, i) for i in range(len(self._formats))]
-        places = laid_out(each.shape for each in arrays)
-        made = [formats[number].made(at) for number, at in zip(numbers, places, strict=True)]
-        count = len(self.states)
+        shapes = [(number, each.shape) for number, each in zip(numbers, arrays, strict=True)]
         try:
             with unseen(formats[0]) as shown:
-                taken = self._function(formats, tuple(made[:count]), made[count:])
+                ends = len(self.states), len(shapes) - len(self._cycles)
+                step, taken = recorded(self._function, formats, shapes, ends)
         except Exception as error:  # the function runs itself, and raises its own error
             return tape.refusal or f"without numbers it stops: {error}"
         if tape.refusal or shown:
             return tape.refusal or "it shows values with peek"
-        self._given, cycles_at = (taken.states, taken.gain), len(places) - len(self._cycles)
-        after, results = ([each.components[0] for each in _leaves(part)] for part in self._given)
-        return RecordedStep(
-            tape,
-            tape.instructions,
-            tape.formats,
-            places[:count],
-            places[count:cycles_at],
-            places[cycles_at:],
-            after,
-            results,
-            truth_of(taken.definite),
-        )
+        self._given = taken.states, taken.gain
+        return step
 
     def _taken(self, repeated: RunningStep | _OneByOne, own: Sequence[FloatArray]) -> StepTaken | None:
         """Repeat a recorded step until one has no result; return None if the first has none."""
@@ -173,9 +167,9 @@ class RepeatedStep:
         done = len(found.definite)
         if not done:
             return None
-        leaves = zip(_leaves(self._given), found.given, strict=True)
+        packed = zip(leaves(self._given), found.given, strict=True)
         arrays = (
-            numbers.unpacked(each, (done, *leaf.shape), self._formats[leaf.format.number]) for leaf, each in leaves
+            numbers.unpacked(each, (done, *leaf.shape), self._formats[leaf.format.number]) for leaf, each in packed
         )
         states, gain = _filled(self._given, arrays)
         return StepTaken(states, gain, found.definite)
@@ -228,15 +222,6 @@ def _packed(numbers: Numbers | OnIntegers, array: FloatArray, rows: int) -> NDAr
     return found.reshape(rows, array.size // rows, *found.shape[array.ndim :])
 
 
-def _leaves(part: Any) -> Iterator[Any]:
-    """Give the arrays in tuples and lists."""
-    if isinstance(part, (list, tuple)):
-        for each in part:
-            yield from _leaves(each)
-    else:
-        yield part
-
-
 def _filled(part: Any, arrays: Iterator[Any]) -> Any:
     """Return tuples and lists with other arrays in them."""
     return type(part)([_filled(each, arrays) for each in part]) if isinstance(part, (list, tuple)) else next(arrays)
@@ -244,4 +229,4 @@ def _filled(part: Any, arrays: Iterator[Any]) -> Any:
 
 def _in_rows(part: Any) -> Any:
     """Return the arrays of a step with an axis of steps."""
-    return _filled(part, (np.stack([each]) for each in _leaves(part)))
+    return _filled(part, (np.stack([each]) for each in leaves(part)))

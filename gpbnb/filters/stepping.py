@@ -6,7 +6,7 @@ States that depend on none of the step's own numbers, such as the covariance of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import compress
 from typing import Any, NamedTuple
 
@@ -17,8 +17,8 @@ from gpbnb.arithmetic.interpreting import Numbers
 from gpbnb.arithmetic.loop import Loop, steps_at_once
 from gpbnb.arithmetic.machine import CODES, OPERANDS, Fault, fault_of, takes_numbers
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.tape import TRUTHS, Places, Tape, depending
-from gpbnb.arithmetic.traced import TracedTruth
+from gpbnb.arithmetic.tape import TRUTHS, Places, Tape, depending, laid_out
+from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
 
 NONE = np.zeros(0, np.int64)
 """No places."""
@@ -75,9 +75,40 @@ class RecordedStep(NamedTuple):
         return found
 
 
-def truth_of(definite: Any) -> int:
-    """Return the place of a truth value that a recorded step gives."""
-    return int(definite.components[0]) if isinstance(definite, TracedTruth) else int(bool(definite))
+StepFunction = Callable[[Sequence[Any], tuple[Any, ...], Sequence[Any]], StepTaken]
+"""A function of formats, of states, and of what a step is given, that takes a step on arrays of any kind."""
+
+
+def leaves(part: Any) -> Iterator[Any]:
+    """Give the arrays in tuples and lists."""
+    if isinstance(part, (list, tuple)):
+        for each in part:
+            yield from leaves(each)
+    else:
+        yield part
+
+
+def recorded(
+    function: StepFunction,
+    formats: Sequence[TracedFormat],
+    arrays: Sequence[tuple[int, tuple[int, ...]]],
+    ends: tuple[int, int],
+) -> tuple[RecordedStep, StepTaken]:
+    """Record a step on the tape of some formats; also return what it gives.
+
+    Parameters
+    ----------
+    arrays : the number of the format, and the shape, of each array that the step takes: states, its own, of cycles.
+    ends : numbers of the first array of its own, and of the first of a cycle.
+    """
+    tape, places, (own, cycles) = formats[0].tape, laid_out(shape for _, shape in arrays), ends
+    made = [formats[number].made(at) for (number, _), at in zip(arrays, places, strict=True)]
+    taken = function(formats, tuple(made[:own]), made[own:])
+    after, results = ([each.components[0] for each in leaves(part)] for part in (taken.states, taken.gain))
+    definite = taken.definite
+    holds = int(definite.components[0]) if isinstance(definite, TracedTruth) else int(bool(definite))
+    given = places[:own], places[own:cycles], places[cycles:]
+    return RecordedStep(tape, tape.instructions, tape.formats, *given, after, results, holds), taken
 
 
 class StepPart(NamedTuple):

@@ -271,6 +271,6 @@ def test_what_a_changing_choice_may_leave_out_changes_with_it():
     product = found.only_if(truth, lambda: found.record("multiply", np.array(2), np.array(3)))
     alone = found.record("add", np.array(2), np.array(3))
     found.record("choose", truth, product, alone)
-    once, each = found.divided(np.array([1]))
+    once, each = found.once_and_each(np.array([1]))
     assert [row[0] for row in once[0].rows] == [CODES["add"]]
     assert [row[0] for row in each[0].rows] == [CODES[name] for name in ("compare", "skip", "multiply", "choose")]
