@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.filters.forms import Form
+from gpbnb.filters.steps import FACTORED, combined_gain
 
 
 class Packed(NamedTuple):
@@ -50,6 +52,7 @@ class Progress(ABC):
         #: The step that has no result and ended the run, and why.
         self.stopped: int | None = None
         self.reason = ""
+        self._kept = list[tuple[Any, ...]]()
 
     @abstractmethod
     def blocks(self, z: Any) -> Iterator[Any]:
@@ -70,14 +73,27 @@ class Progress(ABC):
         none = np.zeros((0, self.model.n, 2))
         return np.concatenate([none, *(self.estimates(each) for each in self.blocks(z))])
 
-    def done(self, definite: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Count some steps, all definite or not, and return the rows of those to save."""
+    def done(self, definite: NDArray[np.bool_], *results: Any) -> None:
+        """Count some steps, all definite or not, and keep their results, (steps, ...), at the checkpoint steps."""
         first, saved = self.steps, self.saved
         self.steps += len(definite)
         if self.indefinite is None and not definite.all():
             self.indefinite = first + 1 + int(np.argmin(definite))
         self.saved = int(np.searchsorted(self.checkpoint_steps, self.steps, side="right"))
-        return self.checkpoint_steps[saved : self.saved] - first - 1
+        rows = self.checkpoint_steps[saved : self.saved] - first - 1
+        if len(rows):
+            self._kept.append(tuple(each[rows] for each in results))
+
+    def kept(self) -> tuple[Any, ...]:
+        """Return the results at the checkpoint steps that were reached, each (c, ...); nothing before the first."""
+        if len(self._kept) > 1:
+            self._kept = [tuple(np.concatenate(each) for each in zip(*self._kept, strict=True))]
+        return self._kept[0] if self._kept else ()
+
+    def stop(self, fault: str, cure: str = "") -> None:
+        """End the run because the next step has no result."""
+        self.stopped = self.steps + 1
+        self.reason = f"{fault} at step {self.stopped}{cure}"
 
 
 class Checkpoints:
@@ -121,6 +137,18 @@ class Checkpoints:
         pairs = ((self.x, true.x), (self.K, true.K), (self.P, true.P))
         x, K, P = ((a - b[:count]).astype(np.float64) for a, b in pairs)
         return x, K, P
+
+
+def without_factors(
+    form: Form, K: NDArray[Any], P: NDArray[Any], H: NDArray[Any], R: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return gains and covariances of steps in a form with factors or roots, all as Fractions.
+
+    Given are the gains of one measurement after the other, the factors or roots, and H and the factors of R.
+    """
+    gains = np.array([combined_gain(*each) for each in zip(K, H, R, strict=True)], dtype=object)
+    covariances = np.array([FACTORED[form].covariance(each) for each in P], dtype=object)
+    return gains.reshape(K.shape), covariances.reshape(P.shape)
 
 
 def _ascending(checkpoint_steps: Sequence[int]) -> NDArray[np.int64]:

@@ -15,7 +15,7 @@ from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
-from gpbnb.filters.checkpoints import Checkpoints, Progress
+from gpbnb.filters.checkpoints import Checkpoints, Progress, without_factors
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.model import identity_in
@@ -33,7 +33,6 @@ from gpbnb.filters.steps import (
     BlockAlgebra,
     ExtendedModel,
     UnscentedModel,
-    combined_gain,
     extended_step,
     root_of_factors,
     unscented_step,
@@ -75,7 +74,6 @@ class NonlinearRun(Progress):
         each = [getattr(fmt, name) for name in BLOCKS] if isinstance(fmt, BlockFormats) else [fmt] * len(BLOCKS)
         of_state, of_covariance = each[0], each[2]
         self.model, self.fmt, self.form = model, fmt, form
-        self._kept: list[tuple[FloatArray, ...]] = []
         for block in each:
             identity_in(block, 1)
         stored_in = fmt.model if isinstance(fmt, BlockFormats) else fmt
@@ -131,13 +129,10 @@ class NonlinearRun(Progress):
             return
         try:
             for found in self._step.take(self._stored(z)):
-                rows = self.done(found.definite)
-                if len(rows):
-                    self._kept.append(tuple(each[rows] for each in (*found.states, *found.gain)))
+                self.done(found.definite, *found.states, *found.gain)
                 yield found
         except (ZeroDivisionError, OverflowError, DomainError, WholeNumberError) as error:
-            self.stopped = self.steps + 1
-            self.reason = f"{_fault(error)} at step {self.stopped}"
+            self.stop(_fault(error))
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""
@@ -145,12 +140,8 @@ class NonlinearRun(Progress):
         if not steps:
             n, m = self.model.n, self.model.m
             return Checkpoints(steps, *(np.zeros((0, *shape), object) for shape in ((n,), (n, m), (n, n))))
-        whole = (cast(Any, np.concatenate)(each).to_fractions() for each in zip(*self._kept, strict=True))
-        x, P, K, *factors = whole
-        if self.form in FACTORED:
-            K = np.array([combined_gain(*each) for each in zip(K, *factors, strict=True)])
-            P = np.array([FACTORED[self.form].covariance(each) for each in P])
-        return Checkpoints(steps, x, K, P)
+        x, P, K, *factors = (each.to_fractions() for each in self.kept())
+        return Checkpoints(steps, x, *(without_factors(self.form, K, P, *factors) if factors else (K, P)))
 
     # -- one step ---------------------------------------------------------------------------------------
 

@@ -19,7 +19,7 @@ from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Limits, Order, Rounding
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
-from gpbnb.filters.checkpoints import Checkpoints, Packed, Progress
+from gpbnb.filters.checkpoints import Checkpoints, Packed, Progress, without_factors
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.forms import WITH_PROGRAM, Form, form_named
 from gpbnb.filters.model import LinearModel, identity_in
@@ -34,7 +34,7 @@ from gpbnb.filters.pairs import double_doubles_near, nearest_floats
 from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
 from gpbnb.filters.stepping import RunningStep, Stop
-from gpbnb.filters.steps import FACTORED, HUNG_FORMS, combined_gain
+from gpbnb.filters.steps import FACTORED, HUNG_FORMS
 
 LEAST_SHARE = 2.0**-60
 """Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""
@@ -123,7 +123,7 @@ class Run(Progress):
             start = self._in_blocks(start, self.block_formats)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(start.repairs)
-        n, m, count = model.n, model.m, len(self.checkpoint_steps)
+        n, m = model.n, model.m
         self.records = records
         self.x = np.ascontiguousarray(np.repeat(start.x0[:, np.newaxis], records, axis=1))
         self.P = start.P0.copy()
@@ -131,9 +131,8 @@ class Run(Progress):
         self.letters = start.letters
         if compensated:
             self.letters["increment"] = as_packed(fmt, model.Phi - np.eye(n, dtype=int))
-        self.X, self.G, self.C = (
-            np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, records), (n, m), (n, n))
-        )
+        shapes = ((n, records), (n, m), (n, n))
+        self._none = tuple(np.zeros((0, *shape, *self.x.shape[2:]), self.x.dtype) for shape in shapes)
         if fmt is not None:
             identity_in(fmt, 1)
         self._compensation = np.zeros_like(self.x)
@@ -187,6 +186,24 @@ class Run(Progress):
         """Return a start whose state and covariance are rounded into the formats of their blocks."""
         x0, P0 = as_packed(formats.state, self.exactly(start.x0)), self.exactly(start.P0)
         return start._replace(x0=x0, P0=as_packed(formats.covariance, P0))
+
+    @property
+    def X(self) -> NDArray[Any]:
+        """The estimates at the checkpoint steps that were reached, packed, (c, n, records, ...)."""
+        return self._saved(0)
+
+    @property
+    def G(self) -> NDArray[Any]:
+        """The gains there, (c, n, m, ...)."""
+        return self._saved(1)
+
+    @property
+    def C(self) -> NDArray[Any]:
+        """The covariances there, (c, n, n, ...)."""
+        return self._saved(2)
+
+    def _saved(self, which: int) -> NDArray[Any]:
+        return (self.kept() or self._none)[which]
 
     @property
     def bounded(self) -> bool:
@@ -297,7 +314,7 @@ class Run(Progress):
 
     def save_at(self, checkpoint_steps: NDArray[np.int64]) -> None:
         """Save the results of other steps, at most as many as before, in place of all results saved so far."""
-        self.checkpoint_steps, self.saved = checkpoint_steps, 0
+        self.checkpoint_steps, self.saved, self._kept = checkpoint_steps, 0, []
         if self._carried is not None:
             self._carried.checkpoint_steps = checkpoint_steps
 
@@ -321,16 +338,12 @@ class Run(Progress):
             self._running = self._opened()
         at = 0
         while at < len(z) and self.stopped is None:
-            begin = self.saved
             found = self._take(self._running, z[at : at + self._running.longest])
             at += len(found.x)
-            rows = self.done(found.definite)
-            for array, each in zip((self.X, self.G, self.C), (found.x, found.K, found.P), strict=True):
-                array[begin : self.saved] = each[rows]
+            self.done(found.definite, found.x, found.K, found.P)
             resumes = found.stop is not None and found.stop.fault.overflows and self._limits is None
             if found.stop is not None and not (resumes and drop_decayed(self.x, self._compensation)):
-                self.stopped = self.steps + 1
-                self.reason = self._reason(found.stop, self.stopped)
+                self.stop(*self._fault(found.stop))
             yield found
 
     @property
@@ -339,21 +352,16 @@ class Run(Progress):
         fmt = self.fmt if self.block_formats is None else self.block_formats.state
         return None if fmt is None else fmt.limits
 
-    def _fault(self, stop: Stop) -> str:
-        """Return in words what ended the run; only a format with a range has an overflow."""
-        if not stop.fault.overflows:
-            return stop.fault.reason
-        if self._limits is None:
-            return "a number beyond the range of the compiled loops"
-        return OVERFLOW
-
-    def _reason(self, stop: Stop, step: int) -> str:
+    def _fault(self, stop: Stop) -> tuple[str, str]:
+        """Return in words what ends the run, and a cure; only a format with a range has an overflow."""
         if stop.fault.reason == ZERO_PIVOT or (stop.fault.reason == ZERO_DIVISOR and stop.quantity == "its inverse"):
-            return f"a zero pivot in the innovation covariance at step {step}"
-        reason = f"{self._fault(stop)} in {stop.quantity} at step {step}"
-        if self.form is Form.UD and isinstance(self.fmt, FixedFormat) and stop.fault.overflows:
-            reason += "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
-        return reason
+            return "a zero pivot in the innovation covariance", ""
+        what, cure = stop.fault.reason, ""
+        if stop.fault.overflows:
+            what = "a number beyond the range of the compiled loops" if self._limits is None else OVERFLOW
+            if self.form is Form.UD and isinstance(self.fmt, FixedFormat):
+                cure = "; the UD form multiplies variances by each other, so scale the states or use more integer bits"
+        return f"{what} in {stop.quantity}", cure
 
     def _opened(self) -> RunningStep:
         """Record a step, and load it in the formats of the run."""
@@ -392,21 +400,14 @@ class Run(Progress):
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""
-        count = self.saved
-        steps = [int(step) for step in self.checkpoint_steps[:count]]
-        x, K, P = (Packed(each[:count].copy(), self.fmt) for each in (self.X[:, :, 0], self.G, self.C))
-        if self.form in FACTORED:
-            return Checkpoints(steps, x, *self._from_factors(K.exactly(), P.exactly()))
-        return Checkpoints(steps, x, K, P)
-
-    def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return gains and covariances from factors and from the gains of one measurement after the other."""
-        gains, covariances = np.empty_like(K), np.empty_like(U)
-        H, UR = self.exactly(self.letters["H"]), self.exactly(self.letters["UR"])
-        for at, step in enumerate(self.checkpoint_steps[: len(K)] - 1):
-            gains[at] = combined_gain(K[at], H[step % len(H)], UR[step % len(UR)])
-            covariances[at] = FACTORED[self.form].covariance(U[at])
-        return gains, covariances
+        at = self.checkpoint_steps[: self.saved] - 1
+        x, K, P = (Packed(each, self.fmt) for each in (self.X[:, :, 0], self.G, self.C))
+        steps = [int(step) + 1 for step in at]
+        if self.form not in FACTORED:
+            return Checkpoints(steps, x, K, P)
+        H, UR = (self.exactly(self.letters[each]) for each in ("H", "UR"))
+        factors = K.exactly(), P.exactly(), H[at % len(H)], UR[at % len(UR)]
+        return Checkpoints(steps, x, *without_factors(self.form, *factors))
 
 
 def _nearest_floats(pairs: NDArray[np.int64], out: NDArray[np.float64]) -> None:
@@ -465,7 +466,7 @@ def reference(model: LinearModel, z: Any, checkpoint_steps: Sequence[int]) -> Ch
     start = run.P.copy()
     run.take(z)
     at = np.array([0, *run.checkpoint_steps[: run.saved]])
-    if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C[: run.saved]])):
+    if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C])):
         return precise_steps(model, z).checkpoints(run.checkpoint_steps)
     return run.checkpoints()
 
