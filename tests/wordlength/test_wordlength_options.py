@@ -143,26 +143,3 @@ def test_numbers_are_read_exactly(folder, computed):
     assert tolerances_of(computed[0].tolerance, 2, "states")[0] <= Fraction("0.1")
     with pytest.raises(ValueError, match=r"got tolerance 1e-400; needed at least 2\*\*-1074"):
         tolerances_of("1e-400", 1, "states")
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ("--format float32 --base 2 --digits 9", "got --format and --digits, --base; needed --format alone, which"),
-        ("--measurements z.csv --simulate step", "got --simulate and --measurements; needed one of them"),
-        ("--measurements z.csv --seed 3", "got --measurements and --seed; needed one of them: a seed is for what"),
-        ("--kind blocks --digits 9", "got --kind blocks and --digits; needed one of them: --kind searches, and"),
-        ("--kind fixed --emin -3 --emax 3", "got --kind fixed and --emin, --emax; needed --kind alone: fixed point"),
-        ("--level 2", "got no --simulate and --level; needed --simulate with one of step, sine, noise"),
-        ("--coefficients 9", "got --kind float and --coefficients; needed --kind fixed or --kind words with them"),
-        ("--state 1", "got no basis that uses limits and --state; needed --basis guarantee or probable"),
-        ("--basis bound --certificate c.json", "got no guarantee and --certificate; needed --basis guarantee"),
-        ("--emin 1", "got one of --emin and --emax; needed both, or neither for unlimited exponents"),
-    ],
-)
-def test_options_that_exclude_each_other_are_refused(given, message, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("filter.toml").write_text(FILTER)
-    Path("z.csv").write_text("1\n2\n")
-    assert main(["filter.toml", "--tolerance", "0.1", *given.split()]) == 2
-    assert message in capsys.readouterr().err
