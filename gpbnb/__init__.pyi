@@ -60,7 +60,6 @@ from gpbnb.arithmetic.traced import TracedFunction as TracedFunction
 from gpbnb.bounds.guarantee import FilterGuarantee as FilterGuarantee
 from gpbnb.bounds.guarantee import Guarantee as Guarantee
 from gpbnb.bounds.guarantee import limits as limits
-from gpbnb.bounds.limit_cycles import LimitCycles as LimitCycles
 from gpbnb.filters.blocks import BlockFormats as BlockFormats
 from gpbnb.filters.forms import Form as Form
 from gpbnb.filters.model import LinearModel as LinearModel
@@ -73,10 +72,11 @@ from gpbnb.filters.words import WordFormats as WordFormats
 from gpbnb.names import NAMED_FORMATS as NAMED_FORMATS
 from gpbnb.wordlength.answer import Requirement as Requirement
 from gpbnb.wordlength.bounding import guarantee as guarantee
-from gpbnb.wordlength.bounding import limit_cycles as limit_cycles
 from gpbnb.wordlength.code import write_code as write_code
 from gpbnb.wordlength.emulation import EmulatedRun as EmulatedRun
 from gpbnb.wordlength.emulation import emulate as emulate
+from gpbnb.wordlength.limit_cycles import LimitCycles as LimitCycles
+from gpbnb.wordlength.limit_cycles import limit_cycles as limit_cycles
 from gpbnb.wordlength.models import read_model as read_model
 from gpbnb.wordlength.records import RecordSurvey as RecordSurvey
 from gpbnb.wordlength.records import survey_records as survey_records

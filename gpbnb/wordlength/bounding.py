@@ -1,4 +1,4 @@
-"""Guarantees and limit cycles of models of any kind that have them."""
+"""Guarantees of models of any kind that have them."""
 
 from __future__ import annotations
 
@@ -9,12 +9,9 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import format_named
 from gpbnb.bounds import guarantee as of_filters
-from gpbnb.bounds import limit_cycles as cycles
 from gpbnb.bounds.guarantee import Guarantee
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.bounds.limit_cycles import LimitCycles
 from gpbnb.bounds.system import output_errors, output_proof
 from gpbnb.bounds.words import WordGuarantee
 from gpbnb.filters.forms import Form
@@ -86,28 +83,3 @@ def _of_system(system: LinearSystem, fmt: Any, largest: NDArray[np.float64], hor
         except (ValueError, OverflowError) as error:
             why = str(error)
     return Guarantee(np.full(system.p, np.inf), 0, why, fmt)
-
-
-def limit_cycles(
-    system: ModelSource,
-    fmt: WordFormats | FixedFormat | str,
-    u: Any = 0,
-    *,
-    most: int | None = None,
-    everywhere: bool = False,
-) -> LimitCycles:
-    """Find every limit cycle in which a fixed-point filter can end when its input is constant.
-
-    Parameters
-    ----------
-    system : a stable linear system, in any structure.
-    fmt : the format of all numbers, or :class:`gpbnb.WordFormats` for data, coefficients and sums.
-    u, most, everywhere : as for :func:`gpbnb.bounds.limit_cycles.limit_cycles`.
-
-    Raises
-    ------
-    ValueError, TypeError, OverflowError : as for that function.
-    """
-    given, named = admitted(system, "be searched for limit cycles"), format_named(fmt)
-    words = WordFormats(named) if isinstance(named, FixedFormat) else named
-    return cycles.limit_cycles(given, words, u, cycles.MOST_STATES if most is None else most, everywhere)

@@ -18,12 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.conversion import MaybeNone
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.named import format_named
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.bounds.words import bounded_rounding
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.program import ADD, SUBTRACT, Program, matrices
-from gpbnb.filters.system import LinearSystem, is_stable
-from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program, integers_of, run_integers, successors
+from gpbnb.filters.system import is_stable
+from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_integers, successors
+from gpbnb.wordlength.asked import admitted
+from gpbnb.wordlength.models import ModelSource
 
 MOST_STATES, LARGEST_SEARCH = 2**24, 2**28
 """Largest number of states that a search tries, by default and at all."""
@@ -85,19 +89,30 @@ class LimitCycles:
 
 
 def limit_cycles(
-    system: LinearSystem, words: WordFormats, u: Any = 0, most: int = MOST_STATES, everywhere: bool = False
+    system: ModelSource,
+    fmt: WordFormats | FixedFormat | str,
+    u: Any = 0,
+    *,
+    most: int = MOST_STATES,
+    everywhere: bool = False,
 ) -> LimitCycles:
     """Find every limit cycle in which a fixed-point filter can end when its input is constant.
 
     Parameters
     ----------
-    system : a stable system, in any structure.
-    words : formats of data, coefficients and sums.
+    system : a stable linear system, in any structure.
+    fmt : the format of all numbers, or :class:`gpbnb.WordFormats` for data, coefficients and sums.
     u : the input, one number or (m,).
     most : largest number of states to try, at most 2**28; if there are more, only the bound is returned.
     everywhere : whether to try every state that the word can store. By default, the search tries only the states within
         the error bound around the state of rest, which no cycle without an overflow can leave. Cycles with an overflow,
         in a format that saturates or wraps, are found only if this is True.
+
+    Raises
+    ------
+    ValueError : a model that cannot be searched; an input of another size; a system that is not stable as stored.
+    TypeError : `fmt` is neither in fixed point nor :class:`gpbnb.WordFormats`.
+    OverflowError : a coefficient or an input beyond the range of its format.
 
     Examples
     --------
@@ -109,55 +124,40 @@ def limit_cycles(
     >>> sorted(int(cycle.outputs[0, 0]) for cycle in found.cycles)
     [509, 510, 511, 512]
     """
-    if not isinstance(system, LinearSystem):
-        raise TypeError(f"got a {type(system).__name__}; needed a LinearSystem")
+    given, named = admitted(system, "be searched for limit cycles"), format_named(fmt)
+    words = WordFormats(named) if isinstance(named, FixedFormat) else named
     if not isinstance(words, WordFormats):
         raise TypeError(f"got words {words!r}; needed WordFormats, such as WordFormats(FixedFormat(0, 15))")
-    most, given = whole_number("most", most, most=LARGEST_SEARCH), system.as_filter()
-    made = integer_program(given, words)
-    if not made.program.is_linear:
-        raise ValueError(f"got {system.name}, which limits its values; needed a linear system for its limit cycles")
-    data, n = words.data, made.program.n
-    given_u = np.asarray(u, dtype=object)
-    if given_u.shape not in ((), (1,), (system.m,)):
-        raise ValueError(f"got an input of shape {given_u.shape}; needed one number, or {system.m}")
-    inputs = integers_of(exact(np.broadcast_to(given_u, (1, system.m))), data)[0]
-    if cause := _unstable(made, system.n):
-        raise ValueError(cause)
-    error = bounded_rounding(given, words) / float(data.unit) * (1 + 2.0**-40)
-    rest = _at_rest(made, inputs)
+    most, n, m = whole_number("most", most, most=LARGEST_SEARCH), given.n, given.m
+    made, data = integer_program(given.as_filter(), words), words.data
+    value = np.asarray(u, dtype=object)
+    if value.shape not in ((), (1,), (m,)):
+        raise ValueError(f"got an input of shape {value.shape}; needed one number, or {m}")
+    inputs = integers_of(exact(np.broadcast_to(value, (1, m))), data)[0]
+    A, B = matrices(made.program, made.coefficients)
+    if not is_stable(A[:n, :n]):
+        raise ValueError(
+            f"got a filter that is not stable as stored in {words}; needed a stable one, which comes to rest"
+        )
+    error = bounded_rounding(given.as_filter(), words) / float(data.unit) * (1 + 2.0**-40)
+    solved = rationals(exact(np.eye(len(A), dtype=int)) - A).solve(rationals((B @ exact(inputs)).reshape(-1, 1)))
+    rest = np.array([Fraction(int(each.p), int(each.q)) for each in solved.entries()], dtype=object)
     if everywhere:
-        low = np.full(n, int(data.lowest / data.unit), np.int64)
-        counts = np.full(n, int((data.largest - data.lowest) / data.unit) + 1, np.int64)
+        ends = [(int(data.lowest / data.unit), int(data.largest / data.unit))] * len(A)
     else:
         ends = [(math.ceil(x - Fraction(r)), math.floor(x + Fraction(r))) for x, r in zip(rest, error, strict=True)]
-        low = np.array([first for first, _ in ends], np.int64)
-        counts = np.array([last - first + 1 for first, last in ends], np.int64)
+    low = np.array([first for first, _ in ends], np.int64)
+    counts = np.array([last - first + 1 for first, last in ends], np.int64)
     counts[~_read(made.program)] = 0
-    bound, outputs = error[system.n :], rest[system.n :]
     total = math.prod(max(int(each), 1) for each in counts)
     if total > most:
-        return LimitCycles(None, bound, outputs, 0)
-    found = _cycles(successors(made, inputs.astype(np.int64), low, counts))
-    cycles = [_cycle(made, numbers, inputs, low, counts, system.n) for numbers in found]
-    return LimitCycles(tuple(sorted(cycles, key=lambda each: -each.period)), bound, outputs, total)
-
-
-def _unstable(made: IntegerProgram, n: int) -> str:
-    """Return in words that a filter as stored in words is not stable; empty if it is."""
-    A, _ = matrices(made.program, made.coefficients)
-    if is_stable(A[:n, :n]):
-        return ""
-    return f"got a filter that is not stable as stored in {made.words}; needed a stable one, which comes to rest"
-
-
-def _at_rest(made: IntegerProgram, u: NDArray[Any]) -> NDArray[Any]:
-    """Return states and outputs at rest without rounding, in units of the data, exact."""
-    A, B = matrices(made.program, made.coefficients)
-    right = B @ np.array([Fraction(int(each)) for each in u], dtype=object)
-    left = exact(np.eye(len(A), dtype=int)) - A
-    solved = rationals(left).solve(rationals(right.reshape(-1, 1)))
-    return np.array([Fraction(int(solved[i, 0].p), int(solved[i, 0].q)) for i in range(len(A))], dtype=object)
+        return LimitCycles(None, error[n:], rest[n:], 0)
+    cycles = list[LimitCycle]()
+    for numbers in _cycles(successors(made, inputs.astype(np.int64), low, counts)):
+        first = np.array(np.unravel_index(numbers[0], np.maximum(counts, 1))) + low
+        states = run_integers(made, np.tile(inputs, (len(numbers), 1)), first)
+        cycles.append(LimitCycle(states[:, :n], states[:, n:]))
+    return LimitCycles(tuple(sorted(cycles, key=lambda each: -each.period)), error[n:], rest[n:], total)
 
 
 def _read(program: Program) -> NDArray[np.bool_]:
@@ -193,16 +193,3 @@ def _on_cycles(following: NDArray[np.int64]) -> NDArray[np.int64]:
         predecessors[after] -= times
         out = after[predecessors[after] == 0]
     return np.flatnonzero(predecessors)
-
-
-def _cycle(
-    made: IntegerProgram,
-    numbers: NDArray[np.int64],
-    u: NDArray[Any],
-    low: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    n: int,
-) -> LimitCycle:
-    first = np.array(np.unravel_index(numbers[0], np.maximum(counts, 1))) + low
-    states = run_integers(made, np.tile(u, (len(numbers), 1)), first)
-    return LimitCycle(states[:, :n], states[:, n:])

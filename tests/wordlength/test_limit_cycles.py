@@ -8,8 +8,8 @@ from itertools import cycle, product
 import pytest
 
 from gpbnb import FixedFormat, LinearSystem
-from gpbnb.bounds.limit_cycles import limit_cycles
 from gpbnb.filters.words import WordFormats
+from gpbnb.wordlength.limit_cycles import limit_cycles
 from tests.oracles import fixed, limited
 
 MODES = ["nearest", "even", "half up", "chop", "up", "down", "odd"]
