@@ -1,9 +1,8 @@
-"""Digital filters by the command, from files and from SciPy; fraction bits of systems and functions."""
+"""Digital filters of SciPy in a structure, sections in an order, and fraction bits of systems."""
 
 from __future__ import annotations
 
 import itertools
-import json
 import math
 
 import numpy as np
@@ -12,55 +11,13 @@ from scipy import signal
 
 from gpbnb import FixedFormat, LinearSystem, required_precision
 from gpbnb.bounds.words import WordGuarantee
-from gpbnb.filters.design import SIDE_BY_SIDE, FilterDesign
+from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.words import WordFormats, run_words
-from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.fixed import with_fraction_bits
 from gpbnb.wordlength.models import read_model
 
 SOS = signal.butter(4, 0.1, output="sos")
 B, A = signal.butter(4, 0.1)
-
-
-@pytest.fixture
-def filters(tmp_path):
-    """A file with sections, and a file with an impulse."""
-    (tmp_path / "sections.toml").write_text(f"sos = {SOS.tolist()}\n", encoding="utf-8")
-    (tmp_path / "u.csv").write_text("\n".join(["1", *["0"] * 39]), encoding="utf-8")
-    return tmp_path
-
-
-def test_the_command_compares_structures(filters, capsys):
-    report = filters / "report.html"
-    arguments = [str(filters / "sections.toml"), "--tolerance", "0.001", "--measurements", str(filters / "u.csv")]
-    assert main([*arguments, "--basis", "emulation", "--report", str(report)]) == 0
-    told = capsys.readouterr()
-    answers = json.loads(report.with_suffix(".json").read_text(encoding="utf-8"))["answers"]
-    names = [each["label"] for each in answers]
-    first = "cascade of direct form II transposed"
-    assert names == [f"{name}, emulation" for name in [first, *(each for each in SIDE_BY_SIDE if each != first)]]
-    digits = {each["label"].removesuffix(", emulation"): each["digits"] for each in answers}
-    assert digits["direct form I"] > digits[first]
-    assert told.out.startswith(f"{first}: {digits[first]} bits")
-    assert "Structures and bases compared" in report.read_text(encoding="utf-8")
-
-
-def test_of_all_structures_the_one_with_the_fewest_digits_answers_and_is_written(filters, capsys):
-    """In direct form I, which is the first, this filter needs four bits more."""
-    sos = signal.butter(2, 0.1, output="sos").tolist()
-    path, report, code, proof = (filters / name for name in ("all.toml", "report.html", "code", "proof.json"))
-    path.write_text(f'structure = "all"\nsos = {sos}\n', encoding="utf-8")
-    arguments = [str(path), "--tolerance", "0.00001", "--measurements", str(filters / "u.csv"), "--basis", "emulation"]
-    more = ["--basis", "guarantee", "--measurement", "1", "--certificate", str(proof)]
-    assert main([*arguments, *more, "--report", str(report), "--code", str(code)]) == 0
-    found = json.loads(report.with_suffix(".json").read_text(encoding="utf-8"))
-    digits = {each["label"].split(",")[0]: each["digits"] for each in found["answers"] if each["basis"] == "emulation"}
-    best = found["structure"]
-    assert digits[best] == min(digits.values()) < digits["direct form I"]
-    assert capsys.readouterr().out.startswith(f"{best}: {digits[best]} bits")
-    assert best in next(code.glob("*.h")).read_text(encoding="utf-8")
-    guaranteed = next(each["digits"] for each in found["answers"] if each["label"] == f"{best}, guarantee")
-    assert json.loads(proof.read_text(encoding="utf-8"))["format"]["precision"] == guaranteed
 
 
 @pytest.mark.parametrize("structure", ["direct form I", "cascade", "lattice"])
