@@ -94,7 +94,8 @@ def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     ----------
     options : passed to numba's ``njit``.
     """
-    decorate = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=Compiler, **options)
+    given = {"forceinline": False} | options  # by default, numba takes this option from the function that calls
+    decorate = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=Compiler, **given)
     return decorate if function is None else decorate(function)
 
 

@@ -309,7 +309,7 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
     return number(fmt, m, e1 + e2 + k, up, tie, inexact, negative)
 
 
-@inner
+@inner(forceinline=True)
 def divide(fmt: Any, a: Any, b: Any) -> Any:
     m1, e1 = a
     m2, e2 = b

@@ -105,7 +105,7 @@ def _lowered(fmt: Any, n: Any, k: Any) -> Any:
     return q, np.int64(rest != wide(_U0)) + np.int64(rest >= half) + np.int64(rest > half)
 
 
-@inner
+@inner(forceinline=True)
 def _cut(fmt: Any, high: Any, low: Any, k: Any) -> Any:
     """Divide 256 bits by ``base**k``: quotient, which must fit into 128 bits, and whether there is a rest."""
     if k == 0:
@@ -313,7 +313,7 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
     return _add_words(fmt, a, b) if _one_word(fmt) else _add_long(fmt, a, b)
 
 
-@inner
+@inner(forceinline=True)
 def _add_long(fmt: Any, a: Any, b: Any) -> Any:
     negative, x, e = a
     other, y, f = b
