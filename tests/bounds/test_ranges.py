@@ -1,4 +1,4 @@
-"""Answers and guarantees for formats with a limited range: overflow is named, underflow is part of the bound."""
+"""Answers and guarantees for formats with a limited range: underflow is part of the bound."""
 
 from __future__ import annotations
 
@@ -17,20 +17,14 @@ from gpbnb.bounds.adversary import attack
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.bounds.guess import ROUNDING
 from gpbnb.bounds.units import units
-from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, reference_states
 from tests.surveying import survey
 
-HALF = {"range": (-14, 15), "rounding": "even"}
 WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
 WITHIN = limits(state=100, innovation=10)
 # Filters in other rounding modes take long to compile; tests/arithmetic compares every mode with Fractions.
 EVEN = Rounding.EVEN
-
-
-def uncertain(variance, h=1):
-    return LinearModel([[1]], [[h]], [["0.01"]], [[1]], [0], [[variance]])
 
 
 def test_a_range_that_suffices_changes_nothing():
@@ -44,50 +38,7 @@ def test_a_range_that_suffices_changes_nothing():
     )
 
 
-def test_an_answer_names_the_quantity_and_the_step_that_overflow():
-    found = required_precision(uncertain("4e4", 2), 20, 0.01, **HALF)
-    assert found.format is None
-    assert "the run is refused: overflow in the innovation covariance at step 1" in str(found)
-    found = required_precision(uncertain("1e5"), 20, 0.01, **HALF)
-    assert "overflow: P0: entry [0, 0]" in str(found)
-    growing = LinearModel([[2]], [["1e-3"]], [["0.01"]], [[1]], [1], [["0.01"]])
-    found = required_precision(growing, np.zeros((30, 1)), 0.01, **HALF | {"range": (-14, 6)})
-    assert found.format is None
-    assert "overflow in " in found.why
-    assert "at step " in found.why
-
-
-@pytest.mark.parametrize(
-    ("form", "given", "reason"),
-    [
-        (Form.INNOVATION, {"Phi": [[300]], "P0": [[300]]}, "the predicted covariance at step 1"),
-        (Form.INNOVATION, {"H": [[300]], "P0": [[300]]}, "the innovation covariance at step 1"),
-        (Form.INNOVATION, {"H": [["1/4096"]], "Q": [[0]], "R": [["1/16777216"]]}, "its inverse at step 1"),
-        (Form.INNOVATION, {"Phi": [[2]]}, "the estimate at step 2"),
-        (Form.UD, {"Phi": [[300]], "P0": [[300]]}, "the predicted covariance at step 1"),
-        (Form.UD, {"Phi": [[2]]}, "the update of factors and estimate at step 2"),
-    ],
-)
-def test_a_run_names_what_overflows(form, given, reason):
-    """Numbers above 65504: squares and products with 300, and the reciprocal of 2**-24; twice an estimate of 40000."""
-    model = LinearModel(**{"Phi": [[1]], "H": [[1]], "Q": [[1]], "R": [[1]], "x0": [0], "P0": [[1]]} | given)
-    run = Run(model, BINARY16, form, range(1, 3))
-    run.take(BINARY16.array(np.full((2, 1), 4e4)))
-    assert run.reason == f"overflow in {reason}"
-
-
 # -- guarantees -------------------------------------------------------------------------------------------
-
-
-def test_a_number_beyond_the_range_has_no_guarantee():
-    found = guarantee(WALK, BINARY16, limits(state=7e4, innovation=10))
-    assert not found.for_ever
-    assert found.bound[0] == math.inf
-    assert "a number may exceed the largest" in str(found)
-    answer = required_precision(WALK, 1, 0.01, basis="guarantee", within=WITHIN, **HALF | {"range": (-14, 5)})
-    assert answer.format is None
-    assert "a number may exceed the largest" in str(answer)
-    assert required_precision(WALK, 1, 0.01, basis="guarantee", within=WITHIN, **HALF).digits == 17
 
 
 @pytest.mark.parametrize(("subnormal", "size"), [(True, 2.0**-9), (False, 2.0**-5)])

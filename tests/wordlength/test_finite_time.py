@@ -10,10 +10,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, LinearModel, LinearSystem, guarantee, limits, required_precision
-from gpbnb.arithmetic.named import arithmetic
+from gpbnb import FloatFormat, LinearSystem, limits, required_precision
 from gpbnb.bounds.system import output_errors
-from gpbnb.wordlength.required import judge
 from tests.oracles import floating
 
 TENTH = Fraction(1, 10)
@@ -115,22 +113,6 @@ def test_a_bound_grows_with_its_steps_and_that_of_a_stable_system_stays_below_th
     assert bounds[2] == pytest.approx(ever, rel=0.01)
 
 
-def test_a_stable_system_is_bounded_for_ever_and_another_only_for_its_steps():
-    within = limits(measurement=1)
-    stable = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 200, 1e-3, basis="guarantee", within=within)
-    assert stable.steps is None
-    assert str(stable).endswith("guaranteed for ever")
-    judged = judge(CLOCK, FloatFormat(2, 24), 200, 1e-3, basis="guarantee", within=within)
-    assert "nothing is proved for 24 bits: the guaranteed bound for 200 steps is " in str(judged)
-    assert judged.ratio == pytest.approx(output_errors(CLOCK, FloatFormat(2, 24), 1.0, 200)[0] / 1e-3)
-
-
-def test_a_guarantee_without_a_bound_says_so_and_why():
-    found = guarantee(LinearSystem.pid("0.5", "0.05", limits=(-1, 1)), "Q0.15", limits(measurement=2), horizon=3)
-    assert not np.isfinite(found.bound).any()
-    assert repr(found) == f"no bound, because {found.why}; in {arithmetic(found.format)}"
-
-
 # -- sums ------------------------------------------------------------------------------------------------------------
 
 
@@ -148,15 +130,3 @@ def test_a_tree_of_1024_numbers_stays_below_the_published_bound():
         output_errors(LinearSystem.sum(64, each), FloatFormat(2, 53), 1.0)[0] for each in ("tree", "pairwise")
     )
     assert halves == pytest.approx(tree)
-
-
-# -- fixed point, and Kalman filters ---------------------------------------------------------------------------------
-
-
-def test_a_kalman_filter_that_never_settles_has_a_guarantee_over_its_steps():
-    """The second state is not observed and keeps its errors."""
-    lost = LinearModel([[1, 0], [0, 1]], [[1, 0]], [["0.01", 0], [0, 0]], [[1]], [0, 0], np.eye(2))
-    found = required_precision(lost, 30, 1e-3, basis="guarantee", within=limits(state=10, innovation=10))
-    assert found.digits is not None
-    assert found.steps == 30
-    assert str(found).endswith("guaranteed for 30 steps")
