@@ -18,7 +18,7 @@ SOME = (
     "kalman 2", "kalman 7", "kalman 13", "kalman 17", "kalman 24", "known inputs 0", "known inputs 2", "known inputs 3",
     "known inputs 5", "known inputs 6", "decayed 7", "fixed kalman 3", "named kalman 10",
     "long kalman 3", "long kalman 4", "long kalman 7",
-    "sums 2", "compensated 2", "records 7", "blocks 8", "extended 0", "extended 2", "extended 7", "extended 19",
+    "sums 2", "records 7", "blocks 8", "extended 0", "extended 2", "extended 7", "extended 19",
     "unscented 5", "smoother 12", "smoother 11", "smoother 13", "systems 5", "words 9", "words 20", "functions 12",
     "functions 13", "elementary 3", "matrices 24",
 )  # fmt: skip

@@ -217,7 +217,7 @@ COMPUTED: dict[tuple[str, str], Callable[[], Any]] = {
     ),
     ("README", "in 0.7 % of single steps"): lambda: round(printed("kalman", "def before_gain")[3], 1) == 0.7,
     ("README", "for all 100,126 random inverses for which it exists"): lambda: 100_126 in in_sight("inversion"),
-    ("CONTRIBUTING", "608 seeded runs"): lambda: len(corpus.names()) == 608,
+    ("CONTRIBUTING", "602 seeded runs"): lambda: len(corpus.names()) == 602,
     ("CONTRIBUTING", "at most 17 lines"): lambda: MOST_LINES_OF_A_FUNCTION == 17,
     ("story", "about 4,000 kilometres"): lambda: round(0.02 / (math.pi / 180 / 3.6e6) / 1e6) == 4,
     ("kalman", r"2^{-11} \approx 0.0005"): lambda: (

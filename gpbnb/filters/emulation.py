@@ -18,7 +18,7 @@ from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import NonlinearRun, nonlinear_checkpoints, opened
-from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, log_spaced, reference
+from gpbnb.filters.run import Run, log_spaced, reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +111,6 @@ def emulate(
     form: Form | str = Form.INNOVATION,
     checkpoint_steps: Sequence[int] | None = None,
     true: Checkpoints | None = None,
-    sums: Sums = LEFT_TO_RIGHT,
-    compensated: bool = False,
 ) -> History:
     """Run the filter with model, measurements and every operation rounded, and compare the run with the reference.
 
@@ -128,7 +126,6 @@ def emulate(
         the errors come only from the arithmetic. With a reference for the model as given, they include the errors of
         storing the model. The reference for a nonlinear model always uses the model as given, because its functions
         round their own constants.
-    sums, compensated : as for :class:`~gpbnb.filters.run.Run`.
 
     Returns
     -------
@@ -154,7 +151,7 @@ def emulate(
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     if chosen and max(chosen) > len(measured):
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
-    run = opened(model, fmt, form, chosen, sums=sums, compensated=compensated)
+    run = opened(model, fmt, form, chosen)
     run.take(measured)
     if true is not None:
         return compare_runs(run, true)

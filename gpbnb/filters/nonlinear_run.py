@@ -25,7 +25,7 @@ from gpbnb.filters.program import Program
 from gpbnb.filters.recording import block_algebra, filter_program, program_states
 from gpbnb.filters.reference import PreciseSteps, agreed, joined
 from gpbnb.filters.repeating import RepeatedStep
-from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums, reference_states
+from gpbnb.filters.run import Run, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
 from gpbnb.filters.stepping import StepTaken
 from gpbnb.filters.steps import (
@@ -233,15 +233,11 @@ def opened(
     form: Form,
     checkpoint_steps: Sequence[int] = (),
     bounded: bool = False,
-    sums: Sums = LEFT_TO_RIGHT,
-    compensated: bool = False,
 ) -> Run | NonlinearRun:
     """Return a run of a filter."""
     if isinstance(model, NonlinearModel):
-        if compensated or sums != LEFT_TO_RIGHT:
-            raise ValueError("got sums or compensated estimates for a nonlinear model; needed neither: it has no loops")
         return NonlinearRun(model, fmt, form, checkpoint_steps)
-    return Run(model, fmt, form, checkpoint_steps, sums, compensated, bounded)
+    return Run(model, fmt, form, checkpoint_steps, bounded=bounded)
 
 
 def true_states(model: AnyModel, z: Any) -> NDArray[np.float64]:

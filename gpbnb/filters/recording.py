@@ -45,7 +45,6 @@ class StepKind(NamedTuple):
     one: bool = True  # whether every format has the number one
     blocks: tuple[int, ...] = (0, 0, 0, 0, 0)  # formats of state, gain, covariance, innovation covariance, model
     sums: tuple[Any, ...] = (False, "left", 32, -1)  # fused, order, block; the format of sums, or -1
-    compensated: bool = False
     alike: bool = True  # whether a number that several formats have is stored alike in all of them
 
 
@@ -55,7 +54,6 @@ def step_kind(
     fmt: Any,
     blocks: tuple[int, ...] = (0, 0, 0, 0, 0),
     sums: tuple[Any, ...] = (False, "left", 32, -1),
-    compensated: bool = False,
 ) -> StepKind:
     """Return the kind of the steps of a filter whose first format is `fmt`, None for double-double.
 
@@ -71,7 +69,7 @@ def step_kind(
             zeros, ones = zeros[..., 0], ones.all(axis=-1)
         entries = np.where(zeros.all(axis=0), 0, np.where(ones.all(axis=0), 1, 2)).astype(np.uint8)
         known.append(Known(letter, entries.shape, entries.tobytes()))
-    return StepKind(form, n, m, tuple(known), one is not None, blocks, sums, compensated, not parts)
+    return StepKind(form, n, m, tuple(known), one is not None, blocks, sums, not parts)
 
 
 @lru_cache(maxsize=64)
@@ -88,7 +86,7 @@ def kalman_step(kind: StepKind) -> RecordedStep:
     It gives the gain and, unless it has factors or roots, the innovation covariance.
     """
     n, m = kind.n, kind.m
-    compensated = kind.compensated or kind.form is Form.COMPENSATED
+    compensated = kind.form is Form.COMPENSATED
     shapes = [(n,), (n, n), *([(n,)] if compensated else []), (m,), *(each.shape for each in kind.model)]
     tape = Tape(sum(map(math.prod, shapes)), one=kind.one)
     tape.fuses, tape.alike, tape.most = True, kind.alike, 2 * MOST_OPERATIONS
@@ -122,7 +120,7 @@ def _kalman_taken(
     fused, order, block, number = kind.sums
     sums = formats[number] if number >= 0 else None
     blocks = block_algebra([formats[i] for i in kind.blocks[:4]], fused, order, block, sums)
-    step = LinearStep(kind.form, blocks, known, tape.about, kind.compensated)
+    step = LinearStep(kind.form, blocks, known, tape.about)
     found = step.taken(x, P, carried[0] if carried else None, z)
     after = (found.x, found.P, *([found.carried] if carried else []))
     return StepTaken(after, (found.K,) if found.S is None else (found.K, found.S), found.definite)

@@ -84,8 +84,6 @@ class Run(Progress):
     form : form in which a step is computed, or its name, such as "UD".
     checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in ascending order.
     sums : how the terms of matrix products are added up.
-    compensated : whether the estimate is updated by Kahan's compensated summation, which carries the rounding error of
-        a step over to the next; only for the innovation form and Joseph's.
     bounded : whether to compute the contraction bound, :mod:`gpbnb.filters.contraction`, along with the run: a bound of
         its errors or, in double-double, of its distance from the exact filter.
     records : number of measurement records. Covariance and gain do not depend on the measurements and are computed
@@ -100,21 +98,17 @@ class Run(Progress):
         form: Form | str,
         checkpoint_steps: Sequence[int],
         sums: Sums = LEFT_TO_RIGHT,
-        compensated: bool = False,
         bounded: bool = False,
         records: int = 1,
     ) -> None:
         #: Formats of the blocks, if they have their own; `fmt` is then that of the model.
         self.block_formats = fmt if isinstance(fmt, BlockFormats) else None
-        if self.block_formats is not None and (sums != LEFT_TO_RIGHT or compensated or bounded or records != 1):
-            raise ValueError(
-                "got formats of blocks with sums, compensated, bounded or many records; needed none of them"
-            )
+        if self.block_formats is not None and (sums != LEFT_TO_RIGHT or bounded or records != 1):
+            raise ValueError("got formats of blocks with sums, bounded or many records; needed none of them")
         fmt = fmt.model if isinstance(fmt, BlockFormats) else fmt
         self.model, self.fmt, self.form = model, fmt, form_named(form)
         super().__init__(checkpoint_steps)
-        self._check(sums, compensated, bounded, records)
-        compensated = compensated or self.form is Form.COMPENSATED
+        self._check(sums, bounded, records)
         self.sums = sums
         #: The arithmetic from which the run draws random numbers, if it has any.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(*sums)
@@ -129,7 +123,7 @@ class Run(Progress):
         self.P = start.P0.copy()
         #: What a step takes of the model, packed, by letters: matrices with a cycle of their own, and inputs.
         self.letters = start.letters
-        if compensated:
+        if self.form is Form.COMPENSATED:
             self.letters["increment"] = as_packed(fmt, model.Phi - np.eye(n, dtype=int))
         shapes = ((n, records), (n, m), (n, n))
         self._none = tuple(np.zeros((0, *shape, *self.x.shape[2:]), self.x.dtype) for shape in shapes)
@@ -143,7 +137,7 @@ class Run(Progress):
             first = FACTORED[self.form].covariance(self.exactly(self.P)) if self.form in FACTORED else None
             self._carried = CarriedBound(self._stored.without_inputs(), self.form, first, self.checkpoint_steps)
 
-    def _check(self, sums: Sums, compensated: bool, bounded: bool, records: int) -> None:
+    def _check(self, sums: Sums, bounded: bool, records: int) -> None:
         """Reject options that the format or the form does not have."""
         if bounded and self.fmt is not None and self.fmt.overflow != "raise":
             raise ValueError(
@@ -161,18 +155,13 @@ class Run(Progress):
                 'form, such as "innovation"'
             )
         if inputs or form not in WITH_PROGRAM:
-            if sums != LEFT_TO_RIGHT or compensated:
-                raise ValueError(
-                    f"got sums or compensated with {'known inputs' if inputs else f'the {form} form'}; needed neither; "
-                    'for compensated summation write form="compensated"'
-                )
+            if sums != LEFT_TO_RIGHT:
+                raise ValueError(f"got sums with {'known inputs' if inputs else f'the {form} form'}; needed none")
             if self.block_formats is not None:
                 raise ValueError(
                     f"got formats of blocks with {'known inputs' if inputs else f'the {form} form'}; needed neither; "
                     f"the forms of blocks are {', '.join(map(str, WITH_PROGRAM))}"
                 )
-        if compensated and form not in (Form.INNOVATION, Form.JOSEPH):
-            raise ValueError(f"got compensated summation in the {form} form; needed the innovation form or Joseph's")
         if sums.order != "left" and form is Form.UD:
             raise ValueError(f"got {sums.order} sums in the UD form; needed another form")
         if records != 1 and (records < 1 or form in FACTORED or bounded or len(self.checkpoint_steps)):
@@ -366,7 +355,7 @@ class Run(Progress):
     def _opened(self) -> RunningStep:
         """Record a step, and load it in the formats of the run."""
         model, (formats, blocks, sums) = self.letters, self._formats()
-        kind = step_kind(self.form, model, formats[0], blocks, sums, "increment" in model)
+        kind = step_kind(self.form, model, formats[0], blocks, sums)
         draws = any(each is not None and each.rounding is Rounding.STOCHASTIC for each in formats)
         parts = recorded_step(kind, together=draws and self.records == 1)
         cycles = zip(model.values(), parts.step.cycles, strict=True)

@@ -469,7 +469,6 @@ class LinearStep:
     """A step on arrays of any kind, also of those that record their operations.
 
     Given are its matrices and known inputs, by their letters. The name of each quantity is told before it is computed.
-    Compensated summation may update the estimate in a form that usually has none.
     """
 
     def __init__(
@@ -478,10 +477,8 @@ class LinearStep:
         blocks: BlockAlgebra,
         given: dict[str, Any],
         about: Callable[[str], None] = unnamed,
-        compensated: bool = False,
     ) -> None:
         self.form, self.blocks, self.given, self.about = form, blocks, given, about
-        self.compensated = compensated or form is Form.COMPENSATED
 
     def taken(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
         """Take a step from an estimate (n,), a covariance, factors or a root (n, n), and what compensation carries."""
@@ -505,11 +502,11 @@ class LinearStep:
             K = blocks.gain.times(of_gain, stored.gain(given["RI"]))
         own = stored.state(K)
         about("the estimate")
-        if form in HUNG_FORMS and not self.compensated:
+        if form in HUNG_FORMS:
             W = reduction(blocks.covariance, stored.covariance(K), stored.covariance(H))
             loop = blocks.state.times(stored.state(W), stored.state(given["Phi"]))
             x = blocks.state.rounded(self._times(loop, x) + self._times(own, z))
-        elif self.compensated:
+        elif form is Form.COMPENSATED:
             x, carried = self._compensated(x, carried, own, z)
         else:
             x = corrected(blocks.state, stored.state(H), own, self._ahead(x)[:, None], z[:, None])[:, 0]

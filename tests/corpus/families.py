@@ -119,13 +119,6 @@ def sums(draw: Draw, i: int) -> Case:
     return Case(title, "filtered", (model, draw.signal(20, m), fmt, form), options)
 
 
-def compensated(draw: Draw, i: int) -> Case:
-    form, fmt = ("innovation", "Joseph")[i % 2], draw.floating(i)
-    model, n, m = _sized(draw, 5)
-    arguments = (model, draw.signal(30, m), fmt, form)
-    return Case(f"{form} compensated, {fmt}, n {n}, m {m}", "filtered", arguments, {"compensated": True})
-
-
 def records(draw: Draw, i: int) -> Case:
     form, fmt = LOOPS[i % 4], draw.floating(i)
     model, n, m = _sized(draw, 6)
@@ -461,7 +454,7 @@ FAMILIES = {
     "kalman": Family(90, kalman), "odd sizes": Family(10, odd_sizes), "stochastic": Family(9, stochastic),
     "fixed kalman": Family(27, fixed_kalman), "decayed": Family(21, decayed), "named kalman": Family(18, named_kalman),
     "long kalman": Family(24, long_kalman), "known inputs": Family(14, known_inputs), "sums": Family(8, sums),
-    "compensated": Family(6, compensated), "records": Family(12, records), "blocks": Family(18, blocks),
+    "records": Family(12, records), "blocks": Family(18, blocks),
     "extended": Family(24, extended), "unscented": Family(11, unscented), "smoother": Family(16, smoother),
     "systems": Family(64, systems), "words": Family(32, words), "functions": Family(16, functions),
     "elements": Family(len(ANY), elements), "elementary": Family(7, elementary), "matrices": Family(len(ANY), matrices),

@@ -70,11 +70,11 @@ def filtered(model: Model, z: Any, fmt: Format, form: str, **options: Any) -> St
     if "sums" in options:
         order, fused, block, wider = options["sums"]
         numbers = Numbers.of(fmt, wider, order=order, fused=fused, block=block)
-    compensated = form == "compensated" or options.get("compensated", False)
+    compensated = form == "compensated"
     kind = plain_filters.Filter
     if isinstance(fmt, Float) and fmt.base != 10 and fmt.emin is None and each is None:
         kind = Fading
-    found = kind(model, numbers, "innovation" if form == "compensated" else form, each, compensated)
+    found = kind(model, numbers, "innovation" if compensated else form, each, compensated)
     for row in z:
         try:
             x = found.step(row)

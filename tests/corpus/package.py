@@ -71,7 +71,7 @@ def model_of(given: Model) -> LinearModel:
 def filtered(model: Model, z: Any, fmt: Format, form: str, **options: Any) -> Steps:
     """A Kalman filter: estimate, gain and covariance after each step, then how it ended.
 
-    Options are `blocks`, formats by block; `sums`, as (order, fused, block, format); and `compensated`.
+    Options are `blocks`, formats by block, and `sums`, as (order, fused, block, format).
     """
     chosen: Any = fmt_of(fmt)
     sums = LEFT_TO_RIGHT
@@ -81,7 +81,7 @@ def filtered(model: Model, z: Any, fmt: Format, form: str, **options: Any) -> St
         order, fused, block, wider = given
         sums = Sums(fused, None if wider is None else fmt_of(wider), order, block)
     given_model = model_of(model)
-    yield from _run(given_model, z, chosen, form, sums, options.get("compensated", False))
+    yield from _run(given_model, z, chosen, form, sums)
 
 
 def as_functions(model: Model, z: Any, fmt: Format, form: str) -> Steps:
@@ -95,9 +95,10 @@ def _linear(matrix: Any) -> tuple[Any, Any]:
     return lambda x: x.format.array(matrix) @ x, lambda x: x.format.array(matrix)
 
 
-def _run(model: Any, z: Any, fmt: Any, form: str, sums: Any, compensated: bool = False) -> Steps:
+def _run(model: Any, z: Any, fmt: Any, form: str, sums: Any) -> Steps:
     try:
-        run = opened(model, fmt, form_named(form), range(1, len(z) + 1), sums=sums, compensated=compensated)
+        asked = model, fmt, form_named(form), range(1, len(z) + 1)
+        run = opened(*asked) if sums == LEFT_TO_RIGHT else Run(*asked, sums)
         run.take(np.array(z, dtype=object))
     except STOPS as error:
         yield {"end": ended(error)}

@@ -62,9 +62,7 @@ def test_compensation_keeps_what_a_step_rounds_away():
     """A bias that is known well moves by less than half of its last digit a step."""
     still = LinearModel(np.eye(2), [[1, "0.5"]], np.zeros((2, 2)), [["0.25"]], [1, 0], np.eye(2) * Fraction(1, 100))
     z, fmt = np.full((4000, 1), 1.9), FloatFormat(2, 11)
-    plain, kept = (
-        np.abs(emulate(still, z, fmt, Form.INNOVATION, compensated=each).state[-1]).max() for each in (False, True)
-    )
+    plain, kept = (np.abs(emulate(still, z, fmt, form).state[-1]).max() for form in (Form.INNOVATION, Form.COMPENSATED))
     assert kept < plain / 4
 
 
