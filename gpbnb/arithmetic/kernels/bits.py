@@ -104,6 +104,19 @@ def at(typingctx: Any, entries: Any, index: Any) -> Any:
 
 
 @intrinsic
+def copy(typingctx: Any, to: Any, given: Any, count: Any) -> Any:
+    """Copy entries at an address to another one."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        to, given, count = args
+        size = context.get_abi_sizeof(to.type.pointee)
+        cgutils.raw_memcpy(builder, to, given, context.cast(builder, count, signature.args[2], types.intp), size)
+        return context.get_dummy_value()
+
+    return types.void(to, given, count), codegen
+
+
+@intrinsic
 def entries(typingctx: Any, table: Any, index: Any, kind: Any) -> Any:
     """The entries of a type, such as ``np.float64``, at the address that an entry of a table holds."""
 

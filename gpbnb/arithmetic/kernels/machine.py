@@ -19,7 +19,7 @@ import numpy as np
 from numba import types
 
 from gpbnb.arithmetic.kernels import decimal, doubledouble, shortdecimal, wide
-from gpbnb.arithmetic.kernels.bits import at, call, entries, words
+from gpbnb.arithmetic.kernels.bits import at, call, copy, entries, words
 from gpbnb.arithmetic.kernels.careful import carefully, masked
 from gpbnb.arithmetic.kernels.compiling import address_of, addressed, borrowing, compiled, inner
 from gpbnb.arithmetic.kernels.kinds import operations_of, pair_format, short_format, word_format
@@ -462,19 +462,15 @@ def once(execute: int, formats: int, code: int, held: int, lanes: int) -> Any:
 @inner
 def _gathered(values: Any, pieces: Any, count: Any, to: Any) -> None:
     for i in range(count):
-        taken, length = at(values, pieces[2 * i]), pieces[2 * i + 1]
-        for j in range(length):
-            to[j] = taken[j]
-        to = at(to, length)
+        copy(to, at(values, pieces[2 * i]), pieces[2 * i + 1])
+        to = at(to, pieces[2 * i + 1])
 
 
 @inner
 def _scattered(values: Any, pieces: Any, count: Any, given: Any) -> None:
     for i in range(count):
-        to, length = at(values, pieces[2 * i]), pieces[2 * i + 1]
-        for j in range(length):
-            to[j] = given[j]
-        given = at(given, length)
+        copy(at(values, pieces[2 * i]), given, pieces[2 * i + 1])
+        given = at(given, pieces[2 * i + 1])
 
 
 @inner
@@ -488,8 +484,7 @@ def _feed(run: Any, values: Any, step: Any, begin: Any) -> None:
             taken = at(entries(feed, ADDRESS, np.int64), feed[BETWEEN] * ((feed[BEGIN] + step) % members))
             to = at(values, feed[PLACE] * wide)
             if parts == wide:
-                for i in range(count * wide):
-                    to[i] = taken[i]
+                copy(to, taken, count * wide)
                 continue
             for i in range(count):
                 for k in range(0, wide, parts):
@@ -537,8 +532,7 @@ def advance(execute: int, formats: int, code: int, held: int, run: int, notes: i
                     noted[ROW] = -1
                     return
             if noted[SINCE] == noted[LASTS]:
-                for j in range(states):
-                    before[j] = after[j]
+                copy(before, after, states)
                 noted[SINCE] = 0
                 noted[LASTS] += cycle * (noted[LASTS] // (8 * cycle) + 1)
     noted[ROW] = -1
