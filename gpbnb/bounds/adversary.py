@@ -148,7 +148,7 @@ class _Search:
         """Return the packed estimate after a step, the exact one, the error, and the largest share of a limit."""
         n, m, at = len(predicted), len(seen), self._at[k]
         after = self._rounded.take(self._given.packed[at], x, z)
-        computed, measured = np.split(_widened(np.concatenate([after, z])), [n])
+        computed, measured = np.split(double_doubles_near(np.concatenate([after, z])), [n])
         found = self._compared.take(self._gains[at], np.concatenate([predicted, seen, computed]), measured)
         innovation, exactly, error = np.split(found, [m, m + n])
         return after, exactly, error[..., 0], self._excess(measured[..., 0], innovation[..., 0], exactly[..., 0])
@@ -185,13 +185,6 @@ def _shares(sizes: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[
     """Return sizes as shares of their limits, which may be zero."""
     found = np.where(sizes == 0, 0.0, 1e10)
     return np.asarray(np.divide(sizes, limits, out=found, where=(sizes != 0) & (limits > 0)))
-
-
-def _widened(numbers: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert packed numbers to double-double: exactly in bases 2 and 16, within four roundings in base 10."""
-    if numbers.dtype == np.float64:
-        return np.stack([numbers, np.zeros_like(numbers)], axis=-1)
-    return double_doubles_near(numbers)
 
 
 def _first_decimals(x: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -23,7 +23,8 @@ from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form, form_with_program
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.opening import as_packed, widened_array
+from gpbnb.filters.opening import as_packed
+from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.program import Program, innovation_program, loop_program, matrices, sequential_program
 from gpbnb.filters.run import Run
 from gpbnb.filters.steps import decorrelated
@@ -96,8 +97,8 @@ def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Sched
     A, B = (double_doubles(each)[None] for each in matrices(program, stored))
     nothing = np.array([Fraction(0)] * n, dtype=object)
     return Schedule(
-        program, fmt, widened_array(packed), packed, A, np.zeros((1, m, n, 2)), B, nothing, first=0, settled=True,
-        repeat=None, period=None, origin=made,
+        program, fmt, nearest_double_doubles(packed), packed, A, np.zeros((1, m, n, 2)), B, nothing, first=0,
+        settled=True, repeat=None, period=None, origin=made,
     )  # fmt: skip
 
 
@@ -171,8 +172,8 @@ def schedule(
     HPhi = double_doubles(products)[phases % cycle]
     exact = true.run.G[:steps].reshape(steps, model.n, model.m, 2)
     return Schedule(
-        program, fmt, widened_array(packed), packed, Phi, HPhi, exact, x0, true.first, true.settled, repeat, period,
-        why, true.run.C[:steps], model, form,
+        program, fmt, nearest_double_doubles(packed), packed, Phi, HPhi, exact, x0, true.first, true.settled, repeat,
+        period, why, true.run.C[:steps], model, form,
     )  # fmt: skip
 
 

@@ -16,7 +16,6 @@ forms, see :mod:`gpbnb.filters.covariance`.
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -151,7 +150,7 @@ def stored_start(fmt: FloatFormat | FixedFormat, x0: Any) -> FloatArray:
 def double_doubles_of(array: FloatArray) -> NDArray[np.float64]:
     """Round the numbers of an array to the nearest double-doubles, (..., 2); exact in base 2 and 16."""
     if isinstance(array.backend, Compiled):
-        return widened_array(array.backend.pack(array.components))
+        return nearest_double_doubles(array.backend.pack(array.components))
     return double_doubles(exact(array))
 
 
@@ -165,17 +164,6 @@ def packed_array(array: FloatArray) -> NDArray[Any]:
             f"scale the states{cure}"
         )
     return array.backend.pack(array.components)
-
-
-def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert packed numbers of any format to double-double, exactly in base 2 and 16, to the nearest in base 10."""
-    if packed.dtype == np.float64:
-        return np.stack([packed, np.zeros_like(packed)], axis=-1)
-    found = nearest_double_doubles(packed)
-    for at in map(tuple, np.argwhere(np.isnan(found[..., 0]))):
-        m, e = packed[at].tolist()
-        found[at] = double_doubles(np.array([Fraction(m) * Fraction(10) ** e]))[0]
-    return found
 
 
 @remembered

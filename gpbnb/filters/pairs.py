@@ -1,10 +1,16 @@
-"""Decimal numbers, pairs of int64, in float64 and in double-double."""
+"""Packed numbers of any format in double-double, and decimal ones, pairs of int64, in float64."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.doubledouble import LEAST, LIMIT
 
 _LAST = 22
@@ -13,29 +19,45 @@ _SPLITTER = 2.0**27 + 1
 
 
 def nearest_floats(pairs: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Convert decimal numbers, (..., 2), to the nearest float64; NaN where that takes more digits."""
+    """Convert decimal numbers, (..., 2), to the nearest float64, infinite beyond its range."""
     m, e = pairs[..., 0], pairs[..., 1]
     x, power = m.astype(np.float64), _POWERS[np.minimum(np.abs(e), _LAST)]
-    return np.where(_takes_one_operation(pairs), np.where(e < 0, x / power, x * power), np.nan)
+    found = np.where(e < 0, x / power, x * power)
+    for at in _taking_more_operations(pairs):
+        m, e = pairs[at].tolist()
+        power = 10 ** min(abs(e), 400)  # which is beyond the range for every m
+        try:
+            found[at] = m / power if e < 0 else float(m * power)
+        except OverflowError:
+            found[at] = math.copysign(math.inf, m)
+    return found
 
 
-def nearest_double_doubles(pairs: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Convert decimal numbers, (..., 2), to the nearest double-doubles; NaN where that takes more digits."""
-    return np.where(_takes_one_operation(pairs)[..., np.newaxis], double_doubles_near(pairs), np.nan)
+def nearest_double_doubles(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """Convert packed numbers of any format, exactly in bases 2 and 16, to the nearest in base 10."""
+    found = double_doubles_near(packed)
+    if packed.dtype != np.float64:
+        for at in _taking_more_operations(packed):
+            m, e = packed[at].tolist()
+            found[at] = double_doubles(np.array([Fraction(m) * Fraction(10) ** e]))[0]
+    return found
 
 
-def _takes_one_operation(pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
-    return (np.abs(pairs[..., 0]) < 2**53) & (np.abs(pairs[..., 1]) <= _LAST)
+def _taking_more_operations(pairs: NDArray[np.int64]) -> Iterator[tuple[int, ...]]:
+    """Give the places of numbers that are not the result of one operation on a float64 and a power of ten."""
+    return map(tuple, np.argwhere((np.abs(pairs[..., 0]) >= 2**53) | (np.abs(pairs[..., 1]) > _LAST)))
 
 
 @np.errstate(all="ignore")
-def double_doubles_near(pairs: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Convert decimal numbers, (..., 2), to double-doubles, with a rounding for each 22 powers of ten.
+def double_doubles_near(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """Convert packed numbers as :func:`nearest_double_doubles`, but faster, with a rounding for each 22 powers of ten.
 
-    Numbers of at least 2**996 or, except for zero, below 2**-850 become NaN.
+    Decimal numbers of at least 2**996 or, except for zero, below 2**-850 become NaN.
     The operations are those of :mod:`gpbnb.arithmetic.kernels.doubledouble` for a second number of one float64.
     """
-    m, e = pairs[..., 0], pairs[..., 1]
+    if packed.dtype == np.float64:
+        return np.stack([packed, np.zeros_like(packed)], axis=-1)
+    m, e = packed[..., 0], packed[..., 1]
     high = m.astype(np.float64)
     low = (m - high.astype(np.int64)).astype(np.float64)
     while (left := (e != 0) & (high != 0) & ~np.isnan(high)).any():

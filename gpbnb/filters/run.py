@@ -28,7 +28,6 @@ from gpbnb.filters.opening import (
     as_packed,
     double_doubles_of,
     opening,
-    widened_array,
 )
 from gpbnb.filters.pairs import double_doubles_near, nearest_floats
 from gpbnb.filters.recording import recorded_step, step_kind
@@ -281,7 +280,7 @@ class Run(Progress):
             if x.dtype == np.float64:
                 out[begin:end] = x if x.ndim == 3 else x[..., 0]
             else:
-                _nearest_floats(x, out[begin:end])
+                out[begin:end] = nearest_floats(x)
         return out
 
     def use_measurement_matrices(self, H: NDArray[np.float64], decimals: int | None = None) -> None:
@@ -399,27 +398,9 @@ class Run(Progress):
         return Checkpoints(steps, x, *without_factors(self.form, *factors))
 
 
-def _nearest_floats(pairs: NDArray[np.int64], out: NDArray[np.float64]) -> None:
-    """Convert decimal numbers to the nearest float64, infinite beyond its range."""
-    out[:] = nearest_floats(pairs)
-    for at in map(tuple, np.argwhere(np.isnan(out))):
-        m, e = pairs[at].tolist()
-        power = 10 ** min(abs(e), 400)  # which is beyond the range for every m
-        try:
-            out[at] = m / power if e < 0 else float(m * power)
-        except OverflowError:
-            out[at] = math.copysign(math.inf, m)
-
-
 def widened(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert results of compiled loops in any format, (k, n, m) or (k, n, m, 2), to double-double.
-
-    In base 10, this is faster than :func:`gpbnb.filters.opening.widened_array`, but it rounds once for every 22 powers
-    of ten.
-    """
-    if packed.ndim == 3:
-        return widened_array(packed)
-    if packed.dtype == np.float64:
+    """Convert results of a run, (k, n, m) or (k, n, m, 2), unless they are in it, to double-doubles near them."""
+    if packed.dtype == np.float64 and packed.ndim == 4:
         return np.ascontiguousarray(packed)
     return double_doubles_near(packed)
 

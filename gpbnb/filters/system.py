@@ -28,7 +28,8 @@ from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
-from gpbnb.filters.opening import as_packed, packed_array, stored_start, widened_array
+from gpbnb.filters.opening import as_packed, packed_array, stored_start
+from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.program import AT_LEAST, Program, matrices
 from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
 from gpbnb.filters.structures import (
@@ -645,11 +646,11 @@ class LinearSystem:
     def _widened(self, outputs: NDArray[Any], first: int | None = None) -> NDArray[np.float64]:
         """Return packed outputs (steps, p) of any format, or states from the first, as pairs of float64."""
         try:
-            return widened_array(outputs)
+            return nearest_double_doubles(outputs)
         except OverflowError:
             for k, i in np.ndindex(outputs.shape[:2]):
                 try:
-                    widened_array(outputs[k : k + 1, i : i + 1])
+                    nearest_double_doubles(outputs[k : k + 1, i : i + 1])
                 except OverflowError:
                     place = self._value((self.n if first is None else first) + i)
                     raise OverflowError(f"{place} at step {k + 1}: {self.beyond(None)}") from None

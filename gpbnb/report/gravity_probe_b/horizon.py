@@ -24,7 +24,7 @@ from gpbnb.bounds.guarantee import limits, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.opening import widened_array
+from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
 from gpbnb.report.gravity_probe_b.error_sets import GAIN, Disturbances, Reach, disturbances, functions
@@ -112,7 +112,9 @@ def bounds_in_blocks(
         at = done + np.arange(count)
         exact = true.G[:count].reshape(count, program.n, program.m, 2)
         of_model = Phi[at % len(Phi)], HPhi[at % len(HPhi)]
-        given = Schedule(program, fmt, widened_array(packed), packed, *of_model, exact, x0, 0, False, None, None)
+        given = Schedule(
+            program, fmt, nearest_double_doubles(packed), packed, *of_model, exact, x0, 0, False, None, None
+        )
         known = functions(given)
         for one in each:
             one.follow(disturbances(given, known, true.bounds.gain[:count], one.within, one.assumed), window)
