@@ -17,11 +17,11 @@ import numpy as np
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.linear import error_coefficients, peak_gain
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.program import recorded
 from gpbnb.filters.system import LinearFilter, LinearSystem
 from gpbnb.report.display.tables import Table, short
+from gpbnb.report.guarantees.peak_gain import error_coefficients, peak_gain
 from gpbnb.report.guarantees.published import fixif_longitudinal
 
 SINGLE, DOUBLE = FloatFormat(2, 24, Rounding.EVEN), FloatFormat(2, 53, Rounding.EVEN)

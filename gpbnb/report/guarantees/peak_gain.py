@@ -14,6 +14,12 @@ from gpbnb.arithmetic.rational import exact
 _COLUMNS = 256
 """Smallest number of columns of a block, which balls multiply at once."""
 
+_BITS = tuple(2**k for k in range(8, 14))
+"""Bits of the balls, one after the other."""
+
+_ACCURACY = 2.0**-40
+"""Largest distance of the two ends, as a share of the gain."""
+
 _MOST_TERMS = 2**22
 """Terms after which the rest of an infinite sum must be negligible."""
 
@@ -39,59 +45,32 @@ class Interval(NamedTuple):
     high: NDArray[np.float64]
 
 
-def peak_gain(A: Any, B: Any, C: Any, D: Any = None, terms: int | None = None, accuracy: float = 2.0**-40) -> Interval:
+def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Interval:
     r"""Return the worst-case peak gain :math:`|D| + \sum_{l\ge0}|CA^lB|`, in ball arithmetic; (p, m).
 
     Multiplied step by step, balls would grow with the norm of :math:`|A|`, which exceeds 1 for most stable filters.
     Powers of A are therefore squared, so that :math:`A^lB` is a product of few factors, at most one for each bit of l.
-    The bits of the balls are doubled until both ends agree.
-
-    Parameters
-    ----------
-    terms : number of terms of the sum, for the gain over a finite time; by default all. The system may then grow.
-    accuracy : largest distance of the two ends, as a share of the gain.
+    The bits of the balls are doubled until the two ends agree up to 2**-40 of the gain.
     """
-    found = _gains((A, B, C, D), terms, accuracy)
-    n = len(found.low) - len(exact(C))
-    return Interval(found.low[n:], found.high[n:])
+    for bits in _BITS:
+        if (found := _enclosed((A, B, C, D), bits)) is not None:
+            if not np.isfinite(found.high).all():
+                raise OverflowError("got a system whose largest gain is beyond the range of float64; scale its inputs")
+            n = len(found.low) - len(exact(C))
+            return Interval(found.low[n:], found.high[n:])
+    raise ValueError(f"the gain cannot be enclosed in balls of {_BITS[-1]} bits; use another structure")
 
 
-def _gains(matrices: tuple[Any, ...], terms: int | None, accuracy: float) -> Interval:
-    """Return the gains to states and outputs, (n + p, m); for the arguments, see :func:`peak_gain`."""
-    _check_terms(terms)
-    bits, most = 256, 2**13 if terms is None else 2**15
-    while bits <= most:
-        if (found := _enclosed(matrices, terms, accuracy, bits)) is not None:
-            if np.isfinite(found.high).all():
-                return found
-            over, cure = ("", "scale its inputs") if terms is None else (f" over {terms + 1} steps", "take fewer")
-            raise OverflowError(f"got a system whose largest gain{over} is beyond the range of float64; {cure}")
-        bits *= 2
-    if terms is not None:
-        raise ValueError(
-            f"the gain over {terms + 1} steps cannot be enclosed in balls of {most} bits; take fewer steps"
-        )
-    raise ValueError(f"the gain cannot be enclosed in balls of {most} bits; use another structure")
-
-
-def _check_terms(terms: int | None) -> None:
-    if terms is not None and terms > 2**20:
-        raise ValueError(f"got a bound over {terms + 1} steps; needed at most {2**20} where no bound holds for ever")
-
-
-def _enclosed(matrices: tuple[Any, ...], terms: int | None, accuracy: float, bits: int) -> Interval | None:
-    """Enclose the gains in balls of some bits; None if these are too few."""
+def _enclosed(matrices: tuple[Any, ...], bits: int) -> Interval | None:
+    """Enclose the gains to states and outputs, (n + p, m), in balls of some bits; None if these are too few."""
     before, ctx.prec = ctx.prec, bits
     try:
         sums = _Sums(*matrices)
-        if terms is not None:
-            sums.add(terms)
-            return sums.ends(accuracy)
         while sums.count < _MOST_TERMS and not sums.lasts():
             sums.add(sums.count or sums.length)
-            if sums.ends(accuracy / 2) is None:  # further terms do not make balls smaller
+            if sums.ends(_ACCURACY / 2) is None:  # further terms do not make balls smaller
                 return None
-            if (rest := sums.rest()) is not None and (found := sums.ends(accuracy, rest)) is not None:
+            if (rest := sums.rest()) is not None and (found := sums.ends(_ACCURACY, rest)) is not None:
                 return found
         raise ValueError(_TOO_SLOW)
     finally:
@@ -129,25 +108,23 @@ class _Sums:
         return bool(abs(power.trace()) > self._n * _SHARP)
 
     def add(self, terms: int) -> None:
-        """Add further terms."""
-        block, left = self._reached() * self._block if self.count else self._block, terms
-        for each in self._blocks(block, -(-terms // self.length)):
+        """Add further terms, a multiple of the length of a block."""
+        block = self._reached() * self._block if self.count else self._block
+        for each in self._blocks(block, terms // self.length):
             rows, width, m = [*each.entries(), *(self._C * each).entries()], each.ncols(), self._inputs
-            used = min(left, self.length) * m
             for i, row in enumerate(self._sums):
-                own = rows[i * width : i * width + used]
+                own = rows[i * width : (i + 1) * width]
                 self._sums[i] = [sum(map(abs, own[j::m]), s) for j, s in enumerate(row)]
-            left -= self.length
         self.count += terms
 
     def _blocks(self, block: Any, count: int) -> Iterator[Any]:
-        """Yield a block and those after it."""
-        if count <= 1:
-            yield from [block] * count
+        """Yield a block and those after it; the count is a power of two."""
+        if count == 1:
+            yield block
             return
-        level = (count - 1).bit_length() - 1
-        yield from self._blocks(block, 2**level)
-        yield from self._blocks(self._power(level) * block, count - 2**level)
+        level = count.bit_length() - 2
+        yield from self._blocks(block, count // 2)
+        yield from self._blocks(self._power(level) * block, count // 2)
 
     def rest(self) -> list[list[Any]] | None:
         r"""Bound the sums over all later terms; None if no bound follows yet.
