@@ -181,6 +181,12 @@ HERE = {
     "B8": B8,
     "FMT": gpbnb.FloatFormat(2, 24),
     "Q": gpbnb.FixedFormat(3, 12),
+    "KINDS": (
+        *(gpbnb.FloatFormat(2, 24), gpbnb.FloatFormat(2, 8, "even"), gpbnb.FloatFormat(2, 5, "up"), gpbnb.BINARY16),
+        *(gpbnb.FloatFormat(10, 4), gpbnb.FloatFormat(10, 3, "down"), gpbnb.FloatFormat(2, 70, "half up")),
+        *(gpbnb.FloatFormat(16, 3, "chop"), gpbnb.FloatFormat(2, 8, "odd"), gpbnb.FP8_E4M3, gpbnb.FixedFormat(5, 6)),
+        *(gpbnb.FixedFormat(5, 6, "half up", "saturate"), gpbnb.FloatFormat(2, 6, "stochastic", seed=3)),
+    ),
     "V": D4.array(["1.5", "-2", "0"]),
     "W": B8.array([1, 2, 3]),
     "ONE": np.ones((2, 2)),
