@@ -196,6 +196,12 @@ HERE = {
     "Z": small_filter.measurements(),
     "SYSTEM": gpbnb.LinearSystem([["0.9"]], [["0.1"]]),
     "BIQUAD": FilterDesign(["0.1", "0.2", "0.1"], [1, "-1.2", "0.5"]),
+    "CASCADE": FilterDesign(sos=[["0.1", "0.2", "0.1", 1, "-1.2", "0.5"], [1, 1, 0, 2, "-0.5", "0.25"]]),
+    "SWING": gpbnb.NonlinearModel(
+        *(lambda x: np.stack([x[0] + x[1] / 8, x[1] - np.sin(x[0]) / 8]), None),
+        *(lambda x: np.stack([np.cos(x[0]), x[1] * x[0]]), None, [[0, 0], [0, "0.01"]], [["0.5", "0.1"], ["0.1", 1]]),
+        *([1, "0.25"], [["0.1", 0], [0, 1]]),
+    ),
     "STEP": gpbnb.NonlinearSystem(lambda fmt, x, u: (x + u / 8, x), [0]),
     "WITHIN": gpbnb.limits(measurement=0.001),
     "MIMO": ([[0.5, 0.1], [-0.2, 0.8]], [[1.0, 0.3], [0.2, -1.0]], [[1.0, 2.0], [0.5, -1.0]], [[0.1, 0], [0, 0.2]]),
@@ -220,8 +226,8 @@ def names(section):
     for path in [*LIBRARIES.split(), *(f"gpbnb.{room}" for room in ROOMS.split())]:
         module = import_module(path)
         found |= {path.rpartition(".")[2]: module} | public(module)
-    found |= {name: getattr(gpbnb, name) for name in gpbnb.__all__} | public(sys.modules[__name__]) | HERE
-    return found | (public(import_module(section.split(":")[0])) if section.startswith("gpbnb.") else {})
+    found |= {name: getattr(gpbnb, name) for name in gpbnb.__all__} | public(sys.modules[__name__])
+    return found | (public(import_module(section)) if section.startswith("gpbnb.") else {}) | HERE
 
 
 def texts(stored):
