@@ -226,8 +226,8 @@ def names(section):
     for path in [*LIBRARIES.split(), *(f"gpbnb.{room}" for room in ROOMS.split())]:
         module = import_module(path)
         found |= {path.rpartition(".")[2]: module} | public(module)
-    found |= {name: getattr(gpbnb, name) for name in gpbnb.__all__} | public(sys.modules[__name__])
-    return found | (public(import_module(section)) if section.startswith("gpbnb.") else {}) | HERE
+    found |= {name: getattr(gpbnb, name) for name in gpbnb.__all__} | public(sys.modules[__name__]) | HERE
+    return found | (public(import_module(section)) if section.startswith("gpbnb.") else {})
 
 
 def texts(stored):
@@ -266,7 +266,7 @@ def folder(stored):
 def real(x, largest=0.0):
     """Ten digits, fewer where a number is small beside the largest of its array."""
     if not math.isfinite(x) or not x:
-        return f"{x:.10g}"
+        return f"{x or 0:.10g}"
     places = min(9, 12 + math.floor(math.log10(abs(x))) - math.floor(math.log10(largest or abs(x))))
     return f"{x:.{places + 1}g}" if places >= 0 else "0"
 
@@ -321,9 +321,9 @@ def written(value, depth=0):
         shape = f"{value.shape} " if value.ndim != 1 else ""
         if value.dtype.kind == "f":
             return f"[{shape}{reals(value)}]"
-        return f"[{shape}{several([written(each, depth + 1) for each in value.ravel().tolist()])}]"
+        return f"[{shape}{several([written(each, depth) for each in value.ravel().tolist()])}]"
     if isinstance(value, Mapping):
-        items = (f"{written(key, 2)}: {written(each, depth + 1)}" for key, each in value.items())
+        items = (f"{written(key, 2)}: {written(each, depth)}" for key, each in value.items())
         return f"{{{several(list(items))}}}"
     if isinstance(value, type | ModuleType) or (callable(value) and not hasattr(value, "__dataclass_fields__")):
         return getattr(value, "__name__", type(value).__name__)
@@ -332,9 +332,9 @@ def written(value, depth=0):
             listed = sorted(value) if isinstance(value, set | frozenset) else list(value)
             if listed and all(isinstance(each, float) for each in listed):
                 return f"[{several([real(each) for each in listed])}]"
-            return f"[{several([written(each, depth + 1) for each in listed])}]"
+            return f"[{several([written(each, depth) for each in listed])}]"
         return several([re.sub(r"-?\d+/\d{12,}", lambda ratio: real(float(Fraction(ratio[0]))), str(value))])
-    if depth > 2:
+    if depth > 1:
         return type(value).__name__
     return f"{type(value).__name__}({several([f'{n}={written(each, depth + 1)}' for n, each in attributes(value)])})"
 
@@ -343,10 +343,11 @@ def text(call, stored, space):
     """What is stored of a call: its refusal, or what it returns, as written, or at a prompt and as print shows it."""
     try:
         found = eval(call, space)
+        said = written(found) if stored == "answers" else ""
     except Exception as error:
         return f"{type(error).__name__}: {error}"
-    if stored == "answers":
-        return "\n".join(textwrap.wrap(written(found), 116, break_long_words=False, break_on_hyphens=False))
+    if said:
+        return "\n".join(textwrap.wrap(said, 116, break_long_words=False, break_on_hyphens=False))
     both = [found.rstrip("\n")] if isinstance(found, str) else [repr(found), str(found)]
     return "\n".join(line.rstrip() for each in dict.fromkeys(both) for line in each.splitlines())
 
