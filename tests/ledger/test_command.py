@@ -86,31 +86,6 @@ def test_formats(ledger):
     assert [line.split()[1] for line in text.splitlines()] == [row.statement.id for row in part]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (
-            ["--document", "hung1983"],
-            "got document 'hung1983', which no entry has; needed one of hung1984, hung1982, savage2016",
-        ),
-        (["--chapter", "V"], "got chapter 'V'"),
-        (["--section", "2", "99"], "got section '99'"),
-        (["--section"], "expected at least one argument"),
-        (["--format", "xml"], "invalid choice: 'xml'"),
-        (["--output", "."], "needed a regular file"),
-        (["--output", os.devnull], "needed a regular file"),
-        (["--output", "no/such/file.csv"], "needed an existing directory"),
-        (["extra"], "unrecognized arguments: extra"),
-    ],
-)
-def test_bad_arguments_are_explained_with_status_2(ledger, arguments, message):
-    done = ledger(*arguments)
-    assert done.returncode == 2
-    assert message in done.stderr.decode()
-    assert "Traceback" not in done.stderr.decode()
-    assert done.stdout == b""
-
-
 def test_output_file_is_replaced_as_a_whole(ledger, tmp_path):
     target = tmp_path / "out" / "ledger.csv"
     target.parent.mkdir()

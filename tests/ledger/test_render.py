@@ -1,9 +1,8 @@
-"""The ledger written out: CSV, JSON, text, and Markdown that renders."""
+"""The ledger written out: CSV, and Markdown that renders; shown.txt has JSON and text."""
 
 import csv
 import io
 import itertools
-import json
 import re
 from dataclasses import replace
 
@@ -13,7 +12,7 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 from gpbnb.report.ledger import Row, load_statements, table
 from gpbnb.report.ledger.finding import Finding, Verdict, compare
-from gpbnb.report.ledger.render import to_csv, to_json, to_text
+from gpbnb.report.ledger.render import to_csv
 from gpbnb.report.ledger.statements import Statement
 
 ENTRY = Statement("hung1984.II.eq20", "hung1984", "II", "6", "eq (20)", "equation", r"$|\tilde Q/Q|\le(n+m+1)\beta$")
@@ -40,30 +39,6 @@ def test_csv_is_rfc_4180_with_the_columns_of_the_contract():
     assert [record["verdict"] for record in records] == [*FINDINGS]
     assert [record["note"] for record in records] == [f.note for f in FINDINGS.values()]
     assert {record["printed"] for record in records} == {ENTRY.printed}
-
-
-def test_json_says_the_same():
-    records = json.loads(to_json(ROWS))
-    assert [record["agrees"] for record in records] == [False, True, None, True]
-    assert [record["verdict"] for record in records] == [*FINDINGS]
-    assert records[0] == {
-        "id": ENTRY.id,
-        "document": "hung1984",
-        "kind": "equation",
-        "printed": ENTRY.printed,
-        "recomputed": r"$(n+m-1)\beta$",
-        "agrees": False,
-        "verdict": "misprint",
-        "note": FINDINGS["misprint"].note,
-    }
-    assert to_json(()) == "[]\n"
-    assert to_json(ROWS).endswith("\n]\n")
-
-
-def test_text_has_a_line_for_each_row():
-    line = rf'misprint      {ENTRY.id}  $(n+m-1)\beta$  one "sign", as |(20)| of 1982'
-    assert to_text(ROWS).splitlines()[0] == line
-    assert len(to_text(ROWS).splitlines()) == len(ROWS)
 
 
 def cells(line):

@@ -49,24 +49,6 @@ def test_select_sections_takes_what_is_below_but_not_what_begins_alike():
     ]
 
 
-@pytest.mark.parametrize(
-    ("filters", "message"),
-    [
-        (
-            {"document": "hung1983"},
-            "got document 'hung1983', which no entry has; needed one of hung1984, hung1982, savage2016",
-        ),
-        ({"document": "hung1984", "chapter": "IV"}, "got chapter 'IV', which no entry has; needed one of I, II, III"),
-        ({"chapter": "IV", "sections": [1]}, "got section '1', which no entry has; needed one of -"),
-        ({"document": "hung1984", "sections": ["9", "99"]}, "got section '99', which no entry has"),
-        ({"sections": []}, "got an empty sections"),
-    ],
-)
-def test_an_empty_selection_is_refused(filters, message):
-    with pytest.raises(ValueError, match=message):
-        select(INVENTORY, **filters)
-
-
 def markup_faults(printed):
     parts = printed.split("$")
     if len(parts) % 2 == 0:
