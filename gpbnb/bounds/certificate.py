@@ -93,6 +93,14 @@ def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
     return Proof(guess.bound, "", why)
 
 
+def proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
+    """Return the first proof that the checker finds, as :func:`first_proved`; ValueError says why there is none."""
+    proof = first_proved(guess, written)
+    if proof.why:
+        raise ValueError(proof.why)
+    return proof
+
+
 def _head(name: str, bound: Any, steps: int | None, back: int) -> dict[str, Any]:
     return {"certificate": KIND, "name": name, "order": ORDER, "bound": texts(bound), "steps": steps, "back": back}
 

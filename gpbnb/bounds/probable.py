@@ -18,7 +18,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import FilterGuarantee, from_guess, limits
 from gpbnb.bounds.guess import linear_steps, rounding_errors, value_sizes
-from gpbnb.bounds.system import guessed_errors
+from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.structures import steady_covariance
 from gpbnb.filters.system import LinearSystem
 
@@ -66,6 +66,6 @@ def probable_output_errors(
     system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Estimate the error of each output, (p,): three deviations of roundings, and bounds of errors of storing."""
-    whole, made, n = guessed_errors(system, fmt, largest), system.as_filter(), system.n
+    whole, made, n = OutputBounds(system, largest).guessed(fmt), system.as_filter(), system.n
     found = from_guess(filter_schedule(made, fmt), limits(measurement=largest))
     return np.asarray(whole - found.bound[n:] + 3 * probable_error(found)[n:])

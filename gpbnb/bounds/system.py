@@ -7,6 +7,8 @@ Over N steps, the sums over earlier steps have N terms, and the same bounds hold
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,48 +18,70 @@ from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.bounds.certificate import Proof, first_proved, of_operations
+from gpbnb.bounds.certificate import Proof, of_operations, proved
 from gpbnb.bounds.guess import Guess, constant_guess
 from gpbnb.bounds.limited import limited_errors
 from gpbnb.bounds.units import largest_errors
+from gpbnb.bounds.words import WordSums
 from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.words import WordFormats
 
 
-def _largest(system: LinearSystem, largest: Any) -> NDArray[np.float64]:
-    if any(system.x0):
-        raise ValueError(f"got a first state {system.x0.tolist()}; needed x0 = 0 for a bound")
-    return np.broadcast_to(all_above(largest), (system.m,))
+class OutputBounds:
+    """Bounds of the errors of a system that starts from rest, for all inputs within limits of their size, (m,).
 
+    They hold for a number of steps, by default for all time. Bounds of a linear system are guessed, and proved by
+    :mod:`gpbnb.bounds.check`; those of a system that limits its values hold without a proof, and have no words.
+    """
 
-def guessed_errors(
-    system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: Any, steps: int | None = None
-) -> NDArray[np.float64]:
-    """Return what :func:`output_errors` is going to prove, without a proof."""
-    inputs = _largest(system, largest)
-    if not system.as_filter().program.is_linear:
-        return limited_errors(system, fmt, inputs, steps)
-    return _guess(system, fmt, inputs, steps).bound[system.n :]
+    def __init__(self, system: LinearSystem, largest: Any, steps: int | None = None) -> None:
+        if any(system.x0):
+            raise ValueError(f"got a first state {system.x0.tolist()}; needed x0 = 0 for a bound")
+        self._system, self._made, self._steps = system, system.as_filter(), steps
+        self._largest = np.broadcast_to(all_above(largest), (system.m,))
 
+    @cached_property
+    def _words(self) -> WordSums:
+        return WordSums(self._system, self._largest, self._steps)
 
-def _guess(
-    system: LinearSystem, fmt: FloatFormat | FixedFormat, inputs: NDArray[np.float64], steps: int | None
-) -> Guess:
-    if steps is None and (cause := system.unstable(fmt)):
-        raise ValueError(cause)
-    if not np.isfinite(largest_errors(fmt, inputs)).all():
-        raise ValueError(f"got inputs of up to {inputs}; needed inputs within the range of {arithmetic(fmt)}")
-    found = constant_guess(system.as_filter(), fmt, inputs, steps, as_given=True)
-    if found.why:
-        raise ValueError(found.why)
-    if not np.isfinite(found.state).all():
-        over, cure = ("", "scale the inputs") if steps is None else (f" over {steps} steps", "take fewer steps")
-        raise OverflowError(f"got a system whose largest gain{over} is beyond the range of float64; {cure}")
-    if not np.isfinite(found.bound).all():
-        why = "in this precision, an error causes rounding errors as large as itself"
-        if fmt.limits is not None:
-            why = f"a number may exceed the largest of {arithmetic(fmt)}"
-        raise ValueError(f"no bound was found: {why}")
-    return found
+    def guessed(self, fmt: FloatFormat | FixedFormat | WordFormats) -> NDArray[np.float64]:
+        """Return what :meth:`errors` is going to prove, without a proof."""
+        return self._errors(fmt, self._guess)
+
+    def errors(self, fmt: FloatFormat | FixedFormat | WordFormats) -> NDArray[np.float64]:
+        """Bound the error of each output, (p,), from the system as given, due to rounding and storing."""
+        return self._errors(fmt, self.proof)
+
+    def _errors(self, fmt: Any, bounded: Callable[[Any], Guess | Proof]) -> NDArray[np.float64]:
+        if not isinstance(fmt, WordFormats) and not self._made.program.is_linear:
+            return limited_errors(self._system, fmt, self._largest, self._steps)
+        return bounded(fmt).bound[self._system.n :]
+
+    def proof(self, fmt: FloatFormat | FixedFormat | WordFormats) -> Proof:
+        """Return the bounds of states and outputs of a linear system with their certificate; see :meth:`errors`."""
+        inputs, steps = self._largest, self._steps
+        return proved(self._guess(fmt), lambda guess: of_operations(self._made, fmt, inputs, guess, steps, "as given"))
+
+    def _guess(self, fmt: FloatFormat | FixedFormat | WordFormats) -> Guess:
+        if isinstance(fmt, WordFormats):
+            return self._words.guess(fmt)
+        system, inputs, steps = self._system, self._largest, self._steps
+        if steps is None and (cause := system.unstable(fmt)):
+            raise ValueError(cause)
+        if not np.isfinite(largest_errors(fmt, inputs)).all():
+            raise ValueError(f"got inputs of up to {inputs}; needed inputs within the range of {arithmetic(fmt)}")
+        found = constant_guess(self._made, fmt, inputs, steps, as_given=True)
+        if found.why:
+            raise ValueError(found.why)
+        if not np.isfinite(found.state).all():
+            over, cure = ("", "scale the inputs") if steps is None else (f" over {steps} steps", "take fewer steps")
+            raise OverflowError(f"got a system whose largest gain{over} is beyond the range of float64; {cure}")
+        if not np.isfinite(found.bound).all():
+            why = "in this precision, an error causes rounding errors as large as itself"
+            if fmt.limits is not None:
+                why = f"a number may exceed the largest of {arithmetic(fmt)}"
+            raise ValueError(f"no bound was found: {why}")
+        return found
 
 
 def output_errors(
@@ -82,17 +106,4 @@ def output_errors(
     >>> bool(output_errors(clock, FloatFormat(2, 17), 0.1, steps=200)[0] < 0.05)
     True
     """
-    inputs = _largest(system, largest)
-    if not system.as_filter().program.is_linear:
-        return limited_errors(system, fmt, inputs, steps)
-    return output_proof(system, fmt, inputs, steps).bound[system.n :]
-
-
-def output_proof(system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: Any, steps: int | None = None) -> Proof:
-    """Return the bounds of states and outputs of a linear system with their certificate; see :func:`output_errors`."""
-    inputs, made = _largest(system, largest), system.as_filter()
-    found = _guess(system, fmt, inputs, steps)
-    proof = first_proved(found, lambda guess: of_operations(made, fmt, inputs, guess, steps, "as given"))
-    if proof.why:
-        raise ValueError(proof.why)
-    return proof
+    return OutputBounds(system, largest, steps).errors(fmt)

@@ -19,15 +19,14 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.bounds.certificate import Proof, first_proved, of_operations
+from gpbnb.bounds.certificate import of_operations, proved
 from gpbnb.bounds.guess import EXCESS, Guess, gains, lags_of, loops, positive
 from gpbnb.bounds.units import units
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, exact_functionals, matrices
@@ -73,10 +72,7 @@ def bounded_rounding(made: LinearFilter, words: WordFormats) -> NDArray[np.float
     sums = gains(F, effects, np.zeros((0, n)), None, lags)
     bound, inputs = positive(sums @ rounding_limits(stored) * EXCESS), np.full(m, np.inf)
     guess = Guess(bound, bound, inputs, np.zeros((n, 3)), lags)
-    proof = first_proved(guess, lambda each: of_operations(made, words, inputs, each, None))
-    if proof.why:
-        raise ValueError(proof.why)
-    return proof.bound
+    return proved(guess, lambda each: of_operations(made, words, inputs, each, None)).bound
 
 
 def _effects(made: IntegerProgram) -> NDArray[np.float64]:
@@ -107,41 +103,20 @@ class _Sums(NamedTuple):
     lags: int  # how many earlier steps are summed one by one
 
 
-class WordGuarantee:
-    """Bounds of the errors of a linear system in fixed-point words, for all inputs within limits of their size, (m,).
+class WordSums:
+    """Guesses for a linear system in fixed-point words, from rest and for all inputs within limits of their size, (m,).
 
-    The system starts from rest, and the bounds hold for a number of steps, by default for all time. Sums are computed
-    once for the same stored coefficients, so that a search over units of the data is fast.
+    Sums are computed once for the same stored coefficients, so that a search over units of the data is fast.
     """
 
-    def __init__(self, system: LinearSystem, largest: Any, steps: int | None = None) -> None:
-        self.system, self._made, self._steps = system, system.as_filter(), steps
-        self._largest = np.broadcast_to(all_above(largest), (system.m,))
+    def __init__(self, system: LinearSystem, largest: NDArray[np.float64], steps: int | None) -> None:
+        self._made, self._steps, self._largest = system.as_filter(), steps, largest
         self._known = dict[tuple[Fraction, ...], _Sums]()
-        if any(system.x0):
-            raise ValueError(f"got a first state {system.x0.tolist()}; needed x0 = 0 for a bound")
         if not self._made.program.is_linear:
             raise ValueError(f"got {self._made.name}, which limits its values; needed a linear system for a bound")
 
-    def errors(self, words: WordFormats) -> NDArray[np.float64]:
-        """Bound the error of each output, (p,), from the system as given, due to rounding and storing."""
-        return self.proof(words).bound[self.system.n :]
-
-    def guessed(self, words: WordFormats) -> NDArray[np.float64]:
-        """Return what :meth:`errors` is going to prove, without a proof."""
-        return self._guess(words).bound[self.system.n :]
-
-    def proof(self, words: WordFormats) -> Proof:
-        """Return the bounds of states and outputs with their certificate; see :meth:`errors`."""
-        guess, inputs = self._guess(words), self._largest
-        proof = first_proved(
-            guess, lambda each: of_operations(self._made, words, inputs, each, self._steps, "as given")
-        )
-        if proof.why:
-            raise ValueError(proof.why)
-        return proof
-
-    def _guess(self, words: WordFormats) -> Guess:
+    def guess(self, words: WordFormats) -> Guess:
+        """Return what is to be proved of some words; OverflowError if a result may be beyond its format."""
         made = integer_program(self._made, words)
         found = self._sums(made)
         share = float(units(words.data).errors[0])

@@ -12,8 +12,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds import guarantee as of_filters
 from gpbnb.bounds.guarantee import Guarantee
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.bounds.system import output_errors, output_proof
-from gpbnb.bounds.words import WordGuarantee
+from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import whole_number
@@ -73,12 +72,10 @@ def _of_system(system: LinearSystem, fmt: Any, largest: NDArray[np.float64], hor
     steps = horizon if why else None
     for tried in (steps, horizon) if not linear else (steps,):
         try:
-            if isinstance(words, WordFormats):
-                proof = WordGuarantee(system, largest, tried).proof(words)
-            elif linear:
-                proof = output_proof(system, fmt, largest, tried)
-            else:
-                return Guarantee(output_errors(system, fmt, largest, tried), tried, why, fmt)
+            bounds = OutputBounds(system, largest, tried)
+            if not linear and not isinstance(words, WordFormats):
+                return Guarantee(bounds.errors(fmt), tried, why, fmt)
+            proof = bounds.proof(words)
             return Guarantee(proof.bound[system.n :], tried, why, fmt, proof.text)
         except (ValueError, OverflowError) as error:
             why = str(error)

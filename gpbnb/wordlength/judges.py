@@ -19,8 +19,7 @@ from gpbnb.arithmetic.search import Outcome
 from gpbnb.bounds.guarantee import FilterGuarantee, guarantee, guessed, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.probable import probable_error, probable_output_errors
-from gpbnb.bounds.system import guessed_errors, output_errors
-from gpbnb.bounds.words import WordGuarantee
+from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import named
@@ -376,17 +375,16 @@ def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, w
     linear = system.as_filter().program.is_linear
 
     def over(steps: int | None) -> Judge:
-        words = cache(lambda: WordGuarantee(system, most, steps))
+        known = OutputBounds(system, most, steps)
 
         def bounds(proved: bool) -> Callable[[Any], Found]:
             def found(fmt: Any) -> NDArray[np.float64]:
                 one = fmt.data if isinstance(fmt, WordFormats) and fmt == WordFormats(fmt.data) else fmt
                 if basis == "probable":
                     return probable_output_errors(system, one, most)
-                if isinstance(one, WordFormats) or (isinstance(one, FixedFormat) and linear):
-                    in_words = WordFormats(one) if isinstance(one, FixedFormat) else one
-                    return words().errors(in_words) if proved else words().guessed(in_words)
-                return (output_errors if proved else guessed_errors)(system, one, most, steps)
+                if isinstance(one, FixedFormat) and linear:
+                    one = WordFormats(one)
+                return known.errors(one) if proved else known.guessed(one)
 
             return reasoned(found)
 

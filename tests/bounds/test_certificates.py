@@ -27,7 +27,7 @@ from gpbnb.bounds.certificate import first_proved, of_operations
 from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
-from gpbnb.bounds.words import WordGuarantee
+from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.system import biquad
 from gpbnb.report.guarantees import certificates
@@ -61,7 +61,7 @@ def section(fmt: Any) -> Content:
 def in_words() -> Content:
     system = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"])
     words = WordFormats(FixedFormat(6, 12), 14, FixedFormat(6, 16))
-    return dict(json.loads(WordGuarantee(system, 1.0).proof(words).text))
+    return dict(json.loads(OutputBounds(system, 1.0).proof(words).text))
 
 
 def refused(content: Content) -> str:

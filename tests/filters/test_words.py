@@ -10,7 +10,7 @@ from test_structures import random_filter
 
 from gpbnb import FixedFormat, LinearSystem
 from gpbnb.arithmetic.kernels import backends
-from gpbnb.bounds.words import WordGuarantee
+from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.structures import STRUCTURES
 from gpbnb.filters.words import WordFormats, integers_of, run_words
 from tests.oracles import fixed, limited
@@ -110,7 +110,7 @@ def test_no_run_is_beyond_its_guarantee(structure, wide):
         sums = FixedFormat(int(rng.integers(5, 9)), 20, mode, str(rng.choice(["raise", "wrap"]))) if wide else None
         words = WordFormats(FixedFormat(int(rng.integers(4, 8)), 12, mode), FixedFormat(6, 16), sums)
         try:
-            bound = WordGuarantee(system, 1.0).errors(words)[0]
+            bound = OutputBounds(system, 1.0).errors(words)[0]
         except OverflowError:
             continue
         found, true = run_words(system, u, words).outputs(1), system.outputs(u)
@@ -125,11 +125,11 @@ def test_no_run_is_beyond_its_guarantee(structure, wide):
 def test_the_range_is_proved_where_the_worst_input_just_fits():
     """y = u + y/2 reaches 2 for inputs within 1, and errors of half a unit each double to two units of 1/64 at most."""
     system = LinearSystem.from_coefficients([1], [1, "-0.5"], "direct form I")
-    bound = WordGuarantee(system, 1.0).errors(WordFormats(FixedFormat(2, 6), FixedFormat(2, 8)))
+    bound = OutputBounds(system, 1.0).errors(WordFormats(FixedFormat(2, 6), FixedFormat(2, 8)))
     # Inputs are off by 1/128 and products by 1/128, doubled; a claim is larger by 2**-20, so that its proof may round.
     assert 1 / 32 <= bound[0] <= (1 / 32) * (1 + 2.0**-19)
     with pytest.raises(OverflowError, match=r"a sum, operation 3 of 3, may reach 2.03125, beyond the 1 integer bits"):
-        WordGuarantee(system, 1.0).errors(WordFormats(FixedFormat(1, 6), FixedFormat(2, 8)))
+        OutputBounds(system, 1.0).errors(WordFormats(FixedFormat(1, 6), FixedFormat(2, 8)))
 
 
 @pytest.mark.parametrize("fmt", [FixedFormat(0, 15), FixedFormat(3, -1), FixedFormat(0, 15, "chop", "saturate")])

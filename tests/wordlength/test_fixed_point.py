@@ -12,7 +12,8 @@ from gpbnb import BINARY64, LinearSystem, WordFormats, emulate, guarantee, limit
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.probable import probable_output_errors
-from gpbnb.bounds.words import WordGuarantee, bounded_rounding, rounding_limits
+from gpbnb.bounds.system import OutputBounds
+from gpbnb.bounds.words import bounded_rounding, rounding_limits
 from gpbnb.filters.system import controller, state_space
 from gpbnb.filters.words import integer_program, run_words
 from gpbnb.wordlength.required import judge
@@ -23,7 +24,7 @@ def test_a_negative_product_reaches_as_far_as_its_rounded_operand() -> None:
     words = WordFormats(FixedFormat(3, 1), FixedFormat(3, 2))
     system = LinearSystem.from_coefficients([-2, "0.5"], [1, "-0.75"], "direct form II")
     with pytest.raises(OverflowError, match=r"operation 3 of 5, may reach 12, beyond the 3 .* of the data; 4 hold it"):
-        WordGuarantee(system, 1).errors(words)
+        OutputBounds(system, 1).errors(words)
 
 
 def test_bits_that_hold_a_number_hold_it_below_their_largest() -> None:
@@ -31,7 +32,7 @@ def test_bits_that_hold_a_number_hold_it_below_their_largest() -> None:
     words = WordFormats(FixedFormat(2, 2), FixedFormat(3, 2))
     system = LinearSystem.from_coefficients(["-1.5", "-0.5"], [1, "-0.75"], "direct form II")
     with pytest.raises(OverflowError, match=r"may reach 3.875, beyond the 2 integer bits of the data; 3 hold it"):
-        WordGuarantee(system, 1).errors(words)
+        OutputBounds(system, 1).errors(words)
 
 
 def test_the_bound_of_one_state_is_its_geometric_series() -> None:

@@ -10,7 +10,7 @@ import pytest
 from scipy import signal
 
 from gpbnb import FixedFormat, LinearSystem, required_precision
-from gpbnb.bounds.words import WordGuarantee
+from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.words import WordFormats, run_words
 from gpbnb.wordlength.fixed import with_fraction_bits
@@ -83,6 +83,6 @@ def test_fraction_bits_of_a_system(structure):
         if math.isfinite(ratio):
             found = run_words(system, u, with_fraction_bits(like, bits)).outputs(1) - system.outputs(u)
             assert ratio == pytest.approx(float(np.abs(found.sum(axis=-1)).max() / 1e-3), rel=1e-9)
-    errors = WordGuarantee(system, np.abs(u).max()).errors(proved.format)
+    errors = OutputBounds(system, np.abs(u).max()).errors(proved.format)
     assert dict(proved.tried)[proved.digits] == pytest.approx(errors[0] / 1e-3)
     assert errors[0] <= 1e-3
