@@ -155,25 +155,24 @@ def _solved(first: Fraction, ratio: Fraction, base: int) -> float:
 # -- ball arithmetic ------------------------------------------------------------------------------
 
 
-def ball(a: Any, x: FloatArray, preconditioned: bool = False, bits: int | None = None) -> float:
-    r"""Bound from inverting A in ball arithmetic, :math:`\||X - \mathrm{mid}| + \mathrm{rad}\|`.
+def ball(a: Any, x: FloatArray) -> float:
+    r"""Bound from inverting A in ball arithmetic, :math:`\||X - \mathrm{mid}| + \mathrm{rad}\|`, by partial pivoting.
+
+    The midpoints of the balls have as many bits as the format.
 
     Parameters
     ----------
     a : (n, n), a FloatArray, or exact numbers.
     x : (n, n), its computed inverse, or any other guess of it.
-    preconditioned : whether to multiply A first by an approximate inverse, in sums of products that are rounded once,
-        so that elimination starts near the identity; otherwise A itself is eliminated with partial pivoting.
-    bits : precision of the balls' midpoints; by default that of the format.
 
     References
     ----------
     Johansson 2017; A is inverted by python-flint.
     """
-    precision = _bits(x.format) if bits is None else bits
+    precision = _bits(x.format)
     with _working(precision):
         try:
-            inverse = _balls(a).solve(_identity(len(x)), algorithm="precond" if preconditioned else "lu")
+            inverse = _balls(a).solve(_identity(len(x)), algorithm="lu")
         except ZeroDivisionError:
             raise ValueError(
                 f"got a matrix that {precision} bits cannot distinguish from a singular one; use more bits"
@@ -182,25 +181,25 @@ def ball(a: Any, x: FloatArray, preconditioned: bool = False, bits: int | None =
         return _upper(_column_sum(_balls(x) - inverse))
 
 
-def a_posteriori(a: Any, x: FloatArray, bits: int | None = None) -> float:
+def a_posteriori(a: Any, x: FloatArray) -> float:
     r"""Bound from the residual, computed with more digits than X has.
 
     .. math:: R = I - AX, \qquad A^{-1} - X = XR\,(I - R)^{-1}, \qquad
         \|X - A^{-1}\| \le \frac{\|XR\|}{1 - \|R\|}
 
-    Every number is a ball, and the bound includes the radii, so it holds for any X, however X was computed.
+    Every number is a ball, and the bound includes the radii, so it holds for any X, however X was computed. Midpoints
+    have four times the bits of the format plus 64, so that A X fits.
 
     Parameters
     ----------
     a : (n, n), a FloatArray, or exact numbers.
     x : (n, n), its computed inverse, or any other guess of it.
-    bits : precision of the balls' midpoints; by default four times that of the format plus 64, so that A X fits.
 
     References
     ----------
     Higham 2002, chapter 14; Rump 2010.
     """
-    with _working(4 * _bits(x.format) + 64 if bits is None else bits):
+    with _working(4 * _bits(x.format) + 64):
         guess = _balls(x)
         residual = _identity(len(x)) - _balls(a) * guess
         size = _upper(_column_sum(residual))
@@ -280,13 +279,12 @@ def smallest_precision(
     tolerance: float,
     base: int = 2,
     rounding: Rounding = Rounding.NEAREST,
-    pivot: bool = True,
     largest: int | None = None,
 ) -> ProvedInverse:
     r"""Find the fewest digits in which the computed inverse of a matrix is within a tolerance of the exact one.
 
-    In each precision that :func:`gpbnb.arithmetic.search.smallest_precision` tries, the matrix is rounded and inverted,
-    and the result X is compared with the exact inverse of the matrix as given:
+    In each precision that :func:`gpbnb.arithmetic.search.smallest_precision` tries, the matrix is rounded and inverted
+    with partial pivoting, and the result X is compared with the exact inverse of the matrix as given:
 
     .. math:: \|X - A^{-1}\| \le \text{tolerance}\,\|A^{-1}\|
 
@@ -295,7 +293,6 @@ def smallest_precision(
     a : (n, n), exact: strings, ints, Fractions; a float stands for its exact binary value.
     tolerance : relative error, above 0.
     base, rounding : base and rounding of the formats.
-    pivot : whether to use partial pivoting.
     largest : highest precision to try; by default :func:`gpbnb.arithmetic.search.largest_by_default`, 200 bits or 60
         decimal digits.
 
@@ -329,7 +326,7 @@ def smallest_precision(
 
     def meets(fmt: FloatFormat) -> bool:
         try:
-            x = linalg.inv(fmt.array(given), pivot)
+            x = linalg.inv(fmt.array(given), pivot=True)
         except np.linalg.LinAlgError as error:  # it is singular in so few digits
             why[fmt.precision] = str(error)
             return False
