@@ -23,7 +23,7 @@ from gpbnb.bounds.guess import linear_steps
 from gpbnb.bounds.units import largest_errors, units
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.pairs import double_doubles_near
-from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, matrices_of, recorded
+from gpbnb.filters.program import MULTIPLY, SUBTRACT, Program, matrices_of, recorded
 
 _BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
 
@@ -292,25 +292,11 @@ def ceiling(found: FilterGuarantee, z: NDArray[np.float64], state: int) -> float
                 exact = values[a] == 0 or values[b] == 0 or abs(values[first + o]) <= table.aligned
             if not exact and values[first + o]:
                 errors[o] = largest_errors(given.fmt, np.abs(values[first + o]))
-        total += float(np.abs(_effects(program, coefficients)[first:] @ rows[k]) @ errors)
+        total += float(np.abs(parts.effects[first:, at] @ rows[k]) @ errors)
         innovation = z[k] - given.HPhi[at, :, :, 0] @ x
         known += float(rows[k] @ (parts.loop[at] @ x + parts.gain[at] @ innovation))
         x = values[program.outputs]
     return total + abs(known)
-
-
-def _effects(program: Program, coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the effect of an error in each value on the states after the step, (n + m + o, n)."""
-    first = program.n + program.m
-    effects = np.zeros((first + len(program.operations), program.n))
-    np.add.at(effects, (program.outputs, np.arange(program.n)), 1.0)
-    for v, (code, a, b) in reversed(list(enumerate(program.operations.tolist(), first))):
-        if code == MULTIPLY:
-            effects[b] += coefficients[a] * effects[v]
-        else:
-            effects[a] += effects[v]
-            effects[b] += effects[v] if code == ADD else -effects[v]
-    return effects
 
 
 def random_errors(found: FilterGuarantee, steps: int, center: Any = None) -> NDArray[np.float64]:

@@ -94,7 +94,7 @@ def linear_steps(given: Schedule, at: NDArray[np.int64]) -> Steps:
     n, first = program.n, program.n + program.m
     c = given.coefficients[at].astype(wide).sum(axis=-1).T
     count, steps, powers = first + len(program.operations), len(at), units(given.fmt).exact
-    rows, effects = np.zeros((count, steps, first), wide), np.zeros((count, steps, n))
+    rows = np.zeros((count, steps, first), wide)
     rows[np.arange(first), :, np.arange(first)] = 1
     factors, exact = np.zeros((count - first, steps)), np.ones((count, steps), dtype=bool)
     zero = np.zeros((count, steps), dtype=bool)
@@ -107,20 +107,29 @@ def linear_steps(given: Schedule, at: NDArray[np.int64]) -> Steps:
         else:
             rows[v] = rows[a] + rows[b] if code == ADD else rows[a] - rows[b]
             zero[v], exact[v] = zero[a] & zero[b], zero[a] | zero[b]
-    for i, o in enumerate(program.outputs.tolist()):
-        effects[o, :, i] += 1
-    for v in range(count - 1, first - 1, -1):
-        code, a, b = program.operations[v - first].tolist()
-        if code == MULTIPLY:
-            effects[b] += c[a][:, None].astype(np.float64) * effects[v]
-        else:
-            effects[a] += effects[v]
-            effects[b] += effects[v] if code == ADD else -effects[v]
     whole = rows[program.outputs].transpose(1, 0, 2)
     Phi, HPhi, K = (each[at].astype(wide).sum(axis=-1) for each in (given.Phi, given.HPhi, given.exact))
     loop, gain = whole[:, :, :n] - Phi + whole[:, :, n:] @ HPhi, whole[:, :, n:] - K
     floats = (each.astype(np.float64) for each in (whole[:, :, :n], whole[:, :, n:], loop, gain, HPhi))
+    effects = error_effects(program, c.astype(np.float64))
     return Steps(factors, rows.astype(np.float64), effects, exact, *floats)
+
+
+def error_effects(program: Program, coefficients: Array) -> Array:
+    """Return the effect of an error of each value on the states after a step, (values, steps, n).
+
+    Coefficients are those of each step, (c, steps).
+    """
+    first, found = program.n + program.m, np.zeros((len(program.places), coefficients.shape[1], program.n))
+    for i, o in enumerate(program.outputs.tolist()):
+        found[o, :, i] += 1
+    for v, (code, a, b) in reversed(list(enumerate(program.operations.tolist(), first))):
+        if code == MULTIPLY:
+            found[b] += coefficients[a][:, None] * found[v]
+        else:
+            found[a] += found[v]
+            found[b] += found[v] if code == ADD else -found[v]
+    return found
 
 
 def _times(a: Array, x: Array) -> Array:

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.bounds.certificate import of_operations, proved
-from gpbnb.bounds.guess import EXCESS, Guess, gains, lags_of, loops, positive
+from gpbnb.bounds.guess import EXCESS, Guess, error_effects, gains, lags_of, loops, positive
 from gpbnb.bounds.units import units
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, exact_functionals, matrices
 from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable
@@ -77,18 +77,8 @@ def bounded_rounding(made: LinearFilter, words: WordFormats) -> NDArray[np.float
 
 def _effects(made: IntegerProgram) -> NDArray[np.float64]:
     """Return the effect of an error of each operation on the states after the step, (n, o)."""
-    program, c = made.program, made.coefficients.astype(np.float64)
-    first = program.n + program.m
-    found = np.zeros((first + len(program.operations), program.n))
-    np.add.at(found, (program.outputs, np.arange(program.n)), 1.0)
-    for o in range(len(program.operations) - 1, -1, -1):
-        code, a, b = program.operations[o].tolist()
-        if code == MULTIPLY:
-            found[b] += c[a] * found[first + o]
-        else:
-            found[a] += found[first + o]
-            found[b] += found[first + o] * (-1 if code == SUBTRACT else 1)
-    return found[first:].T
+    first = made.program.n + made.program.m
+    return error_effects(made.program, made.coefficients.astype(np.float64)[:, None])[first:, 0].T
 
 
 class _Sums(NamedTuple):
