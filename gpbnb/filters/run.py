@@ -205,12 +205,8 @@ class Run(Progress):
 
     @property
     def bound(self) -> Contraction:
-        """The contraction bound after the last step; set it to continue from another one."""
+        """The contraction bound after the last step."""
         return self._bound_taken_along().now
-
-    @bound.setter
-    def bound(self, value: Contraction) -> None:
-        self._bound_taken_along().now = value
 
     def _bound_taken_along(self) -> CarriedBound:
         if self._carried is None:

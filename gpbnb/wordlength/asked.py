@@ -232,7 +232,8 @@ def is_filter(model: Any) -> bool:
 def admitted(model: Any, *tasks: str) -> Any:
     """Read a model of any kind, and refuse tasks, keys of :data:`CANNOT`, that it cannot do, with what to use."""
     library = type(model).__module__.partition(".")[0]
-    own = isinstance(model, (*MODELS, FilterDesign)) or (callable(model) and library not in SYSTEMS)
+    own = isinstance(model, MODELS) or (callable(model) and library not in SYSTEMS)
+    own = own or (isinstance(model, FilterDesign) and "be written in C" in tasks)
     found = model if own else read_model(model)
     kind = kind_of(found)
     for task in filter(None, tasks):
