@@ -291,11 +291,11 @@ def _too_slow(given: Schedule, steps: int | None, radius: float, effort: float) 
     )
 
 
-def _guess(given: Schedule, within: FilterLimits, steps: int | None, dense: bool = False) -> Guess:
+def _guess(given: Schedule, within: FilterLimits, steps: int | None) -> Guess:
     if isinstance(given.origin, LinearFilter):
         return constant_guess(given.origin, given.fmt, within.measurement, steps)
     stored = within._replace(measurement=stored_sizes(given.fmt, within.measurement))
-    return filter_guess(given, stored, steps, dense)
+    return filter_guess(given, stored, steps)
 
 
 def _answered(found: FilterGuarantee) -> FilterGuarantee:

@@ -352,7 +352,7 @@ class Course(NamedTuple):
         return np.minimum(np.where(k <= last, k, self.first + (k - self.first) % max(last + 1 - self.first, 1)), last)
 
 
-def course(given: Schedule, steps: int | None, radius: float, dense: bool) -> Course:
+def course(given: Schedule, steps: int | None, radius: float) -> Course:
     """Choose the steps of a guess; a gain that has nearly settled counts as settled."""
     if steps is not None:
         return Course(given.rows(np.arange(steps)), steps, np.arange(1, steps + 1), steps)
@@ -368,7 +368,7 @@ def course(given: Schedule, steps: int | None, radius: float, dense: bool) -> Co
     at = np.concatenate([np.arange(begun), np.arange(first, first + period)])
     lags = math.ceil(math.log(1e-9) / math.log(min(max(radius, 1e-3), 1 - 1e-12))) + 2 * period
     some = np.arange(1, begun + lags + 1)
-    if not dense and len(some) > _DENSE:
+    if len(some) > _DENSE:
         grown = _DENSE * _RATIO ** np.arange(math.ceil(math.log(len(some) / _DENSE) / math.log(_RATIO)))
         some = np.unique(np.concatenate([some[:_DENSE], grown.astype(np.int64)]))
     return Course(at, begun, np.concatenate([some, begun + (lags // period + 1) * period + np.arange(period)]), lags)
@@ -397,14 +397,14 @@ def summed(chosen: Course, F: Array, G: Array, part: NDArray[np.int64], starts: 
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def filter_guess(given: Schedule, within: FilterLimits, steps: int | None, dense: bool = False) -> Guess:
+def filter_guess(given: Schedule, within: FilterLimits, steps: int | None) -> Guess:
     """Guess the bound of a filter whose gain repeats, or over some steps."""
     program, n, m = given.program, given.program.n, given.program.m
     none = Guess(np.full(n, np.inf), np.full(n, np.inf), np.full(m, np.inf), np.zeros((n, 3)))
     radius = 0.0 if steps is not None else loop_radius(given)
     if radius >= 1:
         return none
-    chosen = course(given, steps, radius, dense)
+    chosen = course(given, steps, radius)
     each = linear_steps(given, chosen.at)
     known = derived_limits(given, chosen, each, within)
     if not all(np.isfinite(limit).all() for limit in known[:2]):

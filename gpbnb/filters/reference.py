@@ -109,12 +109,12 @@ def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> PreciseSteps | str
     x, P = given.pop("x0")[0], given.pop("P0")
 
     def take(formats: Sequence[Any], states: tuple[Any, ...], matrices: Sequence[Any]) -> StepTaken:
-        (x, P, carried), (measured, *rest) = states, matrices
+        (x, P), (measured, *rest) = states, matrices
         step = LinearStep(Form.INNOVATION, block_algebra([*formats] * 4), dict(zip(given, rest, strict=True)))
-        found = step.taken(x, P, carried, measured)
-        return StepTaken((found.x, found.P, found.carried), found.K, found.definite)
+        found = step.taken(x, P, None, measured)
+        return StepTaken((found.x, found.P), found.K, found.definite)
 
-    step = RepeatedStep(take, [fmt], (x, P, x * 0), list(given.values()))
+    step = RepeatedStep(take, [fmt], (x, P), list(given.values()))
     try:
         return joined([(each.states[0], each.gain, each.states[1]) for each in step.take(fmt.array(z))])
     except ZeroDivisionError:
