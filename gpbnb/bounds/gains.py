@@ -196,8 +196,9 @@ def _emulated(
         run.take(np.zeros((steps, model.m)))
         done = run.steps
         seen: dict[tuple[int, bytes], int] = {(0, start.tobytes()): 0}
+        covariances = run.C
         for k in range(1, done + 1):
-            key = (k % model.cycle, (run.C[k - 1] + 0).tobytes())
+            key = (k % model.cycle, (covariances[k - 1] + 0).tobytes())
             if key in seen:
                 return run, seen[key], k - seen[key]
             seen[key] = k

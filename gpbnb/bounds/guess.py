@@ -116,7 +116,7 @@ def linear_steps(given: Schedule, at: NDArray[np.int64]) -> Steps:
 
 
 def error_effects(program: Program, coefficients: Array) -> Array:
-    """Return the effect of an error of each value on the states after a step, (values, steps, n).
+    """Return by how much an error of 1 in each value changes the states after a step, (values, steps, n).
 
     Coefficients are those of each step, (c, steps).
     """

@@ -28,7 +28,7 @@ from gpbnb.filters.words import WordFormats
 
 
 class OutputBounds:
-    """Bounds of the errors of a system that starts from rest, for all inputs within limits of their size, (m,).
+    """Error bounds of a system that starts from rest, for all inputs whose sizes stay within limits, (m,).
 
     They hold for a number of steps, by default for all time. Bounds of a linear system are guessed, and proved by
     :mod:`gpbnb.bounds.check`; those of a system that limits its values hold without a proof, and have no words.

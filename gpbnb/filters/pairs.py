@@ -50,7 +50,7 @@ def _taking_more_operations(pairs: NDArray[np.int64]) -> Iterator[tuple[int, ...
 
 @np.errstate(all="ignore")
 def double_doubles_near(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert packed numbers as :func:`nearest_double_doubles`, but faster, with a rounding for each 22 powers of ten.
+    """Convert packed numbers like :func:`nearest_double_doubles`, faster but rounded once for each 22 powers of ten.
 
     Decimal numbers of at least 2**996 or, except for zero, below 2**-850 become NaN.
     The operations are those of :mod:`gpbnb.arithmetic.kernels.doubledouble` for a second number of one float64.

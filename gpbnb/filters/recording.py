@@ -23,7 +23,7 @@ from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.program import Program, entries
-from gpbnb.filters.stepping import DividedStep, RecordedStep, StepTaken, divided, recorded
+from gpbnb.filters.stepping import DividedStep, RecordedStep, StepTaken, divided, record_step
 from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep
 
 
@@ -81,9 +81,10 @@ def recorded_step(kind: StepKind, together: bool = False) -> DividedStep:
 
 @lru_cache(maxsize=64)
 def kalman_step(kind: StepKind) -> RecordedStep:
-    """Record a step of a filter, whose states are x and P, then what compensated summation carries.
+    """Record a step of a filter.
 
-    It gives the gain and, unless it has factors or roots, the innovation covariance.
+    Its states are x, P and, with compensated summation, what that carries to the next step. Its results are the gain
+    and, in forms without factors or roots, the innovation covariance.
     """
     n, m = kind.n, kind.m
     compensated = kind.form is Form.COMPENSATED
@@ -96,7 +97,7 @@ def kalman_step(kind: StepKind) -> RecordedStep:
     numbers = [of_state, of_covariance, *[of_state] * (own - 1), *[of_model] * len(kind.model)]
     try:
         arrays = list(zip(numbers, shapes, strict=True))
-        step, _ = recorded(partial(_kalman_taken, kind), formats, arrays, (own, own + 1))
+        step, _ = record_step(partial(_kalman_taken, kind), formats, arrays, (own, own + 1))
     except UntraceableError:
         raise ValueError(
             f"got a filter with n = {n} and m = {m}; needed a step of at most {tape.most} operations: about 100 states"
@@ -140,8 +141,8 @@ def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
 def filter_program(form: Form, step: RecordedStep, letters: Iterable[str], others: Sequence[int]) -> Program:
     """Return a recorded step of a filter as a program whose states are those of :func:`program_states`.
 
-    Letters name its cycles: matrices, and the known inputs u if there are any. Coefficients are the entries of the
-    matrices in this order, then those at other places, and 1.
+    There is a letter for each of its cycles, which are matrices and, if there are any, the known inputs u. Coefficients
+    are the entries of the matrices in this order, then those at other places, and 1.
     """
     (x, P, *_), (z,), tape = step.states, step.own, step.tape
     matrices = dict(zip(letters, step.cycles, strict=True))

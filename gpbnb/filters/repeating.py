@@ -29,7 +29,7 @@ from gpbnb.filters.stepping import (
     StepTaken,
     divided,
     leaves,
-    recorded,
+    record_step,
 )
 
 
@@ -147,7 +147,7 @@ class RepeatedStep:
         try:
             with unseen(formats[0]) as shown:
                 ends = len(self.states), len(shapes) - len(self._cycles)
-                step, taken = recorded(self._function, formats, shapes, ends)
+                step, taken = record_step(self._function, formats, shapes, ends)
         except Exception as error:  # the function runs itself, and raises its own error
             return tape.refusal or f"without numbers it stops: {error}"
         if tape.refusal or shown:

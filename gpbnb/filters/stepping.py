@@ -88,7 +88,7 @@ def leaves(part: Any) -> Iterator[Any]:
         yield part
 
 
-def recorded(
+def record_step(
     function: StepFunction,
     formats: Sequence[TracedFormat],
     arrays: Sequence[tuple[int, tuple[int, ...]]],

@@ -627,9 +627,10 @@ class ExtendedModel(NamedTuple):
 
 
 class ExtendedStep(NamedTuple):
-    """Estimate (n,) and covariance, factors or root (n, n) after a step, and whether variances and pivots are positive.
+    """What a step returns: the estimate (n,), and its covariance, factors or root (n, n).
 
-    The gain is K (n, m); with factors, the gain of each measurement, H, and the factors of R.
+    The gain is K (n, m); with factors, the gain of each measurement, H, and the factors of R. The step is definite if
+    all variances and pivots are positive.
     """
 
     x: Matrix

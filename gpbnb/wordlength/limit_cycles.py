@@ -111,7 +111,7 @@ def limit_cycles(
     Raises
     ------
     ValueError : a model that cannot be searched; an input of another size; a system that is not stable as stored.
-    TypeError : `fmt` is neither in fixed point nor :class:`gpbnb.WordFormats`.
+    TypeError : `fmt` is neither a fixed-point format nor :class:`gpbnb.WordFormats`.
     OverflowError : a coefficient or an input beyond the range of its format.
 
     Examples

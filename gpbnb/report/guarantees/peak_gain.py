@@ -50,7 +50,7 @@ def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Interval:
 
     Multiplied step by step, balls would grow with the norm of :math:`|A|`, which exceeds 1 for most stable filters.
     Powers of A are therefore squared, so that :math:`A^lB` is a product of few factors, at most one for each bit of l.
-    The bits of the balls are doubled until the two ends agree up to 2**-40 of the gain.
+    The bits of the balls are doubled until the two ends agree to within 2**-40 of the gain.
     """
     for bits in _BITS:
         if (found := _enclosed((A, B, C, D), bits)) is not None:
