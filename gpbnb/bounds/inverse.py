@@ -9,8 +9,6 @@ bound                         uses
 ============================  =========================================================================
 :func:`wilkinson`             the largest numbers that occur
 :func:`higham`                the computed factors
-:func:`higham_probabilistic`  the same; may fail with a stated probability if rounding errors are random
-:func:`rule_of_thumb`         the same, with the square root of the number of roundings; not a bound
 :func:`ball`                  a second inversion of A, in ball arithmetic
 :func:`a_posteriori`          the residual of X, in ball arithmetic of more bits
 ============================  =========================================================================
@@ -31,7 +29,7 @@ import numpy as np
 
 from gpbnb.arithmetic import linalg, search
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import above, gamma, gamma_probabilistic
+from gpbnb.arithmetic.bounds import above, gamma
 from gpbnb.arithmetic.conversion import exact_fraction
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.linalg import LU
@@ -90,36 +88,15 @@ def higham(factors: LU, x: FloatArray) -> float:
     ----------
     Higham 2002, Theorem 9.4.
     """
-    return _from_factors(factors, x, gamma(3 * len(x), x.format.unit_roundoff))
-
-
-def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> float:
-    r"""Bound as :func:`higham`, with :math:`3\tilde\gamma_n + \tilde\gamma_n^2`, about √n β, for :math:`\gamma_{3n}`.
-
-    If rounding errors are independent with mean zero, the bound fails at most with the probability `failure`. This
-    probability is shared equally by the 3n³ products in the inner products, n² of the factors and 2n² of the solutions.
-
-    References
-    ----------
-    Higham & Mary 2019.
-    """
-    if x.format.rounding is not Rounding.NEAREST:
-        raise ValueError(
-            f"got {x.format}; this bound needs rounding to nearest, whose errors can average out. Use higham."
-        )
-    n = len(x)
-    one = Fraction(gamma_probabilistic(n, x.format.unit_roundoff, failure / (3 * n**3)))
-    return _from_factors(factors, x, 3 * one + one * one)
-
-
-def rule_of_thumb(factors: LU, x: FloatArray) -> float:
-    r"""Estimate as in :func:`higham`, with :math:`\sqrt{3n}\,\beta` in place of :math:`\gamma_{3n}`; not a bound.
-
-    References
-    ----------
-    Wilkinson 1961, who uses the square root in place of the count.
-    """
-    return _from_factors(factors, x, Fraction(math.sqrt(3 * len(x))) * x.format.unit_roundoff)
+    n, weight = len(x), gamma(3 * len(x), x.format.unit_roundoff)
+    sizes, L, U = (abs(exact(each)) for each in (x, factors.lower, factors.upper))
+    lower = np.empty_like(L)
+    lower[factors.permutation] = L
+    e = 2 * n + U.diagonal()
+    underflows = (1 + weight) * _smallest(x) * (e @ sizes + (lower @ e)[:, np.newaxis] + 2 * n)
+    G = rationals(lower) * rationals(U) * rationals(sizes) * flint.fmpq(*weight.as_integer_ratio())
+    G += rationals(underflows)
+    return _solved(column_sum_norm(rationals(sizes) * G), column_sum_norm(G), x.format.base)
 
 
 def _smallest(x: FloatArray) -> Fraction:
@@ -131,18 +108,6 @@ def _smallest(x: FloatArray) -> Fraction:
             "rounding. Use a_posteriori, which holds however the inverse was computed."
         )
     return Fraction(0) if fmt.limits is None else fmt.smallest
-
-
-def _from_factors(factors: LU, x: FloatArray, weight: Fraction) -> float:
-    n = len(x)
-    sizes, L, U = (abs(exact(each)) for each in (x, factors.lower, factors.upper))
-    lower = np.empty_like(L)
-    lower[factors.permutation] = L
-    e = 2 * n + U.diagonal()
-    underflows = (1 + weight) * _smallest(x) * (e @ sizes + (lower @ e)[:, np.newaxis] + 2 * n)
-    G = rationals(lower) * rationals(U) * rationals(sizes) * flint.fmpq(*weight.as_integer_ratio())
-    G += rationals(underflows)
-    return _solved(column_sum_norm(rationals(sizes) * G), column_sum_norm(G), x.format.base)
 
 
 def _solved(first: Fraction, ratio: Fraction, base: int) -> float:

@@ -13,6 +13,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.bounded_steps import Bounds
 from gpbnb.filters.checkpoints import Checkpoints
 from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel, stored_measurements
@@ -35,6 +36,7 @@ class History:
     stopped : the step at which a division by zero or a number beyond the format's range ended the run, if any.
     reason : what ended the run, such as "overflow in the gain at step 812".
     repairs : changes of covariances that would otherwise be indefinite, each as text.
+    bounds : the contraction bound of each error, if it was computed; that of the covariance is of its symmetric part.
     """
 
     model: AnyModel
@@ -49,6 +51,7 @@ class History:
     stopped: int | None
     reason: str = ""
     repairs: tuple[str, ...] = ()
+    bounds: Bounds | None = None
 
     def __repr__(self) -> str:
         fmt = self.fmt if isinstance(self.fmt, BlockFormats) else arithmetic(self.fmt)
@@ -87,6 +90,16 @@ class History:
         scaled = computed / scale[:, :, np.newaxis] / scale[:, np.newaxis, :]
         return np.asarray(np.linalg.eigvalsh((scaled + np.swapaxes(scaled, 1, 2)) / 2)[:, 0], dtype=np.float64)
 
+    def ratios(self) -> NDArray[np.float64]:
+        """Return the largest error over bound of state, gain and covariance, (c, 3); above 1 if one is violated."""
+        if self.bounds is None:
+            raise ValueError("got a run without its bound; needed bounded=True")
+        symmetric = (self.covariance + np.swapaxes(self.covariance, 1, 2)) / 2
+        pairs = zip((self.state, self.gain, symmetric), self.bounds, strict=True)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            each = [np.where(e == 0, 0.0, np.abs(e) / b).reshape(len(e), -1).max(axis=1) for e, b in pairs]
+        return np.stack(each, axis=1)
+
 
 def relative(error: NDArray[np.float64], true: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return norms (22) of errors over norms of the true matrices, (c,)."""
@@ -101,7 +114,9 @@ def compare_runs(run: Run | NonlinearRun, true: Checkpoints) -> History:
     blocks = run.block_formats if isinstance(run, Run) else None
     fmt, steps = blocks or cast(FloatFormat | BlockFormats, run.fmt), np.array(checkpoints.steps, dtype=np.int64)
     repairs = tuple(str(each) for each in run.repairs)
-    return History(run.model, fmt, run.form, steps, x, K, P, true, run.indefinite, run.stopped, run.reason, repairs)
+    bounds = Bounds(*(each[: len(steps)] for each in run.bounds)) if isinstance(run, Run) and run.bounded else None
+    ended = run.indefinite, run.stopped, run.reason
+    return History(run.model, fmt, run.form, steps, x, K, P, true, *ended, repairs, bounds)
 
 
 def emulate(
@@ -111,6 +126,7 @@ def emulate(
     form: Form | str = Form.INNOVATION,
     checkpoint_steps: Sequence[int] | None = None,
     true: Checkpoints | None = None,
+    bounded: bool = False,
 ) -> History:
     """Run the filter with model, measurements and every operation rounded, and compare the run with the reference.
 
@@ -126,6 +142,8 @@ def emulate(
         the errors come only from the arithmetic. With a reference for the model as given, they include the errors of
         storing the model. The reference for a nonlinear model always uses the model as given, because its functions
         round their own constants.
+    bounded : whether to compute the contraction bound of a linear filter, :mod:`gpbnb.filters.contraction`, along with
+        the run.
 
     Returns
     -------
@@ -151,7 +169,7 @@ def emulate(
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     if chosen and max(chosen) > len(measured):
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
-    run = opened(model, fmt, form, chosen)
+    run = opened(model, fmt, form, chosen, bounded)
     run.take(measured)
     if true is not None:
         return compare_runs(run, true)

@@ -13,7 +13,6 @@ from small_filter import STEPS, exact_steps, measurements, model, run
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
-from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.emulation import compare_runs, emulate
 from gpbnb.filters.forms import WITH_PROGRAM, Form
@@ -192,7 +191,7 @@ def test_measurements_are_those_of_the_model():
 def test_no_error_exceeds_the_bound_beside_the_run(fmt, form):
     """Against the exact filter, not the reference."""
     given, z = model(), measurements()
-    found = emulate_with_bound(given, z, fmt, form, range(1, STEPS + 1))
+    found = emulate(given, z, fmt, form, range(1, STEPS + 1), bounded=True)
     ratios = found.ratios()
     assert ratios.max() <= 1
     stored = np.array([[fmt.round(float(v)) for v in row] for row in z], dtype=object)
@@ -201,17 +200,17 @@ def test_no_error_exceeds_the_bound_beside_the_run(fmt, form):
     for k, step in enumerate(exact_steps(given.rounded(fmt), stored)):
         P = (checkpoints.P[k] + checkpoints.P[k].T) / 2
         for error, bound in (
-            (checkpoints.x[k] - step.x, found.state[k]),
-            (checkpoints.K[k] - step.gain, found.gain[k]),
-            (P - step.P, found.covariance[k]),
+            (checkpoints.x[k] - step.x, found.bounds.state[k]),
+            (checkpoints.K[k] - step.gain, found.bounds.gain[k]),
+            (P - step.P, found.bounds.covariance[k]),
         ):
             assert (np.abs(error).astype(float) <= bound * (1 + 1e-12)).all()
             worst = max(worst, float((np.abs(error).astype(float) / bound).max()))
     if fmt.precision * math.log2(fmt.base) > 20:  # with fewer, the covariance's error may be too large
         assert worst > 0.01
-        assert np.isfinite(found.state).all()
+        assert np.isfinite(found.bounds.state).all()
     # The run itself is the one without a bound at its side.
-    assert np.array_equal(found.history.state, emulate(given, z, fmt, form, range(1, STEPS + 1)).state)
+    assert np.array_equal(found.state, emulate(given, z, fmt, form, range(1, STEPS + 1)).state)
 
 
 def test_the_bound_of_the_reference_holds():

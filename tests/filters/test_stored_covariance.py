@@ -13,7 +13,6 @@ from gpbnb.arithmetic.definiteness import is_definite
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters import bounded_steps
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
@@ -90,7 +89,7 @@ def test_emulation_and_bound_of_a_raised_covariance_agree():
     history = emulate(model, z, fmt)
     assert history.repairs == tuple(map(str, model.rounded(fmt).repairs))
     for form in (Form.INNOVATION, Form.UD):
-        assert 0 < emulate_with_bound(model, z, fmt, form).ratios().max() <= 1
+        assert 0 < emulate(model, z, fmt, form, bounded=True).ratios().max() <= 1
 
 
 def test_answers_exist_for_every_precision_and_name_the_change():

@@ -9,7 +9,6 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.report.kalman import ensembles
@@ -26,11 +25,10 @@ def test_a_trial_compares_every_step_with_the_bounds(kind):
     model, size = random_model(rng, kind)
     z = np.array([[float(f"{v:.6g}") for v in row] for row in size * rng.standard_normal((10, model.m))])
     z = np.abs(z) if kind == "one sign" else z
-    run = emulate_with_bound(model, z, fmt, form, range(1, 11))
-    assert [found.state, found.gain, found.covariance] == run.ratios().max(axis=0).tolist()
-    assert found.typical == run.ratios()[-1, 0]
-    assert found.steps_bounded == np.isfinite(run.state).all(axis=1).mean()
-    history = emulate(model, z, fmt, form, range(1, 11))
+    history = emulate(model, z, fmt, form, range(1, 11), bounded=True)
+    assert [found.state, found.gain, found.covariance] == history.ratios().max(axis=0).tolist()
+    assert found.typical == history.ratios()[-1, 0]
+    assert found.steps_bounded == np.isfinite(history.bounds.state).all(axis=1).mean()
     beta, n, m = 1e-7, model.n, model.m
     for error, true, count, ratio in (
         (history.covariance, history.reference.P, 3 * n + m + 2, found.worst_105),

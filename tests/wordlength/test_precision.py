@@ -16,7 +16,6 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
@@ -68,9 +67,9 @@ def test_the_bound_asks_for_more_digits_and_holds():
     by_bound = required_precision(MODEL, Z, tolerance, base=2, basis="bound")
     by_emulation = required_precision(MODEL, Z, tolerance, base=2)
     assert by_emulation.digits < by_bound.digits <= by_emulation.digits + 12
-    found = emulate_with_bound(MODEL, Z, by_bound.format, Form.INNOVATION)
-    assert found.state.max() <= tolerance
-    assert np.abs(found.history.state).max() <= found.state.max()
+    found = emulate(MODEL, Z, by_bound.format, bounded=True)
+    assert found.bounds.state.max() <= tolerance
+    assert np.abs(found.state).max() <= found.bounds.state.max()
     assert str(by_bound).endswith("proved for this run of 60 steps")
 
 

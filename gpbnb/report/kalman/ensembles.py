@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.bounds import column_sum
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.bounded_run import BoundedHistory, emulate_with_bound
+from gpbnb.filters.emulation import History, emulate
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.kalman import report_bounds
@@ -123,16 +123,17 @@ def trial(kind: str, fmt: FloatFormat, form: Form, seed: int, steps: int = STEPS
     model, size = random_model(rng, kind)
     z = _short(size * rng.standard_normal((steps, model.m)))
     z = np.abs(z) if kind == "one sign" else z
-    found = emulate_with_bound(model, z, fmt, form, range(1, steps + 1))
-    ratios, history = found.ratios(), found.history
+    history = emulate(model, z, fmt, form, range(1, steps + 1), bounded=True)
+    assert history.bounds is not None
+    ratios = history.ratios()
     state, gain, covariance = (float(each) for each in (ratios.max(axis=0, initial=0.0) if len(ratios) else (0, 0, 0)))
     last = float(ratios[-1, 0]) if len(ratios) == steps else 0.0  # 0 if the bound is infinite
-    of_covariance, of_gain, of_state = printed_ratios(found, float(fmt.unit_roundoff))
+    of_covariance, of_gain, of_state = printed_ratios(history, float(fmt.unit_roundoff))
     return Summary(
         kind=kind,
         form=form.name.lower(),
         trials=1,
-        steps_bounded=float(np.isfinite(found.state).all(axis=1).sum() / steps),
+        steps_bounded=float(np.isfinite(history.bounds.state).all(axis=1).sum() / steps),
         contraction_violations=int(not all(ratio <= 1 for ratio in (state, gain, covariance))),
         state=state,
         gain=gain,
@@ -149,9 +150,8 @@ def trial(kind: str, fmt: FloatFormat, form: Form, seed: int, steps: int = STEPS
     )
 
 
-def printed_ratios(found: BoundedHistory, beta: float) -> tuple[float, float, float]:
+def printed_ratios(history: History, beta: float) -> tuple[float, float, float]:
     """Return the largest error / bound for (105) and (108) over all entries and steps, and for (125) over all steps."""
-    history = found.history
     c = len(history.steps)
     if not c:
         return 0.0, 0.0, 0.0
@@ -160,14 +160,14 @@ def printed_ratios(found: BoundedHistory, beta: float) -> tuple[float, float, fl
     with np.errstate(divide="ignore", invalid="ignore"):
         covariance = np.abs(history.covariance) / (report_bounds.covariance_count(n, m) * beta * np.abs(P))
         gain = np.abs(history.gain) / (report_bounds.gain_count(n, m) * beta * np.abs(K))
-        return _largest(covariance), _largest(gain), _largest(history.state_norm / _printed_state(found, beta, x, K))
+        return _largest(covariance), _largest(gain), _largest(history.state_norm / _printed_state(history, beta, x, K))
 
 
 def _printed_state(
-    found: BoundedHistory, beta: float, x: NDArray[np.float64], K: NDArray[np.float64]
+    history: History, beta: float, x: NDArray[np.float64], K: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Evaluate (125) as printed after each step, with the least B of (122)."""
-    model = cast(LinearModel, found.history.model)
+    model = cast(LinearModel, history.model)
     given = model.to_float()
     bounds, F, u = np.empty(len(x)), 0.0, 0.0
     for k in range(len(x)):
