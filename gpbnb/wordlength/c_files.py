@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Sequence
 from fractions import Fraction
@@ -33,6 +34,12 @@ class Vectors(NamedTuple):
     inputs: NDArray[Any]
     states: NDArray[Any]
     status: NDArray[np.int64]
+
+
+def checked_identifier(name: str) -> None:
+    """Reject a name that C and file systems do not take as the beginning of others."""
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,30}", name):
+        raise ValueError(f"got name {name!r}; needed a name of C with up to 31 letters, digits and _, such as 'filter'")
 
 
 def refuse_others(folder: Path, name: str) -> None:
@@ -98,7 +105,7 @@ def _header(
         f"{' and bounds its errors' if bounded else ''}. Compilers keep this order unless told otherwise"
     )
     flags = "compile with -ffp-contract=off, and never with -ffast-math."
-    flags = f"{order}: {flags}" if source.arithmetic.floating else f"{order}."
+    flags = f"{order}: {flags}" if source.numbers.floating else f"{order}."
     program, statuses = source.step.program, source.statuses
     functions = ""
     if tolerances is not None:
@@ -111,12 +118,12 @@ def _header(
     values = ",\n".join(f"    {status.name} = {status.value}" for status in statuses)
     meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in statuses)
     takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
-    include = "" if source.arithmetic.floating else "#include <stdint.h>\n\n"
+    include = "" if source.numbers.floating else "#include <stdint.h>\n\n"
     return f"""{paragraphs}
 #ifndef {guard}
 #define {guard}
 
-{include}typedef {source.arithmetic.number} {name}_number;
+{include}typedef {source.numbers.number} {name}_number;
 
 {source.structure()}
 
@@ -141,11 +148,11 @@ def _cmsis(source: CodeSource, sections: Sections) -> str:
     """Return the coefficients of second-order sections in the order of CMSIS-DSP; empty if it does not hold them."""
     if not sections or any(len(b) > 3 or len(a) > 2 for b, a in sections):
         return ""
-    zero, numbers = [Fraction(0)], source.arithmetic
+    zero, numbers = [Fraction(0)], source.numbers
     rows = [[*b, *zero * (3 - len(b)), *(-each for each in a), *zero * (2 - len(a))] for b, a in sections]
     if numbers.floating:
         order, how = "b0, b1, b2", "arm_biquad_cascade_df1_f32 and others"
-        texts = [list(map(numbers.number_text, row)) for row in rows]
+        texts = [list(map(numbers.text, row)) for row in rows]
     else:
         bits = int(numbers.number[3:-2])
         lowest = Fraction(-1, 2 ** (bits - 1))
@@ -164,6 +171,7 @@ def _cmsis(source: CodeSource, sections: Sections) -> str:
 
 _KEPT = """#include <float.h>
 #include <math.h>
+#include <string.h>
 
 #if defined FLT_EVAL_METHOD && FLT_EVAL_METHOD != 0
 #error "This processor rounds to more digits than the type has; use another mode, such as -msse2 -mfpmath=sse."
@@ -178,21 +186,19 @@ _KEPT = """#include <float.h>
 
 
 def _source(source: CodeSource) -> str:
-    function, used = source.function()
-    constants = source.constants(used)
-    includes = _KEPT.format(guard=f"{source.name.upper()}_FAST_MATH") if source.arithmetic.floating else ""
-    helpers = source.arithmetic.helpers(function)
-    parts = [f'#include "{source.name}.h"', includes, constants, helpers, source.start(), function]
-    return f"/* {WRITTEN}. */\n" + "\n".join(f"{part.rstrip()}\n" for part in parts if part)
+    name, includes = source.name, "#include <string.h>\n"
+    if source.numbers.floating:
+        includes = _KEPT.format(guard=f"{name.upper()}_FAST_MATH")
+    return f'/* {WRITTEN}. */\n#include "{name}.h"\n\n{includes}\n{source.text()}'
 
 
 def _test(source: CodeSource, tolerances: NDArray[np.float64] | None) -> str:
     name, program = source.name, source.step.program
     number = f"{name}_number"
-    fields = [f"&state.{place}" for place in source.states] + [f"&output[{i}]" for i in range(program.p)]
+    fields = [f"&state.{place}" for place in source.step.state_names] + [f"&output[{i}]" for i in range(program.p)]
     listed = "\n".join(textwrap.wrap(", ".join(fields), 100, initial_indent=" " * 8, subsequent_indent=" " * 8))
-    if source.arithmetic.floating:
-        read = f'"%{"l" if source.arithmetic.number == "double" else ""}f"'
+    if source.numbers.floating:
+        read = f'"%{"l" if source.numbers.number == "double" else ""}f"'
         variable, convert, same = number, "value", "a == b && !signbit(a) == !signbit(b)"
         same = same if tolerances is None else "fabs(a - b) <= most"
         include = "#include <math.h>\n"
@@ -270,7 +276,7 @@ int main(int count, char **arguments)
 def _vectors(source: CodeSource, vectors: Vectors) -> str:
     """Return a line for each step: status, inputs, states and outputs."""
     rows = zip(*(each.tolist() for each in vectors), strict=True)
-    text = source.arithmetic.vector_text
+    text = source.numbers.vector_text
     lines = [" ".join([str(status), *map(text, [*inputs, *states])]) for inputs, states, status in rows]
     return "\n".join([*lines, ""])
 

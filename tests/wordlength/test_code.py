@@ -33,8 +33,7 @@ from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter, settled_gain
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.c_files import FLAGS
-from gpbnb.wordlength.c_integers import Integers, Needs
-from gpbnb.wordlength.c_source import places
+from gpbnb.wordlength.c_integers import Integers, used_functions
 from gpbnb.wordlength.code import prepared
 from tests.corpus import conformance
 
@@ -112,7 +111,7 @@ def test_the_longest_words_are_divided_as_fractions(integer, fraction, overflow,
     numbers = [-(2**63), *edges, *(-each for each in edges), *drawn, *(each >> 40 for each in drawn)]
     for rounding in roundings:
         fmt = FixedFormat(integer, fraction, rounding, overflow)
-        helpers = Integers(WordFormats(fmt), Needs(fmt.precision + abs(fraction), 63)).text("divide")
+        helpers = used_functions(Integers(WordFormats(fmt), fmt.precision + abs(fraction)).functions(), "divide")
         (tmp_path / "run.c").write_text(DIVISIONS.format(helpers=helpers))
         command = [installed()[0], *FLAGS.split(), "-Werror", *SANITIZER.split(), "-o", "run", "run.c"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
@@ -244,14 +243,6 @@ def test_a_name_cannot_end_a_comment(tmp_path):
 
 
 # -- refusals --------------------------------------------------------------------------------------------------------
-
-
-def test_names_that_are_none_in_c_are_numbered():
-    assert [str(each) for each in places(("x[0]", "P[0][1]"), 2, "c")] == ["x[0]", "P[0][1]"]
-    for names in (("a b",), ("int",), ("r3",), ("a", "a"), ("a", "a[0]"), ()):
-        assert [str(each) for each in places(names, len(names) or 2, "c")] == [
-            f"c[{i}]" for i in range(len(names) or 2)
-        ]
 
 
 @needs_compiler

@@ -65,5 +65,3 @@ def test_written_code_replaces_only_files_that_gpbnb_has_written(name, tmp_path)
         write_code(SYSTEM, BINARY32, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [name]
     assert (tmp_path / name).read_text() == "my own\n"
-    write_code(SYSTEM, BINARY32, tmp_path, overwrite=True)
-    assert (tmp_path / name).read_text() != "my own\n"
