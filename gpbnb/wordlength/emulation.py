@@ -17,7 +17,6 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel, stored_measurements
-from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import opened, true_states
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.smoothing import FixedIntervalSmoother
@@ -77,7 +76,7 @@ class EmulatedRun:
 
 
 def emulate(
-    model: ModelSource | NonlinearModel | Function,
+    model: ModelSource,
     z: Numbers | int,
     fmt: AnyFormat | str,
     *,

@@ -22,15 +22,14 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import format_named
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.bounds.words import bounded_rounding
-from gpbnb.filters.named import whole_number
 from gpbnb.filters.program import ADD, SUBTRACT, Program, matrices
 from gpbnb.filters.system import is_stable
 from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_integers, successors
 from gpbnb.wordlength.asked import admitted
 from gpbnb.wordlength.models import ModelSource
 
-MOST_STATES, LARGEST_SEARCH = 2**24, 2**28
-"""Largest number of states that a search tries, by default and at all."""
+MOST_STATES = 2**24
+"""Largest number of states that a search tries."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,17 +92,17 @@ def limit_cycles(
     fmt: WordFormats | FixedFormat | str,
     u: Any = 0,
     *,
-    most: int = MOST_STATES,
     everywhere: bool = False,
 ) -> LimitCycles:
     """Find every limit cycle in which a fixed-point filter can end when its input is constant.
+
+    If there are more than :data:`MOST_STATES` states to try, only the bound is returned.
 
     Parameters
     ----------
     system : a stable linear system, in any structure.
     fmt : the format of all numbers, or :class:`gpbnb.WordFormats` for data, coefficients and sums.
     u : the input, one number or (m,).
-    most : largest number of states to try, at most 2**28; if there are more, only the bound is returned.
     everywhere : whether to try every state that the word can store. By default, the search tries only the states within
         the error bound around the state of rest, which no cycle without an overflow can leave. Cycles with an overflow,
         in a format that saturates or wraps, are found only if this is True.
@@ -128,7 +127,7 @@ def limit_cycles(
     words = WordFormats(named) if isinstance(named, FixedFormat) else named
     if not isinstance(words, WordFormats):
         raise TypeError(f"got words {words!r}; needed WordFormats, such as WordFormats(FixedFormat(0, 15))")
-    most, n, m = whole_number("most", most, most=LARGEST_SEARCH), given.n, given.m
+    n, m = given.n, given.m
     made, data = integer_program(given.as_filter(), words), words.data
     value = np.asarray(u, dtype=object)
     if value.shape not in ((), (1,), (m,)):
@@ -150,7 +149,7 @@ def limit_cycles(
     counts = np.array([last - first + 1 for first, last in ends], np.int64)
     counts[~_read(made.program)] = 0
     total = math.prod(max(int(each), 1) for each in counts)
-    if total > most:
+    if total > MOST_STATES:
         return LimitCycles(None, error[n:], rest[n:], 0)
     cycles = list[LimitCycle]()
     for numbers in _cycles(successors(made, inputs.astype(np.int64), low, counts)):

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
 from types import MappingProxyType, ModuleType
-from typing import Any, NamedTuple, Protocol, TypeAlias, TypeVar, overload
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,42 +81,11 @@ SYSTEMS = {"scipy": ("StateSpace", "TransferFunction", "ZerosPolesGain"), "contr
 """Classes of ``scipy.signal`` and python-control that are read."""
 
 
-class Discrete(Protocol):
-    """A system of ``scipy.signal`` or python-control."""
-
-    @property
-    def dt(self) -> Any:
-        """Its time step."""
-
-
-class Estimator(Protocol):
-    """A filter of FilterPy."""
-
-    @property
-    def dim_x(self) -> Any:
-        """Number of states."""
-
-
-ModelSource: TypeAlias = (
-    str | Path | Mapping[str, Any] | Sequence[Any] | NDArray[Any] | LinearModel | LinearSystem | Discrete | Estimator
-)
-"""What a model is read from."""
-
+ModelSource: TypeAlias = Any
+"""What :func:`read_model` takes; also a model of this package, or a function of a format and data."""
 
 MODELS = (LinearModel, LinearSystem, NonlinearModel, NonlinearSystem, FixedIntervalSmoother)
 """Models of this package, which are read as they are."""
-
-Own = TypeVar("Own", NonlinearModel, NonlinearSystem, FixedIntervalSmoother)
-
-
-@overload
-def read_model(
-    source: ModelSource, u: Numbers | None = ..., structure: str | None = ...
-) -> LinearModel | LinearSystem | Any: ...
-
-
-@overload
-def read_model(source: Own) -> Own: ...
 
 
 def read_model(source: Any, u: Numbers | None = None, structure: str | None = None) -> Any:

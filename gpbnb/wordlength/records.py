@@ -1,25 +1,19 @@
-"""Run many measurement records in many formats, on any executor."""
+"""Run many measurement records in many formats."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from concurrent.futures import Executor
-from dataclasses import replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
-from gpbnb.arithmetic.search import Outcome, least_from_which_on
 from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import whole_number
-from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.asked import (
@@ -27,7 +21,6 @@ from gpbnb.wordlength.asked import (
     TASK_OF_BASIS,
     Asked,
     Data,
-    Function,
     admitted,
     checked_basis,
     checked_format,
@@ -76,28 +69,9 @@ class RecordSurvey(NamedTuple):
         """For each format, the share of records that stay within the tolerance."""
         return tuple(float(share) for share in (self.ratios <= 1).mean(axis=0))
 
-    def enough(self) -> tuple[FloatFormat | FixedFormat, ...]:
-        """For each base, rounding and range, the format with the fewest digits in which all records meet the tolerance.
-
-        A format counts only if the formats with more digits in the survey also meet the tolerance.
-        """
-        met = {fmt: bool((self.ratios[:, i] <= 1).all()) for i, fmt in enumerate(self.formats)}
-        kinds = dict[Any, dict[int, Any]]()
-        for fmt in self.formats:
-            if isinstance(fmt, FixedFormat):
-                kind: Any = (fmt.integer_bits, fmt.rounding, fmt.overflow)
-                digits = fmt.fraction_bits
-            else:
-                kind, digits = replace(fmt, precision=1, given_largest=None), fmt.precision
-            kinds.setdefault(kind, {})[digits] = fmt
-        least = (
-            (each, least_from_which_on({digits: met[fmt] for digits, fmt in each.items()})) for each in kinds.values()
-        )
-        return tuple(each[digits] for each, digits in least if digits is not None)
-
 
 def survey_records(
-    model: ModelSource | NonlinearModel | Function,
+    model: ModelSource,
     records: Any,
     tolerance: Any,
     formats: Sequence[FloatFormat | FixedFormat | str],
@@ -105,8 +79,6 @@ def survey_records(
     form: Form | str | None = None,
     basis: Basis = "emulation",
     steps: int | None = None,
-    executor: Executor | None = None,
-    progress: bool = False,
 ) -> RecordSurvey:
     """Run a model on many records of measurements or inputs in many formats.
 
@@ -117,8 +89,6 @@ def survey_records(
         missing. A whole number requests that many simulated records of a Kalman filter with `steps` steps each and the
         seeds 0, 1, …; at most :data:`MOST_RECORDS`, and 100 million steps in all.
     formats : formats of any base, rounding and range, or their names; for a linear filter, with compiled loops.
-    executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
-    progress : show a progress bar that counts records.
 
     Raises
     ------
@@ -156,12 +126,12 @@ def survey_records(
         if any(fmt.limits is None for fmt in chosen_formats):
             given.check_sizes()
     data = _data(given, records, steps)
-    one = partial(_outcomes, given, tolerance, chosen_formats, chosen, basis)
-    found = list(
-        tqdm((executor.map if executor else map)(one, data), "records", len(data), unit="record", disable=not progress)
-    )
-    ratios, reasons = (tuple(tuple(each[i] for each in row) for row in found) for i in (0, 1))
-    return RecordSurvey(chosen_formats, np.array(ratios, dtype=np.float64), reasons)
+    most, found = max(fmt.precision for fmt in chosen_formats), []
+    for each in data:
+        judge = judge_for(Asked(given, each, tolerance, basis, form=chosen), chosen_formats[0].base, most)
+        found.append([judge.proof(fmt) for fmt in chosen_formats])
+    ratios = np.array([[each.ratio for each in row] for row in found])
+    return RecordSurvey(chosen_formats, ratios, tuple(tuple(each.why for each in row) for row in found))
 
 
 def _data(model: Any, records: Any, steps: int | None) -> tuple[Data, ...]:
@@ -187,12 +157,3 @@ def _data(model: Any, records: Any, steps: int | None) -> tuple[Data, ...]:
             if len(shape) != 2 or shape[1] != model.m or not shape[0]:
                 raise ValueError(f"got record {number} of shape {shape}; needed (steps, {model.m})")
     return data
-
-
-def _outcomes(
-    model: Any, tolerance: Any, formats: tuple[Any, ...], form: Form, basis: Basis, data: Data
-) -> list[Outcome]:
-    """Return the error / tolerance of one record in each format, and why it is infinite."""
-    most = max(fmt.precision for fmt in formats)
-    judge = judge_for(Asked(model, data, tolerance, basis, form=form), formats[0].base, most)
-    return [judge.proof(fmt) for fmt in formats]

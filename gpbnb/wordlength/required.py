@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from tqdm import tqdm  # type: ignore[import-untyped]
-
 from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -26,7 +24,7 @@ from gpbnb.filters.nonlinear_run import check_form, opened
 from gpbnb.filters.system import LinearSystem, unobserved
 from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, evidence, joined, judgement, listed, share_text
-from gpbnb.wordlength.asked import TASK_OF_KIND, Asked, Function, checked_basis, checked_format, is_filter
+from gpbnb.wordlength.asked import TASK_OF_KIND, Asked, checked_basis, checked_format, is_filter
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS, fixed_like, in_fixed_point, in_words
 from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, slowest_response
 from gpbnb.wordlength.models import ModelSource
@@ -38,7 +36,7 @@ _TASK_IN_WORDS: dict[str, str] = {
 
 
 def required_precision(
-    model: ModelSource | NonlinearModel | Function,
+    model: ModelSource,
     z: Numbers | int,
     tolerance: Any,
     *,
@@ -53,7 +51,6 @@ def required_precision(
     highest: int | None = None,
     coefficient_bits: int | None = None,
     seed: int = 0,
-    progress: bool = False,
 ) -> Requirement:
     """Find the format with the fewest digits with which a filter or a function stays within a tolerance.
 
@@ -106,7 +103,6 @@ def required_precision(
     coefficient_bits : significant bits of each coefficient of a linear system in fixed point, each with its own binary
         point; by default 15. With kind="words", the most to try, by default 24.
     seed : seed of simulated measurements.
-    progress : show a progress bar that counts runs.
 
     Raises
     ------
@@ -150,7 +146,6 @@ def required_precision(
         form=form,
         highest=highest,
         seed=seed,
-        progress=progress,
     )
     options = {"base": base != 2, "rounding": rounding != Rounding.NEAREST, "range": range is not None}
     if like is not None and (names := [name for name, value in options.items() if value]):
@@ -241,15 +236,14 @@ def _in_floating_point(asked: Asked, like: FloatFormat) -> Requirement:
     asked.check_sizes(like)
     lasting = is_filter(asked.model) and asked.basis in ("guarantee", "probable")
     bounds = asked.basis == "bound" or (asked.basis != "emulation" and not lasting)
-    with tqdm(desc="precisions", unit="run", disable=not asked.progress) as bar:
 
-        def search(each: Judge) -> Search[FloatFormat]:
-            proof, checks = each.proof if each.proved else None, () if lasting else CHECKED[base]
-            return Search(each.error, like, checks, bar.update, bounds, highest, proof=proof)
+    def search(each: Judge) -> Search[FloatFormat]:
+        proof, checks = each.proof if each.proved else None, () if lasting else CHECKED[base]
+        return Search(each.error, like, checks, bounds=bounds, largest=highest, proof=proof)
 
-        judge = judge_for(asked, base, highest or largest_compiled(like))
-        found, judge = for_ever_or_over(asked, judge, search, Search.is_bounded)
-        notes, cause = _advice(asked, judge, found, like, search)
+    judge = judge_for(asked, base, highest or largest_compiled(like))
+    found, judge = for_ever_or_over(asked, judge, search, Search.is_bounded)
+    notes, cause = _advice(asked, judge, found, like, search)
     return _float_answer(asked, found, judge.steps is not None, notes, cause, like)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from gpbnb import FixedFormat, LinearSystem
 from gpbnb.filters.words import WordFormats
+from gpbnb.wordlength import limit_cycles as module
 from gpbnb.wordlength.limit_cycles import limit_cycles
 from tests.oracles import fixed, limited
 
@@ -80,13 +81,14 @@ def test_the_dead_band_of_a_filter_of_first_order(a, period):
     assert "outputs stay within 5 units of rest, by a search of 11 states" in str(found)
 
 
-def test_a_smoother_with_floor_rests_up_to_three_units_below_its_input():
+def test_a_smoother_with_floor_rests_up_to_three_units_below_its_input(monkeypatch):
     words = WordFormats(FixedFormat(15, 0, "down"), FixedFormat(3, 12))
     found = limit_cycles(LinearSystem.smoother("1097/4096"), words, 512)
     assert sorted(int(cycle.outputs[0, 0]) for cycle in found.cycles) == [509, 510, 511, 512]
     assert found.largest == [3]
     assert found.rest == [512]
-    few = limit_cycles(LinearSystem.smoother("1097/4096"), words, 512, most=3)
+    monkeypatch.setattr(module, "MOST_STATES", 3)
+    few = limit_cycles(LinearSystem.smoother("1097/4096"), words, 512)
     assert (few.cycles, few.searched, few.largest) == (None, 0, found.bound)
     assert str(few) == "outputs stay within 3.73382 units of rest; too many states to try each"
 

@@ -80,13 +80,6 @@ def test_a_survey_is_what_the_search_sees():
         assert survey(MODEL, Z, (1e-4, math.inf), digits, basis=basis) == found.tried
 
 
-def test_a_bar_for_those_who_wait(capsys):
-    required_precision(MODEL, Z, 1e-4)
-    assert capsys.readouterr().err == ""
-    found = required_precision(MODEL, Z, 1e-4, progress=True)
-    assert f"{len(found.tried)}run" in capsys.readouterr().err.replace(" ", "")
-
-
 def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
     """One state, R far below P: with few digits a variance comes out as zero, whatever the error of the state."""
     given = LinearModel([[1]], [[1]], [[0]], [["1e-6"]], [1], [[1]])
