@@ -31,7 +31,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
         asked = read_files(given)
         tell = (lambda text: None) if given.quiet else (lambda text: print(text, file=sys.stderr, flush=True))
-        report = study(asked.question, asked.origin, command, tell)
+        report = study(asked, command, tell)
         proof = certificate(asked, report) if given.certificate else None
     except Exception as error:
         own = where_raised(error)
@@ -54,7 +54,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             write_run(asked, report, given.csv)
         option = f"--code {given.code}"
         if given.code and report.answer.met:
-            files, fmt = write_code_of(asked, report)
+            files, fmt = write_code_of(given.code, asked, report)
             print("code:", *files)
             if proof is not None and (other := uncovered(proof.format, fmt)):
                 print(other)

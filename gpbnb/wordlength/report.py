@@ -21,8 +21,6 @@ from gpbnb.files import WRITTEN
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import whole_number
-from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.poles import stored_response
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
@@ -41,15 +39,6 @@ SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 BITS = FloatFormat(2, 2)
 """What is searched if nothing else is asked: binary, rounded to nearest, with unlimited exponents."""
 
-DEFAULT_STEPS = 1000
-"""Steps that are simulated if no number is given."""
-
-
-def usual_steps(model: Any) -> int:
-    """Return the number of steps to simulate if none is given: those that a model describes, or the default."""
-    described = model.steps if is_filter(model) else None
-    return DEFAULT_STEPS if described is None else int(described)
-
 
 @dataclass(frozen=True)
 class Question:
@@ -60,18 +49,18 @@ class Question:
     source : the filter, perhaps in several structures. The first gives the answer, or, if the source compares all, that
         which needs the fewest digits on the first basis.
     tolerance, form, bases, within : as in :func:`gpbnb.required_precision`; the first basis gives the answer.
-    z : (steps, m), measurements or inputs; by default simulated, for a Kalman filter.
-    steps : number of steps to simulate; by default the number of measurements, or :data:`DEFAULT_STEPS`.
+    z : (steps, m), measurements or inputs; or the number of steps of what needs none.
+    origin : where they come from.
     like : a format with the base, the rounding and the range of those to search.
     fmt : the one format to judge, in place of a search.
     kind, coefficient_bits : what is searched, as in :func:`gpbnb.required_precision`.
-    seed : seed of simulated measurements.
+    own : the model in its file, if the question is about its filter with a constant gain.
     """
 
     source: FilterSource
     tolerance: str | float | Sequence[str | float]
-    z: Any = None
-    steps: int | None = None
+    z: Any
+    origin: str = "given"
     form: str = "innovation"
     bases: Sequence[Basis] = ("emulation", "bound")
     within: FilterLimits | None = None
@@ -79,7 +68,7 @@ class Question:
     fmt: FloatFormat | FixedFormat | None = None
     kind: Kind = "float"
     coefficient_bits: int | None = None
-    seed: int = 0
+    own: LinearModel | None = None
 
     @property
     def model(self) -> Any:
@@ -87,16 +76,9 @@ class Question:
         return self.source.model
 
     @property
-    def count(self) -> int:
+    def steps(self) -> int:
         """Number of steps."""
-        if self.steps is not None:
-            return self.steps
-        return usual_steps(self.model) if self.z is None else len(self.z)
-
-    @property
-    def data(self) -> Any:
-        """Measurements or inputs, or the number of those to simulate."""
-        return self.count if self.z is None else self.z
+        return self.z if isinstance(self.z, int) else len(self.z)
 
     def parts(self) -> list[Part]:
         """Return the single questions, one for each basis and form or structure."""
@@ -113,24 +95,17 @@ class Question:
         forms = [form, *(each for each in SIDE_BY_SIDE if each is not form and has_forms)]
         return [Part(f"{each}, {basis}", basis, model, each) for each in forms for basis in self.bases]
 
-    def measured(self) -> Any:
-        """Return the measurements or inputs; those of a Kalman filter are simulated if there are none."""
-        if not is_filter(self.model) or self.z is not None:
-            return self.z
-        return simulated(self.model, whole_number("steps", self.count), self.seed)
-
-    def answer(self, part: Part, z: Any) -> Requirement:
+    def answer(self, part: Part) -> Requirement:
         """Answer one of the single questions, by a search or by judging the one format."""
-        basis, data = part.basis, self.count if z is None else z
-        asked: dict[str, Any] = {"form": part.form, "basis": basis}
-        asked["within"] = self.within if basis in ("guarantee", "probable") else None
+        asked: dict[str, Any] = {"form": part.form, "basis": part.basis}
+        asked["within"] = self.within if part.basis in ("guarantee", "probable") else None
         if self.fmt is not None:
-            return judge(part.model, self.fmt, data, self.tolerance, **asked)
+            return judge(part.model, self.fmt, self.z, self.tolerance, **asked)
         if self.kind in IN_FIXED_POINT:
             asked |= {"rounding": self.like.rounding, "coefficient_bits": self.coefficient_bits}
         else:
             asked["like"] = self.like
-        return required_precision(part.model, data, self.tolerance, kind=self.kind, **asked)
+        return required_precision(part.model, self.z, self.tolerance, kind=self.kind, **asked)
 
 
 class Part(NamedTuple):
@@ -170,20 +145,17 @@ class Report(NamedTuple):
         return page(self.entries)
 
 
-def study(
-    asked: Question, source: str = "", command: str = "", tell: Callable[[str], Any] = lambda text: None
-) -> Report:
+def study(asked: Question, command: str = "", tell: Callable[[str], Any] = lambda text: None) -> Report:
     """Find the answer for each basis and form or structure, and collect what explains it.
 
-    `source` says where measurements come from, `command` reproduces the report, `tell` is called with a line of text
-    before and after each search.
+    `command` reproduces the report, `tell` is called with a line of text before and after each search.
     """
-    parts, z, structures = asked.parts(), asked.measured(), asked.source.structures
+    parts, structures = asked.parts(), asked.source.structures
     lacking = dict(asked.source.lacking) if len(structures) > 1 else {}
     found: list[tuple[Part, Requirement]] = []
     for part in parts:
         tell(f"{part.label} …")
-        answer = asked.answer(part, z)
+        answer = asked.answer(part)
         found.append((part, answer))
         tell(f"{part.label}: {answer}")
     for name, why in lacking.items():
@@ -195,11 +167,8 @@ def study(
         tell(f"{first.structure}: {stored}")
     count = model.n if is_filter(model) else getattr(model, "p", np.size(asked.tolerance))
     tolerances = tolerances_of(asked.tolerance, count, "outputs")
-    origin = (
-        "given" if asked.z is not None else f"simulated by the model, seed {asked.seed}" if z is not None else "none"
-    )
     like = fmt or asked.like
-    errors = _errors(model, z, main.format if met else None, asked.form, tolerances)
+    errors = _errors(model, asked.z, main.format if met else None, asked.form, tolerances)
     ratios = [(ratio, i) for i, ratio in enumerate(errors) if ratio is not None]
     entries = {
         "written": WRITTEN,
@@ -209,11 +178,11 @@ def study(
         "text": f"{first.structure}: {main}" if len(structures) > 1 else str(main),
         "base": like.base,
         "rounding": like.rounding.value,
-        "steps": asked.count,
+        "steps": asked.steps,
         "tolerance": [
             _finite(float(exactly(each))) for each in np.broadcast_to(asked.tolerance, len(tolerances)).tolist()
         ],
-        "source": source or origin,
+        "source": asked.origin,
         "answers": [
             {
                 "label": part.label,
@@ -225,7 +194,7 @@ def study(
             for part, answer in found
         ],
         "errors": errors,
-        "ranges": _ranges(model, z),
+        "ranges": _ranges(model, asked.z),
         "command": command,
         "versions": machine(),
         "limits": {} if within is None else {key: list(map(_finite, each)) for key, each in within._asdict().items()},

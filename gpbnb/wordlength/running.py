@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,10 @@ from gpbnb.bounds.guess import FilterLimits
 from gpbnb.files import WRITTEN, replace_file
 from gpbnb.filters.forms import CONSTANT_GAIN
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import whole_number
 from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.settled import settled_filter
-from gpbnb.filters.simulation import simulated_inputs, simulated_measurements
+from gpbnb.filters.simulation import simulated_inputs
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.answer import Basis, format_in_words
 from gpbnb.wordlength.asked import CANNOT, FUNCTION, is_filter, kind_of
@@ -32,28 +33,14 @@ from gpbnb.wordlength.c_files import refuse_others
 from gpbnb.wordlength.code import VECTORS, write_code
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource, read_filter, read_measurements
-from gpbnb.wordlength.options import IN_FIXED_POINT, QUANTITIES
-from gpbnb.wordlength.report import DEFAULT_STEPS, Part, Question, Report, usual_steps
+from gpbnb.wordlength.options import IN_FIXED_POINT, QUANTITIES, printable
+from gpbnb.wordlength.report import Question, Report
+
+DEFAULT_STEPS = 1000
+"""Steps that are simulated if no number is given."""
 
 
-class CommandInput(NamedTuple):
-    """What a command line asks, with the files that it names as they were read.
-
-    Parameters
-    ----------
-    options : the options, as :func:`gpbnb.wordlength.options.read` returns them.
-    own : the model in its file; with a constant gain, the question is about a linear system.
-    question : the question.
-    origin : where measurements or inputs come from.
-    """
-
-    options: argparse.Namespace
-    own: Any
-    question: Question
-    origin: str
-
-
-def read_files(options: argparse.Namespace) -> CommandInput:
+def read_files(options: argparse.Namespace) -> Question:
     """Read the files of a command line, and reject those that do not fit the others or its options."""
     if options.code:
         refuse_others(options.code, "filter")
@@ -71,16 +58,15 @@ def read_files(options: argparse.Namespace) -> CommandInput:
     usual = "" if kind in CANNOT["be bounded along a run"] else usual
     bases: Sequence[Basis] = options.basis or tuple(filter(None, ("emulation", usual)))
     z, origin = _data(options, source.model, own)
-    alone = is_filter(source.model) or (kind == FUNCTION and options.steps)
-    if z is None and not alone and {"emulation", "bound"} & {*bases}:
+    if isinstance(z, int) and not (kind == FUNCTION and options.steps) and {"emulation", "bound"} & {*bases}:
         other = "--steps, if it takes none" if kind == FUNCTION else "--simulate"
         raise ValueError(f"got {kind} without inputs; needed --measurements, a CSV file with its inputs, or {other}")
     rounding = Rounding(options.rounding or "nearest")
-    question = Question(
+    return Question(
         source,
         options.tolerance,
         z,
-        options.steps,
+        origin,
         "innovation" if settles or not options.form else options.form,
         bases,
         _limits(options, bases, of_system, z),
@@ -88,34 +74,31 @@ def read_files(options: argparse.Namespace) -> CommandInput:
         _format(options),
         options.kind,
         options.coefficients,
-        options.seed or 0,
+        own if settles else None,
     )
-    return CommandInput(options, own, question, origin)
 
 
-def _data(given: argparse.Namespace, model: Any, own: Any) -> Any:
-    """Return the measurements or inputs of a command line, None if a model simulates them, and their origin.
+def _data(given: argparse.Namespace, model: Any, own: Any) -> tuple[Any, str]:
+    """Return the measurements or inputs of a command line, or the number of steps of what needs none; and their origin.
 
     `own` is the model in its file, which simulates the measurements of its filter with a constant gain.
     """
     if given.measurements:
         z = read_measurements(given.measurements)
         _check_rows(given, z, model)
-        if kind_of(model) == FUNCTION and z.shape[1] == 1:
-            z = z.ravel()
-        return z, str(given.measurements).encode(errors="surrogateescape").decode(errors="backslashreplace")
-    seed = given.seed or 0
+        return z.ravel() if kind_of(model) == FUNCTION and z.shape[1] == 1 else z, printable(str(given.measurements))
+    described = own.steps if is_filter(own) else None
+    steps, seed = given.steps or described or DEFAULT_STEPS, given.seed or 0
     if given.simulate and (is_filter(own) or kind_of(own) == FUNCTION):
         why = "its model simulates its measurements" if is_filter(own) else "give --measurements, whose rows it takes"
         raise ValueError(f"got --simulate {given.simulate} for {kind_of(own)}; needed none: {why}")
-    if own is not model:
-        z = simulated_measurements(own, given.steps or usual_steps(own), seed)
-        return z, f"simulated by the model, seed {seed}"
+    if is_filter(own):
+        return simulated(own, whole_number("steps", steps), seed), f"simulated by the model, seed {seed}"
     if not given.simulate:
-        return None, ""
+        return whole_number("steps", steps), "none"
     level = 1.0 if given.level is None else np.asarray(exact(given.level), dtype=np.float64)
     shown = ", ".join(f"{each:.6g}" for each in np.ravel(level).tolist())
-    z = simulated_inputs(given.simulate, level, given.steps or DEFAULT_STEPS, model.m, seed)
+    z = simulated_inputs(given.simulate, level, steps, model.m, seed)
     return z, f"simulated, {given.simulate} of level {shown}"
 
 
@@ -135,61 +118,47 @@ def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: Any) -
         )
 
 
-def certificate(asked: CommandInput, report: Report) -> Guarantee:
+def certificate(asked: Question, report: Report) -> Guarantee:
     """Return the first guarantee in a report, which has a certificate, or reject a report without one."""
-    part = _part(report, "guarantee")
-    fmt: Any = next(answer.format for each, answer in report.found if each.label == part.label)
+    structure = report.part.structure
+    part, fmt = next(
+        (each, answer.format)
+        for each, answer in report.found
+        if (each.basis, each.structure) == ("guarantee", structure)
+    )
     if fmt is None:
         raise ValueError("got no precision with a guarantee; needed one for a certificate; allow a larger tolerance")
-    within: Any = asked.question.within or _of_inputs(asked)
-    return guarantee(part.model, fmt, within, form=part.form, horizon=asked.question.count)
+    within: Any = asked.within or _of_inputs(asked)
+    return guarantee(part.model, fmt, within, form=part.form, horizon=asked.steps)  # type: ignore[arg-type]
 
 
-def _of_inputs(asked: CommandInput) -> FilterLimits:
+def _of_inputs(asked: Question) -> FilterLimits:
     """Return limits on the inputs of a linear system that are no larger than those given."""
-    return limits(measurement=np.abs(asked.question.z).max(axis=0))
+    return limits(measurement=np.abs(asked.z).max(axis=0))
 
 
-def _part(report: Report, basis: str) -> Part:
-    """Return the single question on a basis, for the form or the structure of the answer."""
-    structure = report.part.structure
-    return next(each for each, _ in report.found if each.basis == basis and each.structure == structure)
-
-
-def write_code_of(asked: CommandInput, report: Report) -> tuple[tuple[Path, ...], Any]:
-    """Write the filter of a command line as C, into the folder of its option ``--code``; return files and format.
+def write_code_of(folder: Path, asked: Question, report: Report) -> tuple[tuple[Path, ...], Any]:
+    """Write the filter of a command line as C into a folder; return files and format.
 
     The format is the one that is judged, or the answer in fixed point, or else the first of binary32 and binary64 that
     meets the tolerance, on the first basis. A digital filter has the structure that gives the answer of the report.
     """
-    folder, form, own, question, z = asked.options.code, asked.options.form, asked.own, asked.question, asked.question.z
-    fixed = question.kind in IN_FIXED_POINT
-    fmt: Any = report.answer.format if fixed else question.fmt or _type_within_tolerance(asked, report)
-    within = question.within
-    if within is None and fixed and isinstance(question.model, LinearSystem):
+    fixed, source, within = asked.kind in IN_FIXED_POINT, asked.source, asked.within
+    types = (each for each in (BINARY32, BINARY64) if replace(asked, fmt=each).answer(report.part).met)
+    fmt: Any = report.answer.format if fixed else asked.fmt or next(types, None)
+    if fmt is None:
+        raise ValueError(
+            f"got --code {folder}, and neither binary32 nor binary64 meets the tolerance; needed a larger tolerance, "
+            "or --format with fixed point"
+        )
+    if within is None and fixed and isinstance(asked.model, LinearSystem):
         within = _of_inputs(asked)
-    if not is_filter(own):
-        design, structures = question.source.design, question.source.structures
-        model: Any = design or structures.get(report.part.structure) or question.model
-        form = report.part.structure if design else None
+    model: Any = asked.own or source.design or source.structures.get(report.part.structure) or asked.model
+    form = CONSTANT_GAIN if asked.own else report.part.structure if source.design else None
+    if not is_filter(model):
         return write_code(model, fmt, folder, form=form, within=within), fmt
-    if z is None:
-        z = simulated(own, question.count, question.seed)
-    vectors = None if np.isnan(z[:VECTORS]).any() else z[:VECTORS]
-    return write_code(own, fmt, folder, form=form, inputs=vectors, within=within), fmt
-
-
-def _type_within_tolerance(asked: CommandInput, report: Report) -> FloatFormat:
-    """Return binary32 if it meets the tolerance of a command line, else binary64."""
-    question = asked.question
-    part = _part(report, question.bases[0])
-    for fmt in (BINARY32, BINARY64):
-        if replace(question, fmt=fmt).answer(part, question.z).met:
-            return fmt
-    raise ValueError(
-        f"got --code {asked.options.code}, and neither binary32 nor binary64 meets the tolerance; needed a larger "
-        "tolerance, or --format with fixed point"
-    )
+    vectors = None if np.isnan(asked.z[:VECTORS]).any() else asked.z[:VECTORS]
+    return write_code(model, fmt, folder, form=form or asked.form, inputs=vectors, within=within), fmt
 
 
 def uncovered(proved: Any, written: Any) -> str:
@@ -206,12 +175,10 @@ def write(report: Report, page: Path) -> None:
     replace_file(page.with_suffix(".json"), f"{report.to_json()}\n".encode())
 
 
-def write_run(asked: CommandInput, report: Report, file: Path) -> None:
+def write_run(asked: Question, report: Report, file: Path) -> None:
     """Write each step of a run in the format of the answer as CSV: estimates or outputs, and their errors."""
-    question, (_, _, model, form, _) = asked.question, _part(report, asked.question.bases[0])
-    seed = question.seed if question.z is None else 0
-    run = emulate(model, question.data, report.answer.format, form=form, seed=seed)
-    numbers = run.x if is_filter(model) else run.y
+    run = emulate(report.part.model, asked.z, report.answer.format, form=report.part.form)
+    numbers = run.y if run.form is None else run.x
     kind = "output" if run.form is None else "state"
     names = report.entries["names"] or [f"{kind} {i}" for i in range(run.errors.shape[1])]
     lines = [f"# {WRITTEN}", ",".join(["step", *names, *(f"error of {name}" for name in names)])]
@@ -235,7 +202,7 @@ def _limits(given: argparse.Namespace, bases: Sequence[Basis], of_system: bool, 
     """Return the limits that the bases need; None if they need none, or if those of the inputs serve."""
     bounds = [each for each in bases if each in ("guarantee", "probable")]
     sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
-    if not bounds or (not sizes and of_system and z is not None):
+    if not bounds or (not sizes and of_system and not isinstance(z, int)):
         return None
     needed = "--measurement" if of_system else "--state and --innovation, or --measurement"
     if not sizes or (of_system and set(sizes) != {"measurement"}):

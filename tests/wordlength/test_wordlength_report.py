@@ -7,6 +7,7 @@ import pytest
 
 from gpbnb import FixedFormat
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.poles import stored_response
 from gpbnb.wordlength.models import FilterSource, read_filter
 from gpbnb.wordlength.report import Question, study
@@ -14,26 +15,13 @@ from gpbnb.wordlength.report import Question, study
 MODEL = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
 
 
-@pytest.mark.parametrize(
-    ("given", "source"),
-    [
-        ({"steps": 5}, "simulated by the model, seed 0"),
-        ({"z": [[1], [2]]}, "given"),
-        ({"steps": 5, "source": "a"}, "a"),
-    ],
-)
-def test_a_study_says_where_its_measurements_come_from(given, source):
+def test_a_study_answers_for_each_form_and_tells_each_answer():
     told: list[str] = []
-    asked = {name: value for name, value in given.items() if name != "source"}
-    question = Question(FilterSource(MODEL), 0.1, bases=("emulation",), **asked)
-    found = study(question, given.get("source", ""), tell=told.append)
-    told_first = [found.entries[each] for each in ("kind", "source", "steps")]
-    assert told_first == ["Kalman filter", source, given.get("steps", 2)]
-    assert [each["label"] for each in found.entries["answers"]] == [
-        "innovation, emulation",
-        "Joseph, emulation",
-        "UD, emulation",
-    ]
+    question = Question(FilterSource(MODEL), 0.1, [[1], [2]], bases=("emulation",))
+    found = study(question, tell=told.append)
+    assert [found.entries[each] for each in ("kind", "source", "steps")] == ["Kalman filter", "given", 2]
+    forms = ["innovation, emulation", "Joseph, emulation", "UD, emulation"]
+    assert [each["label"] for each in found.entries["answers"]] == forms
     assert told[:2] == ["innovation, emulation …", f"innovation, emulation: {found.answer}"]
 
 
@@ -57,6 +45,6 @@ def test_what_storing_does_to_a_filter_is_told_with_the_format_of_its_coefficien
 
 def test_the_state_with_the_largest_share_of_its_tolerance_limits():
     model = LinearModel([[1, "0.1"], [0, 1]], [[1, 0]], np.eye(2) / 64, [[1]], [0, 0], np.eye(2))
-    entries = study(Question(FilterSource(model), (1, "1/1000"), bases=("emulation",), steps=5)).entries
+    entries = study(Question(FilterSource(model), (1, "1/1000"), simulated(model, 5), bases=("emulation",))).entries
     assert entries["errors"][0] < entries["errors"][1]
     assert entries["limiting"] == 1
