@@ -20,13 +20,13 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.forms import Form
 from gpbnb.report.display.tables import Table
-from gpbnb.wordlength.examples import cyclic
+from gpbnb.report.examples import cyclic
 
 RESULTS = Path(__file__).parent / "results"
 
 
 class Case(NamedTuple):
-    """A filter of :func:`gpbnb.wordlength.examples.cyclic` in 24 bits, and what is to be reached, if anything.
+    """A filter of :func:`gpbnb.report.examples.cyclic` in 24 bits, and what is to be reached, if anything.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ LONGEST_FILE = 800
 TOPICS = ("rounding", "inversion", "kalman", "guarantees", "rolling", "integration", "budget", "geometry")
 LIBRARY = (("files", "interrupts", "names"), ("arithmetic",), ("sweeps",), ("filters",), ("bounds",), ("wordlength",))
 REPORT = (
-    ("display", "measurement", "stored_rows"),
+    ("display", "examples", "measurement", "stored_rows"),
     TOPICS,
     ("gravity_probe_b",),  # its answers are compared with the bounds of the report of 1984
     ("wordlengths", "pictures", "ledger", "ledger_options", "stored", "evidence"),

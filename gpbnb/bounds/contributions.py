@@ -47,10 +47,11 @@ def contributions(found: FilterGuarantee) -> Contributions:
     --------
     Two sums, which give the predicted and the new position of a tracker, cause nearly the whole bound:
 
-    >>> from gpbnb import FloatFormat
+    >>> from gpbnb import FloatFormat, LinearModel
     >>> from gpbnb.bounds.guarantee import guarantee, limits
-    >>> from gpbnb.wordlength.examples import tracker
-    >>> found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1000, 30], innovation=8))
+    >>> Phi, Q = [[1, "0.1"], [0, 1]], [["1/30000", "1/2000"], ["1/2000", "1/100"]]
+    >>> tracker = LinearModel(Phi, [[1, 0]], Q, [[4]], [0, 0], [[100, 0], [0, 100]])
+    >>> found = guarantee(tracker, FloatFormat(2, 24), limits(state=[1000, 30], innovation=8))
     >>> of_position = contributions(found).sums[0]
     >>> [int(o) for o in of_position.argsort()[-2:]], round(float(of_position[[4, 12]].sum() / found.bound[0]), 2)
     ([4, 12], 0.97)

@@ -30,9 +30,9 @@ from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.system import biquad
+from gpbnb.report.examples import cyclic, tracker
 from gpbnb.report.guarantees import certificates
 from gpbnb.report.guarantees.random_filters import draw
-from gpbnb.wordlength.examples import cyclic, tracker
 
 Content = dict[str, Any]
 FORMAT = FloatFormat(2, 24)

@@ -12,8 +12,8 @@ from gpbnb.bounds.contributions import contributions
 from gpbnb.bounds.guarantee import PARTS, guarantee, limits
 from gpbnb.bounds.probable import separate_roundings
 from gpbnb.filters.forms import Form
+from gpbnb.report.examples import cyclic, tracker
 from gpbnb.report.guarantees import published
-from gpbnb.wordlength.examples import cyclic, tracker
 from tests.plain_program import steps_in_python
 from tests.small_filter import named_operations
 

@@ -14,11 +14,11 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.contributions import contributions
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.filters.forms import Form
+from gpbnb.report.examples import tracker
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.pictures import views
 from gpbnb.report.pictures.operations import STEP
 from gpbnb.report.rolling import theory
-from gpbnb.wordlength.examples import tracker
 
 from . import axe
 from . import browser as tools

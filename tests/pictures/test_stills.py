@@ -12,9 +12,9 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.contributions import contributions
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.report.display import style
+from gpbnb.report.examples import tracker
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.pictures import operations, views
-from gpbnb.wordlength.examples import tracker
 
 PICTURES = pytest.mark.parametrize("picture", views.PICTURES, ids=lambda each: each.id)
 

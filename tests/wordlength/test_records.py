@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gpbnb import FloatFormat, Rounding
-from gpbnb.wordlength import examples
+from gpbnb.report import examples
 from gpbnb.wordlength.records import RecordSurvey, survey_records
 from tests.surveying import survey
 

@@ -7,7 +7,7 @@ import pytest
 
 from gpbnb import BFLOAT16, FixedFormat, FloatFormat, LinearSystem, NonlinearModel, required_precision, survey_records
 from gpbnb.filters.simulation import simulated_measurements
-from gpbnb.wordlength import examples
+from gpbnb.report import examples
 from tests.surveying import survey
 
 Z = np.random.default_rng(3).standard_normal(200)

@@ -14,9 +14,10 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.run import log_spaced, reference
+from gpbnb.report import examples
 from gpbnb.report.guarantees import table as guarantees
 from gpbnb.report.wordlengths import study
-from gpbnb.wordlength import examples, ranges
+from gpbnb.wordlength import ranges
 from tests.surveying import survey
 
 TILT = examples.tilt()

@@ -24,6 +24,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.system import LinearFilter, biquad, controller, state_space
 from gpbnb.report.display.tables import Table
+from gpbnb.report.examples import TILT_STATES, altimeter, tilt, tracker
 from gpbnb.report.guarantees.published import (
     dyer_mcreynolds,
     dynamax_tracking,
@@ -37,7 +38,6 @@ from gpbnb.report.guarantees.published import (
 from gpbnb.report.stored_rows import Number, Whole, sweep_of_rows
 from gpbnb.report.stored_rows import load as load_rows
 from gpbnb.wordlength.answer import Basis
-from gpbnb.wordlength.examples import TILT_STATES, altimeter, tilt, tracker
 from gpbnb.wordlength.required import required_precision
 
 FORMAT = FloatFormat(2, 24)

@@ -15,10 +15,10 @@ from gpbnb.bounds.contributions import Contributions, contributions
 from gpbnb.bounds.guarantee import FilterGuarantee
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, innovation_program
 from gpbnb.report.display import style
+from gpbnb.report.examples import tracker
 from gpbnb.report.guarantees.certificates import tracker_guarantee
 from gpbnb.report.guarantees.table import FORMAT
 from gpbnb.report.pictures.picture import Input, Picture, short_number
-from gpbnb.wordlength.examples import tracker
 
 STATES = {"position": "m", "velocity": "m/s"}
 """The states of the tracker and their units."""

@@ -8,9 +8,9 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic, digits
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display.tables import Table, short
+from gpbnb.report.examples import NORMAL_RANGE
 from gpbnb.report.integration.precision import best_rate, needed_precision, stall_rate
 from gpbnb.report.wordlengths.study import InversePrecision, UpdateStagnation
-from gpbnb.wordlength.examples import NORMAL_RANGE
 from gpbnb.wordlength.ranges import BinaryRange
 
 

@@ -10,8 +10,8 @@ import pytest
 from gpbnb import FloatFormat, NonlinearModel, emulate
 from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.run import Run
-from gpbnb.wordlength import nonlinear_examples as examples
-from gpbnb.wordlength.examples import turns
+from gpbnb.report import examples
+from gpbnb.report.examples import turns
 from tests.oracles import Numbers, floating, transposed, unit
 from tests.step_functions import tracked_motion, tracked_sight
 
