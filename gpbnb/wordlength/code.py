@@ -23,7 +23,7 @@ from gpbnb.arithmetic.array import NegativeRootError
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.named import BINARY32, BINARY64, format_text, rounding_text
+from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic, format_text
 from gpbnb.arithmetic.rational import exact as exactly
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.bounds.guarantee import sized_limits
@@ -155,7 +155,7 @@ def write_code(
     if not exact and not isinstance(chosen, FloatFormat):
         raise ValueError("got exact=False in fixed point; needed BINARY32 or BINARY64, which C's functions take")
     found = prepared(given, chosen, form, exact)
-    source = CodeSource(_numbers(found.step, chosen), name)
+    source = CodeSource(numbers_for(found.step, chosen), name)
     data = data_of(given, VECTORS if inputs is None else inputs)
     z = found.inputs(data.steps) if data.z is None else data.z
     if within is not None and found.bounded is None:
@@ -183,8 +183,10 @@ def _bound(model: LinearModel | LinearSystem, form: Form | None, fmt: AnyFormat,
     """Return in words what is proved about the errors within limits."""
     if isinstance(model, LinearSystem):
         most = ", ".join(f"{each:.6g}" for each in largest_inputs(model, within).tolist())
-        proved = f"For inputs of at most {most} in size, each output stays within {{}} of that of the exact filter, "
-        proved += "whose coefficients are not rounded, {}."
+        proved = (
+            f"For inputs of at most {most} in size, each output stays within {{}} of that of the exact filter, whose "
+            "coefficients are not rounded, {}."
+        )
     else:
         sized_limits(within, model.n, model.m, model.x0)
         proved = (
@@ -205,54 +207,38 @@ def format_words(fmt: AnyFormat) -> str:
     """Describe a format for a header, with its rounding and what happens to overflows."""
     if isinstance(fmt, FloatFormat):
         return format_text(fmt)
-    words = _words(fmt)
-    text = f"fixed point, data of {_word(words.data)}; a number n stands for n / 2**{words.data.fraction_bits}"
-    if isinstance(words.coefficients, FixedFormat) and words.coefficients != words.data:
-        text += f"; coefficients of {_word(words.coefficients)}"
-    elif isinstance(words.coefficients, int):
+    words = fmt if isinstance(fmt, WordFormats) else WordFormats(fmt)
+    text = f"{arithmetic(words.data)}; a number n stands for n / 2**{words.data.fraction_bits}"
+    if isinstance(words.coefficients, int):
         text += f"; coefficients of {digits_text(words.coefficients, kind='significant')}"
-    return text if words.sums is None else f"{text}; sums of {_word(words.sums)}"
+    others = {"coefficients": words.coefficients, "sums": words.sums}
+    return text + "".join(
+        f"; {name} in {arithmetic(each)}" for name, each in others.items() if isinstance(each, FixedFormat)
+    )
 
 
-def _word(fmt: FixedFormat) -> str:
-    overflow = {"raise": "which must not overflow", "saturate": "saturated", "wrap": "wrapped around"}[fmt.overflow]
-    rounding = "ties away from zero" if fmt.rounding is Rounding.NEAREST else rounding_text(fmt.rounding)
-    return f"{1 + fmt.precision} bits with {fmt.fraction_bits} after the point ({rounding}, {overflow})"
-
-
-def _type_of(fmt: Any) -> str:
-    """Return the type of a floating-point format in C."""
-    if fmt == BINARY32:
-        return "float"
-    if fmt == BINARY64:
-        return "double"
-    cure = "BINARY32 or BINARY64"
-    if fmt.base == 2 and fmt.precision in (24, 53):
-        cure = f"BINARY{32 if fmt.precision == 24 else 64}, which rounds ties to even and has a range"
-    elif fmt.base == 2 and fmt.precision < 53:
-        cure = f"BINARY{32 if fmt.precision < 24 else 64}, which has more bits"
-    raise ValueError(f"got {format_text(fmt)}, for which C99 has no type; needed {cure}, or fixed point")
-
-
-def _words(fmt: FixedFormat | WordFormats) -> WordFormats:
-    words = WordFormats(fmt) if isinstance(fmt, FixedFormat) else fmt
-    for each in (words.data, words.accumulator, words.coefficients):
-        if isinstance(each, FixedFormat) and each.rounding is Rounding.STOCHASTIC:
-            raise ValueError("got stochastic rounding; needed a rounding that code can repeat")
-    return words
-
-
-def _numbers(step: CodeStep, fmt: AnyFormat) -> CodeNumbers:
+def numbers_for(step: CodeStep, fmt: AnyFormat) -> CodeNumbers:
     """Return how the operations of a step are written."""
-    return CodeFloats(step, _type_of(fmt)) if isinstance(fmt, FloatFormat) else CodeWords(step, _words(fmt))
+    if isinstance(fmt, FloatFormat):
+        return CodeFloats(step, _type_of(fmt))
+    return CodeWords(step, fmt if isinstance(fmt, WordFormats) else WordFormats(fmt))
+
+
+def _type_of(fmt: FloatFormat) -> str:
+    """Return the type of a floating-point format in C."""
+    types = {"float": BINARY32, "double": BINARY64}
+    for name, each in types.items():
+        if fmt == each:
+            return name
+    enough = [each for each in types.values() if fmt.base == 2 and fmt.precision <= each.precision]
+    cure = f"{format_text(enough[0])} ({arithmetic(enough[0])})" if enough else "BINARY32 or BINARY64"
+    raise ValueError(f"got {format_text(fmt)}, for which C99 has no type; needed {cure}, or fixed point")
 
 
 def prepared(given: Filter, fmt: AnyFormat, form: Form | str | None, exact: bool = True) -> Prepared:
     """Return a filter with what is needed to write its code; for the arguments, see :func:`write_code`."""
     if isinstance(fmt, FloatFormat):
         _type_of(fmt)
-    else:
-        _words(fmt)
     if isinstance(given, LinearModel | NonlinearModel):
         if isinstance(given, LinearModel) and isinstance(form, str) and plain_name(form) == plain_name(CONSTANT_GAIN):
             found = _of_system(settled_filter(given), fmt, CONSTANT_GAIN)
@@ -274,12 +260,15 @@ def prepared(given: Filter, fmt: AnyFormat, form: Form | str | None, exact: bool
 
 
 def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared:
-    made, data = system.as_filter(), fmt.data if isinstance(fmt, WordFormats) else fmt
-    words = None if isinstance(fmt, FloatFormat) else _words(fmt)
-    stored = (made.stored(data) if words is None else integer_program(made, words).coefficients)[None]
-    # With sums of their own, also a sum with zero may round or overflow.
-    sums = words is not None and words.sums is not None
-    program = made.program if sums else without_exact(made.program, stored)
+    made, program = system.as_filter(), system.as_filter().program
+    if isinstance(fmt, FloatFormat):
+        data: Any = fmt
+        stored = made.stored(fmt)[None]
+    else:
+        words = fmt if isinstance(fmt, WordFormats) else WordFormats(fmt)
+        data, stored = words.data, integer_program(made, words).coefficients[None]
+    if not (isinstance(fmt, WordFormats) and fmt.sums):  # with sums of their own, a sum with zero may round or overflow
+        program = without_exact(program, stored)
     start = stored_start(data, system.x0).to_fractions()
 
     def emulated(u: Any, fmt: Any) -> Vectors:

@@ -284,13 +284,13 @@ def asked(tmp_path):
     [
         (["--tolerance", "0.001"], "BINARY32"),
         (["--tolerance", "1e-9"], "BINARY64"),
-        (["--tolerance", "0.01", "--format", "fixed 3.12"], "data of 16 bits with 12 after the point"),
+        (["--tolerance", "0.01", "--format", "fixed 3.12"], "16 bits, 12 of them fraction"),
     ],
 )
 def test_the_command_writes_code_in_the_format_that_meets_the_tolerance(options, fmt, asked, capsys):
     arguments, folder = asked
     assert main([*arguments, *options]) == 0
-    assert f"low-pass, direct form I, in {fmt}" in header(folder / "filter.h").replace("fixed point, ", "")
+    assert f"low-pass, direct form I, in {fmt}" in header(folder / "filter.h").replace("fixed point of ", "")
     assert str(folder / "filter.c") in capsys.readouterr().out
 
 
