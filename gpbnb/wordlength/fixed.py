@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, cast
 
 import numpy as np
@@ -72,16 +72,14 @@ def in_fixed_point(
     if data is None:
         data = FixedFormat(_integer_bits(asked), LARGEST_FRACTION, rounding)
     asked.check_sizes(data)
-    if not of_system:
-        return _FixedSearch.of(asked, data, like is None).answer()
-    if like is None:
-        bits = coefficient_bits or COEFFICIENT_BITS
-        blamed = "coefficient_bits, or --coefficients in the command"
-        return _FixedSearch.of(asked, data, True, lambda fmt: WordFormats(fmt, bits), blamed).answer()
-    words = like if isinstance(like, WordFormats) else WordFormats(like)
-    search = _FixedSearch.of(
-        asked, data, False, lambda fmt: with_fraction_bits(words, fmt.fraction_bits), "coefficients of WordFormats"
-    )
+    search = _FixedSearch(asked, data, like is None)
+    if of_system and like is None:
+        bits, blamed = coefficient_bits or COEFFICIENT_BITS, "coefficient_bits, or --coefficients in the command"
+        search = replace(search, words_of=lambda fmt: WordFormats(fmt, bits), blamed=blamed)
+    elif of_system:
+        words = like if isinstance(like, WordFormats) else WordFormats(data)
+        words_of: Any = lambda fmt: with_fraction_bits(words, fmt.fraction_bits)  # noqa: E731
+        search = replace(search, words_of=words_of, blamed="coefficients of WordFormats")
     return search.answer()
 
 
@@ -95,29 +93,22 @@ class _FixedSearch:
     widens : whether a format in which a number overflows gets more integer bits.
     words_of : function that returns what is run for a format of the data.
     blamed : what sets the bits of coefficients.
+    other : what answers the question, if this is not the first search for it.
     more : integer bits that a number of fraction bits needs beyond those of `like`.
     """
 
     asked: Asked
-    judge: Judge
     like: FixedFormat
     widens: bool
-    words_of: Callable[[FixedFormat], Any]
-    blamed: str
+    words_of: Callable[[FixedFormat], Any] = lambda fmt: fmt
+    blamed: str = ""
+    other: Judge | None = None
     more: dict[int, int] = field(default_factory=dict)
 
-    @classmethod
-    def of(
-        cls,
-        asked: Asked,
-        like: FixedFormat,
-        widens: bool,
-        words_of: Callable[[FixedFormat], Any] = lambda fmt: fmt,
-        blamed: str = "",
-    ) -> _FixedSearch:
-        """Return a search for a question."""
-        judge = judge_for(asked, 2, LARGEST_FRACTION + max(like.integer_bits, 0))
-        return cls(asked, judge, like, widens, words_of, blamed)
+    @cached_property
+    def judge(self) -> Judge:
+        """What answers the question."""
+        return self.other or judge_for(self.asked, 2, LARGEST_FRACTION + max(self.like.integer_bits, 0))
 
     @property
     def made(self) -> LinearFilter | None:
@@ -160,9 +151,9 @@ class _FixedSearch:
                 largest = max(compiled, self.least)
                 most = f"{digits_text(largest, kind='fraction')} are the most with compiled loops"
         found, judge = for_ever_or_over(
-            asked, self.judge, lambda each: replace(self, judge=each).search(largest), Search.is_bounded
+            asked, self.judge, lambda each: replace(self, other=each).search(largest), Search.is_bounded
         )
-        return replace(self, judge=judge)._answer(found, largest, most)
+        return replace(self, other=judge)._answer(found, largest, most)
 
     def _answer(self, found: Search[FixedFormat], largest: int, most: str) -> Requirement:
         asked, ratios, reasons, ends = self.asked, dict(found.tried), found.reasons, self.judge.steps is not None
@@ -211,7 +202,7 @@ class _FixedSearch:
 
         def error(bits: FloatFormat) -> Outcome:
             words_of = lambda each: replace(self.words_of(each), coefficients=bits.precision)  # noqa: E731
-            return replace(self, words_of=words_of).error(fmt)
+            return replace(self, words_of=words_of, other=self.judge).error(fmt)
 
         found = Search(error, FloatFormat(2, 2), (), largest=LONGEST_COEFFICIENT)
         if found.fmt is None:
@@ -234,7 +225,7 @@ class _FixedSearch:
             return text and f"errors add up because the system is slow: its {text}"
         asked = replace(self.asked, model=other)
         like = replace(self.like, integer_bits=_integer_bits(asked)) if self.widens else self.like
-        better = _FixedSearch.of(asked, like, self.widens, self.words_of, self.blamed)
+        better = replace(self, asked=asked, like=like, other=None, more={})
         if largest < better.least:
             return ""
         found = better.search(largest)
@@ -338,7 +329,7 @@ def in_words(asked: Asked, rounding: Rounding, bits: int) -> Requirement:
     """Lower the formats of data, coefficients and sums of a linear system in this order."""
     made, like = asked.model.as_filter(), FixedFormat(_stored_integer_bits(asked), LARGEST_FRACTION, rounding)
     blamed = "coefficient_bits=, which is the most to try"
-    search = _FixedSearch.of(asked, like, True, lambda fmt: exact_sums(made, fmt, bits), blamed)
+    search = _FixedSearch(asked, like, True, lambda fmt: exact_sums(made, fmt, bits), blamed)
     data, judge = search.answer(), search.judge
     if data.format is None:
         return data
