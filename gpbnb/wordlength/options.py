@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -57,6 +58,43 @@ interrupted.
 """
 
 
+_OPTIONS = f"""
+--measurements FILE: CSV file with one row per step: measurements of a filter, by default simulated, or inputs of a
+  system
+--inputs FILE: CSV file with the known inputs u of the filter, one row per step
+--simulate {{{",".join(SIGNALS)}}}: inputs of a linear system, in place of --measurements
+--level NUMBERS: of the simulated inputs: height of a step or sine, standard deviation of noise; one number, or one for
+  each input; default: 1
+--steps N: number of steps to simulate; default: 1000, or as many as there are known inputs
+--seed N: seed of what is simulated; default: 0
+--format NAME: judge one format in place of a search: {", ".join(_FORMATS)}, Q15, or Q3.12 with 3 integer bits and 12
+  fraction bits
+--digits N: judge this precision in place of a search
+--base BASE: 2, 10 or 16; default: 2
+--rounding ROUNDING: rounding rule, such as "nearest" or "chop"; default: nearest
+--emin N: exponent of the smallest normal number; default: unlimited
+--emax N: exponent of the largest number; default: unlimited
+--form FORM: form of the covariance update of a Kalman filter, such as "innovation", "Joseph", "UD" or "Cholesky", or
+  "constant gain" for the linear system with the gain that the filter approaches; default: innovation
+--kind {{{",".join(KINDS)}}}: what is searched: digits of floating point; fraction bits of fixed point; for a linear
+  system, words of data, coefficients and sums; for a Kalman filter, the precision of each block (state, gain,
+  covariance, innovation covariance), which names the block that limits the filter; default: float
+--coefficients N: for a linear system in fixed point: significant bits of each coefficient, which has its own binary
+  point; default: 15; with --kind words, the most to try; default: 24
+--basis {{{",".join(BASES)}}}: how to find the precision; may be given more than once; default: emulation and bound
+--state LIMITS: for the bases guarantee and probable: largest size of each state of the filter without rounding, one
+  number or one for each, such as 5,0.1
+--innovation LIMITS: the same for each innovation
+--measurement LIMITS: the same for each measurement, or for each input of a system
+--report FILE: HTML file to write, with a JSON file of the same name beside it
+--certificate FILE: for the basis guarantee: JSON file to write, which python -m gpbnb.bounds.check verifies on its own
+--csv FILE: CSV file to write: each step of a run in the answer, with its estimates or outputs and their errors
+--code DIR: folder for the filter as C99 with test vectors, in the format judged, in the answer in fixed point, or in
+  binary32 or binary64 if one of them meets the tolerance
+"""
+"""Options with a value, or with all values that they may have, as the help shows them."""
+
+
 class _Once(argparse.Action):
     """Store the value of an option, and refuse a second one."""
 
@@ -77,103 +115,14 @@ def parser() -> argparse.ArgumentParser:
     made.register("action", None, _Once)  # for the options that are stored
     made.add_argument("--version", action="version", version=f"gpbnb {gpbnb.__version__}")
     made.add_argument("model", type=Path, help="TOML, JSON, NPZ or MAT file")
-    made.add_argument(
-        "--tolerance",
-        required=True,
-        metavar="NUMBERS",
-        help="largest allowed error: one number, or one per state or output, such as 0.01,1/3,inf",
-    )
-    made.add_argument(
-        "--measurements",
-        type=Path,
-        metavar="FILE",
-        help="CSV file with one row per step: measurements of a filter, by default simulated, or inputs of a system",
-    )
-    made.add_argument(
-        "--inputs", type=Path, metavar="FILE", help="CSV file with the known inputs u of the filter, one row per step"
-    )
-    made.add_argument("--simulate", choices=SIGNALS, help="inputs of a linear system, in place of --measurements")
-    made.add_argument(
-        "--level",
-        metavar="NUMBERS",
-        help="of the simulated inputs: height of a step or sine, standard deviation of noise; one number, or one for "
-        "each input; default: 1",
-    )
-    made.add_argument(
-        "--steps", metavar="N", help="number of steps to simulate; default: 1000, or as many as there are known inputs"
-    )
-    made.add_argument("--seed", metavar="N", help="seed of what is simulated; default: 0")
-    made.add_argument(
-        "--format",
-        metavar="NAME",
-        help=f"judge one format in place of a search: {', '.join(_FORMATS)}, Q15, or Q3.12 with 3 integer "
-        "bits and 12 fraction bits",
-    )
-    made.add_argument("--digits", metavar="N", help="judge this precision in place of a search")
-    made.add_argument("--base", metavar="BASE", help="2, 10 or 16; default: 2")
-    made.add_argument("--rounding", help='rounding rule, such as "nearest" or "chop"; default: nearest')
-    made.add_argument("--emin", metavar="N", help="exponent of the smallest normal number; default: unlimited")
-    made.add_argument("--emax", metavar="N", help="exponent of the largest number; default: unlimited")
-    made.add_argument(
-        "--form",
-        help='form of the covariance update of a Kalman filter, such as "innovation", "Joseph", "UD" or "Cholesky", or '
-        '"constant gain" for the linear system with the gain that the filter approaches; default: innovation',
-    )
-    made.add_argument(
-        "--kind",
-        choices=KINDS,
-        help="what is searched: digits of floating point; fraction bits of fixed point; for a linear system, words of "
-        "data, coefficients and sums; for a Kalman filter, the precision of each block (state, gain, covariance, "
-        "innovation covariance), which names the block that limits the filter; default: float",
-    )
-    made.add_argument(
-        "--coefficients",
-        metavar="N",
-        help="for a linear system in fixed point: significant bits of each coefficient, which has its own binary "
-        "point; default: 15; with --kind words, the most to try; default: 24",
-    )
-    made.add_argument(
-        "--basis",
-        action="append",
-        choices=BASES,
-        help="how to find the precision; may be given more than once; default: emulation and bound",
-    )
-    for quantity in QUANTITIES:
-        made.add_argument(
-            f"--{quantity}",
-            metavar="LIMITS",
-            help=f"for the bases guarantee and probable: largest size of each {quantity} of the filter without "
-            "rounding, one number or one for each, such as 5,0.1",
-        )
-    _add_files(made)
-    return made
-
-
-def _add_files(made: argparse.ArgumentParser) -> None:
-    """Add the options that name what is written."""
-    made.add_argument(
-        "--report", type=Path, metavar="FILE", help="HTML file to write, with a JSON file of the same name beside it"
-    )
-    made.add_argument(
-        "--certificate",
-        type=Path,
-        metavar="FILE",
-        help="for the basis guarantee: JSON file to write, which python -m gpbnb.bounds.check verifies on its own",
-    )
-    made.add_argument(
-        "--csv",
-        type=Path,
-        metavar="FILE",
-        help="CSV file to write: each step of a run in the answer, with its estimates or outputs and their errors",
-    )
+    tolerance = "largest allowed error: one number, or one per state or output, such as 0.01,1/3,inf"
+    made.add_argument("--tolerance", required=True, metavar="NUMBERS", help=tolerance)
+    for option, value, text in re.findall(r"^(--\w+) (\S+): (.*(?:\n  .*)*)", _OPTIONS, re.MULTILINE):
+        given: dict[str, Any] = {"action": "append"} if option == "--basis" else {}
+        given |= {"choices": value[1:-1].split(",")} if value[0] == "{" else {"metavar": value}
+        made.add_argument(option, type=Path if value in ("FILE", "DIR") else str, help=" ".join(text.split()), **given)
     made.add_argument("--quiet", action="store_true", help="write nothing but the answer: no progress")
-    made.add_argument(
-        "--code",
-        type=Path,
-        metavar="DIR",
-        help="folder for the filter as C99 with test vectors, in the format judged, in the answer in fixed point, or "
-        "in binary32 or binary64 if one of them meets the tolerance",
-    )
+    return made
 
 
 def read(arguments: Sequence[str] | None) -> argparse.Namespace:
