@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form, form_named
-from gpbnb.filters.model import LinearModel, stored_measurements
+from gpbnb.filters.model import stored_measurements
 from gpbnb.filters.nonlinear_run import opened, true_states
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.smoothing import FixedIntervalSmoother
@@ -81,19 +81,15 @@ def emulate(
     fmt: AnyFormat | str,
     *,
     form: Form | str | None = None,
-    reference: Literal["given", "stored"] = "given",
     seed: int = 0,
 ) -> EmulatedRun:
-    """Run a model with every operation rounded, and compare each step with a run without rounding.
+    """Run a model with every operation rounded, and compare each step with the model as given, without rounding.
 
     Parameters
     ----------
     model, z, form, seed : as for :func:`gpbnb.required_precision`.
     fmt : a floating-point or fixed-point format, or its name, such as "float32" or "Q3.12"; for a linear system also
         :class:`gpbnb.WordFormats`, and for a Kalman filter :class:`gpbnb.BlockFormats`.
-    reference : "given" compares with the model as given, so that errors include those of storing it. "stored" compares
-        with model and data as the format stores them, so that errors come from the arithmetic alone; for a linear
-        model.
 
     Raises
     ------
@@ -107,18 +103,14 @@ def emulate(
     ([0.125, 0.25, 0.375], 8-bit fixed point (4 fraction bits), 3 steps: largest error of each output 0.045)
     """
     fmt = checked_format(fmt, WordFormats, BlockFormats)
-    if reference not in ("given", "stored"):
-        raise ValueError(f'got reference {reference!r}; needed "given" or "stored"')
     words = "have formats for data, coefficients and sums" if isinstance(fmt, WordFormats) else ""
     blocks = "have formats for blocks" if isinstance(fmt, BlockFormats) else ""
-    asked, stored = Asked.of(model, z, words, blocks, form=form, seed=seed), reference == "stored"
+    asked = Asked.of(model, z, words, blocks, form=form, seed=seed)
     given, data = asked.model, asked.data
-    if stored and not isinstance(given, LinearModel | LinearSystem):
-        raise ValueError('got reference="stored" for functions, which round their own constants; needed "given"')
     if is_filter(given):
-        return _filter(given, data, fmt, asked.form, stored)
+        return _filter(given, data, fmt, asked.form)
     if isinstance(given, LinearSystem):
-        return _system(given, data, fmt, stored)
+        return _system(given, data, fmt)
     return _function(given, data, fmt)
 
 
@@ -131,32 +123,21 @@ def _in_format(pairs: NDArray[np.float64], fmt: Any) -> FloatArray:
     return found
 
 
-def _filter(model: Any, data: Data, fmt: Any, form: Form, stored: bool) -> EmulatedRun:
+def _filter(model: Any, data: Data, fmt: Any, form: Form) -> EmulatedRun:
     sound, z = measured(model, data)
-    kept = stored_measurements(z, fmt)
     run = opened(sound, fmt, form)
-    states = run.states(kept)
-    if stored:
-        true = true_states(sound.rounded(fmt.model if isinstance(fmt, BlockFormats) else fmt), kept)  # type: ignore[union-attr]
-    else:
-        true = true_states(sound, z)
+    states, true = run.states(stored_measurements(z, fmt)), true_states(sound, z)
     x = _in_format(states, fmt.state if isinstance(fmt, BlockFormats) else fmt)
     errors = np.asarray((states - true[: len(states)]).sum(axis=2))
     repairs = tuple(str(each) for each in run.repairs)
     return EmulatedRun(fmt, x, None, errors, run.reason, run.indefinite, form, repairs)
 
 
-def _system(system: LinearSystem, data: Data, fmt: Any, stored: bool) -> EmulatedRun:
+def _system(system: LinearSystem, data: Data, fmt: Any) -> EmulatedRun:
     if data.z is None:
         raise ValueError(f"got a number of steps for {system.name}; needed its inputs, of shape (steps, {system.m})")
     u, of_data = system_inputs(system, data.z), fmt.data if isinstance(fmt, WordFormats) else fmt
     true = system.outputs(u)
-    if stored:
-        if isinstance(fmt, WordFormats):
-            raise ValueError('got reference="stored" and WordFormats; needed "given"')
-        x0 = of_data.array(system.x0).to_fractions()
-        A, B, C, D = system.stored(fmt)
-        true = LinearSystem(A, B, C, D, x0).outputs(of_data.array(u).to_fractions())
     _check_stored(system, fmt)
     _, pairs, reason = longest(lambda steps: system_pairs(system, u[:steps], fmt), len(u))
     if pairs is None:

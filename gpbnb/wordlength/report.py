@@ -30,7 +30,6 @@ from gpbnb.wordlength.asked import exactly, is_filter, kind_of, tolerances_of
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource
 from gpbnb.wordlength.options import IN_FIXED_POINT
-from gpbnb.wordlength.ranges import binary_ranges
 from gpbnb.wordlength.required import judge, required_precision
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
@@ -125,8 +124,8 @@ class Report(NamedTuple):
     ----------
     entries : plain numbers and texts, as in the JSON file. None stands for a number that is missing or infinite.
         `answers` has one for each basis and form or structure, the requested one first; `errors` are over tolerances,
-        `ranges` have the powers of two between which numbers lie, `blocks` the digits of each block together with the
-        others and alone, and `limiting` is the index of the state with the largest error / tolerance.
+        `blocks` has the digits of each block together with the others and alone, and `limiting` is the index of the
+        state with the largest error / tolerance.
     found : the single questions, each with its answer.
     part, answer : those that `entries` tells first.
     """
@@ -194,7 +193,6 @@ def study(asked: Question, command: str = "", tell: Callable[[str], Any] = lambd
             for part, answer in found
         ],
         "errors": errors,
-        "ranges": _ranges(model, asked.z),
         "command": command,
         "versions": machine(),
         "limits": {} if within is None else {key: list(map(_finite, each)) for key, each in within._asdict().items()},
@@ -273,14 +271,6 @@ def _digits_of_blocks(found: Requirement) -> tuple[tuple[str, int | None, int | 
     )
 
 
-def _ranges(model: Any, z: Any) -> tuple[tuple[str, int, int], ...]:
-    """Return name, smallest and largest power of two of the quantities of a linear Kalman filter."""
-    if not isinstance(model, LinearModel):
-        return ()
-    sound, filled = model.without_missing(z)
-    return tuple((each.name, each.least, each.largest) for each in binary_ranges(sound, filled))
-
-
 def _errors(model: Any, z: Any, fmt: Any, form: str, tolerances: np.ndarray) -> tuple[float | None, ...]:
     """Return the largest error / tolerance of each state of a Kalman filter at the answer."""
     if fmt is None or not is_filter(model):
@@ -349,8 +339,8 @@ def page(entries: dict[str, Any]) -> str:
     of_filter = report.kind.endswith("filter")
     what, given = ("Form", "measurements") if of_filter else ("Structure", "inputs")
     meant = [_MEANINGS[each].format(given) for each in dict.fromkeys(each["basis"] for each in report.answers)]
-    if report.ranges and not report.exponents:
-        meant.append("These runs have unlimited exponents; the ranges below show which formats suffice.")
+    if not report.exponents and not report.fixed:
+        meant.append("These runs have unlimited exponents; a format that is judged has its own range.")
     rows = [
         (each["label"], "none" if each["digits"] is None else str(each["digits"]), each["text"])
         for each in report.answers
@@ -371,7 +361,6 @@ def page(entries: dict[str, Any]) -> str:
     states = report.names or [str(i + 1) for i in range(len(report.errors))]
     shares = ["not limited" if each is None else f"{each:.3g}" for each in report.errors]
     of_states = list(zip(states, shares, strict=True)) if shares else []
-    ranges = [(name, _power(low), _power(high)) for name, low, high in report.ranges]
     about = "\n".join(f"{key}: {value}" for key, value in report.versions.items())
     each_form = f"{what.lower()} and basis"
     parts = [
@@ -390,7 +379,6 @@ def page(entries: dict[str, Any]) -> str:
             "Precision of each block", ("block of the filter", f"{unit}, with the others", f"{unit}, alone"), cells
         ),
         _section("Error of each state at the answer", ("state", "error / tolerance"), of_states),
-        _section("Range of the numbers", ("numbers", "smallest", "largest"), ranges),
         "<h2>How to reproduce this report</h2>",
         f"<pre>{html.escape(report.command or 'gpbnb.wordlength.report.study(...)')}\n\n{html.escape(about)}</pre>",
     ]
@@ -435,10 +423,3 @@ def _section(heading: str, header: Sequence[str], body: Sequence[Sequence[str]])
     rows = "\n".join(f"<tr>{line}</tr>" for line in lines)
     table = f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody>\n</table>"
     return f"<h2>{heading}</h2>\n{table}" if lines else ""
-
-
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def _power(exponent: int) -> str:
-    return f"2{str(exponent).translate(_SUPERSCRIPTS)}"

@@ -16,8 +16,7 @@ from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.run import log_spaced, reference
 from gpbnb.report import examples
 from gpbnb.report.guarantees import table as guarantees
-from gpbnb.report.wordlengths import study
-from gpbnb.wordlength import ranges
+from gpbnb.report.wordlengths import ranges, study
 from tests.surveying import survey
 
 TILT = examples.tilt()

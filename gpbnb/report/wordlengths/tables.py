@@ -10,8 +10,8 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.examples import NORMAL_RANGE
 from gpbnb.report.integration.precision import best_rate, needed_precision, stall_rate
+from gpbnb.report.wordlengths.ranges import BinaryRange
 from gpbnb.report.wordlengths.study import InversePrecision, UpdateStagnation
-from gpbnb.wordlength.ranges import BinaryRange
 
 
 def update_stagnation(found: Sequence[UpdateStagnation], tolerance: float) -> Table:
