@@ -11,23 +11,12 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
-from gpbnb.filters.forms import Form, form_named
+from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.answer import Basis
-from gpbnb.wordlength.asked import (
-    MOST_STEPS,
-    TASK_OF_BASIS,
-    Asked,
-    Data,
-    admitted,
-    checked_basis,
-    checked_format,
-    data_of,
-    is_filter,
-    tolerances_of,
-)
+from gpbnb.wordlength.asked import MOST_STEPS, Asked, admitted, checked_format, is_filter
 from gpbnb.wordlength.judges import judge_for
 from gpbnb.wordlength.models import ModelSource
 
@@ -108,52 +97,43 @@ def survey_records(
     4 bits                      0%                       15.7
     BINARY32                  100%                   7.39e-06
     """
-    given = admitted(model, TASK_OF_BASIS[checked_basis(basis)], "" if form is None else "have a form")
-    chosen = form_named(Form.INNOVATION if form is None else form)
-    if basis not in ("emulation", "bound"):
+    if basis in ("guarantee", "probable"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a record')
     if isinstance(formats, str) or not isinstance(formats, Iterable):
         raise TypeError(f"got formats {formats!r}; needed a list of formats or names")
-    chosen_formats = tuple(map(checked_format, formats))
-    if not chosen_formats or len(set(chosen_formats)) != len(chosen_formats):
-        count, different = len(chosen_formats), len(set(chosen_formats))
+    chosen = tuple(map(checked_format, formats))
+    if not chosen or len(set(chosen)) != len(chosen):
+        count, different = len(chosen), len(set(chosen))
         raise ValueError(f"got {count} formats, {different} different; needed different ones, at least one")
-    for fmt in chosen_formats:
+    given, most, found = admitted(model), max(fmt.precision for fmt in chosen), []
+    asked = [
+        Asked.of(given, z, form=form, seed=seed, tolerance=tolerance, basis=basis)
+        for z, seed in _records(given, records, steps)
+    ]
+    for fmt in chosen:
+        asked[0].check_sizes(fmt)
         if isinstance(given, LinearModel | LinearSystem):
             fmt.check_compiled()
-    if is_filter(given):
-        tolerance = tolerances_of(tolerance, given.n, "states").tolist()
-        if any(fmt.limits is None for fmt in chosen_formats):
-            given.check_sizes()
-    data = _data(given, records, steps)
-    most, found = max(fmt.precision for fmt in chosen_formats), []
-    for each in data:
-        judge = judge_for(Asked(given, each, tolerance, basis, form=chosen), chosen_formats[0].base, most)
-        found.append([judge.proof(fmt) for fmt in chosen_formats])
+    for each in asked:
+        judge = judge_for(each, chosen[0].base, most)
+        found.append([judge.proof(fmt) for fmt in chosen])
     ratios = np.array([[each.ratio for each in row] for row in found])
-    return RecordSurvey(chosen_formats, ratios, tuple(tuple(each.why for each in row) for row in found))
+    return RecordSurvey(chosen, ratios, tuple(tuple(each.why for each in row) for row in found))
 
 
-def _data(model: Any, records: Any, steps: int | None) -> tuple[Data, ...]:
-    """Return the measurements of each record."""
+def _records(model: Any, records: Any, steps: int | None) -> list[tuple[Any, int]]:
+    """Return each record, or its number of steps, and its seed."""
     if isinstance(records, (int, np.integer)):
         count = whole_number("records", records, most=MOST_RECORDS)
         if not is_filter(model):
             raise ValueError(f"got {count} records to simulate; needed a list: only a Kalman filter simulates them")
         if steps is None:
             raise ValueError(f"got {count} records to simulate without steps; needed steps=, how many each has")
-        length = whole_number("steps", steps, most=MOST_STEPS // count)
-        return tuple(data_of(model, length, seed) for seed in range(count))
+        return [(whole_number("steps", steps, most=MOST_STEPS // count), seed) for seed in range(count)]
     if steps is not None:
         raise ValueError("got steps with records; needed steps only for records to simulate")
     if not isinstance(records, Iterable) or isinstance(records, str):
         raise TypeError(f"got records {records!r}; needed a list of records (steps, m), or a whole number and steps=")
-    data = tuple(data_of(model, z) for z in records)
-    if not data:
+    if not (data := [(z, 0) for z in records]):
         raise ValueError("got no records; needed at least one")
-    if is_filter(model):
-        for number, each in enumerate(data):
-            shape = np.shape(each.z)
-            if len(shape) != 2 or shape[1] != model.m or not shape[0]:
-                raise ValueError(f"got record {number} of shape {shape}; needed (steps, {model.m})")
     return data
