@@ -25,7 +25,7 @@ from gpbnb.filters.poles import stored_response
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.sweeps import machine
-from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, format_in_words
+from gpbnb.wordlength.answer import Basis, Kind, Requirement, format_in_words
 from gpbnb.wordlength.asked import exactly, is_filter, kind_of, tolerances_of
 from gpbnb.wordlength.emulation import emulate
 from gpbnb.wordlength.models import FilterSource
@@ -123,9 +123,7 @@ class Report(NamedTuple):
     Parameters
     ----------
     entries : plain numbers and texts, as in the JSON file. None stands for a number that is missing or infinite.
-        `answers` has one for each basis and form or structure, the requested one first; `errors` are over tolerances,
-        `blocks` has the digits of each block together with the others and alone, and `limiting` is the index of the
-        state with the largest error / tolerance.
+        `answers` has one for each basis and form or structure, the requested one first; `errors` are over tolerances.
     found : the single questions, each with its answer.
     part, answer : those that `entries` tells first.
     """
@@ -168,7 +166,6 @@ def study(asked: Question, command: str = "", tell: Callable[[str], Any] = lambd
     tolerances = tolerances_of(asked.tolerance, count, "outputs")
     like = fmt or asked.like
     errors = _errors(model, asked.z, main.format if met else None, asked.form, tolerances)
-    ratios = [(ratio, i) for i, ratio in enumerate(errors) if ratio is not None]
     entries = {
         "written": WRITTEN,
         "name": getattr(model, "name", getattr(model, "__name__", "a function")),
@@ -202,12 +199,10 @@ def study(asked: Question, command: str = "", tell: Callable[[str], Any] = lambd
         "measurement_names": getattr(model, "measurement_names" if is_filter(model) else "input_names", ()),
         "exponents": _exponents(like),
         "fixed": asked.kind in IN_FIXED_POINT,
-        "blocks": _digits_of_blocks(main),
         "structure": first.structure,
         "lacking": lacking,
         "stored": stored,
         "shortest": _shorter(found, main, fmt is not None),
-        "limiting": max(ratios)[1] if ratios else None,
     }
     return Report(entries, found, first, main)
 
@@ -262,15 +257,6 @@ def _shorter(found: Sequence[tuple[Part, Requirement]], answer: Requirement, jud
     return "fewest digits: " + named.format(digits_text(_length(best), fmt.base))
 
 
-def _digits_of_blocks(found: Requirement) -> tuple[tuple[str, int | None, int | None], ...]:
-    """Return the digits of each block, together with the others and alone."""
-    formats = found.format
-    return tuple(
-        (name, None if formats is None else getattr(formats, name).precision, digits)
-        for name, digits in found.alone.items()
-    )
-
-
 def _errors(model: Any, z: Any, fmt: Any, form: str, tolerances: np.ndarray) -> tuple[float | None, ...]:
     """Return the largest error / tolerance of each state of a Kalman filter at the answer."""
     if fmt is None or not is_filter(model):
@@ -320,22 +306,7 @@ def page(entries: dict[str, Any]) -> str:
     report = SimpleNamespace(**entries)
     kind, base = ("fraction", 2) if report.fixed else ("", report.base)
     unit = f"{kind} {digit_unit(base)}".strip()
-    answer = digits_text(report.digits, base, kind) if report.digits is not None else "no precision that can be run"
-    verdict = f"needs <strong>{html.escape(answer)}</strong> to keep rounding errors within the tolerance"
-    if report.format:
-        missed = "is not proved to keep" if report.answers[0]["basis"] in PROOFS else "does not keep"
-        verdict = f"{'keeps' if report.met else missed} rounding errors within the tolerance in "
-        verdict += f"<strong>{html.escape(report.format)}</strong>"
-    limiting = ""
-    if report.limiting is not None:
-        i, ratio = report.limiting, report.errors[report.limiting]
-        state = f"State {html.escape(report.names[i])}" if report.names else f"State {i + 1} of {len(report.errors)}"
-        limiting = f"<p>{state} limits the answer: its error is {ratio:.2g} of its tolerance.</p>"
-    of = {
-        "state": report.names,
-        "innovation": report.measurement_names,
-        "measurement": report.measurement_names,
-    }
+    of = {"state": report.names, "innovation": report.measurement_names, "measurement": report.measurement_names}
     of_filter = report.kind.endswith("filter")
     what, given = ("Form", "measurements") if of_filter else ("Structure", "inputs")
     meant = [_MEANINGS[each].format(given) for each in dict.fromkeys(each["basis"] for each in report.answers)]
@@ -357,7 +328,6 @@ def page(entries: dict[str, Any]) -> str:
         ("rounding", report.rounding),
         *([("exponents", report.exponents)] if report.exponents else []),
     ]
-    cells = [(name, *("none" if each is None else str(each) for each in digits)) for name, *digits in report.blocks]
     states = report.names or [str(i + 1) for i in range(len(report.errors))]
     shares = ["not limited" if each is None else f"{each:.3g}" for each in report.errors]
     of_states = list(zip(states, shares, strict=True)) if shares else []
@@ -365,19 +335,14 @@ def page(entries: dict[str, Any]) -> str:
     each_form = f"{what.lower()} and basis"
     parts = [
         f"<h1>Wordlength for {html.escape(report.name)}</h1>",
-        f'<p class="answer">This {report.kind} {verdict}.</p>',
-        f"<p>{html.escape(report.text)}.</p>",
+        f'<p class="answer">{html.escape(report.text)}.</p>',
         f"<p>{html.escape(report.shortest[:1].upper() + report.shortest[1:])}.</p>" if report.shortest else "",
         f"<p>At this answer, {html.escape(report.stored)}.</p>" if report.stored else "",
-        limiting,
         _section("Basis of the answer", ("question", "value"), question),
         f"<p>{' '.join(meant)}</p>",
         _section(f"{what}s and bases compared", (each_form, unit, "answer"), rows),
         *(f"<p>{html.escape(f'Left out: {name}: {why}')}.</p>" for name, why in report.lacking.items()),
         _section("Error / tolerance at each precision", (each_form, f"{unit}: error / tolerance"), tried),
-        _section(
-            "Precision of each block", ("block of the filter", f"{unit}, with the others", f"{unit}, alone"), cells
-        ),
         _section("Error of each state at the answer", ("state", "error / tolerance"), of_states),
         "<h2>How to reproduce this report</h2>",
         f"<pre>{html.escape(report.command or 'gpbnb.wordlength.report.study(...)')}\n\n{html.escape(about)}</pre>",

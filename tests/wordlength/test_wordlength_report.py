@@ -7,7 +7,6 @@ import pytest
 
 from gpbnb import FixedFormat
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.filters.poles import stored_response
 from gpbnb.wordlength.models import FilterSource, read_filter
 from gpbnb.wordlength.report import Question, study
@@ -41,10 +40,3 @@ def test_what_storing_does_to_a_filter_is_told_with_the_format_of_its_coefficien
     change = stored_response(source.model, found.answer.format)._replace(format=stored.format(found.answer.digits))
     assert found.entries["stored"] == str(change)
     assert found.entries["shortest"].partition(" (structure")[0] == shortest
-
-
-def test_the_state_with_the_largest_share_of_its_tolerance_limits():
-    model = LinearModel([[1, "0.1"], [0, 1]], [[1, 0]], np.eye(2) / 64, [[1]], [0, 0], np.eye(2))
-    entries = study(Question(FilterSource(model), (1, "1/1000"), simulated(model, 5), bases=("emulation",))).entries
-    assert entries["errors"][0] < entries["errors"][1]
-    assert entries["limiting"] == 1
