@@ -71,9 +71,20 @@ def written_files(
 
     `what` and `bound` are sentences; `tolerances`, (n,), is how far each state may be from its vectors.
     """
-    name = source.name
+    name, functions = source.name, ""
+    flags = ": compile with -ffp-contract=off, and never with -ffast-math." if source.numbers.floating else "."
+    order = (
+        "Each statement of the step is one operation, rounded once, in the order in which gpbnb emulates the filter"
+        f"{' and bounds its errors' if bounded else ''}. Compilers keep this order unless told otherwise{flags}"
+    )
+    if tolerances is not None:
+        functions = (
+            "Functions of the platform may have other last digits than those of the emulation, which are correctly "
+            f"rounded. The test allows each state at most {tolerances.max():.2g}: four times what it changes if every "
+            "operation is rounded up, or every one down."
+        )
     return {
-        f"{name}.h": _header(source, what, bound, bounded, sections, tolerances),
+        f"{name}.h": _header(source, _comment(f"{what}.", f"{WRITTEN}.", order, bound, functions), sections),
         f"{name}.c": _source(source),
         f"test_{name}.c": _test(source, tolerances),
         f"{name}_vectors.txt": _vectors(source, vectors),
@@ -91,35 +102,13 @@ def _comment(*paragraphs: str) -> str:
     return "\n".join(["/*", *(f" * {line}".rstrip().rstrip("\\") for line in lines), " */", ""])
 
 
-def _header(
-    source: CodeSource,
-    what: str,
-    bound: str,
-    bounded: bool,
-    sections: Sections,
-    tolerances: NDArray[np.float64] | None,
-) -> str:
-    name, guard = source.name, f"{source.name.upper()}_H"
-    order = (
-        "Each statement of the step is one operation, rounded once, in the order in which gpbnb emulates the filter"
-        f"{' and bounds its errors' if bounded else ''}. Compilers keep this order unless told otherwise"
-    )
-    flags = "compile with -ffp-contract=off, and never with -ffast-math."
-    flags = f"{order}: {flags}" if source.numbers.floating else f"{order}."
-    program, statuses = source.step.program, source.statuses
-    functions = ""
-    if tolerances is not None:
-        functions = (
-            "Functions of the platform may have other last digits than those of the emulation, which are correctly "
-            f"rounded. The test allows each state at most {tolerances.max():.2g}: four times what it changes if every "
-            "operation is rounded up, or every one down."
-        )
-    paragraphs = _comment(f"{what}.", f"{WRITTEN}.", flags, bound, functions)
-    values = ",\n".join(f"    {status.name} = {status.value}" for status in statuses)
-    meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in statuses)
+def _header(source: CodeSource, comment: str, sections: Sections) -> str:
+    name, guard, program = source.name, f"{source.name.upper()}_H", source.step.program
+    values = ",\n".join(f"    {status.name} = {status.value}" for status in source.statuses)
+    meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in source.statuses)
     takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
     include = "" if source.numbers.floating else "#include <stdint.h>\n\n"
-    return f"""{paragraphs}
+    return f"""{comment}
 #ifndef {guard}
 #define {guard}
 
@@ -198,13 +187,10 @@ def _test(source: CodeSource, tolerances: NDArray[np.float64] | None) -> str:
     fields = [f"&state.{place}" for place in source.step.state_names] + [f"&output[{i}]" for i in range(program.p)]
     listed = "\n".join(textwrap.wrap(", ".join(fields), 100, initial_indent=" " * 8, subsequent_indent=" " * 8))
     if source.numbers.floating:
-        read = f'"%{"l" if source.numbers.number == "double" else ""}f"'
-        variable, convert, same = number, "value", "a == b && !signbit(a) == !signbit(b)"
-        same = same if tolerances is None else "fabs(a - b) <= most"
-        include = "#include <math.h>\n"
+        read, variable, include = '"%lf"', "double", "#include <math.h>\n"
+        same = "a == b && !signbit(a) == !signbit(b)" if tolerances is None else "fabs(a - b) <= most"
     else:
-        read, variable, convert, same, include = '"%" SCNd64', "int64_t", f"({number})value", "a == b", ""
-        include = "#include <inttypes.h>\n"
+        read, variable, include, same = '"%" SCNd64', "int64_t", "#include <inttypes.h>\n", "a == b"
     output = f"    {number} output[{program.p}] = {{0}};\n" if program.p else ""
     passed = ", output" if program.p else ""
     most, at, digits, table = "", "", "bit for bit", ""
@@ -227,7 +213,7 @@ static int read_number(FILE *file, {number} *found)
     {variable} value;
     if (fscanf(file, {read}, &value) != 1)
         return 0;
-    *found = {convert};
+    *found = ({number})value;
     return 1;
 }}
 
