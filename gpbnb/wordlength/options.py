@@ -194,14 +194,16 @@ def check_files(given: argparse.Namespace, sources: Sequence[Path]) -> None:
         written.append((f"--report {report}, beside which JSON is written", report.with_suffix(".json")))
     for option, path in written:
         try:
-            path.resolve().exists()
+            there = path.exists()
+            tempfile.TemporaryFile(dir=path.resolve().parent).close()
         except OSError as error:
-            raise ValueError(f"got {option}, which cannot be written: {error.strerror}; needed another name") from None
-        what = "is in no folder that exists" if not path.parent.is_dir() else ""
-        if path.exists() and not path.is_file():
-            what = "is a folder" if path.is_dir() else "is a device or pipe"
-        if what:
-            raise ValueError(f"got {option}, but {path} {what}; needed a file in a folder; create it first")
+            raise ValueError(
+                f"got {option}, which cannot be written: {os.strerror(error.errno or 0)}; needed a file in a folder "
+                "that exists and that you can write to, on a disk with space"
+            ) from None
+        if there and not path.is_file():
+            kind = "folder" if path.is_dir() else "device or pipe"
+            raise ValueError(f"got {option}, but {path} is a {kind}; needed a file in a folder")
     files = [*sources, *(path for _, path in written)]
     for place, path in enumerate(files):
         for other in files[:place]:
@@ -210,13 +212,6 @@ def check_files(given: argparse.Namespace, sources: Sequence[Path]) -> None:
     for option, path in written:
         if path.exists() and not is_written(path):
             raise ValueError(f"got {option}, and {path} is a file that gpbnb has not written; needed another name")
-        try:
-            tempfile.TemporaryFile(dir=path.resolve().parent).close()
-        except OSError as error:
-            raise ValueError(
-                f"got {option}, but its folder cannot be written to: {os.strerror(error.errno or 0)}; needed "
-                "a folder that you can write to, on a disk with space"
-            ) from None
 
 
 def _numbers(text: str) -> str | list[str]:

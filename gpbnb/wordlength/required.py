@@ -34,6 +34,15 @@ _TASK_IN_WORDS: dict[str, str] = {
     "probable": "have a probable error in words",
 }
 
+_NOT_FOR = {
+    "highest": (("fixed", "words", "blocks"), 'only kind "float" has a highest precision to set'),
+    "coefficient_bits": (("float", "blocks"), 'kind="fixed" has coefficients of their own'),
+    "base": (("fixed", "words"), "like=FixedFormat(...) sets integer bits"),
+    "range": (("fixed", "words"), "like=FixedFormat(...) sets integer bits"),
+    "like": (("words",), "the search sets all formats"),
+}
+"""Arguments that some kinds of search do not take, and why."""
+
 
 def required_precision(
     model: ModelSource,
@@ -150,25 +159,16 @@ def required_precision(
     options = {"base": base != 2, "rounding": rounding != Rounding.NEAREST, "range": range is not None}
     if like is not None and (names := [name for name, value in options.items() if value]):
         raise ValueError(f"got {' and '.join(names)} beside like; needed like alone, which sets them")
-    if kind != "float" and highest is not None:
-        raise ValueError(
-            f'got highest={highest} and kind "{kind}"; needed none: only kind "float" has a highest precision to set'
-        )
+    given = {"highest": highest, "coefficient_bits": coefficient_bits, "range": range, "like": like}
+    given["base"] = None if base == 2 else base
+    for name, (kinds, why) in _NOT_FOR.items():
+        if given[name] is not None and kind in kinds:
+            raise ValueError(f'got {name}={given[name]} and kind "{kind}"; needed none: {why}')
     if kind in ("fixed", "words"):
-        if base != 2 or range is not None:
-            raise ValueError(
-                "got base or range for fixed point; needed neither: like=FixedFormat(...) sets integer bits"
-            )
         bits = None if coefficient_bits is None else whole_number("coefficient_bits", coefficient_bits, 1, 53)
         if kind == "words":
-            if like is not None:
-                raise ValueError('got like for kind="words"; needed none: the search sets all formats')
             return in_words(asked, rounding_named(rounding), bits or MOST_COEFFICIENT_BITS)
         return in_fixed_point(asked, fixed_like(like, asked.model), rounding_named(rounding), bits)
-    if coefficient_bits is not None:
-        raise ValueError(
-            'got coefficient_bits for floating point; needed none: kind="fixed" has coefficients of their own'
-        )
     kind_like = _float_like(like, base, rounding_named(rounding), range)
     return (_of_blocks if kind == "blocks" else _in_floating_point)(asked, kind_like)
 

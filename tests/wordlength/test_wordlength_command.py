@@ -39,7 +39,7 @@ def test_a_page_needs_no_network_and_json_has_the_errors(folder):
     assert main(asked.split()) == 0
     expected = required_precision(read_model("model.toml"), z, ("0.01", np.inf))
     found = json.loads((folder / "out.json").read_text(encoding="utf-8"))
-    assert (found["digits"], found["limiting"]) == (expected.digits, 0)
+    assert found["digits"] == expected.digits
     assert found["errors"] == [pytest.approx(dict(expected.tried)[expected.digits]), None]
     text = (folder / "out.html").read_text(encoding="utf-8")
     assert "tracker &lt;1&gt;" in text
