@@ -160,7 +160,7 @@ def required_precision(
     if like is not None and (names := [name for name, value in options.items() if value]):
         raise ValueError(f"got {' and '.join(names)} beside like; needed like alone, which sets them")
     given = {"highest": highest, "coefficient_bits": coefficient_bits, "range": range, "like": like}
-    given["base"] = None if base == 2 else base
+    given["base"] = None if isinstance(base, int) and base == 2 else base
     for name, (kinds, why) in _NOT_FOR.items():
         if given[name] is not None and kind in kinds:
             raise ValueError(f'got {name}={given[name]} and kind "{kind}"; needed none: {why}')
