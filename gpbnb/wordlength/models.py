@@ -88,7 +88,7 @@ MODELS = (LinearModel, LinearSystem, NonlinearModel, NonlinearSystem, FixedInter
 """Models of this package, which are read as they are."""
 
 
-def read_model(source: Any, u: Numbers | None = None, structure: str | None = None) -> Any:
+def read_model(source: Any, u: Numbers | None = None) -> Any:
     """Read a model from a TOML file, a mapping of its matrices, or an object of another library.
 
     The model that is read computes the same estimates or outputs as the object of the other library. An object with
@@ -104,14 +104,11 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
         x0 and P0 for a :class:`gpbnb.NonlinearModel`; function for a function of a format and data. Reading such a
         model runs the Python file: read none that you do not trust. Or (b, a), or
         sections (sections, 6). Or a discrete StateSpace or TransferFunction of ``scipy.signal`` or python-control, or a
-        ZerosPolesGain of ``scipy.signal``; it is read as a linear system that starts at rest. Or a KalmanFilter,
-        SquareRootKalmanFilter or FadingKalmanFilter of FilterPy, or a KalmanFilter of OpenCV; its current estimate
+        ZerosPolesGain of ``scipy.signal``; it is read as a linear system in state space that starts at rest. Or a
+        KalmanFilter, SquareRootKalmanFilter or FadingKalmanFilter of FilterPy, or a KalmanFilter of OpenCV; its current estimate
         becomes the first estimate, and a step means ``predict()`` or ``predict(u)``, then ``update(z)`` or
         ``correct(z)``, without other arguments. A model of this package is returned as it is.
     u : (steps, p), known inputs of a Kalman filter, in place of those in `source`; the source must have B.
-    structure : structure of a digital filter, or of a TransferFunction or ZerosPolesGain of ``scipy.signal``; one of
-        :data:`gpbnb.filters.structures.STRUCTURES`. By default, the structure that the file names; for an object, state
-        space.
 
     Raises
     ------
@@ -131,20 +128,13 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
     if isinstance(source, tuple | list | np.ndarray):
         source = _coefficients(source)
     if isinstance(source, (str, Path, Mapping)):
-        return _of_file(source, u, structure)[0]
+        return _of_file(source, u)[0]
     library, kind = type(source).__module__.partition(".")[0], type(source).__name__
-    own = isinstance(source, MODELS)
-    of_filter = own or (library == "filterpy" and kind in FILTERS)
-    if structure is not None and of_filter:
-        raise ValueError(
-            f"got structure {structure!r} for a {kind}, which is computed as it is; needed none; give b and a, or sos, "
-            "of a digital filter"
-        )
     if library == "filterpy" and kind in FILTERS:
         return _from_filterpy(source, u)
     if u is not None:
         raise ValueError(f"got inputs for a {kind}; needed a TOML file, a mapping or a filter of FilterPy with B")
-    if own:
+    if isinstance(source, MODELS):
         return source
     if library == "cv2" and kind == "KalmanFilter":
         return _from_opencv(source)
@@ -155,7 +145,7 @@ def read_model(source: Any, u: Numbers | None = None, structure: str | None = No
             "that is the identity for step 0, and Q one that is zero there"
         )
     if kind.removesuffix("Continuous").removesuffix("Discrete") in SYSTEMS.get(library, ()):
-        return _from_system(source, library, structure)
+        return _from_system(source, library)
     raise TypeError(
         f"got a {kind}; needed the path of a TOML file, a mapping, a discrete {', '.join(SYSTEMS['scipy'])} of "
         f"scipy.signal or python-control, or a {', '.join(FILTERS)} of FilterPy; write the matrices of another class, "
@@ -267,7 +257,7 @@ def read_filter(source: str | Path | Mapping[str, Any], u: Numbers | None = None
     return FilterSource(model, structures, lacking, design=design)
 
 
-def _of_file(source: Any, u: Any, structure: str | None = None) -> tuple[Any, FilterDesign | None, Any]:
+def _of_file(source: Any, u: Any) -> tuple[Any, FilterDesign | None, Any]:
     """Return a model and, of a digital filter, its design and the structure that the file names, perhaps "all"."""
     if isinstance(source, Mapping):
         given, where, folder = source, "the mapping", Path()
@@ -283,11 +273,9 @@ def _of_file(source: Any, u: Any, structure: str | None = None) -> tuple[Any, Fi
             arguments[key] = function_at(arguments[key], key, folder, loaded)
         made = _KINDS[kind][0](**arguments)
         if isinstance(made, FilterDesign):
-            return made.system(structure or (None if named == "all" else named)), made, named
+            return made.system(None if named == "all" else named), made, named
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where}: {error}") from None
-    if structure is not None:
-        raise ValueError(f"{where}: got structure={structure!r}; needed none: only a digital filter has structures")
     return made, None, named
 
 
@@ -319,7 +307,7 @@ def _json(path: Path) -> dict[str, Any]:
     return found
 
 
-def _from_system(given: Any, library: str, structure: str | None) -> LinearSystem:
+def _from_system(given: Any, library: str) -> LinearSystem:
     kind, dt = type(given).__name__, given.dt
     if (dt is None) if library == "scipy" else (dt == 0):
         raise ValueError(
@@ -328,8 +316,6 @@ def _from_system(given: Any, library: str, structure: str | None) -> LinearSyste
         )
     if dt is None or not 0 < dt < np.inf:
         raise ValueError(f"got a {kind} with dt = {dt}; needed a discrete system; set dt to its time step, or to True")
-    if structure is not None:
-        return _in_structure(given, kind, library, structure)
     try:
         system = given if hasattr(given, "A") else given.to_ss()
     except (NotImplementedError, ImportError, ValueError) as error:
@@ -338,18 +324,6 @@ def _from_system(given: Any, library: str, structure: str | None) -> LinearSyste
         ) from None
     name = given.name if library == "control" else kind
     return LinearSystem(system.A, system.B, system.C, system.D, name=name)
-
-
-def _in_structure(given: Any, kind: str, library: str, structure: str) -> LinearSystem:
-    if library == "scipy" and hasattr(given, "num"):
-        b, a = (np.atleast_1d(np.squeeze(each)) for each in (given.num, given.den))
-        return LinearSystem.from_coefficients([0] * (len(a) - len(b)) + list(b), a, structure)  # both in powers of 1/z
-    if library == "scipy" and hasattr(given, "gain"):
-        return LinearSystem.from_zeros(given.zeros, given.poles, given.gain, structure)
-    raise ValueError(
-        f"got structure={structure!r} for a {kind} of {library}; needed a TransferFunction or a ZerosPolesGain of "
-        "scipy.signal; or use LinearSystem.from_coefficients"
-    )
 
 
 _KEYS = (

@@ -14,24 +14,9 @@ from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.words import WordFormats, run_words
 from gpbnb.wordlength.fixed import with_fraction_bits
-from gpbnb.wordlength.models import read_model
 
 SOS = signal.butter(4, 0.1, output="sos")
 B, A = signal.butter(4, 0.1)
-
-
-@pytest.mark.parametrize("structure", ["direct form I", "cascade", "lattice"])
-def test_systems_of_scipy_are_read_in_a_structure(structure):
-    z, p, k = signal.butter(4, 0.1, output="zpk")
-    expected = signal.lfilter(B, A, np.eye(1, 80)[0])
-    impulse = np.eye(80, 1)
-    for given in (signal.dlti(B, A, dt=1), signal.dlti(z, p, k, dt=1)):
-        system = read_model(given, structure=structure)
-        assert system.name.startswith(structure)
-        found = system.outputs(impulse)[:, 0, 0]
-        assert found == pytest.approx(expected, abs=1e-12)  # z, p and k differ from b and a in their last digits
-    with pytest.raises(ValueError, match="needed a TransferFunction or a ZerosPolesGain"):
-        read_model(signal.StateSpace([[0.5]], [[1]], [[1]], [[0]], dt=1), structure=structure)
 
 
 # -- sections ---------------------------------------------------------------------------------------------------------
