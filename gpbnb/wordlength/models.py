@@ -105,8 +105,8 @@ def read_model(source: Any, u: Numbers | None = None) -> Any:
         model runs the Python file: read none that you do not trust. Or (b, a), or
         sections (sections, 6). Or a discrete StateSpace or TransferFunction of ``scipy.signal`` or python-control, or a
         ZerosPolesGain of ``scipy.signal``; it is read as a linear system in state space that starts at rest. Or a
-        KalmanFilter, SquareRootKalmanFilter or FadingKalmanFilter of FilterPy, or a KalmanFilter of OpenCV; its current estimate
-        becomes the first estimate, and a step means ``predict()`` or ``predict(u)``, then ``update(z)`` or
+        KalmanFilter, SquareRootKalmanFilter or FadingKalmanFilter of FilterPy, or a KalmanFilter of OpenCV; its current
+        estimate becomes the first estimate, and a step means ``predict()`` or ``predict(u)``, then ``update(z)`` or
         ``correct(z)``, without other arguments. A model of this package is returned as it is.
     u : (steps, p), known inputs of a Kalman filter, in place of those in `source`; the source must have B.
 
