@@ -24,8 +24,8 @@ from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, first_integers, integer_program
 from gpbnb.wordlength.answer import format_in_words
 from gpbnb.wordlength.asked import AnyFormat, Asked, Data, Function, checked_format, is_filter
-from gpbnb.wordlength.functions import STOPS, exact_outputs, outputs_of
-from gpbnb.wordlength.judges import judge_of_function, measured, system_pairs
+from gpbnb.wordlength.functions import STOPS, exact_outputs, outputs_of, referenced
+from gpbnb.wordlength.judges import measured, system_pairs
 from gpbnb.wordlength.models import ModelSource
 
 
@@ -174,7 +174,7 @@ def longest(run: Callable[[int], Any], steps: int) -> tuple[int, Any, str]:
 
 
 def _function(run: Function, data: Data, fmt: Any) -> EmulatedRun:
-    made, z, true = judge_of_function(run, data, 1.0, fmt.base, fmt.precision)[1]
+    made, z, true, _ = referenced(run, data, 1.0, fmt.base, fmt.precision)
     try:
         found = outputs_of(made, fmt, z, None)
     except STOPS as fault:

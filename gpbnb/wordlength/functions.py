@@ -16,16 +16,19 @@ from gpbnb.arithmetic.exits import kept_in, lifted
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.arithmetic.rounding import digits_text
+from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import Outcome, largest_by_default
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother
-from gpbnb.wordlength.asked import Data, Function
+from gpbnb.wordlength.asked import Data, Function, tolerances_of
 
 SPARE_BITS = 37
 """Bits that the reference has beyond the highest precision; a second run that checks it has half as many again."""
+
+SETTLED = 2.0**-20
+"""Largest difference allowed between two references of a function, as a share of the tolerance."""
 
 Prepared = TracedFunction | NonlinearSystem | FixedIntervalSmoother
 """What records its operations itself."""
@@ -35,11 +38,12 @@ STOPS = (ZeroDivisionError, OverflowError, DomainError, WholeNumberError, np.lin
 
 
 class Referenced(NamedTuple):
-    """A function, its inputs, and `true`, its outputs in the reference, (steps, p)."""
+    """A function, its inputs, `true`, its outputs in the reference, (steps, p), and their tolerances, (p,)."""
 
     run: Prepared
     z: NDArray[Any] | None
     true: NDArray[Any]
+    tolerances: NDArray[np.float64]
 
     @property
     def untraced(self) -> str:
@@ -49,17 +53,13 @@ class Referenced(NamedTuple):
     def errors(self, fmt: Any) -> NDArray[np.float64] | Outcome:
         """Return the largest error of each output, or why the function stops."""
         try:
-            return self.off(exact_outputs(outputs_of(self.run, fmt, self.z, None)))
+            return _largest(exact_outputs(outputs_of(self.run, fmt, self.z, None)) - self.true)
         except STOPS as fault:
             return Outcome(math.inf, f"the function stops: {fault}", isinstance(fault, OverflowError))
 
-    def off(self, outputs: NDArray[Any]) -> NDArray[np.float64]:
-        """Return the largest distance of outputs, (steps, p), from the reference, (p,)."""
-        return np.array([_float(max(abs(each) for each in column)) for column in (outputs - self.true).T])
 
-
-def referenced(run: Function, data: Data, base: int, most: int) -> tuple[Referenced, NDArray[Any], int]:
-    """Compute the reference of a function in more digits than `most`; return also one in fewer, and their number."""
+def referenced(run: Function, data: Data, tolerance: Any, base: int, most: int) -> Referenced:
+    """Compute the reference of a function in more digits than `most`, and again in half as many again."""
     inputs, steps = None if data.z is None else real_numbers(data.z), data.steps
     if isinstance(run, FixedIntervalSmoother):
         if inputs is not None or steps != len(run.z):
@@ -69,7 +69,21 @@ def referenced(run: Function, data: Data, base: int, most: int) -> tuple[Referen
     made = run if isinstance(run, Prepared) else TracedFunction(run)
     digits = max(most, largest_by_default(base)) + math.ceil(SPARE_BITS / math.log2(base))
     short, true = (_reference(made, FloatFormat(base, each), inputs, steps) for each in (digits, digits * 3 // 2))
-    return Referenced(made, inputs, true), short, digits
+    tolerances = tolerances_of(tolerance, true.shape[1], "outputs")
+    off = float((_largest(short - true) / tolerances).max())
+    if not off <= SETTLED:
+        raise ValueError(
+            f"got a function whose reference in {digits_text(digits, base)} is {off:.2g} times the tolerance from "
+            f"that in {digits * 3 // 2}; needed one that settles; do comparisons, or the format itself, decide between "
+            f"results far apart? If errors only grow, try highest={2 * digits}, which gives the reference more "
+            f"{digit_unit(base)}"
+        )
+    return Referenced(made, inputs, true, tolerances)
+
+
+def _largest(errors: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the largest size in each column of exact numbers."""
+    return np.array([_float(max(abs(each) for each in column)) for column in errors.T])
 
 
 def _reference(

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.arithmetic.search import Outcome
 from gpbnb.bounds.guarantee import FilterGuarantee, guarantee, guessed, sized_limits
 from gpbnb.bounds.guess import FilterLimits
@@ -31,15 +30,12 @@ from gpbnb.filters.system import LinearSystem, is_stable, system_inputs
 from gpbnb.filters.words import WordFormats, run_words
 from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.asked import AnyFormat, Asked, Data, is_filter, tolerances_of
-from gpbnb.wordlength.functions import Referenced, referenced
+from gpbnb.wordlength.functions import referenced
 
 Found = NDArray[np.float64] | Outcome
 """The largest error or bound of each state or output, (n,); or why there is none."""
 
 Answer = TypeVar("Answer")
-
-SETTLED = 2.0**-20
-"""Largest difference allowed between two references of a function, as a share of the tolerance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +50,6 @@ class Judge:
     steps : steps for which a bound holds; None if it holds for ever.
     over : function that returns a judge over some steps, where nothing bounds the errors for ever.
     warnings : function that returns why the errors may say little about other runs.
-    beyond : what an infinite ratio means; by default that float64 does not hold it.
     untraced : why a user's function cannot be traced; empty if it can be.
     model, form : a Kalman filter for the measurements that are present, and its form; `of_form` judges another.
     """
@@ -65,7 +60,6 @@ class Judge:
     steps: int | None = None
     over: Callable[[int], Judge] | None = None
     warnings: Callable[[], tuple[str, ...]] = tuple
-    beyond: str = ""
     untraced: str = ""
     model: AnyModel | None = None
     form: Form = Form.INNOVATION
@@ -89,7 +83,7 @@ class Judge:
         if ratio < math.inf:
             return Outcome(ratio)
         what = "an error over its tolerance" if np.isfinite(found).all() else "an output or a bound"
-        return Outcome(math.inf, self.beyond or f"{what} is beyond the range of float64")
+        return Outcome(math.inf, f"{what} is beyond the range of float64")
 
 
 def judge_for(asked: Asked, base: int = 2, most: int = 0) -> Judge:
@@ -98,12 +92,11 @@ def judge_for(asked: Asked, base: int = 2, most: int = 0) -> Judge:
     if isinstance(model, LinearSystem):
         return _of_system(model, data, asked.tolerance, basis, asked.within)
     if not is_filter(model):
-        return judge_of_function(model, data, asked.tolerance, base, most)[0]
+        given = referenced(model, data, asked.tolerance, base, most)
+        return Judge(given.errors, given.tolerances, untraced=given.untraced)
     tolerances = tolerances_of(asked.tolerance, model.n, "states")
     if basis in ("emulation", "bound"):
         return _of_record(model, data, tolerances, asked.form, basis == "bound")
-    if not isinstance(model, LinearModel):
-        raise TypeError(f"got {model.name}; needed a LinearModel")
     return _for_ever(model, data, tolerances, basis, asked.form, asked.within)
 
 
@@ -131,29 +124,6 @@ def reasoned(errors: Callable[[Any], Found]) -> Callable[[Any], Found]:
             return Outcome(math.inf, str(fault), True)
 
     return found
-
-
-# -- functions --------------------------------------------------------------------------------------------------------
-
-
-def judge_of_function(run: Any, data: Data, tolerance: Any, base: int, most: int) -> tuple[Judge, Referenced]:
-    """Return what judges a function by its reference in more digits than `most`, and this reference."""
-    given, short, digits = referenced(run, data, base, most)
-    found = Judge(
-        given.errors,
-        tolerances_of(tolerance, given.true.shape[1], "outputs"),
-        beyond="an error of the function is beyond the range of float64",
-        untraced=given.untraced,
-    )
-    off = found.outcome(given.off(short)).ratio
-    if not off <= SETTLED:
-        raise ValueError(
-            f"got a function whose reference in {digits_text(digits, base)} is {off:.2g} times the tolerance from "
-            f"that in {digits * 3 // 2}; needed one that settles; do comparisons, or the format itself, decide between "
-            f"results far apart? If errors only grow, try highest={2 * digits}, which gives the reference more "
-            f"{digit_unit(base)}"
-        )
-    return found, given
 
 
 # -- Kalman filters ---------------------------------------------------------------------------------------------------
@@ -206,7 +176,7 @@ def _of_record(model: AnyModel, data: Data, tolerances: NDArray[np.float64], for
 
     def of_form(form: Form) -> Judge:
         errors = partial(_recorded, sound, z, form, true, lacking)
-        return Judge(errors, tolerances, beyond="the bound says nothing", model=sound, form=form, of_form=of_form)
+        return Judge(errors, tolerances, model=sound, form=form, of_form=of_form)
 
     return of_form(form)
 
