@@ -14,9 +14,9 @@ import gpbnb
 ROOT = Path(gpbnb.__file__).parent
 LONGEST_FILE = 800
 TOPICS = ("rounding", "inversion", "kalman", "guarantees", "rolling", "integration", "budget", "geometry")
-LIBRARY = (("files", "interrupts", "names"), ("arithmetic",), ("sweeps",), ("filters",), ("bounds",), ("wordlength",))
+LIBRARY = (("files", "interrupts", "names"), ("arithmetic",), ("filters",), ("bounds",), ("wordlength",))
 REPORT = (
-    ("display", "examples", "measurement", "stored_rows"),
+    ("display", "examples", "measurement", "stored_table", "sweep"),
     TOPICS,
     ("gravity_probe_b",),  # its answers are compared with the bounds of the report of 1984
     ("wordlengths", "pictures", "ledger", "ledger_options", "stored", "evidence"),

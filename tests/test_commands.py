@@ -12,7 +12,7 @@ from forks import answering
 import gpbnb
 from gpbnb import __main__ as top
 from gpbnb.report.stored import SWEEPS, main
-from gpbnb.sweeps import Sweep
+from gpbnb.report.sweep import Sweep
 
 PACKAGE = Path(gpbnb.__file__).parent
 COMMANDS = sorted(

@@ -25,7 +25,7 @@ from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.structures import structure_named
 from gpbnb.filters.system import LinearSystem
-from gpbnb.sweeps import plain_number
+from gpbnb.wordlength.numbers import plain_number
 from gpbnb.wordlength.own_code import function_at
 
 KALMAN = ("Phi", "H", "Q", "R", "x0", "P0")

@@ -15,7 +15,7 @@ from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.files import is_written
 from gpbnb.filters.forms import CONSTANT_GAIN, form_named, plain_name
 from gpbnb.names import NAMED_FORMATS, WITHOUT_LOOPS, format_parts
-from gpbnb.sweeps.numbers import plain_integer, plain_number
+from gpbnb.wordlength.numbers import plain_integer, plain_number
 
 BASES = ("emulation", "bound", "guarantee", "probable")
 """What an answer may be based on, as in ``gpbnb.wordlength.answer.Basis``."""

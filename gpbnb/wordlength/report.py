@@ -17,14 +17,13 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import digit_unit, digits_text
 from gpbnb.bounds.guess import FilterLimits
-from gpbnb.files import WRITTEN
+from gpbnb.files import WRITTEN, machine
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.poles import stored_response
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
-from gpbnb.sweeps import machine
 from gpbnb.wordlength.answer import Basis, Kind, Requirement, format_in_words
 from gpbnb.wordlength.asked import exactly, is_filter, kind_of, tolerances_of
 from gpbnb.wordlength.emulation import emulate

@@ -64,6 +64,5 @@ def test_errors_are_those_of_every_step():
     assert [line[:6] for line in lines] == [
         ("deviation", "2", "nearest", "hung", str(t), str(r)) for t in (20, 24) for r in (3, 4)
     ]
-    assert lines[0][:6] == SMALL.key
     one = found["largest"][1][2][1], found["largest"][1][3][1]
     assert lines[3][7] == f"{max(one):.6g}"

@@ -8,7 +8,7 @@ from scipy import stats
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.gravity_probe_b import threshold
 from gpbnb.report.gravity_probe_b.threshold import Share, needed, shares
-from gpbnb.sweeps import StoredTable
+from gpbnb.report.stored_table import StoredTable
 
 
 def most(share):

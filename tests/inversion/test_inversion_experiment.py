@@ -13,7 +13,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import inverse as bounds
 from gpbnb.report.inversion import experiment, procedure, theory
 from gpbnb.report.inversion.procedure import Reading
-from gpbnb.sweeps import StoredTable
+from gpbnb.report.stored_table import StoredTable
 from tests import oracles
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
@@ -170,18 +170,6 @@ class TestKept:
         assert int(whole["trials"]) >= 100_000
         assert float(whole["median"]) <= 1.1
         assert int(whole["tight"]) > int(whole["trials"]) / 2
-
-
-def test_what_is_recomputed_is_read(tmp_path, monkeypatch):
-    cells = [experiment.InverseCell("random", FMT, True, (2,), 5, (1, k)) for k in range(3)]
-    monkeypatch.setattr(experiment, "SWEEPS", {"small": (lambda: cells, ("ball", "a posteriori"))})
-    for _ in range(2):  # the second time, the folder exists
-        file = experiment.stored_sweep("small").recompute(tmp_path / "new" / "folder", count=2)
-    text = file.read_text(encoding="utf-8")
-    command = "python -m gpbnb.report.stored recompute inversion/small"
-    assert text.startswith(f"# command: {command}\n# seed: 1984\n# cells: 2 of 3\n")
-    assert text.count("\nrandom,2:24:nearest,yes,2,ball,5,") == 2
-    assert experiment.stored_sweep("small").load(file).records()[-1]["trials"] == "10"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,8 +30,8 @@ from gpbnb.report.gravity_probe_b.error_sets import GAIN, Disturbances, Reach, d
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS
 from gpbnb.report.gravity_probe_b.year import model as year_model
-from gpbnb.report.stored_rows import sweep
-from gpbnb.sweeps import Column
+from gpbnb.report.stored_table import Column
+from gpbnb.report.sweep import Sweep
 
 COLUMNS = (
     Column("precision", "integer", 2, 53),
@@ -189,27 +188,27 @@ def gravity_probe_b_bounds(precision: int, steps: int = YEAR) -> Iterator[tuple[
 # -- the stored table -------------------------------------------------------------------------------------------------
 
 
-def year_of_bounds(precision: int, directory: Path | None = None, steps: int = YEAR) -> list[list[str]]:
+def year_of_bounds(precision: int, steps: int = YEAR) -> list[tuple[str, ...]]:
     """Return two rows after each hundredth of the year and at the end; they hold for the steps done so far."""
-    rows: list[list[str]] = []
+    rows: list[tuple[str, ...]] = []
     every = 0
-    with tqdm(total=steps, unit="step", disable=directory is None) as bar:
+    with tqdm(total=steps, unit="step", disable=None) as bar:
         for done, found in gravity_probe_b_bounds(precision, steps):
             bar.update(done - bar.n)
             if done == steps or done >= every:
                 every = done + YEAR // 100
                 for name, each in zip(("absolute", "deviation"), found, strict=True):
                     bounds, parts = (f"{b:.6g}" for b in each.worst), (f"{b:.3g}" for b in each.parts[:, GAIN])
-                    rows.append([str(precision), str(done), name, *bounds, *parts])
+                    rows.append((str(precision), str(done), name, *bounds, *parts))
     return rows
 
 
 def first_cycle(precision: int, rng: np.random.Generator) -> list[tuple[str, ...]]:
     """Return the rows after the first cycle of the model."""
-    return [tuple(row) for row in year_of_bounds(precision, steps=year_model(MODELS[0], 2).cycle)]
+    return year_of_bounds(precision, year_model(MODELS[0], 2).cycle)
 
 
-SWEEP = sweep("gravity_probe_b/horizon", COLUMNS, 3, lambda: (53,), year_of_bounds, sample=first_cycle)
+SWEEP = Sweep("gravity_probe_b/horizon", COLUMNS, 3, lambda: (53,), year_of_bounds, sample=first_cycle)
 
 
 def load() -> tuple[HorizonRow, ...]:

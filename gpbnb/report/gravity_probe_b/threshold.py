@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,8 +28,8 @@ from gpbnb.filters.simulation import BLOCK, Simulation
 from gpbnb.report.gravity_probe_b.mission import SETTINGS, Mission
 from gpbnb.report.gravity_probe_b.model import TRUTH, YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS, model
-from gpbnb.report.stored_rows import sweep
-from gpbnb.sweeps import Column, StoredTable, Sweep
+from gpbnb.report.stored_table import Column, StoredTable
+from gpbnb.report.sweep import Sweep
 
 #: States of the filter, either drift angles and rates or their deviations from the predicted drift.
 STATES = ("absolute", "deviation")
@@ -99,11 +98,6 @@ class YearCell:
     precisions: tuple[int, ...]
     first: int = 0
     count: int = 100
-
-    @property
-    def key(self) -> tuple[str, ...]:
-        """Return the first columns of this cell's first row."""
-        return (*self.heads()[0], str(self.first))
 
     def heads(self) -> list[tuple[str, ...]]:
         """Return the first columns of the rows of each format; the simple model has no column for a setting."""
@@ -209,10 +203,10 @@ def raise_largest(largest: NDArray[np.float64], errors: NDArray[np.float64]) -> 
     np.maximum(largest, np.nan_to_num(np.abs(errors), nan=np.inf, posinf=np.inf).max(axis=0), out=largest)
 
 
-def compute(cell: YearCell, directory: Path | None = None, steps: int | None = None) -> dict[str, Any]:
+def compute(cell: YearCell, steps: int | None = None) -> dict[str, Any]:
     """Run the years of a cell; return the largest errors and those at the end, by format, state and record."""
     years = Lockstep(cell, steps)
-    for block in tqdm(range(-(-years.steps // BLOCK)), desc=repr(cell), disable=directory is None):
+    for block in tqdm(range(-(-years.steps // BLOCK)), repr(cell), disable=None):
         years.advance(block)
     return {"largest": years.largest.tolist(), "end": years.end.tolist()}
 
@@ -250,7 +244,7 @@ MISSION_COLUMNS = (Column("setting", "text", choices=tuple(SETTINGS)), *COLUMNS)
 
 def _sweep(name: str, columns: tuple[Column, ...], cells: tuple[YearCell, ...], seed: int) -> Sweep[YearCell]:
     name, key = f"gravity_probe_b/{name}", len(columns) - 4
-    return sweep(name, columns, key, lambda: cells, compute, seed, rows=rows, sample=sample)
+    return Sweep(name, columns, key, lambda: cells, compute, seed, rows=rows, sample=sample)
 
 
 SWEEP = _sweep("threshold", COLUMNS, SIMPLE_CELLS, SEED)

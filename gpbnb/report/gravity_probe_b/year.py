@@ -27,8 +27,8 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
 from gpbnb.filters.simulation import Simulation
 from gpbnb.report.gravity_probe_b.model import SEED, YEAR, gravity_probe_b, gravity_probe_b_year
-from gpbnb.report.stored_rows import sweep
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_table import Column
+from gpbnb.report.sweep import Sweep
 
 #: Format in which the model is stored, by base; every format of this base in :data:`CASES` contains it.
 STORED = {2: FloatFormat(2, 14), 10: FloatFormat(10, 4)}
@@ -115,7 +115,7 @@ def checkpoint_steps(steps: int = YEAR) -> tuple[int, ...]:
 # -- what is computed ---------------------------------------------------------------------------------
 
 
-def rows(case: YearCase, directory: Path | None = None, steps: int = YEAR) -> list[tuple[str, ...]]:
+def rows(case: YearCase, steps: int = YEAR) -> list[tuple[str, ...]]:
     """Return the rows of a case in ``year.csv`` up to some step, with six significant digits."""
     chosen = checkpoint_steps(steps)
     z, true = _reference(case.reference, chosen)
@@ -131,7 +131,7 @@ def _reference(case: YearCase, chosen: tuple[int, ...]) -> tuple[NDArray[np.floa
     return z, reference(model(case.model, case.base), z, chosen)
 
 
-def bound_rows(case: YearCase, directory: Path | None = None, steps: int = YEAR) -> list[tuple[str, ...]]:
+def bound_rows(case: YearCase, steps: int = YEAR) -> list[tuple[str, ...]]:
     """Return the rows of a reference in ``bounds.csv``, with six significant digits, rounded upwards.
 
     The errors of a run without its own bound are at most its distance from the reference plus the reference's bound:
@@ -220,7 +220,7 @@ def bounds() -> dict[YearCase, Year]:
     return {each.case: each for each in _years(BOUND_SWEEP, None)}
 
 
-SWEEP = sweep(
+SWEEP = Sweep(
     "gravity_probe_b/year",
     COLUMNS,
     6,
@@ -230,7 +230,7 @@ SWEEP = sweep(
     sample=lambda case, rng: rows(case, steps=SAMPLE_STEPS),
     same=_same,
 )
-BOUND_SWEEP = sweep(
+BOUND_SWEEP = Sweep(
     "gravity_probe_b/bounds",
     BOUND_COLUMNS,
     6,

@@ -22,8 +22,8 @@ from gpbnb.interrupts import interruptible
 from gpbnb.report.display.tables import Table
 from gpbnb.report.examples import cyclic, tracker
 from gpbnb.report.guarantees.table import CASES, FORMAT, case_guarantee
-from gpbnb.report.stored_rows import Number, sweep_of_rows
-from gpbnb.report.stored_rows import load as load_rows
+from gpbnb.report.sweep import Number, sweep_of_rows
+from gpbnb.report.sweep import load as load_rows
 from gpbnb.wordlength.required import required_precision
 
 COMMAND = "python -m gpbnb.report.guarantees.certificates"

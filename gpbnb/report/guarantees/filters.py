@@ -33,8 +33,8 @@ from gpbnb.report.guarantees.random_filters import (
     draw,
     innovations,
 )
-from gpbnb.report.stored_rows import Number, sweep_of_rows
-from gpbnb.report.stored_rows import load as load_rows
+from gpbnb.report.sweep import Number, sweep_of_rows
+from gpbnb.report.sweep import load as load_rows
 
 FILTERS = 3_000
 MOST, CANDIDATES = 1_000, 8

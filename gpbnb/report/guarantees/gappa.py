@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -25,9 +24,9 @@ from gpbnb.bounds.guess import FilterLimits, columns, linear_steps, rounding_err
 from gpbnb.filters.program import ADD, MULTIPLY
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.guarantees.table import FORMAT, case_guarantee, case_named
-from gpbnb.report.stored_rows import Number, sweep
-from gpbnb.report.stored_rows import columns as columns_of
-from gpbnb.report.stored_rows import load as load_rows
+from gpbnb.report.sweep import Number, Sweep
+from gpbnb.report.sweep import columns as columns_of
+from gpbnb.report.sweep import load as load_rows
 
 FILTERS = ("tracker, 0 m from its origin", "PX4, landing target", "dynamax, tracking")
 _RESULT = re.compile(r"v\d+ - e\d+ in \[(-?\d+)(?:b(-?\d+))?(?: \{[^}]*\})?, (-?\d+)(?:b(-?\d+))?")
@@ -101,7 +100,7 @@ def _rows(name: str, bounds_of_gappa: Callable[[FilterGuarantee], Sequence[str]]
     return [(name, str(i), f"{mine:.4g}", other) for i, (mine, other) in enumerate(pairs)]
 
 
-def _computed(name: str, directory: Path | None = None) -> list[tuple[str, ...]]:
+def _computed(name: str) -> list[tuple[str, ...]]:
     return _rows(name, lambda found: [f"{bound:.4g}" for bound in gappa(script(found))])
 
 
@@ -112,7 +111,7 @@ def _sample(name: str, rng: np.random.Generator) -> list[tuple[str, ...]]:
     return _rows(name, lambda found: [row.gappa for row in load() if row.name == name])
 
 
-SWEEP = sweep("guarantees/gappa", columns_of(GappaRow), 2, lambda: FILTERS, _computed, sample=_sample)
+SWEEP = Sweep("guarantees/gappa", columns_of(GappaRow), 2, lambda: FILTERS, _computed, sample=_sample)
 load = partial(load_rows, SWEEP, GappaRow)
 
 

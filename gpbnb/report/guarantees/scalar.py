@@ -29,8 +29,8 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.random_filters import DETERMINISTIC
-from gpbnb.report.stored_rows import Number, sweep_of_rows
-from gpbnb.report.stored_rows import load as load_rows
+from gpbnb.report.sweep import Number, sweep_of_rows
+from gpbnb.report.sweep import load as load_rows
 
 FILTERS = 500
 LONGEST = 400

@@ -13,8 +13,8 @@ from gpbnb.bounds.adversary import responses, run_against
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import closed_loops, from_schedule, limits
 from gpbnb.filters.system import state_space
-from gpbnb.report.stored_rows import Number, sweep_of_rows
-from gpbnb.report.stored_rows import load as load_rows
+from gpbnb.report.sweep import Number, sweep_of_rows
+from gpbnb.report.sweep import load as load_rows
 
 ROWS = 2_000
 RANDOM, CONSTANT, CHOSEN = 40, 6, 5

@@ -35,8 +35,8 @@ from gpbnb.report.guarantees.published import (
     nile_local_level,
     px4_landing_target,
 )
-from gpbnb.report.stored_rows import Number, Whole, sweep_of_rows
-from gpbnb.report.stored_rows import load as load_rows
+from gpbnb.report.sweep import Number, Whole, sweep_of_rows
+from gpbnb.report.sweep import load as load_rows
 from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.required import required_precision
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, partial
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,8 +23,8 @@ from gpbnb.arithmetic.rational import column_sum_norm, rationals, true_inverse
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import inverse as bounds
 from gpbnb.report.inversion import procedure, theory
-from gpbnb.report.stored_rows import sweep
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.report.stored_table import Column
+from gpbnb.report.sweep import Sweep
 
 # -- one inverse beside its bounds ----------------------------------------------------------------
 
@@ -262,7 +261,7 @@ Trials = list[list[Any] | None]
 inverse is exact, and for each bound that exists whether the error exceeds it, and bound / error."""
 
 
-def computed(cell: InverseCell, directory: Path | None = None, *, names: Sequence[str]) -> Trials:
+def computed(cell: InverseCell, *, names: Sequence[str]) -> Trials:
     """Compute the trials of a cell."""
     found: Trials = []
     for one in cell.trials(names):
@@ -321,7 +320,7 @@ def format_name(fmt: FloatFormat) -> str:
 def stored_sweep(name: str) -> Sweep[InverseCell]:
     """Return one of the sweeps of :data:`SWEEPS`."""
     cells, names = SWEEPS[name]
-    return sweep(
+    return Sweep(
         f"inversion/{name}",
         COLUMNS,
         5,
@@ -330,5 +329,4 @@ def stored_sweep(name: str) -> Sweep[InverseCell]:
         SEED,
         rows=partial(rows, names=names),
         summary=partial(sums, names=names),
-        packages=("numpy", "numba", "python-flint"),
     )

@@ -22,8 +22,8 @@ from gpbnb.filters.emulation import History, emulate
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.kalman import report_bounds
-from gpbnb.report.stored_rows import columns, sweep
-from gpbnb.sweeps import Column
+from gpbnb.report.stored_table import Column
+from gpbnb.report.sweep import Sweep, columns
 
 #: The kinds of random models; see :func:`random_model`.
 KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
@@ -225,12 +225,12 @@ def lines(seed: int, trials: Sequence[Summary]) -> list[tuple[str, ...]]:
 COLUMNS = (Column("seed", "integer", 0), *columns(Summary))
 
 
-def trials_of_seed(seed: int, directory: Path | None = None) -> list[tuple[str, ...]]:
+def trials_of_seed(seed: int) -> list[tuple[str, ...]]:
     """Return the rows for one seed of the random filters."""
     return lines(seed, [trial(kind, fmt, form, seed) for kind, fmt, form in product(KINDS, FORMATS, WITH_PROGRAM)])
 
 
-SWEEP = sweep("kalman/ensembles", COLUMNS, 3, lambda: range(REPEATS), trials_of_seed)
+SWEEP = Sweep("kalman/ensembles", COLUMNS, 3, lambda: range(REPEATS), trials_of_seed)
 
 
 @cache

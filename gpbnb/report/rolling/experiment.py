@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,8 @@ from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
 from gpbnb.report.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
-from gpbnb.report.stored_rows import sweep
-from gpbnb.sweeps import Column
+from gpbnb.report.stored_table import Column
+from gpbnb.report.sweep import Sweep
 
 YEAR_SAMPLES = round(YEAR / INTERVAL)
 
@@ -221,14 +220,13 @@ def drift_rates(
     gyros: int,
     rng: np.random.Generator,
     samples: int = YEAR_SAMPLES,
-    progress: bool = False,
 ) -> DriftStudy:
     """Roll, measure, deroll and fit both drifts of gyros with two readouts each; all periods use the same noise."""
     index = np.arange(samples)
     ramp = complex(*theory.DRIFTS) * (index * INTERVAL / YEAR)
     phases = [np.zeros(samples) if p is None else theory.roll_phase(index, p) for p in periods]
     errors = np.empty((len(periods), gyros, 2))
-    for g in tqdm(range(gyros), desc="gyros", ncols=80, disable=not progress):
+    for g in tqdm(range(gyros), desc="gyros", ncols=80, disable=None):
         noise = record(LEVEL, samples, 2, rng) @ (1, 1j)
         for p, phase in enumerate(phases):
             turn = np.exp(1j * phase)
@@ -264,13 +262,13 @@ def survey_rows(study: DriftStudy) -> list[tuple[str, ...]]:
     return [(str(gyro), *(f"{value:.5e}" for value in row)) for gyro, row in enumerate(table)]
 
 
-def survey_of(gyros: int, directory: Path | None = None) -> list[tuple[str, ...]]:
+def survey_of(gyros: int) -> list[tuple[str, ...]]:
     """Simulate a year for each of several gyros; the noise of each does not depend on their number."""
     rng = np.random.default_rng(1984)
-    return survey_rows(drift_rates(SURVEY_PERIODS, gyros, rng, progress=directory is not None))
+    return survey_rows(drift_rates(SURVEY_PERIODS, gyros, rng))
 
 
-SWEEP = sweep(
+SWEEP = Sweep(
     "rolling/drift_rates",
     SURVEY_COLUMNS,
     1,
