@@ -227,6 +227,14 @@ def test_a_name_from_a_removed_cell_is_unseen():
 
 
 @each_notebook
+def test_every_name_of_the_package_that_a_cell_imports_exists(path):
+    for cell in code_cells(path):
+        for node in ast.walk(ast.parse("".join(cell["source"]))):
+            if isinstance(node, ast.Import | ast.ImportFrom) and "gpbnb" in ast.unparse(node):
+                exec(ast.unparse(node))
+
+
+@each_notebook
 def test_a_reader_finds_every_name_of_a_visible_cell(path):
     assert unseen(code_cells(path)) == []
 

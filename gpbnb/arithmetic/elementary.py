@@ -262,7 +262,7 @@ def _rational(name: str, values: Sequence[Fraction]) -> Fraction | None:
 
 def _power(x: Fraction, y: Fraction) -> Fraction | None:
     """Return x to the power y if it is rational and not too long."""
-    if not x or not y:
+    if not x:
         return Fraction(not y) if y >= 0 else None
     if y.denominator == 1:
         root = x

@@ -322,6 +322,6 @@ def prints_as(value: Any, printed: str, *roundings: Rounding) -> bool:
     ----------
     roundings : the ways in which it may have been rounded; by default only to nearest.
     """
-    figures = len(printed.lower().partition("e")[0].replace(".", "").lstrip("+-0"))
+    figures = max(len(printed.lower().partition("e")[0].replace(".", "").lstrip("+-0")), 1)
     formats = (FloatFormat(10, figures, rounding) for rounding in roundings or (Rounding.NEAREST,))
     return any(fmt.round(value) == Fraction(printed) for fmt in formats)

@@ -718,9 +718,9 @@ class ErrorSet:
         self.x = [list(start[i : i + 1]) for i in range(self.n)]
         self.M, self.box, self.one = diagonal(self.n, 0), [0] * self.n, diagonal(self.n, 1 << loops)
 
-    def image(self, row: Any, start: int = 0) -> list[int]:
+    def image(self, row: Any) -> list[int]:
         """A row, in units of 2**-loops, times each segment."""
-        total = [start] * len(self.x[0])
+        total = [0] * len(self.x[0])
         for f, x in zip(row, self.x, strict=True):
             total = list(map(add, total, map(mul, repeat(f), x))) if f else total
         return total
@@ -772,7 +772,7 @@ class ErrorSet:
 
     def move(self, F: Any) -> None:
         """Take the image of the set, and round its numbers."""
-        moved, loops = [self.image(row, 1 << self.loops - 1) for row in F], self.loops
+        moved, loops = list(map(self.image, F)), self.loops
         self.x = [[s >> loops for s in x] for x in moved]
         self.box = [up(size(row, self.box), 1 << loops) + len(moved[0]) for row in F]
         self.M = each(lambda x, y: (x >> 2 * loops) + y, around(F, self.M), diagonal(self.n, self.n))

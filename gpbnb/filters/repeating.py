@@ -99,13 +99,10 @@ class RepeatedStep:
 
         A run of few operations uses Python's integers, which need no loading.
         """
-        formats, alike = self._formats, True
+        formats = self._formats
         if any(fmt.rounding is Rounding.STOCHASTIC for fmt in formats):
             return None
-        if len(formats) > 1:
-            if not all(isinstance(fmt.backend, Looped) for fmt in formats):
-                return None
-            alike = formats[0].backend.count == 1
+        alike = len(formats) == 1 or formats[0].backend.count == 1
         step = self._recorded(given, [formats.index(each.format) for each in (*self.states, *given)], alike)
         if isinstance(step, str):
             return None

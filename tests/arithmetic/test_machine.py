@@ -14,6 +14,7 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.lanes import recorded, repeatable
 from gpbnb.arithmetic.machine import (
     CODES,
+    NEGATIVE_ROOT,
     OPERANDS,
     OVERFLOW,
     ZERO_DIVISOR,
@@ -113,15 +114,24 @@ def test_a_program_has_the_digits_of_fractions(fmt):
 
 @pytest.mark.parametrize(
     ("name", "row", "reason"),
-    [("multiply", (1, 1), OVERFLOW), ("divide", (1, 0), ZERO_DIVISOR), ("nonzero", (0, 0), ZERO_PIVOT)],
+    [
+        *(("multiply", (1, 1), OVERFLOW), ("divide", (1, 0), ZERO_DIVISOR), ("nonzero", (0, 0), ZERO_PIVOT)),
+        ("sqrt", (5, 0), NEGATIVE_ROOT),
+    ],
 )
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 11, "even", -14, 15), FloatFormat(2, 24)], ids=str)
 def test_the_first_row_without_a_result_is_named(fmt, name, row, reason):
+    """Alone, and in one lane of three whose numbers are 1 in the others."""
     large = Fraction(60000) if fmt.emax is not None else Fraction(2) ** 800
-    values, truths = np.array([0.0, float(large), 1.0, 0.0, 0.0]), np.array([0, 1], np.uint8)
+    values, truths = np.array([0.0, float(large), 1.0, 0.0, 0.0, -1.0]), np.array([0, 1], np.uint8)
     rows = np.array([(CODES["add"], 2, 2, 0, 3), (CODES[name], *row, 0, 4)], np.int64)
     kind, formats = tables([fmt])
-    done = evaluate(Memory(values, truths), kind, formats, code_of(rows, np.zeros(2, np.int64)))
+    code = code_of(rows, np.zeros(2, np.int64))
+    for lane in (0, 2):
+        lanes = np.ones((6, 3))
+        lanes[:, lane] = values
+        assert evaluate(Memory(lanes, np.repeat(truths[:, None], 3, axis=1)), kind, formats, code) == 1
+    done = evaluate(Memory(values, truths), kind, formats, code)
     fault = fault_of(rows, values, done)
     assert (fault.row, fault.reason) == (1, reason)
     assert values[3] == 2
@@ -130,9 +140,9 @@ def test_the_first_row_without_a_result_is_named(fmt, name, row, reason):
 @pytest.mark.parametrize(("name", "powers"), [("multiply", (-600, -600)), ("divide", (-600, 600))])
 @pytest.mark.parametrize("lanes", [(), (3,)], ids=["one lane", "lanes"])
 def test_a_result_below_float64_is_no_zero_where_the_format_has_no_end(name, powers, lanes):
-    """The processor's product, or quotient, is zero."""
-    values, truths = np.zeros((3, *lanes)), np.zeros((2, *lanes), np.uint8)
-    values[0], values[1] = (2.0**each for each in powers)
+    """The processor's product, or quotient, is zero; those of later lanes are 1."""
+    values, truths = np.ones((3, *lanes)), np.zeros((2, *lanes), np.uint8)
+    values.reshape(3, -1)[:2, 0] = [2.0**each for each in powers]
     rows = np.array([(CODES[name], 0, 1, 0, 2)], np.int64)
     kind, formats = tables([FloatFormat(2, 24)])
     assert evaluate(Memory(values, truths), kind, formats, code_of(rows, np.zeros(1, np.int64))) == 0
@@ -259,7 +269,7 @@ def test_relative_errors_stay_below_the_bound(name: str, cancelling: bool) -> No
 
 
 def test_range_and_zero() -> None:
-    zero, tiny, huge = ((np.full(5, each), np.zeros(5)) for each in (0.0, 2.0**-500, 2.0**600))
+    zero, tiny, huge = ((np.append(each, np.ones(4)), np.zeros(5)) for each in (0.0, 2.0**-500, 2.0**600))
     for name, operands_of in (("multiply", (zero, huge)), ("subtract", (huge, huge))):
         out = computed(name, *operands_of)
         assert out is not None

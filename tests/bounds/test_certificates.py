@@ -713,7 +713,7 @@ def test_measurements_that_are_stored_beyond_their_limit_count(monkeypatch: pyte
     """Three bits store 0.95 as 1; a bound for 0.95 once forgot the roundings of results above 1."""
     fmt, within = FloatFormat(2, 3), limits(measurement=0.95)
     made = filter_schedule(LinearSystem([["0.5"]], [["1"]]).as_filter(), fmt)
-    prove(json.loads(from_schedule(made, within).certificate()))
+    assert f"{{'measurement': ['{Fraction(0.95)}']}}" in prove(json.loads(from_schedule(made, within).certificate()))
     monkeypatch.setattr(guess, "stored_sizes", lambda _, sizes: sizes)
     found = guess.constant_guess(made.origin, fmt, within.measurement, None)
     refused(json.loads(of_operations(made.origin, fmt, within.measurement, found, None)))

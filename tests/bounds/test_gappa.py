@@ -6,6 +6,7 @@ import re
 import shutil
 from collections.abc import Callable
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,6 +67,14 @@ def test_stored_bounds_are_those_of_the_columns() -> None:
     for name in gappa.FILTERS[:2]:
         mine = gappa.ours(one_step(name))
         assert [f"{each:.4g}" for each in mine] == [row.ours for row in gappa.load() if row.name == name]
+
+
+def test_a_bound_is_the_larger_end_of_an_interval(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = "v4 - e4 in [-3b-2 {-0.75}, 1b-2 {0.25}]", "v5 - e5 in [-1, 5]"
+    (tmp_path / "gappa").write_text("#!/bin/sh\n" + "".join(f"echo '{line}'\n" for line in lines))
+    (tmp_path / "gappa").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    assert gappa.gappa("") == [0.75, 5]
 
 
 def test_without_gappa_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,6 +6,7 @@ import ast
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gpbnb.report.display import style
@@ -50,7 +51,12 @@ def judged(fig):
 
 
 def test_a_good_figure_has_no_defect():
-    fig, _ = good()
+    """A missing point is none beyond the axes, and nothing is beyond axes that are not drawn."""
+    fig, axes = good()
+    axes[0].plot([1, 2], [np.nan, 2], "o", color=style.OBSERVED)
+    assert judged(fig) == []
+    cut(axes[0])
+    axes[0].axis("off")
     assert judged(fig) == []
 
 

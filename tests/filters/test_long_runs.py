@@ -11,6 +11,7 @@ from gpbnb import BINARY32, BINARY64, FloatFormat, LinearModel, LinearSystem, em
 from gpbnb.arithmetic.kernels import tags
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, Sums
+from gpbnb.filters.stepping import RunningStep
 
 STEPS = 400
 
@@ -66,6 +67,13 @@ def test_a_covariance_that_comes_back_changes_no_digit(fmt, form, repeated):
         # the covariance does come back within the run
         cycle = given.cycle
         assert any(np.array_equal(run.C[-1], earlier) for earlier in run.C[-1 - cycle : 0 : -cycle][:300])
+
+
+def test_a_covariance_that_came_back_is_not_computed_again(monkeypatch):
+    run, z = Run(model(3, 1), FloatFormat(2, 12), Form.INNOVATION, ()), measurements(STEPS)
+    run.take(z)
+    monkeypatch.setattr(RunningStep, "_early_alone", None)
+    run.take(z)
 
 
 DECAYING = LinearModel([["0.9"]], [["1"]], [["0.01"]], [["1"]], ["0"], [["1"]])

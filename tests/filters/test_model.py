@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.definiteness import factor
+from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form, form_named
-from gpbnb.filters.model import LinearModel
+from gpbnb.filters.model import INPUTS, LETTERS, LinearModel
 from gpbnb.report.gravity_probe_b.model import STATES, YEAR, gravity_probe_b
 
 GOOD = {
@@ -24,12 +25,15 @@ GOOD = {
 
 
 def test_entries_are_read_exactly_and_held_for_ever():
-    model = LinearModel(**GOOD)
+    given = GOOD | {"B": exact([[1], [2]]), "u": exact([[3]]), "b": exact([4, 5]), "d": exact([6])}
+    model = LinearModel(**given)
+    for letter in INPUTS:
+        given[letter][:] = 7
+        assert np.ravel(getattr(model, letter)).tolist() == {"B": [1, 2], "u": [3], "b": [4, 5], "d": [6]}[letter]
+    assert not any(getattr(model, letter).flags.writeable for letter in (*LETTERS, *INPUTS))
     assert (model.n, model.m, model.cycle) == (2, 1, 1)
     assert model.Phi[0, 0, 0] == Fraction(9, 10)
     assert model.Phi.shape == (1, 2, 2)
-    with pytest.raises(ValueError, match="read-only"):
-        model.Phi[0, 0, 0] = Fraction(1)
     assert model.to_float()["P0"].tolist() == [[1.0, 0.5], [0.5, 1.0]]
 
 

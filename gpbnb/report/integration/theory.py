@@ -234,6 +234,8 @@ def first_order(sigma_x: float, omega_bw: float) -> Process:
 
 def resonant(sigma_x: float, omega_0: float, zeta: float) -> Process:
     r"""Return a resonant input: white noise through :math:`\ddot x + 2\zeta\omega_0\dot x + \omega_0^2x`, ζ < 1."""
+    if not 0 < zeta < 1:
+        raise ValueError(f"got zeta = {zeta}; needed a number between 0 and 1, so that the input resonates")
     damped = math.sqrt(1 - zeta * zeta)
     drift = ((0.0, omega_0), (-omega_0, -2 * zeta * omega_0))
     return Process(sigma_x, (omega_0 * complex(zeta, -damped),), (complex(1, -zeta / damped),), drift)

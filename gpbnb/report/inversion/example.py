@@ -145,8 +145,8 @@ def agree(value: float | Fraction, printed: str) -> bool:
 @cache
 def interval(printed: str) -> tuple[Fraction, Fraction]:
     """Return the interval of the numbers that round or chop to the printed one."""
-    digits, exponent = printed.split("e")
-    unit = Fraction(10) ** (int(exponent) - len(digits.split(".")[1]))
+    digits, _, exponent = printed.partition("e")
+    unit = Fraction(10) ** (int(exponent or 0) - len(digits.partition(".")[2]))
     return Fraction(printed) - unit / 2, Fraction(printed) + unit
 
 

@@ -317,6 +317,10 @@ def filter_study(
     """
     n = round(duration / INTERVAL)
     skip = math.ceil(10 / (4 * min(bandwidths)) / INTERVAL)
+    if n <= skip:
+        raise ValueError(
+            f"got a duration of {duration:g} s; needed more than {skip * INTERVAL:g} s, ten time constants"
+        )
     filters = [theory.single_pole(1 / (4 * b)) for b in bandwidths]
     filters += [theory.moving_average(1 / (2 * b)) for b in bandwidths]
     squares = np.zeros((len(filters), 2 * gyros))

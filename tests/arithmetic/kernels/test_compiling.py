@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import itertools
-import json
 import os
 import re
-import shutil
+import runpy
 import subprocess
 import sys
 from importlib import import_module
@@ -20,115 +19,31 @@ from numba.core.bytecode import FunctionIdentity
 from numba.core.registry import CPUDispatcher, cpu_target
 
 import gpbnb
+from gpbnb.arithmetic.kernels import compiling
 from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.machine_code import generate_on_demand
 
 PACKAGE = Path(gpbnb.__file__).parent
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-# Python would take old bytecode for a source that changes within a second and keeps its size.
-ENVIRONMENT["PYTHONDONTWRITEBYTECODE"] = "1"
-PROGRAM = """
-import json
-from gpbnb.alone import alone, functions
-from gpbnb.outer import outer
-
-values = [outer(1.0), alone(1.0), *(each(5.0) for each in functions)]
-print(json.dumps([values, [f.__name__ for f in (outer, alone, *functions) if f.stats.cache_misses]]))
-"""
-HEADER = "from gpbnb.arithmetic.kernels.compiling import compiled, inner\n"
-ADDED = {
-    "arithmetic/kernels/added.py": HEADER + "\n\n@inner\ndef twice(x):\n    return 2.0 * x\n",
-    "outer.py": HEADER
-    + "from gpbnb.arithmetic.kernels.added import twice\n\n\n@compiled\ndef outer(x):\n    return twice(x) + 1.0\n",
-    "alone.py": HEADER
-    + """
-
-def multiple(factor):
-    @compiled
-    def scaled(x):
-        return factor * x
-
-    return scaled
 
 
-functions = [multiple(factor) for factor in (2.0, 3.0)]
-
-
-@compiled
-def alone(x):
-    return x + 1.0
-""",
-}
-
-
-class Copy:
-    """A copy of what compiles functions, with some of its own; `copy.run()` returns values, and what was compiled."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.environment = folder, dict(ENVIRONMENT)
-        kernels = folder / "gpbnb" / "arithmetic" / "kernels"
-        kernels.mkdir(parents=True)
-        for path in (kernels.parents[1], kernels.parent, kernels):
-            (path / "__init__.py").touch()
-        for name in ("compiling", "machine_code"):
-            shutil.copy(PACKAGE / "arithmetic" / "kernels" / f"{name}.py", kernels)
-        for name, text in ADDED.items():
-            (folder / "gpbnb" / name).write_text(text)
-
-    @property
-    def kept(self) -> list[Path]:
-        return sorted(self.folder.rglob("*.nbc"))
-
-    def start(self) -> subprocess.Popen:
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        return subprocess.Popen([sys.executable, "-c", PROGRAM], cwd=self.folder, env=self.environment, **pipes)
-
-    def run(self) -> tuple[list[float], list[str]]:
-        return ended(self.start())
-
-    def change(self, name: str, old: str, new: str) -> None:
-        path = self.folder / "gpbnb" / name
-        text = path.read_text(encoding="utf-8")
-        assert old in text
-        path.write_text(text.replace(old, new), encoding="utf-8")
-
-
-def ended(process: subprocess.Popen) -> tuple[list[float], list[str]]:
-    out, told = process.communicate()
-    assert (process.returncode, told) == (0, "")
-    return tuple(json.loads(out))
-
-
-ALL = ["outer", "alone", "scaled", "scaled"]
-VALUES = [3.0, 2.0, 10.0, 15.0]
-
-
-@pytest.fixture
-def copy(tmp_path):
-    return Copy(tmp_path)
-
-
-@pytest.mark.long  # five processes compile from scratch
-def test_what_changed_is_compiled_again(copy):
+def test_what_changed_or_was_damaged_is_compiled_again(tmp_path, monkeypatch):
     """A change in a folder of kernels concerns all functions, another one those of its file."""
-    assert copy.run() == (VALUES, ALL)
-    assert copy.run() == (VALUES, [])
-    copy.change("arithmetic/kernels/added.py", "2.0 * x", "1000.0 * x")
-    assert copy.run() == ([1001.0, *VALUES[1:]], ALL)
-    copy.change("outer.py", "+ 1.0", "+ 7.0")
-    assert copy.run() == ([1007.0, *VALUES[1:]], ["outer"])
-    assert copy.run() == ([1007.0, *VALUES[1:]], [])
-    assert len(copy.kept) == 4  # new files take the place of old ones
+    path = tmp_path / "own.py"
 
+    def compiled(factor: int, kernels: bytes = b"") -> list[float]:
+        text = f"def multiple(n):\n    @compiled\n    def f(x):\n        return n * x + {factor}\n    return f\n"
+        path.write_text(f"from gpbnb.arithmetic.kernels.compiling import compiled\n{text}")
+        monkeypatch.setattr(compiling, "_KERNELS", kernels)
+        two, three = map(runpy.run_path(str(path))["multiple"], (2.0, 3.0))
+        assert (two(5.0), three(5.0)) == (10.0 + factor, 15.0 + factor)
+        return sum(each.stats.cache_misses.total() for each in (two, three))
 
-@pytest.mark.long  # three processes compile from scratch
-def test_damaged_files_are_compiled_again(copy):
-    """Each of the four in its way; one is cut by a byte."""
-    copy.run()
-    for path, damage in zip(copy.kept, (b"", b"no pickle", b"cgpbnb.nowhere\nNothing\n.", None), strict=True):
-        path.write_bytes(path.read_bytes()[:-1] if damage is None else damage)
-    assert copy.run() == (VALUES, ALL)
-    assert copy.run() == (VALUES, [])
+    assert [compiled(1), compiled(1), compiled(2), compiled(2), compiled(2, b"new")] == [2, 0, 2, 0, 2]
+    for damage in (b"", b"no pickle", b"cgpbnb.nowhere\nNothing\n.", None):
+        kept, _ = sorted(tmp_path.rglob("*.nbc"))  # new files take the place of old ones
+        kept.write_bytes(kept.read_bytes()[:-1] if damage is None else damage)
+        assert [compiled(2, b"new"), compiled(2, b"new")] == [1, 0]
 
 
 def test_a_change_is_noticed_of_every_function_that_is_compiled_in():
@@ -146,7 +61,7 @@ def test_a_change_is_noticed_of_every_function_that_is_compiled_in():
                 continue
             seen.add(function)
             file = Path(function.__code__.co_filename).resolve()
-            assert file == path or file.parent.name == "kernels", (path, file, function)
+            assert file == path or file in compiling._SOURCES, (path, file, function)
             checked += file != path
             waiting += [function.__globals__.get(name) for name in function.__code__.co_names]
             waiting += [cell.cell_contents for cell in function.__closure__ or ()]
