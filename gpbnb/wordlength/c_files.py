@@ -104,8 +104,8 @@ def _comment(*paragraphs: str) -> str:
 
 def _header(source: CodeSource, comment: str, sections: Sections) -> str:
     name, guard, program = source.name, f"{source.name.upper()}_H", source.step.program
-    values = ",\n".join(f"    {status.name} = {status.value}" for status in source.statuses)
-    meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in source.statuses)
+    values = ",\n".join(f"    {status} = {value}" for status, value, _ in source.statuses)
+    meanings = "\n".join(f" * {status}: {meaning}." for status, _, meaning in source.statuses)
     takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
     include = "" if source.numbers.floating else "#include <stdint.h>\n\n"
     return f"""{comment}

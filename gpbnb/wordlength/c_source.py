@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from gpbnb.wordlength.c_numbers import CodeNumbers
 from gpbnb.wordlength.c_step import DIVISOR, RADICAND, Operation
@@ -20,14 +19,6 @@ _STOPS = {DIVISOR: "a divisor is zero", RADICAND: "a square root has a negative 
 
 WIDTH = 110
 """Length of a line."""
-
-
-class Status(NamedTuple):
-    """What a step may return: its name and value in C, and its meaning."""
-
-    name: str
-    value: int
-    meaning: str
 
 
 class CodeSource:
@@ -46,17 +37,17 @@ class CodeSource:
         self._used = set[int]()
 
     @property
-    def statuses(self) -> list[Status]:
-        """What a step may return."""
+    def statuses(self) -> list[tuple[str, int, str]]:
+        """What a step may return: name, value and meaning."""
         name, ends = self.name.upper(), {condition for _, condition in self.step.stops}
-        found = [Status(f"{name}_OK", 0, "the step is done")]
+        found = [(f"{name}_OK", 0, "the step is done")]
         if self.step.may_be_indefinite:
-            found.append(Status(f"{name}_INDEFINITE", 1, "the step is done, but a variance is not positive"))
+            found.append((f"{name}_INDEFINITE", 1, "the step is done, but a variance is not positive"))
         if ends:
             reasons = ", or ".join(why for condition, why in _STOPS.items() if condition in ends)
-            found.append(Status(f"{name}_STOPPED", 2, f"{reasons}; the state stays as it was"))
+            found.append((f"{name}_STOPPED", 2, f"{reasons}; the state stays as it was"))
         if self.numbers.may_overflow:
-            found.append(Status(f"{name}_OVERFLOW", 3, "a number is beyond the range; the state stays as it was"))
+            found.append((f"{name}_OVERFLOW", 3, "a number is beyond the range; the state stays as it was"))
         return found
 
     @property

@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import NegativeRootError
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -56,11 +55,8 @@ from gpbnb.wordlength.models import ModelSource
 VECTORS = 100
 """Steps of the test vectors."""
 
-STOPS = (OverflowError, ZeroDivisionError, NegativeRootError, DomainError)
+STOPS = (OverflowError, ZeroDivisionError, DomainError)
 """Errors that end the emulation of a step, as the code ends it with its status."""
-
-Filter = LinearSystem | LinearModel | FilterDesign | NonlinearSystem | NonlinearModel
-"""What code is written for."""
 
 AnyFormat = FloatFormat | FixedFormat | WordFormats
 """Formats that may have types in C."""
@@ -91,7 +87,7 @@ class Prepared(NamedTuple):
 
 
 def write_code(
-    model: Filter | ModelSource,
+    model: ModelSource,
     fmt: AnyFormat | str,
     folder: str | Path,
     *,
@@ -235,7 +231,7 @@ def _type_of(fmt: FloatFormat) -> str:
     raise ValueError(f"got {format_text(fmt)}, for which C99 has no type; needed {cure}, or fixed point")
 
 
-def prepared(given: Filter, fmt: AnyFormat, form: Form | str | None, exact: bool = True) -> Prepared:
+def prepared(given: Any, fmt: AnyFormat, form: Form | str | None, exact: bool = True) -> Prepared:
     """Return a filter with what is needed to write its code; for the arguments, see :func:`write_code`."""
     if isinstance(fmt, FloatFormat):
         _type_of(fmt)

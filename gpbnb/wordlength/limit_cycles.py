@@ -170,14 +170,10 @@ def _cycles(following: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Return the numbers of the states on each cycle of a map, -1 where a state leaves it."""
     left, found = set(_on_cycles(following).tolist()), list[NDArray[np.int64]]()
     while left:
-        at = first = next(iter(left))
-        numbers = list[int]()
-        while True:
-            numbers.append(at)
-            left.discard(at)
-            at = int(following[at])
-            if at == first:
-                break
+        numbers = [next(iter(left))]
+        while (after := int(following[numbers[-1]])) != numbers[0]:
+            numbers.append(after)
+        left.difference_update(numbers)
         found.append(np.array(numbers))
     return found
 
