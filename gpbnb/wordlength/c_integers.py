@@ -17,16 +17,16 @@ from gpbnb.filters.words import WordFormats
 NARROW = {32: 30, 64: 62}
 """Bits of a C type, and how many bits without the sign the intermediate results may have."""
 
-_GROWS = {
-    Rounding.NEAREST: "rest >= {size} - rest",
-    Rounding.EVEN: "rest > {size} - rest || (rest == {size} - rest && (found & 1))",
-    Rounding.HALF_UP: "rest > {size} - rest || (rest == {size} - rest && {positive})",
-    Rounding.CHOP: "",
-    Rounding.UP: "rest > 0 && {positive}",
-    Rounding.DOWN: "rest > 0 && !({positive})",
+_UP = {
+    Rounding.NEAREST: "rest >= {size} - rest + ({negative})",
+    Rounding.EVEN: "rest >= {size} - rest + !(found & 1)",
+    Rounding.HALF_UP: "rest >= {size} - rest",
+    Rounding.CHOP: "rest > 0 && {negative}",
+    Rounding.UP: "rest > 0",
+    Rounding.DOWN: "",
     Rounding.ODD: "rest > 0 && !(found & 1)",
 }
-"""When the size of a result grows by one; `rest` is what `found` units leave of it, `size` one unit."""
+"""When a result rounds up from its floor, `found` units; `rest` is what the floor leaves, `size` one unit."""
 
 _WHOLE = {"floor": Rounding.DOWN, "ceil": Rounding.UP, "trunc": Rounding.CHOP, "rint": Rounding.EVEN}
 """How each function of C finds a whole number."""
@@ -37,6 +37,11 @@ _WIDE = """#ifndef __SIZEOF_INT128__
 __extension__ typedef __int128 wide;
 __extension__ typedef unsigned __int128 uwide;
 """
+
+
+def _more(rounding: Rounding, size: str, negative: str) -> str:
+    """Return what a rounding adds to a floor."""
+    return f" + ({_UP[rounding].format(size=size, negative=negative)})" if _UP[rounding] else ""
 
 
 def word_bits(fmt: FixedFormat) -> int | None:
@@ -112,7 +117,7 @@ class Integers:
         first, of_first = ("data", data) if self.words.sums is None else ("sums", sums)
         nearest, stored = (f"rounded_{each.rounding.name.lower()}" for each in (of_first, data))
         found = {"wide": _WIDE} if self.bits == 128 else {}
-        found |= {f"rounded_{each.name.lower()}": self._rounded(each) for each in _GROWS}
+        found |= {f"rounded_{each.name.lower()}": self._rounded(each) for each in _UP}
         found |= {f"in_{name}": self._kept(name, fmt) for name, fmt in (("data", data), ("sums", sums))}
         found["multiply"] = f"""/* c x, which loses `shift` fraction bits, in the format of the {first} */
 static {V} multiply({V} c, {V} x, int shift{o})
@@ -157,24 +162,16 @@ static {V} whole_{name}({V} a{o})
 """
         return found
 
-    def _grown(self, rounding: Rounding, size: str, positive: str, rest: str = "") -> str:
-        """Return the lines that add one to `found` if a result is rounded away from zero."""
-        if not _GROWS[rounding]:
-            return ""
-        declared = f"    const u{self.wide} rest = {rest};\n" if rest else ""
-        return f"{declared}    if ({_GROWS[rounding].format(size=size, positive=positive)})\n        found++;\n"
-
     def _rounded(self, rounding: Rounding) -> str:
-        W, U, unit = self.wide, f"u{self.wide}", f"((u{self.wide})1 << shift)"
-        grown = self._grown(rounding, unit, "value > 0", "top - (found << shift)")
+        W, up = self.wide, _more(rounding, "size", "value < 0")
+        rest = f"    const {W} size = ({W})1 << shift, rest = value - found * size;\n" if up else ""
         return f"""/* value / 2**shift, {rounding_text(rounding)} */
 static {W} rounded_{rounding.name.lower()}({W} value, int shift)
 {{
-    const {U} top = value < 0 ? 0 - ({U})value : ({U})value;
     if (shift <= 0)
         return value * (({W})1 << -shift);
-    {U} found = top >> shift;
-{grown}    return value < 0 ? -({W})found : ({W})found;
+    const {W} found = value >= 0 ? value >> shift : -1 - ((-1 - value) >> shift);
+{rest}    return found{up};
 }}
 """
 
@@ -207,24 +204,29 @@ static {V} in_{name}({self.wide} x{", int *overflow" if self.raises else ""})
 
     def _quotient(self, overflow: str, passed: str) -> str:
         V, W, U, data = self.value, self.wide, f"u{self.wide}", self.words.data
-        up, down = max(data.fraction_bits, 0), max(-data.fraction_bits, 0)
-        grown = self._grown(data.rounding, "size", "!negative", "top % size")
+        left, right = max(data.fraction_bits, 0), max(-data.fraction_bits, 0)
+        up = _more(data.rounding, "size", "negative")
         return f"""/* a / b, {rounding_text(data.rounding)}; the step itself notes a divisor of zero */
 static {V} divide({V} a, {V} b{overflow})
 {{
     const int negative = (a < 0) != (b < 0);
-    const {U} top = ({U})(a < 0 ? -({W})a : a) << {up};
-    const {U} size = ({U})(b < 0 ? -({W})b : b) << {down};
+    const {U} top = ({U})(a < 0 ? -({W})a : a) << {left};
+    const {U} size = ({U})(b < 0 ? -({W})b : b) << {right};
     if (b == 0)
         return 0;
-    {U} found = top / size;
-{grown}    return in_data(negative ? -({W})found : ({W})found{passed});
+    {W} found = ({W})(top / size);
+    {U} rest = top % size;
+    if (negative) {{
+        found = -found - (rest > 0);
+        rest = rest > 0 ? size - rest : 0;
+    }}
+    return in_data(found{up}{passed});
 }}
 """
 
     def _root(self, overflow: str, passed: str) -> str:
         V, data, point = self.value, self.words.data, self.words.data.fraction_bits
-        grown = self._grown(data.rounding, "(2 * found + 1)", "a > 0")
+        up = _more(data.rounding, "(2 * found + 1)", "a < 0")
         return f"""/* square root, {rounding_text(data.rounding)}; the step itself notes a negative argument */
 static {V} root({V} a{overflow})
 {{
@@ -240,6 +242,6 @@ static {V} root({V} a{overflow})
             found++;
         }}
     }}
-{grown}    return in_data(({self.wide})found{passed});
+    return in_data(({self.wide})(found{up}){passed});
 }}
 """
