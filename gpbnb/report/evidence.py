@@ -17,37 +17,24 @@ class Checked(NamedTuple):
 
 
 def operations(file: Path) -> Checked:
-    """Count operations compared with other arithmetic, from the table that ``make exactness`` stores.
-
-    Parameters
-    ----------
-    file : a table with the columns `all` and `different`.
-    """
-    rows = _rows(file)
-    if not rows or not {"all", "different"} <= rows[0].keys():
-        raise ValueError(f"got the table {file.name}; needed the columns 'all' and 'different'")
-    return Checked(*(sum(int(row[name].replace(",", "")) for row in rows) for name in ("all", "different")))
-
-
-def _rows(file: Path) -> list[dict[str, str]]:
-    """Return the rows of the table in a Markdown file."""
-    lines = file.read_text(encoding="utf-8").splitlines()
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
-    return [dict(zip(cells[0], row, strict=True)) for row in cells[2:]]
+    """Count operations compared with other arithmetic, from a table that ``make exactness`` stores."""
+    return Checked(*_sums(file, "all", "different"))
 
 
 def compiled(file: Path) -> Checked:
-    """Count builds of generated C code that were compared with the emulation, and those that differ.
-
-    Parameters
-    ----------
-    file : the table that ``make exactness`` stores, with the columns `builds` and `different`.
-    """
-    rows = _rows(file)
-    if not rows or not {"builds", "different"} <= rows[0].keys():
-        raise ValueError(f"got the table {file.name}; needed the columns 'builds' and 'different'")
-    agree, wrong = (sum(int(row[name].replace(",", "")) for row in rows) for name in ("builds", "different"))
+    """Count builds of generated C code that were compared with the emulation, and those that differ."""
+    agree, wrong = _sums(file, "builds", "different")
     return Checked(agree + wrong, wrong)
+
+
+def _sums(file: Path, *names: str) -> list[int]:
+    """Return the sums of two columns of the table in a Markdown file."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    header, _, *cells = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")
+    ]
+    rows = [dict(zip(header, row, strict=True)) for row in cells]
+    return [sum(int(row[name].replace(",", "")) for row in rows) for name in names]
 
 
 def attacks() -> Checked:

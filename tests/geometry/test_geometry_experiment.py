@@ -13,11 +13,10 @@ SIZE = 20 * ARCSEC
 STEP = 7200.0  # long steps in long rolls: as many rolls as the tests have time for
 PERIOD = 5 * 7200.0
 ANGLES = [f"{name}{axis}" for name in ("alpha", "beta", "gamma") for axis in (1, 2, 3)]
-PAIRS = ("beta1", "alpha2"), ("gamma1", "alpha2"), ("gamma1", "alpha3"), ("beta2", "gamma3"), ("gamma1", "alpha_rate2")
-CHANGING = ("alpha_rate2", "beta_rate2", "beta_rate3", "gamma_rate2", "gamma_rate3")
+PAIRS = ("beta1", "alpha2"), ("gamma1", "alpha2"), ("gamma1", "alpha3"), ("beta2", "gamma3")
 CASES = {
     "no angle": Misalignments(),
-    **{name: Misalignments().with_angle(name, SIZE) for name in (*ANGLES, *CHANGING)},
+    **{name: Misalignments().with_angle(name, SIZE) for name in ANGLES},
     **{f"{a} and {b}": Misalignments().with_angle(a, SIZE).with_angle(b, SIZE) for a, b in PAIRS},
 }
 
@@ -40,16 +39,12 @@ def ramp_leak(rate):
     return rate * PERIOD / 5 * abs(np.mean(k * np.exp(2j * np.pi * k / 5)))
 
 
-@pytest.mark.parametrize("period", [None, PERIOD])
-def test_a_year_agrees_with_the_analysis(period):
+def test_a_year_agrees_with_the_analysis():
     for name in CASES:
         case = CASES[name]
-        result, analysed = experiment.year(case, period, STEP), theory.effect(case, period is not None)
-        # an angle that grows by SIZE in the year leaves a constant in the mean of a roll
-        rate = np.hypot(*case.gamma_rate[1:]) / theory.YEAR
-        leak = ramp_leak(rate) if period else 0.0
+        result, analysed = experiment.year(case, PERIOD, STEP), theory.effect(case)
         assert np.hypot(*np.subtract(result.drift, analysed.drift)) <= third_order(case)
-        assert np.hypot(*np.subtract(result.angle, analysed.angle)) <= 1.001 * leak + third_order(case)
+        assert np.hypot(*np.subtract(result.angle, analysed.angle)) <= third_order(case)
         # the drift itself turns within a roll, too
         assert result.line == pytest.approx(
             analysed.line, abs=ramp_leak(theory.GEODETIC / theory.YEAR) * 2 + 1e-3 * SIZE
@@ -60,8 +55,8 @@ def test_any_misalignments():
     for values in np.random.default_rng(9).uniform(-1e-4, 1e-4, (15, 9)):
         case = Misalignments(tuple(values[:3]), tuple(values[3:6]), tuple(values[6:]))
         result = experiment.year(case, PERIOD, STEP)
-        assert np.hypot(*np.subtract(result.drift, theory.effect(case, True).drift)) <= 30 * 1e-12 + 1e-15
-        assert np.hypot(*np.subtract(result.angle, theory.effect(case, True).angle)) <= 30 * 1e-12 + 1e-15
+        assert np.hypot(*np.subtract(result.drift, theory.effect(case).drift)) <= 30 * 1e-12 + 1e-15
+        assert np.hypot(*np.subtract(result.angle, theory.effect(case).angle)) <= 30 * 1e-12 + 1e-15
 
 
 def test_the_line_fit_to_samples_keeps_what_the_fit_to_means_drops():

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from printed_ratios import ratios
 from small_filter import CHOP
 
 from gpbnb.arithmetic.formats import FloatFormat
@@ -58,7 +59,7 @@ def test_a_step_has_the_digits_of_the_oracle(chapter, fmt, second):
 def test_the_table_has_the_ratios_of_the_oracle(chapter, second, z):
     four = FloatFormat(10, 4)
     *found, sigmas = chapter["compare"](four, "1e-5", second, exact([[z]]))
-    assert found == pytest.approx(list(smallest.ratios(four, smallest.scalar(four, z=z), second)), rel=1e-12)
+    assert found == pytest.approx(list(ratios(four, smallest.scalar(four, z=z), second)), rel=1e-12)
     if second and not z:
         assert sigmas == pytest.approx(float(1 / (1 + Fraction(1, 10**5))) / float(Fraction(1, 100_001)) ** 0.5)
 
@@ -70,9 +71,9 @@ def test_random_steps_are_counted_as_exact_ratios_say():
     covariance, state = [], []
     for i in range(400):
         entries = ([[Phi[i]]], [[H[i]]], [[Q[i]]], [[R[i]]], [x[i]], [[P[i]]], [z[i]])
-        ratios = smallest.ratios(found["fmt"], smallest.FilterCase(*map(exact, entries)))
-        covariance.append(ratios.covariance > 1)
-        state.append(ratios.state > 1)
+        found_ratios = ratios(found["fmt"], smallest.FilterCase(*map(exact, entries)))
+        covariance.append(found_ratios.covariance > 1)
+        state.append(found_ratios.state > 1)
     assert found["wrong_P"].tolist() == covariance
     assert found["wrong_x"].tolist() == state
     assert any(covariance)

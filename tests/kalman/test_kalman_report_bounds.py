@@ -6,7 +6,6 @@ import pytest
 import sympy as sp
 
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.kalman import derivation, report_bounds
 
 # -- counts ---------------------------------------------------------------------------------------
@@ -59,4 +58,3 @@ def test_the_closing_example():
     assert (first, second) == (258_595_200, 407_752_879_824_000)
     assert (report_bounds.precision_for_coefficient(first), report_bounds.precision_for_coefficient(second)) == (10, 16)
     assert report_bounds.precision_for_coefficient(second, base=2) == 49  # IEEE double has 53
-    assert report_bounds.precision_for_coefficient(second, base=2, rounding=Rounding.CHOP) == 50

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
+from printed_ratios import ratios
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
@@ -26,7 +27,7 @@ def test_the_smallest_filter_breaks_the_bounds_by_the_derived_factors_in_every_f
     assert (x[0], K[0, 0], P[0, 0]) == (0, 1, 0)
     x, K, P = smallest.rounded_step(fmt, case, second=True)
     assert (x[0], K[0, 0], P[0, 0]) == (1, 0, 0)
-    first, second = smallest.ratios(fmt, case), smallest.ratios(fmt, case, second=True)
+    first, second = ratios(fmt, case), ratios(fmt, case, second=True)
     assert first.covariance == second.covariance == float(1 / (6 * beta))
     assert second.gain == float(1 / (9 * beta))
     assert first.state == float(1 / (16 * beta))
@@ -36,12 +37,12 @@ def test_the_smallest_filter_breaks_the_bounds_by_the_derived_factors_in_every_f
 
 def test_more_steps_and_more_states():
     four = FloatFormat(10, 4)
-    later = smallest.ratios(four, smallest.scalar(four), steps=2)
+    later = ratios(four, smallest.scalar(four), steps=2)
     assert later.gain == float(1 / (9 * four.unit_roundoff))
-    assert smallest.ratios(four, smallest.scalar(four), steps=3).state == float(1 / (48 * four.unit_roundoff))
+    assert ratios(four, smallest.scalar(four), steps=3).state == float(1 / (48 * four.unit_roundoff))
     # (4n + 2m + 3) β = 13 β, and the first entry of the gain is lost.
     case, beta = smallest.correlated(), four.unit_roundoff
-    found = smallest.ratios(four, case)
+    found = ratios(four, case)
     assert found.gain == float(1 / (13 * beta))
     K = case.P @ case.H.T / (case.H @ case.P @ case.H.T + case.R)[0, 0]
     error = abs(smallest.rounded_step(four, case)[0] - K @ case.z).max()  # the estimate was zero
@@ -51,7 +52,7 @@ def test_more_steps_and_more_states():
 def test_nothing_is_broken_where_nothing_cancels():
     four = FloatFormat(10, 4)
     for second in (False, True):
-        assert max(smallest.ratios(four, smallest.scalar(four, r=9), second)) < 1
+        assert max(ratios(four, smallest.scalar(four, r=9), second)) < 1
 
 
 def test_a_measurement_far_from_zero_saves_the_bound():
@@ -61,4 +62,4 @@ def test_a_measurement_far_from_zero_saves_the_bound():
     edge = R * (1 - 16 * beta) / (R + 20 * beta)
     for factor, fails in ((Fraction(9, 10), True), (Fraction(11, 10), False)):
         case = smallest.scalar(four, z=four.round(edge * factor))
-        assert (smallest.ratios(four, case).state > 1) == fails
+        assert (ratios(four, case).state > 1) == fails

@@ -62,12 +62,12 @@ def test_the_spectra_of_drift_and_noise():
     drift = theory.ramp_density(DRIFTS[1] * YEAR / found.duration, found.duration, frequency)
     assert found.ramp[:3] == pytest.approx(drift[:3], rel=0.02)
     # Means of 4 gyros' two readouts over independent frequencies.
-    roll, count = float(theory.flicker_density(found.level, 1 / theory.PERIOD)), len(found.base_noise)
+    roll, count = float(theory.flicker_density(theory.LEVEL, 1 / theory.PERIOD)), len(found.base_noise)
     assert len(found.line_noise) == 2 * count == 50
     assert np.mean(found.line_noise) == pytest.approx(roll, rel=4 / math.sqrt(16 * count))
     assert np.mean(found.base_noise) == pytest.approx(roll, rel=4 / math.sqrt(8 * count))
     banded = experiment.in_bands(frequency, found.noise, 8, frequency[0] * 0.99, 0.05, 40)
-    noise = theory.flicker_density(found.level, banded.frequency, theory.INTERVAL)
+    noise = theory.flicker_density(theory.LEVEL, banded.frequency, theory.INTERVAL)
     assert np.max(abs(banded.density / noise - 1) / banded.error) < 4.5
 
 

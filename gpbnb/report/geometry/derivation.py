@@ -67,16 +67,14 @@ def up_to(order: int, expression: sp.Expr, small: Iterable[sp.Symbol]) -> sp.Exp
 # -- what is read ---------------------------------------------------------------------------------
 
 
-def star(small: bool = True) -> sp.Matrix:
-    """Return the star in the telescope frame, (1), with small-angle or exact matrices."""
-    matrix = printed_small if small else exact
-    return matrix(BETA) * turn(1, P) * matrix(ALPHA) * E1
+def star() -> sp.Matrix:
+    """Return the star in the telescope frame, (1), with small-angle matrices."""
+    return printed_small(BETA) * turn(1, P) * printed_small(ALPHA) * E1
 
 
-def spin(small: bool = True) -> sp.Matrix:
-    """Return the spin axis in the readout frame, (2), with small-angle or exact matrices."""
-    matrix = printed_small if small else exact
-    return matrix(GAMMA) * matrix(BETA) * turn(1, P) * matrix(THETA) * E1
+def spin() -> sp.Matrix:
+    """Return the spin axis in the readout frame, (2), with small-angle matrices."""
+    return printed_small(GAMMA) * printed_small(BETA) * turn(1, P) * printed_small(THETA) * E1
 
 
 def aligned(vector: sp.Matrix) -> sp.Matrix:

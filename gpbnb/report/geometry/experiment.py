@@ -23,10 +23,9 @@ def difference(case: Misalignments, years: ArrayLike, phase: ArrayLike) -> Float
     years, phase : (...), time since the start, and roll phase in radians; broadcast.
     """
     since = np.asarray(years, dtype=float)
-    alpha, beta, gamma = (case.at(name, since) for name in ("alpha", "beta", "gamma"))
-    pointing = rotation(alpha)
-    telescope = into_spacecraft(pointing[..., 0], phase, beta)
-    gyro = into_spacecraft(apply(pointing, spin_axis(case, since)), phase, beta, gamma)
+    pointing = rotation(case.alpha)
+    telescope = into_spacecraft(pointing[..., 0], phase, case.beta)
+    gyro = into_spacecraft(apply(pointing, spin_axis(case, since)), phase, case.beta, case.gamma)
     y, z = np.moveaxis(deroll((gyro - telescope)[..., 1:], phase), -1, 0)
     return np.stack([z, -y], axis=-1)
 
@@ -38,18 +37,18 @@ def spin_axis(case: Misalignments, years: ArrayLike) -> Floats:
     return np.stack([np.cos(phi2) * np.cos(phi3), -np.sin(phi3), np.sin(phi2) * np.cos(phi3)], axis=-1)
 
 
-def year(case: Misalignments, roll_period: float | None = 600.0, step: float = 60.0) -> Effect:
+def year(case: Misalignments, roll_period: float = 600.0, step: float = 60.0) -> Effect:
     """Simulate a year of samples; return the errors of a straight line fitted to means of whole rolls.
 
     Parameters
     ----------
     case : the angles.
-    roll_period : seconds, a multiple of 0.1; None for a spacecraft that stays at phase 0.
+    roll_period : seconds, a multiple of 0.1.
     step : seconds between samples, a multiple of 0.1; at least three samples per roll.
     """
     block = _block(roll_period, step)
     count = int(YEAR / step) // block
-    rate = 0.0 if roll_period is None else 2 * math.pi / roll_period
+    rate = 2 * math.pi / roll_period
     # Each block begins at phase zero. In a phase that grows for a year, by 3e5 rolls, float64 loses seven digits.
     phase = rate * step * np.arange(block)
     means, standing = np.empty((count, 2)), np.zeros(2)
@@ -66,7 +65,7 @@ def year(case: Misalignments, roll_period: float | None = 600.0, step: float = 6
     centred = time - time.mean()
     slope = centred @ means / (centred @ centred)
     angle, drift = means.mean(axis=0) - slope * time.mean(), slope - case.drift
-    amplitude = float(np.hypot(*standing)) / (count * block) if roll_period is not None else 0.0
+    amplitude = float(np.hypot(*standing)) / (count * block)
     return Effect((float(angle[0]), float(angle[1])), (float(drift[0]), float(drift[1])), amplitude)
 
 
@@ -90,13 +89,11 @@ def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float]) 
     return np.array(errors)
 
 
-def _block(roll_period: float | None, step: float) -> int:
-    if not step > 0 or (roll_period is not None and not roll_period > 0):
+def _block(roll_period: float, step: float) -> int:
+    if not (step > 0 and roll_period > 0):
         raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; needed both above 0")
     if step > YEAR / 100:
         raise ValueError(f"got a step of {step} s; needed at least a hundred samples per year")
-    if roll_period is None:
-        return 10
     period, between = round(10 * roll_period), round(10 * step)
     if period != 10 * roll_period or between != 10 * step:
         raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; needed multiples of 0.1 s")

@@ -79,17 +79,13 @@ class Misalignments:
 
     Parameters
     ----------
-    alpha, beta, gamma : pointing, and misalignments of telescope and readout, at the start; radians.
-    alpha_rate, beta_rate, gamma_rate : rates of change of these angles; radians per year.
+    alpha, beta, gamma : pointing, and misalignments of telescope and readout; radians.
     drift : rates of φ2 and φ3; radians per year. The z axis lies in the plane of the orbit, so φ2 is geodetic.
     """
 
     alpha: Triple = ZERO
     beta: Triple = ZERO
     gamma: Triple = ZERO
-    alpha_rate: Triple = ZERO
-    beta_rate: Triple = ZERO
-    gamma_rate: Triple = ZERO
     drift: tuple[float, float] = (GEODETIC, MOTIONAL)
 
     def __post_init__(self) -> None:
@@ -99,25 +95,20 @@ class Misalignments:
                 raise ValueError(f"got {name} = {value}; needed {needed} finite numbers, in radians")
 
     def with_angle(self, name: str, size: float) -> Misalignments:
-        """Return a copy with one angle changed, as in ``case.with_angle("gamma1", size)`` or ``"alpha_rate3"``."""
+        """Return a copy with one angle changed, as in ``case.with_angle("gamma1", size)``."""
         which, axis = str(name)[:-1], str(name)[-1:]
         if which == "drift" or which not in vars(self) or axis not in ("1", "2", "3"):
-            raise ValueError(f"got angle {name!r}; needed alpha, beta, gamma or their _rate and 1, 2 or 3: 'gamma1'")
+            raise ValueError(f"got angle {name!r}; needed alpha, beta or gamma and 1, 2 or 3: 'gamma1'")
         values = list(getattr(self, which))
         values[int(axis) - 1] = size
         return replace(self, **{which: tuple(values)})
-
-    def at(self, name: str, years: ArrayLike) -> Floats:
-        """Return the angles `name` after `years` (...): (..., 3), or (3,) if they do not change."""
-        start, rate = np.asarray(getattr(self, name)), np.asarray(getattr(self, f"{name}_rate"))
-        return start + np.asarray(years, dtype=float)[..., None] * rate if rate.any() else start
 
 
 @dataclass(frozen=True)
 class Effect:
     """Errors of φ2 and φ3 in radians: in the angle at the start, and in the drift over a year.
 
-    `line` is the amplitude at the roll frequency in the derolled difference, in the middle of the year.
+    `line` is the amplitude at the roll frequency in the derolled difference.
     """
 
     angle: tuple[float, float]
@@ -134,35 +125,21 @@ def printed_deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
     return -deroll(readings, -np.asarray(phase, dtype=float))
 
 
-def measured(case: Misalignments, rolling: bool, years: ArrayLike = 0.0, phase: float = 0.0) -> Floats:
-    r"""Return the errors of the measured φ2, φ3 to second order; if rolling, those of the mean over a roll.
+def measured(case: Misalignments, years: ArrayLike = 0.0) -> Floats:
+    r"""Return the errors of the measured φ2, φ3 to second order, in the mean over a roll; (..., 2), in radians.
 
-    .. math:: \Delta\varphi_2 &= (\alpha_1 + \beta_1 + \gamma_1)\varphi_3 + \gamma_1\alpha_3 + m_2 \\
-        \Delta\varphi_3 &= -(\alpha_1 + \beta_1 + \gamma_1)\varphi_2 - \gamma_1\alpha_2 + m_3
+    .. math:: \Delta\varphi_2 &= (\alpha_1 + \beta_1 + \gamma_1)\varphi_3 + \gamma_1\alpha_3 \\
+        \Delta\varphi_3 &= -(\alpha_1 + \beta_1 + \gamma_1)\varphi_2 - \gamma_1\alpha_2
 
-    Without rolling, m is the effect of the transverse misalignments, to first order γ2 and γ3, rotated by the constant
-    roll `phase`. With rolling, its mean is zero.
-
-    Parameters
-    ----------
-    case : the angles.
-    rolling : whether the spacecraft rolls.
-    years : (...), time since the start.
-    phase : roll phase of a spacecraft that does not roll; radians.
-
-    Returns
-    -------
-    errors : (..., 2), radians.
+    The mean effect of the transverse misalignments, to first order γ2 and γ3, is zero. `years` (...) is the time since
+    the start.
     """
     since = np.asarray(years, dtype=float)
-    alpha, beta, gamma = (case.at(name, since) for name in ("alpha", "beta", "gamma"))
     phi2, phi3 = case.drift[0] * since, case.drift[1] * since
-    twist = alpha[..., 0] + beta[..., 0] + gamma[..., 0]
-    second = twist * phi3 + gamma[..., 0] * alpha[..., 2]
-    third = -twist * phi2 - gamma[..., 0] * alpha[..., 1]
-    if not rolling:
-        y, z = np.moveaxis(deroll(standing(beta, gamma), phase), -1, 0)
-        second, third = second + z, third - y
+    (alpha1, alpha2, alpha3), gamma1 = case.alpha, case.gamma[0]
+    twist = alpha1 + case.beta[0] + gamma1
+    second = twist * phi3 + gamma1 * alpha3
+    third = -twist * phi2 - gamma1 * alpha2
     return np.stack([second, third], axis=-1)
 
 
@@ -172,14 +149,10 @@ def standing(beta: ArrayLike, gamma: ArrayLike) -> Floats:
     return np.asarray((apply(rotation(gamma), boresight) - boresight)[..., 1:])
 
 
-def effect(case: Misalignments, rolling: bool, phase: float = 0.0) -> Effect:
-    """Return the errors of angle and drift to second order, from the values at the start and after a year.
-
-    The drift is the slope of a straight line through both ends. In between, the error of a product of two changing
-    angles is not linear.
-    """
-    start, end = measured(case, rolling, np.array([0.0, 1.0]), phase)
-    line = float(np.hypot(*standing(case.at("beta", 0.5), case.at("gamma", 0.5)))) if rolling else 0.0
+def effect(case: Misalignments) -> Effect:
+    """Return the errors of angle and drift to second order, from the values at the start and after a year."""
+    start, end = measured(case, np.array([0.0, 1.0]))
+    line = float(np.hypot(*standing(case.beta, case.gamma)))
     drift = end - start
     return Effect((float(start[0]), float(start[1])), (float(drift[0]), float(drift[1])), line)
 
@@ -205,8 +178,8 @@ def line_fit_leak(amplitude: float, rolls: float) -> float:
     return 6 / (rolls * math.pi) * abs(amplitude)
 
 
-def twist_limit(allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
+def twist_limit(allowed: float) -> float:
     """Return the rotation about the roll axis that moves `allowed` from one drift to the other; both in radians."""
     if not allowed > 0:
         raise ValueError(f"got allowed = {allowed}; needed an angle above 0, in radians")
-    return allowed / max(map(abs, drift))
+    return allowed / GEODETIC

@@ -40,19 +40,6 @@ FILTERS = 3_000
 MOST, CANDIDATES = 1_000, 8
 """Steps until a gain must have settled; measurements that the adversary tries at each step."""
 INPUTS = ("random", "constant", "chosen")
-RESULTS = ("for ever", "some steps", "no bound", "refused", "failed")
-"""The last one is an error that does not say what is wrong with the filter."""
-REASONS = (
-    "",
-    "no compiled loops",
-    "beyond the range",
-    "indefinite covariance",
-    "gain not settled",
-    "unstable loop",
-    "too few digits",
-    "not proved",
-    "another",
-)
 
 
 class FilterRow(NamedTuple):
@@ -60,7 +47,8 @@ class FilterRow(NamedTuple):
 
     `steps` counts the steps of all runs in which the exact filter was within its limits, `stopped` the runs that ended
     there although the filter was within them, and `gains` the steps in which the gain of a run is not the one for which
-    the guarantee holds.
+    the guarantee holds. The `result` is "for ever", "some steps", "no bound", "refused", or "failed" for an error that
+    does not say what is wrong with the filter.
     """
 
     seed: int

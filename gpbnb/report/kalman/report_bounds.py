@@ -114,13 +114,13 @@ def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fr
     return u * max(Fraction(1), F ** (len(inputs) - 1))
 
 
-def precision_for_coefficient(
-    coefficient: int | Fraction, tolerance: Fraction | int = 1, base: int = 10, rounding: Rounding = Rounding.NEAREST
-) -> int:
+def precision_for_coefficient(coefficient: int | Fraction, tolerance: Fraction | int = 1, base: int = 10) -> int:
     r"""Return the smallest t with :math:`\text{coefficient}\cdot\beta(t) \le \text{tolerance}`; (8), (13)."""
     if coefficient <= 0 or tolerance <= 0:
         raise ValueError(f"got coefficient {coefficient} and tolerance {tolerance}; needed both positive")
-    found = smallest_precision(lambda fmt: coefficient * fmt.unit_roundoff <= tolerance, base, rounding, monotone=True)
+    found = smallest_precision(
+        lambda fmt: coefficient * fmt.unit_roundoff <= tolerance, base, Rounding.NEAREST, monotone=True
+    )
     if found is None:
         raise ArithmeticError("got no sufficient precision, although the unit roundoff can be arbitrarily small")
     return found.precision

@@ -7,17 +7,16 @@ oracle.
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.algebra import rounded_algebra
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rational import exact, max_norm
+from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
 from gpbnb.filters.steps import BlockAlgebra, LinearStep
-from gpbnb.report.kalman import exact_step, report_bounds
 
 
 class FilterCase(NamedTuple):
@@ -30,14 +29,6 @@ class FilterCase(NamedTuple):
     x: NDArray[Any]
     P: NDArray[Any]
     z: NDArray[Any]
-
-
-class Ratios(NamedTuple):
-    """Largest error / bound over all entries; infinite for an error where the bound is zero."""
-
-    covariance: float
-    gain: float
-    state: float
 
 
 def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> FilterCase:
@@ -90,36 +81,3 @@ def rounded_step(
     )
     x, _, P, K, *_ = step.taken(x, P, x * 0, z)
     return x, K, P
-
-
-def ratios(fmt: FloatFormat, case: FilterCase, second: bool = False, steps: int = 1) -> Ratios:
-    r"""Compare the errors of the last of `steps` rounded steps with (105), (108) and (125).
-
-    Parameters
-    ----------
-    fmt, case, second : as for :func:`rounded_step`; each step has the same measurement.
-    steps : k. The B of (125) is the least that (122) allows.
-    """
-    rounded, exactly = case, case
-    transitions, inputs = [], []
-    for _ in range(steps):
-        x, K, P = rounded_step(fmt, rounded, second)
-        rounded = rounded._replace(x=x, P=P)
-        true = exact_step.exact_step(*exactly)
-        exactly = exactly._replace(x=true.x, P=true.P)
-        transitions.append(true.transition)
-        inputs.append(true.gain @ case.z)
-    (n, m), beta = true.gain.shape, cast(Any, fmt.unit_roundoff)
-    counts = report_bounds.coefficients(steps, n, m)
-    B = report_bounds.printed_input_bound(transitions, inputs)
-    bound = beta * (counts.first * max_norm(true.x) + counts.second * B)
-    return Ratios(
-        _worst(P - true.P, report_bounds.covariance_count(n, m) * beta * abs(true.P)),
-        _worst(K - true.gain, report_bounds.gain_count(n, m) * beta * abs(true.gain)),
-        _worst(exact([max_norm(x - true.x)]), exact([bound])),
-    )
-
-
-def _worst(error: NDArray[Any], bound: NDArray[Any]) -> float:
-    pairs = zip(abs(error).flat, bound.flat, strict=True)
-    return max((float(e / b) if b else float("inf") for e, b in pairs if e), default=0.0)

@@ -159,7 +159,6 @@ class Spectra:
     of a derolled component.
     """
 
-    level: float
     duration: float
     ramp: NDArray[np.float64]
     noise: NDArray[np.float64]
@@ -167,33 +166,33 @@ class Spectra:
     base_noise: NDArray[np.float64]
 
 
-def _periodogram(x: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
+OFFSETS = 25
+"""Frequencies on either side of the roll frequency that count as near it."""
+
+
+def _periodogram(x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the one-sided density of a record, without a window, from one cycle per record on."""
-    return np.asarray(2 * np.abs(np.fft.rfft(x)[1:]) ** 2 * interval / len(x))
+    return np.asarray(2 * np.abs(np.fft.rfft(x)[1:]) ** 2 * INTERVAL / len(x))
 
 
 def spectra(
     drift: float,
     rng: np.random.Generator,
     gyros: int = 4,
-    level: float = LEVEL,
-    period: float = PERIOD,
     samples: int = YEAR_SAMPLES,
-    interval: float = INTERVAL,
-    offsets: int = 25,
 ) -> Spectra:
     """Simulate a drift, and the noise of gyros with two readouts each, for a whole number of turns."""
-    duration = samples * interval
-    turns = round(duration / period)
-    offset = np.concatenate([np.arange(-offsets, 0), np.arange(1, offsets + 1)])
+    duration = samples * INTERVAL
+    turns = round(duration / PERIOD)
+    offset = np.concatenate([np.arange(-OFFSETS, 0), np.arange(1, OFFSETS + 1)])
     before, after = np.zeros((2, samples // 2))
     for child in rng.spawn(gyros):
-        stages = derolled_record((0.0, 0.0), level, period, child, samples, interval)
-        before += (_periodogram(stages["noise"].real, interval) + _periodogram(stages["noise"].imag, interval)) / 2
-        after += (_periodogram(stages["derolled"].real, interval) + _periodogram(stages["derolled"].imag, interval)) / 2
-    ramp = _periodogram(np.asarray(drift * (np.arange(samples) * interval / YEAR)), interval)
-    around, below = before[turns + offset - 1] / gyros, after[:offsets] / gyros
-    return Spectra(level, duration, ramp, before / gyros, around, below)
+        stages = derolled_record((0.0, 0.0), LEVEL, PERIOD, child, samples)
+        before += (_periodogram(stages["noise"].real) + _periodogram(stages["noise"].imag)) / 2
+        after += (_periodogram(stages["derolled"].real) + _periodogram(stages["derolled"].imag)) / 2
+    ramp = _periodogram(np.asarray(drift * (np.arange(samples) * INTERVAL / YEAR)))
+    around, below = before[turns + offset - 1] / gyros, after[:OFFSETS] / gyros
+    return Spectra(duration, ramp, before / gyros, around, below)
 
 
 # -- drift rates ---------------------------------------------------------------------------------

@@ -387,7 +387,7 @@ def year_of(name: str) -> tuple[bool, float]:
     size, case = 20 * ARCSEC, theory.Misalignments()
     for angle in name.split():
         case = case.with_angle(angle, size)
-    found, analysed = experiment.year(case, step=200.0), theory.effect(case, True)
+    found, analysed = experiment.year(case, step=200.0), theory.effect(case)
     gap = float(np.hypot(*(np.array(found.drift) - analysed.drift)))
     right = gap < THIRD_ORDER * size**2 * theory.GEODETIC and math.isclose(found.line, analysed.line, abs_tol=0.1 * MAS)
     return right, float(np.hypot(*found.drift)) / MAS

@@ -457,7 +457,7 @@ def spread() -> Names:
 
 def inphase_noise() -> Names:
     found = spectra()
-    level = float(np.mean(found.base_noise) / theory.flicker_density(found.level, 1 / PERIOD))
+    level = float(np.mean(found.base_noise) / theory.flicker_density(LEVEL, 1 / PERIOD))
     error = 1 / math.sqrt(8 * len(found.base_noise))
     return {"noise": "the inphase components" if abs(level - 1) < 4 * error else "no components", "level": level,
             "error": error}  # fmt: skip
