@@ -44,10 +44,8 @@ from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.filters.words import WordFormats, integer_program
 from gpbnb.wordlength.asked import admitted, checked_format, data_of
 from gpbnb.wordlength.bounding import guarantee
-from gpbnb.wordlength.c_files import Sections, Vectors, checked_identifier, refuse_others, written_files
-from gpbnb.wordlength.c_numbers import CodeFloats, CodeNumbers, CodeWords
-from gpbnb.wordlength.c_source import CodeSource
-from gpbnb.wordlength.c_step import CodeStep
+from gpbnb.wordlength.c_files import CodeSource, Sections, Vectors, checked_identifier, refuse_others, written_files
+from gpbnb.wordlength.c_numbers import CodeFloats, CodeNumbers, CodeStep, CodeWords
 from gpbnb.wordlength.emulation import longest
 from gpbnb.wordlength.judges import largest_inputs, system_pairs
 from gpbnb.wordlength.models import ModelSource
