@@ -12,7 +12,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import format_text, rounding_text
 from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.forms import Form
 from gpbnb.filters.words import WordFormats
 
@@ -72,14 +72,7 @@ class Requirement:
     @property
     def digits(self) -> int | None:
         """Digits of the format, fraction bits in fixed point, or the most digits of a block; None without a format."""
-        fmt = self.format
-        if isinstance(fmt, BlockFormats):
-            return max(getattr(fmt, name).precision for name in self.alone)
-        if isinstance(fmt, WordFormats):
-            return fmt.data.fraction_bits
-        if isinstance(fmt, FixedFormat):
-            return fmt.fraction_bits
-        return None if fmt is None else int(fmt.precision)
+        return None if self.format is None else digits_of(self.format)
 
     @property
     def limiting(self) -> tuple[str, ...]:
@@ -146,32 +139,30 @@ def format_in_words(fmt: FloatFormat | FixedFormat | WordFormats) -> str:
     return f"{1 + fmt.precision}-bit fixed point ({fraction}{rounding}{overflow})"
 
 
+def digits_of(fmt: FloatFormat | FixedFormat | WordFormats | BlockFormats) -> int:
+    """Return the digits of a format, fraction bits in fixed point, or the most digits of a block."""
+    if isinstance(fmt, BlockFormats):
+        return max(getattr(fmt, name).precision for name in BLOCKS)
+    fmt = fmt.data if isinstance(fmt, WordFormats) else fmt
+    return fmt.fraction_bits if isinstance(fmt, FixedFormat) else int(fmt.precision)
+
+
 def judgement(
-    fmt: FloatFormat | FixedFormat | WordFormats,
-    basis: Basis,
-    steps: int | None,
-    ratio: float,
-    why: str,
-    ends: bool = False,
-    notes: tuple[str, ...] = (),
-) -> Requirement:
-    """Return the answer for one format."""
+    fmt: FloatFormat | FixedFormat | WordFormats, basis: Basis, steps: int, ratio: float, why: str, ends: bool = False
+) -> str:
+    """Say whether one format meets a tolerance."""
     name = format_in_words(fmt)
     many = isinstance(fmt, FloatFormat) and name[0].isdigit() and fmt.precision > 1
     meets, misses = ("meet", "miss") if many else ("meets", "misses")
     missed = f"nothing is proved for {name}" if basis in PROOFS else f"{name} {misses} the tolerance"
     known, needed = evidence(basis, steps, ends)
     if math.isinf(ratio):
-        text = f"{missed}, {needed if basis == 'emulation' else needed.replace('by', 'without', 1)}: {why}"
-    elif ratio <= 1:
-        text = f"{name} {meets} the tolerance: {ratio:.2g} of it, {known}"
-    elif basis == "emulation":
-        text = f"{missed}: its error is {ratio:.3g} times as large, {known}"
-    else:
-        what = f"the guaranteed bound for {needed.rpartition(' for ')[2] if ends else 'ever'}"
-        if basis != "guarantee":
-            what = needed.removeprefix("by ").replace("a bound", "the bound", 1)
-        text = f"{missed}: {what} is {ratio:.3g} times the tolerance"
-    digits = fmt.data.fraction_bits if isinstance(fmt, WordFormats) else fmt.precision
-    tried = ((fmt.fraction_bits if isinstance(fmt, FixedFormat) else digits, ratio),)
-    return Requirement(fmt, ratio, basis, steps, tried, joined(text, notes), why, notes)
+        return f"{missed}, {needed if basis == 'emulation' else needed.replace('by', 'without', 1)}: {why}"
+    if ratio <= 1:
+        return f"{name} {meets} the tolerance: {ratio:.2g} of it, {known}"
+    if basis == "emulation":
+        return f"{missed}: its error is {ratio:.3g} times as large, {known}"
+    what = f"the guaranteed bound for {needed.rpartition(' for ')[2] if ends else 'ever'}"
+    if basis != "guarantee":
+        what = needed.removeprefix("by ").replace("a bound", "the bound", 1)
+    return f"{missed}: {what} is {ratio:.3g} times the tolerance"
