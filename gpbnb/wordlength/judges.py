@@ -239,7 +239,7 @@ def _for_ever(
             raise ValueError(
                 f'got missing measurements and basis "{basis}"; needed none: it does not depend on a record'
             )
-        outside = _outside(model, z, sized)
+        outside = _outside(_seen(model, z, sized))
 
     def over(steps: int | None) -> Judge:
         guess, proof = (partial(_bounded, model, sized, form, steps, basis, each) for each in (guessed, guarantee))
@@ -273,21 +273,26 @@ def _bounded(
     return 3 * probable_error(found) if basis == "probable" else found.bound
 
 
-def _outside(model: LinearModel, z: NDArray[Any], within: FilterLimits) -> tuple[str, ...]:
-    """Return in words which limits the filter without rounding leaves in a run, one sentence at most."""
+def _seen(model: LinearModel, z: NDArray[Any], within: FilterLimits) -> dict[str, tuple[Any, Any, Any]]:
+    """Return what has limits in a run of the filter without rounding, its limits and names."""
     x = true_states(model, z)[..., 0]
     before = np.concatenate([model.x0.astype(np.float64)[None], x[:-1]])
     at = np.arange(len(z))
     Phi, H = (each.astype(np.float64)[at % len(each)] for each in (model.Phi, model.H))
     numbers = z.astype(np.float64)
     expected = np.einsum("kij,kjl,kl->ki", H, Phi, before)
-    seen = {"state": x, "innovation": numbers - expected, "measurement": numbers}
-    for name, values in seen.items():
-        most = getattr(within, name)
+    seen, names = {"state": x, "innovation": numbers - expected, "measurement": numbers}, model.measurement_names
+    named_by = {"state": model.state_names, "innovation": names, "measurement": names}
+    return {name: (values, getattr(within, name), named_by[name]) for name, values in seen.items()}
+
+
+def _outside(seen: dict[str, tuple[Any, Any, Any]]) -> tuple[str, ...]:
+    """Say which limits a run leaves, in one sentence at most."""
+    for name, (values, most, names) in seen.items():
         over = np.abs(values) > most * (1 + 2.0**-30)
         if over.any():
             k, i = np.argwhere(over)[0].tolist()
-            which = named(name, i, model.state_names if name == "state" else model.measurement_names)
+            which = named(name, i, names)
             return (
                 f"the given run leaves the limits at step {k + 1}: {which} is {values[k, i]:.4g}, above {most[i]:.4g}",
             )
@@ -333,13 +338,7 @@ def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, w
     else:
         most = largest_inputs(system, within)
         if u is not None:
-            reached = np.abs(u).astype(np.float64).max(axis=0)
-            outside = tuple(
-                f"the given run leaves the limits: {named('input', i, system.input_names)} reaches {size:.4g}, above "
-                f"{limit:.4g}"
-                for i, (size, limit) in enumerate(zip(reached.tolist(), most.tolist(), strict=True))
-                if size > limit
-            )[:1]
+            outside = _outside({"input": (u.astype(np.float64), most, system.input_names)})
     if any(system.x0):
         raise ValueError(f'got a first state {system.x0.tolist()} and basis "{basis}"; needed x0 = 0 for a bound')
     linear = system.as_filter().program.is_linear
