@@ -119,48 +119,40 @@ class Integers:
         found = {"wide": _WIDE} if self.bits == 128 else {}
         found |= {f"rounded_{each.name.lower()}": self._rounded(each) for each in _UP}
         found |= {f"in_{name}": self._kept(name, fmt) for name, fmt in (("data", data), ("sums", sums))}
-        found["multiply"] = f"""/* c x, which loses `shift` fraction bits, in the format of the {first} */
-static {V} multiply({V} c, {V} x, int shift{o})
-{{
-    return in_{first}({nearest}(({W})c * x, shift){passed});
-}}
-"""
-        found["lifted"] = f"""/* a number of the data in units of the {first} */
-static {W} lifted({V} x)
-{{
-    return x * (({W})1 << {gap});
-}}
-"""
-        for name, sign in (("add", "+"), ("subtract", "-")):
-            found[name] = f"""static {V} {name}({W} a, {W} b{o})
-{{
-    return in_{first}(a {sign} b{passed});
-}}
-"""
-        found["store"] = f"""/* a sum in the format of the data, rounded once */
-static {V} store({V} x{o})
-{{
-    return in_data({stored}(x, {gap}){passed});
-}}
-"""
-        found["divide"] = self._quotient(o, passed)
-        found["modulo"] = f"""/* what a / b, toward zero, leaves of a; the step itself notes a divisor of zero */
-static {V} modulo({V} a, {V} b)
-{{
-    return b == 0 || b == -1 ? 0 : a % b;
-}}
-"""
-        found["modulus"] = modulus(V, "modulo(x, y)")
-        found["root"] = self._root(o, passed)
         point = max(data.fraction_bits, 0)
-        for name, rounding in _WHOLE.items():
-            found[f"whole_{name}"] = f"""/* a whole number, {rounding_text(rounding)} */
-static {V} whole_{name}({V} a{o})
-{{
-    return in_data(rounded_{rounding.name.lower()}(a, {point}) * (({W})1 << {point}){passed});
-}}
-"""
-        return found
+        short = {
+            "multiply": (
+                f"c x, which loses `shift` fraction bits, in the format of the {first}",
+                f"{V} multiply({V} c, {V} x, int shift{o})",
+                f"in_{first}({nearest}(({W})c * x, shift){passed})",
+            ),
+            "lifted": (f"a number of the data in units of the {first}", f"{W} lifted({V} x)", f"x * (({W})1 << {gap})"),
+            "add": (f"a + b in the format of the {first}", f"{V} add({W} a, {W} b{o})", f"in_{first}(a + b{passed})"),
+            "subtract": ("a - b, likewise", f"{V} subtract({W} a, {W} b{o})", f"in_{first}(a - b{passed})"),
+            "store": (
+                "a sum in the format of the data, rounded once",
+                f"{V} store({V} x{o})",
+                f"in_data({stored}(x, {gap}){passed})",
+            ),
+            "modulo": (
+                "what a / b, toward zero, leaves of a; the step itself notes a divisor of zero",
+                f"{V} modulo({V} a, {V} b)",
+                "b == 0 || b == -1 ? 0 : a % b",
+            ),
+        } | {
+            f"whole_{name}": (
+                f"a whole number, {rounding_text(rounding)}",
+                f"{V} whole_{name}({V} a{o})",
+                f"in_data(rounded_{rounding.name.lower()}(a, {point}) * (({W})1 << {point}){passed})",
+            )
+            for name, rounding in _WHOLE.items()
+        }
+        found |= {
+            name: f"/* {what} */\nstatic {head}\n{{\n    return {value};\n}}\n"
+            for name, (what, head, value) in short.items()
+        }
+        found |= {"divide": self._quotient(o, passed), "root": self._root(o, passed)}
+        return found | {"modulus": modulus(V, "modulo(x, y)")}
 
     def _rounded(self, rounding: Rounding) -> str:
         W, up = self.wide, _more(rounding, "size", "value < 0")
