@@ -22,7 +22,7 @@ from gpbnb import (
 )
 from gpbnb.filters.run import Run, reference
 from gpbnb.filters.simulation import simulated_measurements
-from gpbnb.report.wordlengths.ranges import binary_ranges
+from gpbnb.report.wordlengths.study import binary_ranges
 from gpbnb.wordlength.required import judge
 
 LENGTHS = {"Phi": 2, "H": 3, "Q": 4, "R": 3, "B": 4, "b": 2, "d": 6}

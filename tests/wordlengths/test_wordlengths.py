@@ -16,7 +16,7 @@ from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.run import log_spaced, reference
 from gpbnb.report import examples
 from gpbnb.report.guarantees import table as guarantees
-from gpbnb.report.wordlengths import ranges, study
+from gpbnb.report.wordlengths import study
 from tests.surveying import survey
 
 TILT = examples.tilt()
@@ -57,7 +57,7 @@ def test_normal_numbers_are_those_of_numpy():
 def test_spans_hold_every_number():
     checkpoints = reference(TILT, Z, log_spaced(300, 16))
     numbers = {"estimate": checkpoints.x, "gain": checkpoints.K, "covariance": checkpoints.P}
-    found = {each.name: each for each in ranges.binary_ranges(TILT, Z)}
+    found = {each.name: each for each in study.binary_ranges(TILT, Z)}
     for name, values in numbers.items():
         sizes = np.abs(values.astype(float)).ravel()
         sizes = sizes[sizes > 0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic, digits
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.inverse import check_relative, smallest_precision
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.contraction import companion_bound
@@ -20,6 +22,9 @@ from gpbnb.filters.emulation import compare_runs
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
+from gpbnb.report.display.tables import Table, short
+from gpbnb.report.examples import NORMAL_RANGE
+from gpbnb.report.integration.precision import best_rate, needed_precision, stall_rate
 from gpbnb.report.kalman import report_bounds
 
 Curve = Sequence[tuple[int, float]]
@@ -94,6 +99,16 @@ def update_stagnation(
     return tuple(found)
 
 
+def stagnation_table(found: Sequence[UpdateStagnation], tolerance: float) -> Table:
+    """Tabulate the effect of few digits on a state that hardly changes."""
+    body = tuple(
+        (arithmetic(each.fmt), short(each.variance, 3), f"{100 * each.unchanged:.0f} %", short(each.error / tolerance))
+        for each in found
+    )
+    header = ("arithmetic", "variance, computed / true", "steps without a change", "error / tolerance")
+    return Table(f"{len(body)} formats", header, body)
+
+
 def _check_state(model: LinearModel, state: int) -> None:
     if state not in range(model.n):
         raise ValueError(f"got state {state!r}; needed an index from 0 to {model.n - 1}")
@@ -162,3 +177,57 @@ def inverse_precision(name: str, matrix: NDArray[Any], tolerance: float) -> Inve
     expected = report_bounds.precision_for_coefficient(conditions[1], Fraction(tolerance), 2)
     needed = smallest_precision(matrix, tolerance, 2).fmt.precision
     return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, needed)
+
+
+def inverses_table(found: Sequence[InversePrecision]) -> Table:
+    """Tabulate the bits that inverses need, by the rule of thumb and in fact."""
+    body = tuple(
+        (each.name, short(each.condition), short(each.scaled), str(each.expected), str(each.needed)) for each in found
+    )
+    header = ("matrix", "condition $\\kappa_1$", "$\\kappa_1$, scaled", "bits, rule of thumb", "bits needed")
+    return Table(f"{len(body)} inverses", header, body)
+
+
+class BinaryRange(NamedTuple):
+    """Powers of two between which the magnitudes of nonzero numbers lie."""
+
+    name: str
+    least: int
+    largest: int
+
+
+def binary_ranges(model: LinearModel, z: NDArray[Any]) -> tuple[BinaryRange, ...]:
+    """Return the ranges of a model, and of its estimates, gains and covariances at sixteen steps per decade.
+
+    Numbers that are all zero have no range.
+    """
+    checkpoints = reference(model, z, log_spaced(len(z), 16))
+    given = np.concatenate([getattr(model, letter).ravel() for letter in ("Phi", "H", "Q", "R", "P0")])
+    numbers = {"model": given, "estimate": checkpoints.x, "gain": checkpoints.K, "covariance": checkpoints.P}
+    result = []
+    for name, values in numbers.items():
+        powers = [math.frexp(abs(float(value)))[1] - 1 for value in values.ravel() if value]
+        if powers:
+            result.append(BinaryRange(name, min(powers), max(powers)))
+    return tuple(result)
+
+
+def ranges_table(found: Sequence[BinaryRange]) -> Table:
+    """Tabulate the ranges of a filter's numbers, and the standard formats in which they are normal."""
+    body = []
+    for each in found:
+        suitable = [name for name, (low, high) in NORMAL_RANGE.items() if low <= each.least and each.largest <= high]
+        body.append((each.name, f"$2^{{{each.least}}}$", f"$2^{{{each.largest}}}$", ", ".join(suitable) or "none"))
+    return Table(f"{len(body)} kinds of numbers", ("numbers", "smallest", "largest", "normal in"), tuple(body))
+
+
+def integrator_table(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt: FloatFormat) -> Table:
+    """Tabulate bits at which rounding is a tenth of the discretization error, and the rates that a format allows."""
+    body = []
+    for name, duration in durations.items():
+        needed = [needed_precision(omega_bw, f_c, duration, 2, rounding) for rounding in Rounding.documented()]
+        rates = best_rate(omega_bw, duration, fmt), stall_rate(omega_bw, duration, fmt)
+        body.append((name, *map(str, needed), *(f"{rate:,.3g}" for rate in rates)))
+    kind = digits(fmt)
+    header = ("duration", "bits, rounded", "bits, chopped", f"best rate with {kind}, Hz", "increments vanish at, Hz")
+    return Table(f"{len(body)} durations", header, tuple(body))
