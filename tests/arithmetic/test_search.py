@@ -71,12 +71,15 @@ def test_above_an_answer_that_is_refuted_every_precision_is_tried(missed, answer
     assert not found.undecided
 
 
-@pytest.mark.parametrize(("above", "answer", "undecided"), [(math.inf, 6, (16,)), (2.0, 17, ())])
-def test_where_there_is_no_bound_above_an_answer_it_stays_and_a_missed_one_refutes_it(above, answer, undecided):
-    """In base 10: 5 digits and fewer miss the tolerance, 16 have no bound or miss it, too."""
+@pytest.mark.parametrize(
+    ("ratios", "answer", "undecided"),
+    [({16: math.inf}, 6, (16,)), ({16: 2.0}, 17, ()), ({8: 2.0, 16: math.inf}, 17, ())],
+)
+def test_where_there_is_no_bound_above_an_answer_it_stays_and_a_missed_one_refutes_it(ratios, answer, undecided):
+    """In base 10: 5 digits and fewer miss the tolerance, 16 and perhaps 8 have no bound or miss it, too."""
 
     def error(fmt):
-        return Outcome(above if fmt.precision == 16 else 1 + (fmt.precision < 6))
+        return Outcome(ratios.get(fmt.precision, 1 + (fmt.precision < 6)))
 
     found = Search(error, FloatFormat(10, 5), (7, 16), bounds=True)
     assert (found.fmt, found.undecided) == (FloatFormat(10, answer), undecided)

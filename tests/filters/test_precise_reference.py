@@ -36,10 +36,8 @@ def test_one_step_with_a_precise_sensor_is_enough_for_more_digits():
 @pytest.mark.parametrize("bits", [20, 104])
 def test_results_agree_in_some_bits_of_the_largest_of_each_entry(bits, share, agree):
     fmt = FloatFormat(2, 120)
-    some, other = (
-        precise_reference.PreciseSteps(fmt.array([[1], [last], [0]]), fmt.array([[[1]]] * 3), fmt.array([[[1]]] * 3))
-        for last in (4, 4 + 4 * share / 2**bits)
-    )
+    x, P = ([[1, 2], [last, 2], [0, 2]] for last in (4, 4 + 4 * share / 2**bits)), fmt.array([[[1]]] * 3)
+    some, other = (precise_reference.PreciseSteps(fmt.array(each), P, P) for each in x)
     assert precise_reference._agree(some, other, bits) is agree
 
 

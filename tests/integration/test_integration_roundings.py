@@ -38,26 +38,6 @@ def test_correlated_roundings_add_up_as_they_do():
         assert observed == pytest.approx(float(precision.correlation_factor(s)), rel=0.12)
 
 
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8), FloatFormat(16, 8, CHOP), FloatFormat(3, 15)])
-def test_errors_fall_and_grow_with_the_rate_as_the_closed_forms_say(fmt):
-    omega, duration = 100.0, 1000.0
-    slow, fast = 2000.0, 8000.0
-    first, second = (precision.two_errors(1.0, omega, f, duration, fmt) for f in (slow, fast))
-    assert first.discretization / second.discretization == pytest.approx(4, rel=1e-4)
-    if fmt.rounding is CHOP:
-        expected = precision.mean_chopping(fmt) * slow * math.sqrt(2 * duration**3 / (3 * omega))
-        assert first.rounding == pytest.approx(expected, rel=2e-3)  # a = 1.3e-3: 3a/8 of it leaks
-        assert second.rounding / first.rounding == pytest.approx(4, rel=5e-3)
-    else:
-        variance = precision.mean_square_rounding(fmt) * duration**2 * slow / omega
-        # The spacing averaged over a normal accumulator is near, not at, that of evenly spread logarithms.
-        assert first.rounding**2 == pytest.approx(variance, rel=0.2 if fmt.base < 10 else 0.6)
-        assert second.rounding / first.rounding == pytest.approx(2, rel=0.05)
-    scaled = precision.two_errors(fmt.base**3, omega, slow, duration, fmt)
-    assert scaled.rounding == pytest.approx(fmt.base**3 * first.rounding, rel=1e-9)
-    assert scaled.total == pytest.approx(math.hypot(scaled.discretization, scaled.rounding))
-
-
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 16), FloatFormat(2, 24), FloatFormat(10, 7), FloatFormat(2, 32, CHOP)])
 @pytest.mark.parametrize("omega", [10.0, 628.0])
 def test_the_best_rate_is_the_best(fmt, omega):
@@ -83,16 +63,3 @@ def test_the_needed_precision_is_the_least_that_suffices(base, rounding):
             )
             assert enough.rounding <= share * enough.discretization
             assert less.rounding > share * less.discretization
-
-
-def test_the_stall_rate_is_where_increments_are_half_a_spacing():
-    fmt, omega, duration = FloatFormat(2, 16), 64.0, 50.0
-    spacing = math.sqrt(12 * precision.mean_square_rounding(fmt) * 2 * duration / omega)
-    assert 1 / precision.stall_rate(omega, duration, fmt) == pytest.approx(spacing / 2)
-
-
-def test_both_errors_are_equal_at_the_best_rate_with_chopping():
-    """In closed form, for rates far above the bandwidth and a leak far below one."""
-    fmt = FloatFormat(2, 40, CHOP)
-    found = precision.two_errors(1.0, 1.0, precision.independent_best_rate(1.0, 1e4, fmt), 1e4, fmt)
-    assert found.discretization == pytest.approx(found.rounding, rel=1e-3)
