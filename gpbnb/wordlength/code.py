@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.elementary import DomainError
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -319,12 +320,12 @@ def _of_filter(model: LinearModel | NonlinearModel, fmt: AnyFormat, form: Form |
         if model.u is not None:
             u = np.broadcast_to(model.u, (len(z), model.u.shape[-1])) if model.u.ndim == 1 else model.u[: len(z)]
             inputs = np.concatenate([inputs, fmt.array(u).to_fractions()], axis=1)
-        first, states = _first(run, chosen), [*_states(run, chosen, z)]
-        return _vectors(fmt, inputs, first, states, run.indefinite)
+        first, *states = _states(run, chosen, z)
+        return _vectors(fmt, inputs, first[0], states, run.indefinite)
 
     method = "unscented" if getattr(model, "method", "") == "unscented" else f"{chosen} form"
     return Prepared(
-        CodeStep(without_exact(program, stored), stored, _first(run, chosen)),
+        CodeStep(without_exact(program, stored), stored, next(_states(run, chosen))[0]),
         model.name,
         emulated,
         lambda steps: simulated(model, min(steps, model.steps or steps)),
@@ -341,20 +342,13 @@ def _program(run: Run) -> tuple[Any, list[NDArray[Any]]]:
     return program, [each for letter, each in given.items() if letter != "u"]
 
 
-def _first(run: Any, form: Form) -> NDArray[Any]:
-    """Return the exact states of a program before the first step."""
-    if isinstance(run, Run):
-        return np.asarray(program_states(form, run.exactly(run.x.T), run.exactly(run.P[None]))[0])
-    return np.asarray(program_states(form, run.x[None], run.P[None])[0].to_fractions())
-
-
-def _states(run: Any, form: Form, z: Any) -> Iterator[NDArray[Any]]:
-    """Give the exact states of a program after each step, some steps at a time."""
+def _states(run: Any, form: Form, z: Any = ()) -> Iterator[NDArray[Any]]:
+    """Give the exact states of a program, (k, n), before the first step, then after each, some at a time."""
+    linear = isinstance(run, Run)
+    exact: Any = run.exactly if linear else FloatArray.to_fractions
+    yield program_states(form, exact(run.x.T if linear else run.x[None]), exact(run.P[None]))
     for each in run.blocks(z):
-        if isinstance(run, Run):
-            yield program_states(form, run.exactly(each.x[:, :, 0]), run.exactly(each.P))
-        else:
-            yield program_states(form, *each.states).to_fractions()
+        yield program_states(form, *map(exact, (each.x[:, :, 0], each.P) if linear else each.states))
 
 
 def _one_format(fmt: AnyFormat, what: str) -> FloatFormat | FixedFormat:
