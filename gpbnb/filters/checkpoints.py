@@ -1,14 +1,10 @@
-"""What a run has computed after some of its steps, and how it differs from a reference.
-
-A run keeps numbers as its loops compute them. They become Fractions when these are asked for.
-"""
+"""What a run has computed after some of its steps, and how it differs from a reference."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,18 +17,12 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.steps import FACTORED, combined_gain
 
 
-class Packed(NamedTuple):
-    """Numbers as compiled loops compute them, in a format, or in double-double if that is None."""
-
-    numbers: NDArray[Any]  # float64 in bases 2 and 16, pairs (..., 2) of int64 in base 10, of float64 in double-double
-    fmt: FloatFormat | FixedFormat | None
-
-    def exactly(self) -> NDArray[Any]:
-        """Return the numbers as Fractions."""
-        if self.fmt is None:
-            high, low = (part.astype(object) for part in (self.numbers[..., 0], self.numbers[..., 1]))
-            return np.asarray(np.frompyfunc(_exact_sum, 2, 1)(high, low), dtype=object)
-        return np.asarray(FloatArray.from_packed(self.numbers, self.fmt).to_fractions(), dtype=object)
+def exactly(packed: NDArray[Any], fmt: FloatFormat | FixedFormat | None) -> NDArray[Any]:
+    """Return numbers as compiled loops compute them, in a format or in double-double if that is None, as Fractions."""
+    if fmt is None:
+        high, low = (part.astype(object) for part in (packed[..., 0], packed[..., 1]))
+        return np.asarray(np.frompyfunc(_exact_sum, 2, 1)(high, low), dtype=object)
+    return np.asarray(FloatArray.from_packed(packed, fmt).to_fractions(), dtype=object)
 
 
 class Progress(ABC):
@@ -96,36 +86,18 @@ class Progress(ABC):
         self.reason = f"{fault} at step {self.stopped}{cure}"
 
 
-class Checkpoints:
-    """Exact values after some steps, object arrays of Fractions: x (c, n), K (c, n, m), P (c, n, n).
+class Checkpoints(NamedTuple):
+    """Exact values after some steps, object arrays of Fractions."""
 
-    They are given as Fractions, or as a run keeps them.
-    """
-
-    def __init__(
-        self, steps: Sequence[int], x: NDArray[Any] | Packed, K: NDArray[Any] | Packed, P: NDArray[Any] | Packed
-    ) -> None:
-        self.steps = tuple(steps)
-        self._kept = x, K, P
-
-    @cached_property
-    def x(self) -> NDArray[Any]:
-        """Estimates, (c, n)."""
-        return _exactly(self._kept[0])
-
-    @cached_property
-    def K(self) -> NDArray[Any]:
-        """Gains, (c, n, m)."""
-        return _exactly(self._kept[1])
-
-    @cached_property
-    def P(self) -> NDArray[Any]:
-        """Covariances, (c, n, n)."""
-        return _exactly(self._kept[2])
+    steps: tuple[int, ...]
+    x: NDArray[Any]  # (c, n), estimates
+    K: NDArray[Any]  # (c, n, m), gains
+    P: NDArray[Any]  # (c, n, n), covariances
 
     def to_float(self, letter: str) -> NDArray[np.float64]:
         """Return the nearest float64 of "x", "K" or "P"."""
-        return _nearest(self._kept["xKP".index(letter)])
+        values: NDArray[Any] = getattr(self, letter)
+        return values.astype(np.float64)
 
     def minus(self, true: Checkpoints) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Return x, K and P minus those of a reference with at least as many checkpoints, correctly rounded."""
@@ -161,19 +133,7 @@ def _ascending(checkpoint_steps: Sequence[int]) -> NDArray[np.int64]:
     return steps.astype(np.int64)
 
 
-def _exactly(values: NDArray[Any] | Packed) -> NDArray[Any]:
-    return values.exactly() if isinstance(values, Packed) else values
-
-
 def _exact_sum(high: float, low: float) -> Fraction:
     # Both denominators are powers of two: faster than the sum of two Fractions.
     (n, d), (p, q) = high.as_integer_ratio(), low.as_integer_ratio()
     return Fraction(n * (q // d) + p, q) if q > d else Fraction(n + p * (d // q), d)
-
-
-def _nearest(values: NDArray[Any] | Packed) -> NDArray[np.float64]:
-    if isinstance(values, Packed):
-        if values.fmt is None:
-            return np.array(values.numbers[..., 0])  # the nearest by definition of a double-double
-        return np.asarray(FloatArray.from_packed(values.numbers, values.fmt).to_float(), dtype=np.float64)
-    return values.astype(np.float64)

@@ -31,7 +31,7 @@ from gpbnb.filters.covariance import (
     repair_tolerance,
     repaired,
 )
-from gpbnb.filters.named import checked_name, checked_names, range_text, sized
+from gpbnb.filters.named import checked_name, checked_names, naming, range_text, sized
 
 LARGEST_EXPONENT = 450
 """Largest size of an exponent of two in a model for compiled loops of a format with any exponent."""
@@ -170,10 +170,8 @@ class LinearModel:
         if self.repair is not False:
             tolerances = {letter: repair_tolerance(getattr(self, letter)) for letter in _COVARIANCES}
         for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
-            try:
+            with naming(letter):
                 entries = exact(getattr(self, letter))
-            except (TypeError, ValueError) as error:
-                raise type(error)(f"{letter}: {error}") from None
             if letter in ("Phi", "H", "Q", "R") and entries.ndim == 2:
                 entries = entries[np.newaxis]
             entries.flags.writeable = False
@@ -223,10 +221,8 @@ class LinearModel:
                 shapes = {np.shape(each) for each in members}
                 if len(shapes) != 1:
                     raise ValueError(f"{letter}: the function gave shapes {sorted(shapes)}; needed one shape")
-                try:
+                with naming(letter):
                     values = np.array(members) if in_floats(members) else exact(members)
-                except (TypeError, ValueError) as error:
-                    raise type(error)(f"{letter}: {error}") from None
                 object.__setattr__(self, letter, values)
 
     def _read_inputs(self) -> None:
@@ -241,10 +237,8 @@ class LinearModel:
             given = getattr(self, letter)
             if given is None:
                 continue
-            try:
+            with naming(letter):
                 entries = exact(given)
-            except (TypeError, ValueError) as error:
-                raise type(error)(f"{letter}: {error}") from None
             single = 2 if letter == "B" else 1
             if letter == "u" and entries.ndim == 2 and (self.steps is None or self.steps > len(entries)):
                 if self.steps is not None:
@@ -427,10 +421,8 @@ class LinearModel:
             fmt.restart()
         made: dict[str, FloatArray] = {}
         for letter, (values, places) in different_entries(self).items():
-            try:
+            with naming(letter):
                 made[letter] = fmt.store(values[places]) if random else _in_places(fmt, values, places)
-            except OverflowError as error:
-                raise OverflowError(f"{letter}: {error}") from None
             if letter in _COVARIANCES and random:
                 made[letter] = made[letter].moved(_mirrored)
         return made
@@ -501,10 +493,8 @@ def identity_in(fmt: FloatFormat | FixedFormat, n: int) -> FloatArray:
 
 def stored_measurements(z: Any, fmt: FloatFormat | FixedFormat | BlockFormats) -> FloatArray:
     """Round measurements into a format."""
-    try:
+    with naming("measurements"):
         return fmt.array(z)
-    except OverflowError as error:
-        raise OverflowError(f"measurements: {error}") from None
 
 
 def in_columns(z: Any, m: int) -> Any:
@@ -528,12 +518,8 @@ def real_numbers(values: Any) -> NDArray[Any]:
             nearest = given.astype(np.float64, copy=False)
         if np.array_equal(nearest, given, equal_nan=True):
             return nearest
-    try:
+    with naming("measurements"):
         return exact(given if given.dtype.kind == "f" else values)
-    except TypeError as error:
-        raise TypeError(f"measurements: {error}") from None
-    except ValueError as error:
-        raise ValueError(f"measurements: {error}") from None
 
 
 LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")

@@ -1,10 +1,11 @@
-"""Read arguments as users write them: whole numbers and names."""
+"""Read arguments as users write them: whole numbers and names; name the argument in an error."""
 
 from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any
 
@@ -23,6 +24,15 @@ def whole_number(name: str, value: Any, least: int = 1, most: int | None = None)
                 return number
     limit = "" if most is None else f" and at most {most:,}"
     raise ValueError(f"got {name} {value!r}; needed a whole number, at least {least}{limit}")
+
+
+@contextmanager
+def naming(argument: str) -> Iterator[None]:
+    """Put the name of an argument before the message of an error in reading or storing it."""
+    try:
+        yield
+    except (TypeError, ValueError, OverflowError) as error:
+        raise type(error)(f"{argument}: {error}") from None
 
 
 def checked_name(name: Any) -> str:

@@ -20,7 +20,7 @@ from gpbnb.arithmetic.exits import kept_in
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.covariance import Repair
 from gpbnb.filters.model import Entries, LinearModel
-from gpbnb.filters.named import range_text, sized, whole_number
+from gpbnb.filters.named import naming, range_text, sized, whole_number
 
 Function = Callable[..., Any]
 """A function of a state (n,), and of the inputs (p,) of a step if there are any, written with arrays of a format."""
@@ -417,10 +417,8 @@ def _given(u: FloatArray | None) -> tuple[FloatArray, ...]:
 
 
 def _inputs(u: Any) -> NDArray[Any]:
-    try:
+    with naming("u"):
         found = exact(u)
-    except (TypeError, ValueError) as error:
-        raise type(error)(f"u: {error}") from None
     if found.ndim != 2 or not found.size:
         raise ValueError(f"got u of shape {found.shape}; needed (steps, p), one row for each step")
     return found

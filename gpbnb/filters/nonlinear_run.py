@@ -27,11 +27,11 @@ from gpbnb.filters.reference import PreciseSteps, agreed, joined
 from gpbnb.filters.repeating import RepeatedStep
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
-from gpbnb.filters.stepping import StepTaken
 from gpbnb.filters.steps import (
     FACTORED,
     BlockAlgebra,
     ExtendedModel,
+    StepTaken,
     UnscentedModel,
     extended_step,
     root_of_factors,
@@ -136,7 +136,7 @@ class NonlinearRun(Progress):
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""
-        steps = [int(step) for step in self.checkpoint_steps[: self.saved]]
+        steps = tuple(self.checkpoint_steps[: self.saved].tolist())
         if not steps:
             n, m = self.model.n, self.model.m
             return Checkpoints(steps, *(np.zeros((0, *shape), object) for shape in ((n,), (n, m), (n, n))))
@@ -178,8 +178,7 @@ class NonlinearRun(Progress):
             given["Q"],
             given["R"],
         )
-        found = extended_step(blocks, self.form, step, x, P, given["z"])
-        return StepTaken((found.x, found.P), found.gain, found.definite)
+        return extended_step(blocks, self.form, step, x, P, given["z"])
 
     def _unscented(self, blocks: BlockAlgebra, x: Any, P: Any, given: dict[str, Any]) -> StepTaken:
         model, u = self.model, given.get("u")
@@ -189,8 +188,7 @@ class NonlinearRun(Progress):
             lambda a, b: _seen(given, model.difference(a, b)),
             *(given[name] for name in (*_WEIGHTS, "Q", "R")),
         )
-        found = unscented_step(blocks.state, step, x, P, given["z"])
-        return StepTaken((found.x, found.P), (found.K,), found.definite)
+        return unscented_step(blocks.state, step, x, P, given["z"])
 
 
 def _seen(given: dict[str, Any], numbers: Any) -> Any:

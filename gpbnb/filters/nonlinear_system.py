@@ -26,10 +26,10 @@ from gpbnb.arithmetic.second_format import convert
 from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.model import real_numbers
-from gpbnb.filters.named import checked_name, sized, whole_number
+from gpbnb.filters.named import checked_name, naming, sized, whole_number
 from gpbnb.filters.program import Program, entries, without_exact
 from gpbnb.filters.repeating import RepeatedStep
-from gpbnb.filters.stepping import StepTaken
+from gpbnb.filters.steps import StepTaken
 
 Step = Callable[[Any, Any, Any], tuple[Any, Any]]
 """A function ``step(fmt, x, u)`` that returns the next state and the output."""
@@ -92,10 +92,8 @@ class NonlinearSystem:
             raise TypeError(f"got a step with other arguments: {error}; needed step(fmt, x, u)") from None
         except ValueError:  # a function of C without a signature
             pass
-        try:
+        with naming("x0"):
             first = exact(x0)
-        except (TypeError, ValueError) as error:
-            raise type(error)(f"x0: {error}") from None
         if first.ndim != 1:
             raise ValueError(f"got x0 of shape {first.shape}; needed one entry for each state, (n,)")
         first.flags.writeable = False

@@ -33,6 +33,7 @@ from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, 
 from gpbnb.filters.factors import factors_of_each, inverses_of_each, roots_of_each
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.model import LinearModel, different_entries, remembered, stored_arrays
+from gpbnb.filters.named import naming
 from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.steps import FACTORED
 
@@ -141,10 +142,8 @@ def as_packed(fmt: FloatFormat | FixedFormat | None, values: Any) -> NDArray[Any
 
 def stored_start(fmt: FloatFormat | FixedFormat, x0: Any) -> FloatArray:
     """Round a first state into a format."""
-    try:
+    with naming("x0"):
         return fmt.store(x0)
-    except OverflowError as error:
-        raise OverflowError(f"x0: {error}") from None
 
 
 def double_doubles_of(array: FloatArray) -> NDArray[np.float64]:
@@ -175,8 +174,6 @@ def _packed(model: LinearModel, fmt: FloatFormat) -> dict[str, NDArray[Any]]:
     """The matrices by their letters, as the compiled loops expect them."""
     packed = {}
     for letter, each in stored_arrays(model, fmt).items():
-        try:
+        with naming(letter):
             packed[letter] = packed_array(each)
-        except OverflowError as error:
-            raise OverflowError(f"{letter}: {error}") from None
     return packed

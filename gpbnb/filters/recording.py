@@ -23,8 +23,8 @@ from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.program import Program, entries
-from gpbnb.filters.stepping import DividedStep, RecordedStep, StepTaken, divided, record_step
-from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep
+from gpbnb.filters.stepping import DividedStep, RecordedStep, divided, record_step
+from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep, StepTaken
 
 
 class Known(NamedTuple):
@@ -121,10 +121,7 @@ def _kalman_taken(
     fused, order, block, number = kind.sums
     sums = formats[number] if number >= 0 else None
     blocks = block_algebra([formats[i] for i in kind.blocks[:4]], fused, order, block, sums)
-    step = LinearStep(kind.form, blocks, known, tape.about)
-    found = step.taken(x, P, carried[0] if carried else None, z)
-    after = (found.x, found.P, *([found.carried] if carried else []))
-    return StepTaken(after, (found.K,) if found.S is None else (found.K, found.S), found.definite)
+    return LinearStep(kind.form, blocks, known, tape.about).taken((x, P, *carried), z)
 
 
 def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:

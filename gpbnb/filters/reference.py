@@ -20,8 +20,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.recording import block_algebra
 from gpbnb.filters.repeating import RepeatedStep
-from gpbnb.filters.stepping import StepTaken
-from gpbnb.filters.steps import LinearStep
+from gpbnb.filters.steps import LinearStep, StepTaken
 
 FEW_BITS = 40
 """Bits of the first run, which compiled loops compute."""
@@ -56,7 +55,7 @@ class PreciseSteps(NamedTuple):
     def checkpoints(self, steps: Sequence[int] | NDArray[np.int64]) -> Checkpoints:
         """Return the exact values after some steps, which count from 1."""
         rows = [int(step) - 1 for step in steps]
-        return Checkpoints([row + 1 for row in rows], *(each[rows].to_fractions() for each in self))
+        return Checkpoints(tuple(row + 1 for row in rows), *(each[rows].to_fractions() for each in self))
 
 
 def precise_steps(model: LinearModel, z: Any) -> PreciseSteps:
@@ -109,14 +108,13 @@ def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> PreciseSteps | str
     x, P = given.pop("x0")[0], given.pop("P0")
 
     def take(formats: Sequence[Any], states: tuple[Any, ...], matrices: Sequence[Any]) -> StepTaken:
-        (x, P), (measured, *rest) = states, matrices
+        measured, *rest = matrices
         step = LinearStep(Form.INNOVATION, block_algebra([*formats] * 4), dict(zip(given, rest, strict=True)))
-        found = step.taken(x, P, None, measured)
-        return StepTaken((found.x, found.P), found.K, found.definite)
+        return step.taken(states, measured)
 
     step = RepeatedStep(take, [fmt], (x, P), list(given.values()))
     try:
-        return joined([(each.states[0], each.gain, each.states[1]) for each in step.take(fmt.array(z))])
+        return joined([(each.states[0], each.gain[0], each.states[1]) for each in step.take(fmt.array(z))])
     except ZeroDivisionError:
         return SINGULAR
 

@@ -26,11 +26,11 @@ from gpbnb.filters.stepping import (
     RunningStep,
     StepFunction,
     StepsTaken,
-    StepTaken,
     divided,
     leaves,
     record_step,
 )
+from gpbnb.filters.steps import StepTaken
 
 
 class RepeatedStep:

@@ -19,7 +19,7 @@ from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Limits, Order, Rounding
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
-from gpbnb.filters.checkpoints import Checkpoints, Packed, Progress, without_factors
+from gpbnb.filters.checkpoints import Checkpoints, Progress, exactly, without_factors
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.forms import WITH_PROGRAM, Form, form_named
 from gpbnb.filters.model import LinearModel, identity_in
@@ -380,18 +380,16 @@ class Run(Progress):
 
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Convert results of the compiled loops to exact Fractions."""
-        return Packed(packed, self.fmt).exactly()
+        return exactly(packed, self.fmt)
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""
         at = self.checkpoint_steps[: self.saved] - 1
-        x, K, P = (Packed(each, self.fmt) for each in (self.X[:, :, 0], self.G, self.C))
-        steps = [int(step) + 1 for step in at]
-        if self.form not in FACTORED:
-            return Checkpoints(steps, x, K, P)
-        H, UR = (self.exactly(self.letters[each]) for each in ("H", "UR"))
-        factors = K.exactly(), P.exactly(), H[at % len(H)], UR[at % len(UR)]
-        return Checkpoints(steps, x, *without_factors(self.form, *factors))
+        x, K, P = (self.exactly(each) for each in (self.X[:, :, 0], self.G, self.C))
+        if self.form in FACTORED:
+            H, UR = (self.exactly(self.letters[each]) for each in ("H", "UR"))
+            K, P = without_factors(self.form, K, P, H[at % len(H)], UR[at % len(UR)])
+        return Checkpoints(tuple((at + 1).tolist()), x, K, P)
 
 
 def widened(packed: NDArray[Any]) -> NDArray[np.float64]:

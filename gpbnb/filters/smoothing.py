@@ -42,10 +42,9 @@ from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel, identity_in, in_columns
 from gpbnb.filters.repeating import RepeatedStep
-from gpbnb.filters.stepping import StepTaken
 from gpbnb.filters.steps import (
-    RootModel,
     StepModel,
+    StepTaken,
     filtered,
     filtered_root,
     root_of_factors,
@@ -185,12 +184,12 @@ class FixedIntervalSmoother:
         return (fmt.store(model.x0), S), [Phi, H, SQ, UR]
 
     def _forwards(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
-        (fmt,), (z, *model), (x, P) = formats, given, states
+        (fmt,), (x, P), (z, Phi, H, Q, R) = formats, states, given
         if self.form is Form.CARLSON:
             identity = fmt.array(np.eye(self.model.n, dtype=int))
-            x, P, *kept = filtered_root(RootModel(*model), x, P, z, identity)
+            x, P, *kept = filtered_root(Phi, H, Q, R, x, P, z, identity)
         else:
-            x, P, *kept = filtered(_algebra(fmt), form_named(self.form), StepModel(*model), x, P, z)
+            x, P, *kept = filtered(_algebra(fmt), form_named(self.form), StepModel(Phi, H, Q, R), x, P, z)
         return StepTaken((x, P), tuple(kept), True)
 
     def _backwards(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:

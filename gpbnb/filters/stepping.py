@@ -19,6 +19,7 @@ from gpbnb.arithmetic.machine import CODES, OPERANDS, Fault, fault_of, takes_num
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.tape import TRUTHS, Places, Tape, depending, laid_out
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
+from gpbnb.filters.steps import StepTaken
 
 NONE = np.zeros(0, np.int64)
 """No places."""
@@ -28,17 +29,6 @@ LARGEST_KEPT = 1 << 18
 
 _GIVES_TRUTH = np.array([name in TRUTHS for name in CODES])
 _GIVES_NUMBER = np.array([name not in (*TRUTHS, "nonzero", "skip") for name in CODES])
-
-
-class StepTaken(NamedTuple):
-    """What a step gives: its states, its gain as arrays in tuples or lists, and whether all is definite.
-
-    Of several steps, arrays and truth values have one row for each.
-    """
-
-    states: tuple[Any, ...]
-    gain: Any
-    definite: Any
 
 
 class RecordedStep(NamedTuple):

@@ -19,6 +19,18 @@ from gpbnb.arithmetic.algebra import Algebra, Matrix, as_computed, inverse_in_or
 from gpbnb.filters.forms import Form
 
 
+class StepTaken(NamedTuple):
+    """What a step gives: its states, its gain as arrays in tuples or lists, and whether all is definite.
+
+    All is definite if all variances, and all pivots of the innovation covariance, are positive. Of several steps,
+    arrays and truth values have one row for each.
+    """
+
+    states: tuple[Any, ...]
+    gain: Any
+    definite: Any
+
+
 class BlockStorage(NamedTuple):
     """How each block of a filter takes numbers from the model or from another block; by default as they are."""
 
@@ -61,14 +73,6 @@ class Innovation(NamedTuple):
     pivots: list[Any]
 
 
-class Gain(NamedTuple):
-    """A gain (n, m), the innovation covariance (m, m) and the pivots of its elimination."""
-
-    K: Matrix
-    innovation_covariance: Matrix
-    pivots: list[Any]
-
-
 def predicted(algebra: Algebra, Phi: Matrix, P: Matrix, Q: Matrix) -> Matrix:
     r"""Return :math:`(\Phi P)\Phi^T + Q`; (100)."""
     times = algebra.times
@@ -84,10 +88,10 @@ def innovation(algebra: Algebra, H: Matrix, R: Matrix, V: Matrix, about: Callabl
     return Innovation(VH, S, *algebra.invert(S, algebra.identity(len(S))))
 
 
-def gain(algebra: Algebra, H: Matrix, R: Matrix, V: Matrix) -> Gain:
+def gain(algebra: Algebra, H: Matrix, R: Matrix, V: Matrix) -> tuple[Matrix, Innovation]:
     """Return :math:`(VH^T)(H(VH^T) + R)^{-1}` for the predicted covariance V; the first form of (99)."""
     found = innovation(algebra, H, R, V)
-    return Gain(algebra.times(found.VH, found.inverse), found.covariance, found.pivots)
+    return algebra.times(found.VH, found.inverse), found
 
 
 def reduction(algebra: Algebra, K: Matrix, H: Matrix) -> Matrix:
@@ -115,10 +119,7 @@ class BlockAlgebra(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """A gain (n, m), the covariance (n, n) after a measurement, the innovation covariance, and whether all is definite.
-
-    That is so if all variances, and all pivots of the innovation covariance, are positive.
-    """
+    """A gain (n, m), covariance (n, n) and innovation covariance after a measurement, and whether all is definite."""
 
     K: Matrix
     P: Matrix
@@ -345,15 +346,6 @@ def decorrelated(UR: Matrix, a: Matrix) -> Matrix:
     return _stacked(rows)
 
 
-class FactoredStep(NamedTuple):
-    """The estimate (n,), the factors or root (n, n), the gains (n,) one by one, and whether variances stay positive."""
-
-    x: Matrix
-    P: Matrix
-    gains: list[Matrix]
-    definite: bool
-
-
 Observe = Callable[[Matrix, Matrix, Matrix, Matrix, Matrix], tuple[Matrix, Matrix, Matrix, bool]]
 """An update by one measurement, such as :func:`observe_ud`."""
 
@@ -366,10 +358,10 @@ def observed(
     ahead: Matrix,
     P: Matrix,
     stored: BlockStorage = ONE_FORMAT,
-) -> FactoredStep:
+) -> StepTaken:
     """Update a predicted estimate (n,) and its factors or root P (n, n) by measurements z (m,), one by one.
 
-    They are decorrelated by the factors of R, UR (m, m).
+    They are decorrelated by the factors of R, UR (m, m). Column i of the gain is that of measurement i.
     """
     UR, of_state = stored.innovation(UR), stored.state(UR)
     rows, values, gains, x, definite = (
@@ -383,7 +375,7 @@ def observed(
         x, P, K, positive = observe(rows[i], values[i], UR[i, i], x, P)
         gains.append(K)
         definite = definite & positive
-    return FactoredStep(x, P, gains, definite)
+    return StepTaken((x, P), np.stack(gains, axis=1), definite)
 
 
 def root_of_factors(U: Matrix) -> Matrix:
@@ -454,17 +446,6 @@ FACTORED: dict[Form, Factored] = {
 # -- whole steps -------------------------------------------------------------------------------------------------------
 
 
-class LinearTaken(NamedTuple):
-    """What a step gives; in the forms with factors and roots, column i of K is the gain of measurement i."""
-
-    x: Any
-    carried: Any
-    P: Any
-    K: Any
-    S: Any | None
-    definite: Any
-
-
 class LinearStep:
     """A step on arrays of any kind, also of those that record their operations.
 
@@ -480,16 +461,18 @@ class LinearStep:
     ) -> None:
         self.form, self.blocks, self.given, self.about = form, blocks, given, about
 
-    def taken(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
-        """Take a step from an estimate (n,), a covariance, factors or a root (n, n), and what compensation carries."""
+    def taken(self, states: tuple[Any, ...], z: Any) -> StepTaken:
+        """Take a step from an estimate (n,), a covariance, factors or a root (n, n), and what compensation carries.
+
+        The gain is (K, S), or with factors and roots (K,), of which column i is the gain of measurement i.
+        """
         if "d" in self.given:
             self.about("the measurement without its offset")
             z = z - self.given["d"]
-        if self.form in FACTORED:
-            return self._factored(x, P, carried, z)
-        return self._covariance(x, P, carried, z)
+        return self._factored(states, z) if self.form in FACTORED else self._covariance(states, z)
 
-    def _covariance(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
+    def _covariance(self, states: tuple[Any, ...], z: Any) -> StepTaken:
+        x, P, *carried = states
         blocks, given, form, about = self.blocks, self.given, self.form, self.about
         stored = blocks.stored
         about("the predicted covariance")
@@ -507,10 +490,10 @@ class LinearStep:
             loop = blocks.state.times(stored.state(W), stored.state(given["Phi"]))
             x = blocks.state.rounded(self._times(loop, x) + self._times(own, z))
         elif form is Form.COMPENSATED:
-            x, carried = self._compensated(x, carried, own, z)
+            x, *carried = self._compensated(x, carried[0], own, z)
         else:
             x = corrected(blocks.state, stored.state(H), own, self._ahead(x)[:, None], z[:, None])[:, 0]
-        return LinearTaken(x, carried, P, K, S, definite)
+        return StepTaken((x, P, *carried), (K, S), definite)
 
     def _ahead(self, x: Any) -> Any:
         return self._with_inputs(self._times(self.blocks.stored.state(self.given["Phi"]), x))
@@ -530,7 +513,8 @@ class LinearStep:
         after = x + change
         return after, (after - x) - change
 
-    def _factored(self, x: Any, P: Any, carried: Any, z: Any) -> LinearTaken:
+    def _factored(self, states: tuple[Any, ...], z: Any) -> StepTaken:
+        x, P = states
         stored, given, about = self.blocks.stored, self.given, self.about
         predict, observe, _ = FACTORED[self.form]
         about("the predicted covariance")
@@ -541,21 +525,11 @@ class LinearStep:
         ahead = self._ahead(x)
         if self.form is Form.UD:
             observe = partial(observe, stored=stored)
-        found = observed(observe, given["H"], given["UR"], z, ahead, P, stored)
-        K: Any = np.stack(found.gains, axis=1)
-        return LinearTaken(found.x, carried, found.P, K, None, definite & found.definite)
+        states, K, positive = observed(observe, given["H"], given["UR"], z, ahead, P, stored)
+        return StepTaken(states, (K,), definite & positive)
 
 
 # -- smoothing ---------------------------------------------------------------------------------------------------------
-
-
-class RootModel(NamedTuple):
-    """The matrices of one step with roots: Phi (n, n), H (m, n), a root of Q (n, n), factors of R (m, m)."""
-
-    Phi: Matrix
-    H: Matrix
-    SQ: Matrix
-    UR: Matrix
 
 
 def filtered(
@@ -567,7 +541,7 @@ def filtered(
     a smoother keeps of the step.
     """
     V = predicted(algebra, model.Phi, P, model.Q)
-    K = gain(algebra, model.H, model.R, V).K
+    K, _ = gain(algebra, model.H, model.R, V)
     P = updated(algebra, form, model, V, K)
     ahead = algebra.times(model.Phi, x)
     return corrected(algebra, model.H, K, ahead, z), P, ahead, V
@@ -583,14 +557,16 @@ def smoothed(
     return x, rounded(before[1] + times(times(G, rounded(P - V)), G.T))
 
 
-def filtered_root(model: RootModel, x: Matrix, S: Matrix, z: Matrix, identity: Matrix) -> tuple[Matrix, ...]:
+def filtered_root(
+    Phi: Matrix, H: Matrix, SQ: Matrix, UR: Matrix, x: Matrix, S: Matrix, z: Matrix, identity: Matrix
+) -> tuple[Matrix, ...]:
     """Take one step with square roots, from an estimate x (n,) and a root S (n, n), with a measurement z (m,).
 
-    Return x and S, the prediction, and A, B and C of the triangle.
+    Given are a root of Q and factors of R. Return x and S, the prediction, and A, B and C of the triangle.
     """
-    A, B, C = _joint_root(model, S, identity)
-    ahead = model.Phi @ x
-    x, S, _, _ = observed(observe_carlson, model.H, model.UR, z, ahead, C)
+    A, B, C = _joint_root(Phi, SQ, S, identity)
+    ahead = Phi @ x
+    (x, S), _, _ = observed(observe_carlson, H, UR, z, ahead, C)
     return x, S, ahead, A, B, C
 
 
@@ -602,12 +578,12 @@ def smoothed_root(
     return before + B @ solved[:, 0], predict_root(B, solved[:, 1:], A)[0]
 
 
-def _joint_root(model: RootModel, S: Matrix, identity: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+def _joint_root(Phi: Matrix, SQ: Matrix, S: Matrix, identity: Matrix) -> tuple[Matrix, Matrix, Matrix]:
     """Return A, B and C of the triangle; the root of the prediction, C, has the digits of the filter alone."""
     n, zero = len(S), identity * 0
-    Phi = np.concatenate([np.concatenate([identity, zero], axis=1), np.concatenate([model.Phi, identity], axis=1)])
-    joint = np.concatenate([np.concatenate([S, zero], axis=1), np.concatenate([zero, model.SQ], axis=1)])
-    root, _ = predict_root(Phi, joint, joint[:, :0])
+    both = np.concatenate([np.concatenate([identity, zero], axis=1), np.concatenate([Phi, identity], axis=1)])
+    joint = np.concatenate([np.concatenate([S, zero], axis=1), np.concatenate([zero, SQ], axis=1)])
+    root, _ = predict_root(both, joint, joint[:, :0])
     return root[:n, :n], root[:n, n:], root[n:, n:]
 
 
@@ -626,23 +602,11 @@ class ExtendedModel(NamedTuple):
     R: Matrix  # (m, m), or its factors
 
 
-class ExtendedStep(NamedTuple):
-    """What a step returns: the estimate (n,), and its covariance, factors or root (n, n).
+def extended_step(blocks: BlockAlgebra, form: Form, model: ExtendedModel, x: Matrix, P: Matrix, z: Matrix) -> StepTaken:
+    """Predict, then update once or several times, each time with h and its derivatives at the last estimate.
 
-    The gain is K (n, m); with factors, the gain of each measurement, H, and the factors of R. The step is definite if
-    all variances and pivots are positive.
+    The gain is (K,), or with factors and roots the gains of one measurement after the other, H, and the factors of R.
     """
-
-    x: Matrix
-    P: Matrix
-    gain: tuple[Matrix, ...]
-    definite: Any
-
-
-def extended_step(
-    blocks: BlockAlgebra, form: Form, model: ExtendedModel, x: Matrix, P: Matrix, z: Matrix
-) -> ExtendedStep:
-    """Predict, then update once or several times, each time with h and its derivatives at the last estimate."""
     stored = blocks.stored
     ahead, F = model.f(x)
     if form in FACTORED:
@@ -660,14 +624,13 @@ def extended_step(
         if form in FACTORED:  # what the measurements correct is zero before them
             observe = FACTORED[form].observe
             observe = partial(observe, stored=stored) if form is Form.UD else observe
-            step = observed(observe, H, model.R, y, ahead * 0, V, stored)
-            x, P, positive = ahead + step.x, step.P, step.definite
-            K = (np.stack(step.gains, axis=1), H, model.R)
+            (change, P), gains, positive = observed(observe, H, model.R, y, ahead * 0, V, stored)
+            x, K = ahead + change, (gains, H, model.R)
         else:
             found = measured_in(blocks, form, H, model.R, V)
             x = corrected_by(blocks.state, stored.state(found.K), ahead, y)
             P, K, positive = found.P, (found.K,), found.definite
-    return ExtendedStep(x, P, K, definite & positive)
+    return StepTaken((x, P), K, definite & positive)
 
 
 class UnscentedModel(NamedTuple):
@@ -683,16 +646,7 @@ class UnscentedModel(NamedTuple):
     R: Matrix  # (m, m)
 
 
-class UnscentedStep(NamedTuple):
-    """Estimate (n,), gain (n, m) and covariance (n, n) after a step, and whether variances and pivots are positive."""
-
-    x: Matrix
-    K: Matrix
-    P: Matrix
-    definite: Any
-
-
-def unscented_step(algebra: Algebra, model: UnscentedModel, x: Matrix, P: Matrix, z: Matrix) -> UnscentedStep:
+def unscented_step(algebra: Algebra, model: UnscentedModel, x: Matrix, P: Matrix, z: Matrix) -> StepTaken:
     r"""Take one step of an unscented filter.
 
     The points are :math:`x` and :math:`x \pm` the columns of the lower Cholesky factor of :math:`(n + \lambda)P`. With
@@ -724,7 +678,7 @@ def unscented_step(algebra: Algebra, model: UnscentedModel, x: Matrix, P: Matrix
     definite = np.all(np.diagonal(P) > 0)
     for each in pivots:
         definite = definite & np.all(each > 0)
-    return UnscentedStep(corrected_by(algebra, K, ahead, model.difference(z, expected)), K, P, definite)
+    return StepTaken((corrected_by(algebra, K, ahead, model.difference(z, expected)), P), (K,), definite)
 
 
 def _mean(weights: Matrix, points: list[Matrix], difference: Callable[[Matrix, Matrix], Matrix]) -> Any:

@@ -44,6 +44,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.named import naming
 from gpbnb.filters.program import Program, dot, matrices_of, recorded
 
 DESIGN = FloatFormat(2, 256, Rounding.EVEN)
@@ -217,10 +218,8 @@ def transfer_function(b: Any, a: Any) -> tuple[list[Fraction], list[Fraction]]:
     """
     rows = []
     for letter, given in (("b", b), ("a", a)):
-        try:
+        with naming(letter):
             entries = exact(given)
-        except (TypeError, ValueError) as error:
-            raise type(error)(f"{letter}: {error}") from None
         if entries.ndim > 1 or not entries.size:
             raise ValueError(
                 f"got {letter} of shape {entries.shape}; needed one row of coefficients, such as [1, -0.5]"
@@ -253,10 +252,8 @@ def sections_of(sos: Any) -> list[tuple[list[Fraction], list[Fraction]]]:
         )
     found = []
     for i, row in enumerate(entries):
-        try:
+        with naming(f"section {i}"):
             found.append(transfer_function(row[:3], row[3:]))
-        except ValueError as error:
-            raise ValueError(f"section {i}: {error}") from None
     return found
 
 

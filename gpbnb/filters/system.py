@@ -27,7 +27,7 @@ from gpbnb.arithmetic.named import arithmetic, format_named
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import real_numbers
-from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
+from gpbnb.filters.named import checked_name, checked_names, named, naming, range_text, sized, whole_number
 from gpbnb.filters.opening import as_packed, packed_array, stored_start
 from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.program import AT_LEAST, Program, matrices
@@ -253,10 +253,8 @@ class LinearSystem:
                     "D": np.zeros((len(self.C) if letter == "D" else n, m), dtype=int),
                     "x0": np.zeros(n, dtype=int),
                 }[letter]
-            try:
+            with naming(letter):
                 entries = exact(given)
-            except (TypeError, ValueError) as error:
-                raise type(error)(f"{letter}: {error}") from None
             if letter != "x0" and (entries.ndim != 2 or not entries.size):
                 raise ValueError(f"got {letter} of shape {entries.shape}; needed a matrix")
             entries.flags.writeable = False
@@ -595,10 +593,8 @@ class LinearSystem:
             tag = fmt.run_tag()
             fmt.restart()
             coefficients = given.packed(fmt)
-            try:
+            with naming("inputs"):
                 z = as_packed(fmt, inputs)
-            except OverflowError as error:
-                raise OverflowError(f"inputs: {error}") from None
             x = packed_array(stored_start(fmt, start))
         out, lost = LinearSteps(given.program, fmt, tag, coefficients, x).take(z)
         if lost >= 0:

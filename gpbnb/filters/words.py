@@ -29,6 +29,7 @@ from gpbnb.arithmetic.kernels.selection import MODES
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
+from gpbnb.filters.named import naming
 from gpbnb.filters.program import AT_LEAST, MULTIPLY, Program
 from gpbnb.filters.system import LinearFilter, LinearSystem, system_inputs
 from gpbnb.interrupts import slices
@@ -200,10 +201,8 @@ def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats) ->
 
 def first_integers(x0: Any, fmt: FixedFormat) -> NDArray[Any]:
     """Round a first state as :func:`integers_of` does."""
-    try:
+    with naming("x0"):
         return integers_of(np.asarray(x0)[None], fmt.strict)[0]
-    except OverflowError as error:
-        raise OverflowError(f"x0: {error}") from None
 
 
 def integers_of(values: Any, fmt: FixedFormat) -> NDArray[Any]:

@@ -9,7 +9,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.filters.checkpoints import Checkpoints, Packed
+from gpbnb.filters.checkpoints import Checkpoints, exactly
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
@@ -19,7 +19,7 @@ TENTH = Fraction(1, 10)
 
 def saved(steps, numbers, fmt):
     """Checkpoints with one number, the same for state, gain and covariance."""
-    each = [Packed(numbers.reshape(1, *(1,) * k, *numbers.shape[1:]), fmt) for k in (1, 2, 2)]
+    each = [exactly(numbers.reshape(1, *(1,) * k, *numbers.shape[1:]), fmt) for k in (1, 2, 2)]
     return Checkpoints(steps, *each)
 
 
@@ -28,7 +28,7 @@ def test_a_difference_below_what_double_double_resolves_is_correctly_rounded():
     near = double_doubles(np.array([TENTH]))
     run = saved((2,), fmt.backend.pack(fmt.array(["0.1"]).components), fmt)
     true = Checkpoints(
-        (2, 5), *(Packed(np.concatenate([near, near]).reshape(2, *(1,) * k, 2), None) for k in (1, 2, 2))
+        (2, 5), *(exactly(np.concatenate([near, near]).reshape(2, *(1,) * k, 2), None) for k in (1, 2, 2))
     )
     off = float(TENTH - Fraction(near[0, 0]) - Fraction(near[0, 1]))
     assert 0 < abs(off) < 2.0**-107

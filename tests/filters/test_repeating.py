@@ -11,8 +11,7 @@ from gpbnb import FixedFormat, FloatFormat, NonlinearModel
 from gpbnb.filters import repeating
 from gpbnb.filters.nonlinear_run import NonlinearRun
 from gpbnb.filters.repeating import RepeatedStep
-from gpbnb.filters.stepping import StepTaken
-from gpbnb.filters.steps import if_holds
+from gpbnb.filters.steps import StepTaken, if_holds
 from tests.step_functions import tracked_motion, tracked_sight
 
 Z = [[5.0, 0.93], [5.6, 0.9], [None, 0.88], [6.9, 0.86], [7.5, None], [8.1, 0.83], [8.8, 0.81], [9.4, 0.8]]

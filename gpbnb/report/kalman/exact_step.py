@@ -38,7 +38,7 @@ def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> Exac
     """
     Phi, H, Q, R, x, P, z = map(exact, (Phi, H, Q, R, x, P, z))
     V = predicted(EXACT, Phi, P, Q)
-    K, S, _ = gain(EXACT, H, R, V)
+    K, (_, S, *_) = gain(EXACT, H, R, V)
     W, ahead = reduction(EXACT, K, H), Phi @ x
     innovation = z - H @ ahead
     return ExactStep(ahead + K @ innovation, product_in_order(W, V), V, K, S, innovation, product_in_order(W, Phi))

@@ -79,5 +79,5 @@ def rounded_step(
     step = LinearStep(
         Form.HUNG_SECOND_GAIN if second else Form.HUNG, BlockAlgebra(algebra, algebra, algebra, algebra), given
     )
-    x, _, P, K, *_ = step.taken(x, P, x * 0, z)
+    (x, P), (K, _), _ = step.taken((x, P), z)
     return x, K, P

@@ -53,7 +53,7 @@ def take(algebra: Algebra, number: Number, case: FilterCase, x: Matrix, P: Matri
     """Take one step, (100)-(111), of a filter; the estimate uses the second or the first form of (99)."""
     model = StepModel(*map(number, (case.Phi, case.H, case.Q, case.R)))
     P_kp = predicted(algebra, model.Phi, P, model.Q)
-    K = gain(algebra, model.H, model.R, P_kp).K
+    K, _ = gain(algebra, model.H, model.R, P_kp)
     P_new = updated(algebra, Form.HUNG, model, P_kp, K)
     inverse = algebra.invert(model.R, algebra.identity(len(model.R))).matrix
     K_2 = algebra.times(algebra.times(P_new, model.H.T), inverse)
