@@ -26,7 +26,7 @@ from gpbnb.bounds.guess import EXCESS, FilterLimits, Guess, radius_of
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, matrices
-from gpbnb.filters.system import LinearFilter
+from gpbnb.filters.structures import LinearFilter
 from gpbnb.filters.words import WordFormats, integer_program
 
 KIND = "rounding guarantee 2"

@@ -28,7 +28,7 @@ from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.program import Program, innovation_program, loop_program, matrices, sequential_program
 from gpbnb.filters.run import Run
 from gpbnb.filters.steps import decorrelated
-from gpbnb.filters.system import LinearFilter
+from gpbnb.filters.structures import LinearFilter
 
 MOST, WORK = 20_000, 1e8
 """Largest number of steps to emulate unless more are asked for, and of steps times the cube of the number of states."""

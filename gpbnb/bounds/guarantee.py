@@ -34,7 +34,7 @@ from gpbnb.bounds.units import stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LARGEST_EXPONENT, LinearModel
 from gpbnb.filters.named import whole_number
-from gpbnb.filters.system import LinearFilter
+from gpbnb.filters.structures import LinearFilter
 from gpbnb.filters.words import WordFormats
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain")

@@ -26,7 +26,7 @@ from gpbnb.bounds.gains import Schedule, filter_schedule
 from gpbnb.bounds.units import largest_errors, stored_sizes, units
 from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.program import ADD, MULTIPLY, Program, matrices
-from gpbnb.filters.system import LinearFilter
+from gpbnb.filters.structures import LinearFilter
 
 Array = NDArray[np.float64]
 

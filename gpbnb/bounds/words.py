@@ -30,7 +30,8 @@ from gpbnb.bounds.certificate import of_operations, proved
 from gpbnb.bounds.guess import EXCESS, Guess, error_effects, gains, lags_of, loops, positive
 from gpbnb.bounds.units import units
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, exact_functionals, matrices
-from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable
+from gpbnb.filters.structures import LinearFilter
+from gpbnb.filters.system import LinearSystem, is_stable
 from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program
 
 

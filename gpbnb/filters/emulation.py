@@ -66,30 +66,6 @@ class History:
         """The computed estimates in float64, (c, n), which are the reference plus its error."""
         return np.asarray(self.reference.to_float("x")[: len(self.state)] + self.state)
 
-    @property
-    def state_norm(self) -> NDArray[np.float64]:
-        """Largest entry of the error of the estimate, (c,), in norm (21)."""
-        return np.abs(self.state).max(axis=1)
-
-    @property
-    def gain_norm(self) -> NDArray[np.float64]:
-        """Relative error of the gain, (c,), by largest column sums, norm (22)."""
-        return relative(self.gain, self.reference.to_float("K"))
-
-    @property
-    def covariance_norm(self) -> NDArray[np.float64]:
-        """Relative error of the covariance, (c,), by largest column sums, norm (22)."""
-        return relative(self.covariance, self.reference.to_float("P"))
-
-    @property
-    def least_eigenvalue(self) -> NDArray[np.float64]:
-        """Least eigenvalue of the symmetric part of the computed covariance, (c,), in units of the true variances."""
-        true = self.reference.to_float("P")[: len(self.steps)]
-        computed = true + self.covariance
-        scale = np.sqrt(np.diagonal(true, axis1=1, axis2=2))
-        scaled = computed / scale[:, :, np.newaxis] / scale[:, np.newaxis, :]
-        return np.asarray(np.linalg.eigvalsh((scaled + np.swapaxes(scaled, 1, 2)) / 2)[:, 0], dtype=np.float64)
-
     def ratios(self) -> NDArray[np.float64]:
         """Return the largest error over bound of state, gain and covariance, (c, 3); above 1 if one is violated."""
         if self.bounds is None:
@@ -99,12 +75,6 @@ class History:
         with np.errstate(divide="ignore", invalid="ignore"):
             each = [np.where(e == 0, 0.0, np.abs(e) / b).reshape(len(e), -1).max(axis=1) for e, b in pairs]
         return np.stack(each, axis=1)
-
-
-def relative(error: NDArray[np.float64], true: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return norms (22) of errors over norms of the true matrices, (c,)."""
-    size = np.abs(true[: len(error)]).sum(axis=1).max(axis=1)
-    return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
 
 
 def compare_runs(run: Run | NonlinearRun, true: Checkpoints) -> History:

@@ -340,34 +340,27 @@ class NonlinearModel:
 
     def value(self, name: str, x: FloatArray, u: FloatArray | None = None) -> FloatArray:
         """Return f or h at a state, checked to be of its shape and format."""
-        function = getattr(self, name)
-        with kept_in(x.format):
-            return self._checked(name, function(x, *_given(u)), x, (self.n if name == "f" else self.m,))
+        return self._called(name, (self.n if name == "f" else self.m,), x, *_given(u))
 
     def _with_jacobian(
         self, name: str, slopes: str, x: FloatArray, u: FloatArray | None
     ) -> tuple[FloatArray, FloatArray]:
-        function, given = getattr(self, name), getattr(self, slopes)
         rows = self.n if name == "f" else self.m
-        if given is not None:
-            with kept_in(x.format):
-                J = self._checked(slopes, given(x, *_given(u)), x, (rows, self.n))
+        if getattr(self, slopes) is not None:
+            J = self._called(slopes, (rows, self.n), x, *_given(u))
             return self.value(name, x, u), J
         with kept_in(x.format):
-            return jacobian(lambda state: self._checked(name, function(state, *_given(u)), x, (rows,)), x)
+            return jacobian(lambda at: self._checked(name, getattr(self, name)(at, *_given(u)), x, (rows,)), x)
 
     def difference(self, z: FloatArray, predicted: FloatArray) -> FloatArray:
-        """Return the innovation (m,): z - h(x) with its angles wrapped, or what `residual` returns."""
-        if self.residual is not None:
-            with kept_in(z.format):
-                return self._checked("residual", self.residual(z, predicted), z, (self.m,))
-        return self.wrapped(z - predicted)
+        r"""Return the innovation (m,): z - h(x) with its angles wrapped, or what `residual` returns.
 
-    def wrapped(self, y: FloatArray) -> FloatArray:
-        r"""Wrap the angles of a difference (m,): :math:`y - 2\pi\,\mathrm{rint}(y/2\pi)`, each operation rounded.
-
-        The value used for :math:`2\pi` is twice the rounded :math:`\pi`.
+        Angles are wrapped by :math:`y - 2\pi\,\mathrm{rint}(y/2\pi)`, each operation rounded. The value used for
+        :math:`2\pi` is twice the rounded :math:`\pi`.
         """
+        if self.residual is not None:
+            return self._called("residual", (self.m,), z, predicted)
+        y = z - predicted
         if not self.angles:
             return y
         angle = np.isin(np.arange(self.m), self.angles)
@@ -377,10 +370,12 @@ class NonlinearModel:
 
     def normalized(self, x: FloatArray) -> FloatArray:
         """Return a new estimate (n,) after the model's normalization."""
-        if self.normalize is None:
-            return x
+        return x if self.normalize is None else self._called("normalize", (self.n,), x)
+
+    def _called(self, name: str, shape: tuple[int, ...], x: FloatArray, *others: FloatArray) -> FloatArray:
+        """Call a function of the model, and check that its result has a shape, and the format of its first argument."""
         with kept_in(x.format):
-            return self._checked("normalize", self.normalize(x), x, (self.n,))
+            return self._checked(name, getattr(self, name)(x, *others), x, shape)
 
     def _checked(self, name: str, found: Any, x: FloatArray, shape: tuple[int, ...]) -> FloatArray:
         found = _joined([found] if shape == (1,) and getattr(found, "shape", None) == () else found, x)

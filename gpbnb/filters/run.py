@@ -20,7 +20,6 @@ from gpbnb.arithmetic.rounding import Limits, Order, Rounding
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Progress, exactly, without_factors
-from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.forms import WITH_PROGRAM, Form, form_named
 from gpbnb.filters.model import LinearModel, identity_in
 from gpbnb.filters.opening import (
@@ -201,17 +200,9 @@ class Run(Progress):
     @property
     def bounds(self) -> Bounds:
         """Bounds of the errors at the checkpoint steps."""
-        return self._bound_taken_along().saved
-
-    @property
-    def bound(self) -> Contraction:
-        """The contraction bound after the last step."""
-        return self._bound_taken_along().now
-
-    def _bound_taken_along(self) -> CarriedBound:
         if self._carried is None:
             raise ValueError("got a run without its bound; needed bounded=True")
-        return self._carried
+        return self._carried.saved
 
     def blocks(self, z: Any) -> Iterator[Block]:
         """Continue by as many steps as there are measurements, (steps, m), and give their results some at a time.

@@ -13,7 +13,8 @@ from gpbnb.filters.forms import CONSTANT_GAIN, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.program import innovation_program
 from gpbnb.filters.run import Run
-from gpbnb.filters.system import LinearFilter, LinearSystem
+from gpbnb.filters.structures import LinearFilter
+from gpbnb.filters.system import LinearSystem
 
 SETTLED = 2.0**-64
 """Largest change of a gain in a step, relative to its largest entry, that counts as settled."""

@@ -33,6 +33,7 @@ exact, or have relative errors below 2**-250.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import islice
 from typing import Any, NamedTuple
@@ -41,17 +42,26 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.named import naming
-from gpbnb.filters.program import Program, dot, matrices_of, recorded
+from gpbnb.filters.named import checked_name, naming
+from gpbnb.filters.opening import packed_array
+from gpbnb.filters.program import AT_LEAST, Program, dot, matrices_of, recorded
 
 DESIGN = FloatFormat(2, 256, Rounding.EVEN)
 """Format of computed coefficients that would be too long as fractions."""
 
 LONGEST = 512
 """Bits of numerator and denominator together up to which a computed coefficient is kept as it is."""
+
+
+_WORDS = (
+    "; coefficients may have a format of their own: WordFormats(data, coefficients), or --kind words in the command"
+)
 
 
 class Cascade(NamedTuple):
@@ -66,12 +76,73 @@ class Cascade(NamedTuple):
         return [([*islice(values, above)], [*islice(values, below)]) for above, below in self.lengths]
 
 
-class Structure(NamedTuple):
-    """One step of a filter in a structure."""
+@dataclass(frozen=True, eq=False)
+class LinearFilter:
+    """A linear filter: the operations of a step, and its coefficients, exact."""
 
-    program: Program  # its outputs follow the states
+    program: Program
     coefficients: NDArray[Any]  # (c,), the exact design values, which are rounded when a format stores them
-    cascade: Cascade | None = None
+    name: str = "a linear filter"  # in tables
+    cascade: Cascade | None = None  # its sections, if it is a cascade
+
+    def __post_init__(self) -> None:
+        checked_name(self.name)
+        try:
+            _ = self.program.operations
+        except ValueError as error:
+            raise ValueError(f"{self.name}: {error}") from None
+
+    def stored(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
+        """Return the coefficients as a run in a format stores them, exact, (c,).
+
+        In fixed point, nothing is multiplied by 1 or -1, which need not be numbers of the format. Stochastic rounding
+        begins with its first random number, as in a run.
+        """
+        fmt.restart()
+        unit, rounded = self._stored(fmt)
+        return np.where(unit, self.coefficients, np.asarray(rounded.to_fractions(), dtype=object))
+
+    def _stored(self, fmt: FloatFormat | FixedFormat) -> tuple[NDArray[np.bool_], FloatArray]:
+        """Return which coefficients are exact, and all others in the format."""
+        unit, others = np.zeros(len(self.coefficients), np.bool_), self.coefficients.copy()
+        if isinstance(fmt, FixedFormat):
+            limits = self.limits_in(fmt)
+            unit = abs(self.coefficients) == 1
+            unit[list(limits)] = False  # limits are data
+            others[list(limits)] = list(limits.values())
+        others[unit] = Fraction(0)
+        try:
+            return unit, fmt.store(others)
+        except OverflowError:
+            raise self._beyond(fmt, others) from None
+
+    def limits_in(self, data: FixedFormat) -> dict[int, Fraction]:
+        """Return the coefficients that are limits; one beyond the data, as 1 in Q15, is their last number instead."""
+        found = dict[int, Fraction]()
+        for code, a, _ in self.program.operations.tolist():
+            if code >= AT_LEAST:
+                value = self.coefficients[a]
+                found[a] = max(value, data.lowest) if code == AT_LEAST else min(value, data.largest)
+        return found
+
+    def packed(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
+        """Return the coefficients, rounded into a format, as the compiled loops expect them."""
+        unit, rounded = self._stored(fmt)
+        found = packed_array(rounded)
+        if unit.any():  # fixed point has loops for float64 only
+            found[unit] = self.coefficients[unit].astype(np.float64)
+        return found
+
+    def _beyond(self, fmt: FloatFormat | FixedFormat, coefficients: NDArray[Any]) -> OverflowError:
+        """Return the error that names the first coefficient beyond the range of a format."""
+        names = self.program.coefficient_names or [str(i) for i in range(len(self.coefficients))]
+        for name, value in zip(names, coefficients, strict=True):
+            try:
+                fmt.strict.round(value)
+            except OverflowError as error:
+                cure = _WORDS if isinstance(fmt, FixedFormat) else ""
+                return OverflowError(f"coefficient {name}: {error}{cure}")
+        return OverflowError(f"got coefficients beyond the range of {arithmetic(fmt)}")
 
 
 class Section(NamedTuple):
@@ -284,7 +355,7 @@ def shortened(values: Sequence[Fraction]) -> list[Fraction]:
 # -- structures -------------------------------------------------------------------------------------------------------
 
 
-def cascade(sections: Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]], name: str) -> Structure:
+def cascade(sections: Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]], name: str) -> LinearFilter:
     """Return sections in a row, each in the direct form with this name; the output of one is the input of the next."""
     form = DIRECT[name]
     padded = [([*b, *[Fraction(0)] * (len(a) + 1 - len(b))] if form.pads else [*b], [*a]) for b, a in sections]
@@ -310,10 +381,10 @@ def cascade(sections: Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]], n
     program = recorded(step, len(states) + 1, 1, len(labels), 1, [*states, "y"], labels, outputs)
     lengths = tuple((len(b), len(a)) for b, a in padded)
     coefficients = exact([each for b, a in padded for each in (*b, *a)])
-    return Structure(program, coefficients, Cascade(name, lengths) if len(padded) > 1 else None)
+    return LinearFilter(program, coefficients, cascade=Cascade(name, lengths) if len(padded) > 1 else None)
 
 
-def lattice(b: Sequence[Fraction], a: Sequence[Fraction]) -> Structure:
+def lattice(b: Sequence[Fraction], a: Sequence[Fraction]) -> LinearFilter:
     """Return the lattice and ladder of a filter, with two products for each reflection coefficient."""
     K = max(len(b) - 1, len(a))
     k, v = reflections([*b, *[Fraction(0)] * (K + 1 - len(b))], [Fraction(1), *a, *[Fraction(0)] * (K - len(a))])
@@ -328,7 +399,7 @@ def lattice(b: Sequence[Fraction], a: Sequence[Fraction]) -> Structure:
 
     names = [f"k{i + 1}" for i in range(K)] + [f"v{i}" for i in range(K + 1)]
     states = [*(f"g{i}" for i in range(K)), "y"]
-    return Structure(recorded(step, K + 1, 1, 2 * K + 1, 1, states, names), exact([*k, *v]))
+    return LinearFilter(recorded(step, K + 1, 1, 2 * K + 1, 1, states, names), exact([*k, *v]))
 
 
 def reflections(b: Sequence[Fraction], a: Sequence[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
@@ -410,10 +481,15 @@ def _fractions(matrix: fmpq_mat) -> NDArray[Any]:
     return found
 
 
-def state_space_structure(A: Any, B: Any, C: Any = None, D: Any = None) -> Structure:
-    """Return a filter from its exact matrices; with C (p, n) and D (p, m), its last p states are the outputs."""
+def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a state-space filter") -> LinearFilter:
+    """Return a filter from its matrices; with C (p, n) and D (p, m), its last p states are the outputs."""
+    A, B, C, D = (each if each is None else exact(each) for each in (A, B, C, D))
     n, m = B.shape
     p = 0 if C is None else len(C)
+    if A.shape != (n, n) or (C is not None and (C.shape != (p, n) or D.shape != (p, m))):
+        raise ValueError(
+            f"got A of shape {A.shape} and B of shape {B.shape}; needed (n, n) and (n, m), C (p, n), D (p, m)"
+        )
     names = [
         f"{letter}{i + 1}_{j + 1}"
         for letter, each in zip("ABCD", (A, B, C, D), strict=True)
@@ -427,7 +503,7 @@ def state_space_structure(A: Any, B: Any, C: Any = None, D: Any = None) -> Struc
 
     states = [*_numbered("x", n), *(["y"] if p == 1 else _numbered("y", p))]
     coefficients = np.concatenate([np.asarray(each).reshape(-1) for each in (A, B, C, D) if each is not None])
-    return Structure(recorded(step, n + p, m, len(coefficients), p, states, names), coefficients)
+    return LinearFilter(recorded(step, n + p, m, len(coefficients), p, states, names), coefficients, name)
 
 
 # -- sums, smoothing and control --------------------------------------------------------------------------------------
@@ -437,7 +513,7 @@ SUMS = ("left", "pairwise", "blocked", "tree")
 """Orders in which a sum is added, those of :func:`gpbnb.arithmetic.linalg.matmul`, and neighbours level by level."""
 
 
-def sum_structure(count: int, order: str, block: int, running: bool) -> Structure:
+def sum_structure(count: int, order: str, block: int, running: bool) -> LinearFilter:
     """Return the sum of the inputs of a step, added to that of all earlier steps if it is running.
 
     The states are the sum, and the sum again as output.
@@ -449,7 +525,7 @@ def sum_structure(count: int, order: str, block: int, running: bool) -> Structur
             total = x[0] + total
         return [total, total]
 
-    return Structure(recorded(step, 2, count, 0, 1, ["sum", "y"]), exact(np.zeros(0, dtype=int)))
+    return LinearFilter(recorded(step, 2, count, 0, 1, ["sum", "y"]), exact(np.zeros(0, dtype=int)))
 
 
 def _in_a_row(values: Any, block: int) -> Any:
@@ -480,42 +556,37 @@ def _by_blocks(values: Any, block: int) -> Any:
 _SUMMED = dict(zip(SUMS, (_in_a_row, _by_halves, _by_blocks, _by_levels), strict=True))
 
 
-def smoother(alpha: Fraction) -> Structure:
+def smoother(alpha: Fraction) -> LinearFilter:
     """Return exponential smoothing :math:`y + α(u - y)`; the states are y, and y again as output."""
 
     def step(c: Any, x: Any, u: Any) -> list[Any]:
         y = x[0] + c[0] * (u[0] - x[0])
         return [y, y]
 
-    return Structure(recorded(step, 2, 1, 1, 1, ["y1", "y"], ["alpha"]), exact([alpha]))
+    return LinearFilter(recorded(step, 2, 1, 1, 1, ["y1", "y"], ["alpha"]), exact([alpha]))
 
 
-class Controller(NamedTuple):
-    r"""Settings of a PID controller with the error e as its input; all exact, None where a term is absent.
+def controller(
+    Kp: Fraction,
+    Ki: Fraction,
+    leak: Fraction,
+    Kd: Fraction | None,
+    limits: tuple[Fraction, Fraction] | None,
+    integral_limits: tuple[Fraction, Fraction] | None,
+    back: Fraction | None,
+) -> LinearFilter:
+    """Return a PI or PID controller, with up to four states: integral, last error, excess over the limits, and output.
 
-    .. math::
-        i \leftarrow \lambda i + K_i e + K_b (u - v),\quad v = K_p e + i + K_d(e - e_{-1}),\quad u = v \text{ limited}
+    Its equations are those of :meth:`gpbnb.filters.system.LinearSystem.pid`; None stands for a term that is absent.
     """
-
-    Kp: Fraction  # gains per step
-    Ki: Fraction
-    Kd: Fraction | None = None
-    leak: Fraction = Fraction(1)  # λ, the factor by which the integral decays in a step
-    limits: tuple[Fraction, Fraction] | None = None  # lowest and highest output
-    integral_limits: tuple[Fraction, Fraction] | None = None  # lowest and highest
-    back: Fraction | None = None  # the gain K_b
-
-
-def controller_structure(given: Controller) -> Structure:
-    """Return a PI or PID controller with four states: integral, last error, excess over the limits, and output."""
-    numbers: dict[str, Fraction] = {"leak": given.leak, "Ki": given.Ki, "Kp": given.Kp}
-    if given.Kd is not None:
-        numbers["Kd"] = given.Kd
-    for end, pair in (("", given.limits), ("_integral", given.integral_limits)):
+    numbers: dict[str, Fraction] = {"leak": leak, "Ki": Ki, "Kp": Kp}
+    if Kd is not None:
+        numbers["Kd"] = Kd
+    for end, pair in (("", limits), ("_integral", integral_limits)):
         if pair is not None:
             numbers[f"low{end}"], numbers[f"high{end}"] = pair
-    if given.back is not None:
-        numbers["Kb"] = given.back
+    if back is not None:
+        numbers["Kb"] = back
     states = ["integral", *(["last"] if "Kd" in numbers else []), *(["excess"] if "Kb" in numbers else []), "y"]
 
     def step(c: Any, x: Any, u: Any) -> list[Any]:
@@ -538,4 +609,4 @@ def controller_structure(given: Controller) -> Structure:
         return [following[each] for each in states]
 
     program = recorded(step, len(states), 1, len(numbers), 1, states, list(numbers))
-    return Structure(program, exact(list(numbers.values())))
+    return LinearFilter(program, exact(list(numbers.values())))

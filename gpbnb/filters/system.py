@@ -10,14 +10,13 @@ emulated and bounded.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -30,32 +29,26 @@ from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, naming, range_text, sized, whole_number
 from gpbnb.filters.opening import as_packed, packed_array, stored_start
 from gpbnb.filters.pairs import nearest_double_doubles
-from gpbnb.filters.program import AT_LEAST, Program, matrices
+from gpbnb.filters.program import matrices
 from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
 from gpbnb.filters.structures import (
     CASCADES,
     DIRECT,
     SUMS,
-    Cascade,
-    Controller,
-    Structure,
+    LinearFilter,
     balanced,
     cascade,
     check_of_cascade,
     companion,
-    controller_structure,
+    controller,
     expanded,
     lattice,
     sections_of,
     smoother,
-    state_space_structure,
+    state_space,
     structure_named,
     sum_structure,
     transfer_function,
-)
-
-_WORDS = (
-    "; coefficients may have a format of their own: WordFormats(data, coefficients), or --kind words in the command"
 )
 
 BLOCK = 32
@@ -63,106 +56,6 @@ BLOCK = 32
 
 MOST_INPUTS = 100_000
 """Largest number of inputs of a sum, whose operations are listed in seconds."""
-
-
-@dataclass(frozen=True, eq=False)
-class LinearFilter:
-    """A linear filter: the operations of a step, and its coefficients, exact."""
-
-    program: Program
-    coefficients: NDArray[Any]  # (c,), the exact design values, which are rounded when a format stores them
-    name: str = "a linear filter"  # in tables
-    cascade: Cascade | None = None  # its sections, if it is a cascade
-
-    def __post_init__(self) -> None:
-        checked_name(self.name)
-        try:
-            _ = self.program.operations
-        except ValueError as error:
-            raise ValueError(f"{self.name}: {error}") from None
-
-    def stored(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
-        """Return the coefficients as a run in a format stores them, exact, (c,).
-
-        In fixed point, nothing is multiplied by 1 or -1, which need not be numbers of the format. Stochastic rounding
-        begins with its first random number, as in a run.
-        """
-        fmt.restart()
-        unit, rounded = self._stored(fmt)
-        return np.where(unit, self.coefficients, np.asarray(rounded.to_fractions(), dtype=object))
-
-    def _stored(self, fmt: FloatFormat | FixedFormat) -> tuple[NDArray[np.bool_], FloatArray]:
-        """Return which coefficients are exact, and all others in the format."""
-        unit, others = np.zeros(len(self.coefficients), np.bool_), self.coefficients.copy()
-        if isinstance(fmt, FixedFormat):
-            limits = self.limits_in(fmt)
-            unit = abs(self.coefficients) == 1
-            unit[list(limits)] = False  # limits are data
-            others[list(limits)] = list(limits.values())
-        others[unit] = Fraction(0)
-        try:
-            return unit, fmt.store(others)
-        except OverflowError:
-            raise self._beyond(fmt, others) from None
-
-    def limits_in(self, data: FixedFormat) -> dict[int, Fraction]:
-        """Return the coefficients that are limits; one beyond the data, as 1 in Q15, is their last number instead."""
-        found = dict[int, Fraction]()
-        for code, a, _ in self.program.operations.tolist():
-            if code >= AT_LEAST:
-                value = self.coefficients[a]
-                found[a] = max(value, data.lowest) if code == AT_LEAST else min(value, data.largest)
-        return found
-
-    def packed(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
-        """Return the coefficients, rounded into a format, as the compiled loops expect them."""
-        unit, rounded = self._stored(fmt)
-        found = packed_array(rounded)
-        if unit.any():  # fixed point has loops for float64 only
-            found[unit] = self.coefficients[unit].astype(np.float64)
-        return found
-
-    def _beyond(self, fmt: FloatFormat | FixedFormat, coefficients: NDArray[Any]) -> OverflowError:
-        """Return the error that names the first coefficient beyond the range of a format."""
-        names = self.program.coefficient_names or [str(i) for i in range(len(self.coefficients))]
-        for name, value in zip(names, coefficients, strict=True):
-            try:
-                fmt.strict.round(value)
-            except OverflowError as error:
-                cure = _WORDS if isinstance(fmt, FixedFormat) else ""
-                return OverflowError(f"coefficient {name}: {error}{cure}")
-        return OverflowError(f"got coefficients beyond the range of {arithmetic(fmt)}")
-
-
-def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a state-space filter") -> LinearFilter:
-    """Return a filter from its matrices; with C and D, its last states are the outputs."""
-    A, B = exact(A), exact(B)
-    n, m = B.shape
-    outputs = 0 if C is None else len(exact(C))
-    if A.shape != (n, n) or (C is not None and (exact(C).shape != (outputs, n) or exact(D).shape != (outputs, m))):
-        raise ValueError(
-            f"got A of shape {A.shape} and B of shape {B.shape}; needed (n, n) and (n, m), C (p, n), D (p, m)"
-        )
-    return _named(state_space_structure(A, B, *(() if C is None else (exact(C), exact(D)))), name)
-
-
-def biquad(b0: Any, b1: Any, b2: Any, a1: Any, a2: Any) -> LinearFilter:
-    """Return a second-order section (b0 + b1/z + b2/z²)/(1 + a1/z + a2/z²), transposed form II; output is state 2."""
-    b, a = exact([b0, b1, b2]).tolist(), exact([a1, a2]).tolist()
-    return _named(cascade([(b, a)], "direct form II transposed"), "a second-order section")
-
-
-def controller(leak: Any, Ki: Any, Kp: Any, Kd: Any) -> LinearFilter:
-    """Return a PID controller whose integral decays by the factor `leak` per step; input is the error, output state 2.
-
-    With leak = 1 the integral keeps every rounding error, and there is no bound that holds for ever.
-    """
-    leak, Ki, Kp, Kd = exact([leak, Ki, Kp, Kd])
-    return _named(controller_structure(Controller(Kp, Ki, Kd, leak)), "a PID controller")
-
-
-def _named(made: Structure, name: str) -> LinearFilter:
-    return LinearFilter(made.program, made.coefficients, name, made.cascade)
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -268,13 +161,16 @@ class LinearSystem:
                 )
 
     @classmethod
-    def from_filter(cls, made: LinearFilter, x0: Any = None) -> LinearSystem:
+    def from_filter(cls, made: LinearFilter, x0: Any = None, name: str | None = None) -> LinearSystem:
         """Return a system that a program computes; A, B, C and D are the exact matrices of the program.
+
+        A name replaces that of the filter.
 
         Raises
         ------
         ValueError : the program has no states, or no outputs.
         """
+        made = made if name is None else replace(made, name=name)
         n = made.program.n - made.program.p
         if not made.program.p or not n:
             raise ValueError(f"got a program with {n} states and {made.program.p} outputs; needed at least one of each")
@@ -332,9 +228,10 @@ class LinearSystem:
                 raise ValueError(f'got structure "FIR" and a of {len(bottom) + 1} coefficients; needed a = [1]')
             made = cascade([(top, bottom)], "direct form I")
         else:
-            A, B, C, D = companion(top, bottom)
-            made = state_space_structure(*(balanced((A, B, C, D)) if found == "balanced state space" else (A, B, C, D)))
-        return cls.from_filter(_named(made, found if name is None else name))
+            companions = companion(top, bottom)
+            A, B, C, D = balanced(companions) if found == "balanced state space" else companions
+            made = state_space(A, B, C, D)
+        return cls.from_filter(made, name=found if name is None else name)
 
     @classmethod
     def from_sections(
@@ -382,7 +279,7 @@ class LinearSystem:
         sections = repaired(sections, pairing or "given", "given" if order is None else order)
         if scale:
             sections = scaled(sections, form)
-        return cls.from_filter(_named(cascade(sections, form), f"cascade of {form}" if name is None else name))
+        return cls.from_filter(cascade(sections, form), name=f"cascade of {form}" if name is None else name)
 
     @classmethod
     def from_zeros(
@@ -404,7 +301,7 @@ class LinearSystem:
         check_of_cascade(found, pairing=pairing, order=order)
         sections = sections_from_zeros(z, p, k, pairing or "nearest", "up" if order is None else order)
         if found in CASCADES:
-            return cls.from_filter(_named(cascade(sections, found.removeprefix("cascade of ")), found))
+            return cls.from_filter(cascade(sections, found.removeprefix("cascade of ")), name=found)
         b, a = expanded(sections)
         return cls.from_coefficients(b, a, found)
 
@@ -426,7 +323,7 @@ class LinearSystem:
         >>> system.outputs(np.ones((2, 1)))[:, 0, 0].tolist()
         [0.125, 0.234375]
         """
-        return cls.from_filter(_named(smoother(exact([alpha])[0]), name))
+        return cls.from_filter(smoother(exact([alpha])[0]), name=name)
 
     @classmethod
     def sum(
@@ -466,7 +363,7 @@ class LinearSystem:
             raise ValueError(f"got the sum of {count} inputs; needed at most {MOST_INPUTS}; add sums of fewer inputs")
         made = sum_structure(count, found, block, running)
         usual = "a running sum" if running else f"a {found} sum" if found != "left" else "a sum from left to right"
-        return cls.from_filter(_named(made, usual if name is None else name))
+        return cls.from_filter(made, name=usual if name is None else name)
 
     @classmethod
     def pid(
@@ -511,18 +408,18 @@ class LinearSystem:
         """
         if back_calculation is not None and limits is None:
             raise ValueError("got back_calculation without limits; needed limits=(low, high) of the output")
-        needed = exact([Kp, Ki, leak]).tolist()
-        given = Controller(
-            Kp=needed[0],
-            Ki=needed[1],
-            Kd=None if Kd is None else exact([Kd])[0],
-            leak=needed[2],
-            limits=_ascending("limits", limits),
-            integral_limits=_ascending("integral_limits", integral_limits),
-            back=None if back_calculation is None else exact([back_calculation])[0],
+        proportional, integral, kept = exact([Kp, Ki, leak])
+        made = controller(
+            proportional,
+            integral,
+            kept,
+            None if Kd is None else exact([Kd])[0],
+            _ascending("limits", limits),
+            _ascending("integral_limits", integral_limits),
+            None if back_calculation is None else exact([back_calculation])[0],
         )
         kind = "a PI controller" if Kd is None else "a PID controller"
-        return cls.from_filter(_named(controller_structure(given), kind if name is None else name))
+        return cls.from_filter(made, name=kind if name is None else name)
 
     @property
     def n(self) -> int:

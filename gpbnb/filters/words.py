@@ -31,7 +31,8 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.filters.named import naming
 from gpbnb.filters.program import AT_LEAST, MULTIPLY, Program
-from gpbnb.filters.system import LinearFilter, LinearSystem, system_inputs
+from gpbnb.filters.structures import LinearFilter
+from gpbnb.filters.system import LinearSystem, system_inputs
 from gpbnb.interrupts import slices
 
 _POLICIES = ("raise", "saturate", "wrap")

@@ -22,7 +22,8 @@ from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.sections import scaled
-from gpbnb.filters.system import LinearFilter, LinearSystem
+from gpbnb.filters.structures import LinearFilter
+from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
 from gpbnb.wordlength.answer import Requirement, evidence, joined, share_text
 from gpbnb.wordlength.asked import Asked, is_filter

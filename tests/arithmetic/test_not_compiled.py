@@ -8,7 +8,7 @@ from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.filters.run import Run, Sums
-from gpbnb.filters.system import state_space
+from gpbnb.filters.structures import state_space
 
 
 def test_whoever_needs_loops_names_the_setting_that_prevents_them():

@@ -29,7 +29,6 @@ from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.forms import WITH_PROGRAM, Form
-from gpbnb.filters.system import biquad
 from gpbnb.report.examples import cyclic, tracker
 from gpbnb.report.guarantees import certificates
 from gpbnb.report.guarantees.random_filters import draw
@@ -53,7 +52,7 @@ def written(model: Any, fmt: Any, within: Any, form: Form | str = Form.INNOVATIO
 
 
 def section(fmt: Any) -> Content:
-    made = biquad("0.01", "0.02", "0.01", "-1.6", "0.7")
+    made = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"]).as_filter()
     found = from_schedule(filter_schedule(made, fmt), limits(measurement=1.0))
     return dict(json.loads(found.certificate()))
 
@@ -722,7 +721,7 @@ def test_measurements_that_are_stored_beyond_their_limit_count(monkeypatch: pyte
 @pytest.mark.parametrize("subnormal", [True, False])
 def test_underflow_counts(subnormal: bool) -> None:
     """A bound that holds for any exponents does not hold where results underflow."""
-    made = biquad("0.01", "0.02", "0.01", "-1.6", "0.7")
+    made = LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"]).as_filter()
     within = limits(measurement=2.0**-9)
     content = json.loads(from_schedule(filter_schedule(made, FloatFormat(2, 11)), within).certificate())
     prove(content)

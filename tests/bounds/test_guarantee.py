@@ -24,7 +24,7 @@ from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.run import Run
-from gpbnb.filters.system import biquad, state_space
+from gpbnb.filters.structures import state_space
 from gpbnb.report.guarantees.published import nile_local_level
 from gpbnb.report.kalman.exact_step import exact_step
 from tests.plain_program import steps_in_python
@@ -174,7 +174,10 @@ def test_an_adversary_comes_near_but_not_above(form: Form, rounding: Rounding) -
 
 def test_an_attack_takes_the_candidate_within_the_limits_whose_error_is_largest_one_step_later() -> None:
     fmt = FloatFormat(2, 9)
-    found = from_schedule(filter_schedule(biquad("0.2", "0.1", "0.05", "-0.5", "0.3"), fmt), limits(measurement=1))
+    found = from_schedule(
+        filter_schedule(LinearSystem.from_coefficients(["0.2", "0.1", "0.05"], [1, "-0.5", "0.3"]).as_filter(), fmt),
+        limits(measurement=1),
+    )
     n, rng = found.schedule.program.n, np.random.default_rng(4)
     steer = np.zeros((1, n + 1))
 
@@ -246,7 +249,10 @@ def test_a_covariance_that_loses_definiteness_ends_the_bound() -> None:
 
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(2, 12, Rounding.CHOP)], ids=str)
 def test_a_second_order_section(fmt: FloatFormat) -> None:
-    found = from_schedule(filter_schedule(biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), fmt), limits(measurement=1))
+    found = from_schedule(
+        filter_schedule(LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"]).as_filter(), fmt),
+        limits(measurement=1),
+    )
     outcome = attack(found, 100, 100)
     assert 0.3 < outcome.ratio <= 1
 

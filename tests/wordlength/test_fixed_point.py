@@ -14,7 +14,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.probable import probable_output_errors
 from gpbnb.bounds.system import OutputBounds
 from gpbnb.bounds.words import bounded_rounding, rounding_limits
-from gpbnb.filters.system import controller, state_space
+from gpbnb.filters.structures import state_space
 from gpbnb.filters.words import integer_program, run_words
 from gpbnb.wordlength.required import judge
 
@@ -37,7 +37,7 @@ def test_bits_that_hold_a_number_hold_it_below_their_largest() -> None:
 
 def test_the_bound_of_one_state_is_its_geometric_series() -> None:
     """s <- s / 2 + z: one product a step, half a unit each, halved from step to step."""
-    made = controller("0.5", "1", "0", "0")
+    made = LinearSystem.pid("0", "1", "0", "0.5").as_filter()
     fmt = FixedFormat(2, 10)
     bound = bounded_rounding(made, WordFormats(fmt, 15))
     exact = float(fmt.unit) / 2 / (1 - 0.5)

@@ -21,7 +21,7 @@ from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.checkpoints import Checkpoints
-from gpbnb.filters.emulation import emulate, relative
+from gpbnb.filters.emulation import History, emulate
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference
@@ -120,8 +120,25 @@ def rows(case: YearCase, steps: int = YEAR) -> list[tuple[str, ...]]:
     chosen = checkpoint_steps(steps)
     z, true = _reference(case.reference, chosen)
     found = emulate(model(case.model, case.base), z, case.fmt, case.form, chosen, true)
-    norms = found.state_norm, found.gain_norm, found.covariance_norm, found.least_eigenvalue
-    return _written(case, found.steps.tolist(), np.column_stack([found.state[:, :4], *norms]))
+    return _written(case, found.steps.tolist(), np.column_stack([found.state[:, :4], *norms(found)]))
+
+
+def norms(found: History) -> list[NDArray[np.float64]]:
+    """Return norms of errors after each step: (21) of the state, (22) of gain and covariance relative to the true ones.
+
+    The last number is the least eigenvalue of the symmetric part of the covariance, in units of the true variances.
+    """
+    K, P = (found.reference.to_float(letter)[: len(found.steps)] for letter in "KP")
+    scale = np.sqrt(np.diagonal(P, axis1=1, axis2=2))
+    scaled = (P + found.covariance) / scale[:, :, np.newaxis] / scale[:, np.newaxis, :]
+    least = np.linalg.eigvalsh((scaled + np.swapaxes(scaled, 1, 2)) / 2)[:, 0]
+    return [np.abs(found.state).max(axis=1), relative(found.gain, K), relative(found.covariance, P), least]
+
+
+def relative(error: NDArray[np.float64], true: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return norms (22) of errors over norms of the true matrices, (c,)."""
+    size = np.abs(true[: len(error)]).sum(axis=1).max(axis=1)
+    return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
 
 
 @cache
@@ -142,8 +159,8 @@ def bound_rows(case: YearCase, steps: int = YEAR) -> list[tuple[str, ...]]:
     run.take(simulation(case.model).measurements(chosen[-1]))
     true = run.checkpoints()
     states, gains, covariances = run.bounds
-    norms = relative(gains, true.to_float("K")), relative(covariances, true.to_float("P"))
-    numbers = np.column_stack([states[:, :4], states.max(axis=1), *norms]) * (1 + 1e-5)
+    others = relative(gains, true.to_float("K")), relative(covariances, true.to_float("P"))
+    numbers = np.column_stack([states[:, :4], states.max(axis=1), *others]) * (1 + 1e-5)
     return _written(case, chosen, numbers)
 
 

@@ -19,7 +19,8 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.system import output_errors
 from gpbnb.filters.program import recorded
-from gpbnb.filters.system import LinearFilter, LinearSystem
+from gpbnb.filters.structures import LinearFilter
+from gpbnb.filters.system import LinearSystem
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.guarantees.peak_gain import error_coefficients, peak_gain
 from gpbnb.report.guarantees.published import fixif_longitudinal

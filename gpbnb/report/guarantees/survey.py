@@ -12,7 +12,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.adversary import responses, run_against
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import closed_loops, from_schedule, limits
-from gpbnb.filters.system import state_space
+from gpbnb.filters.structures import state_space
 from gpbnb.report.sweep import Number, sweep_of_rows
 from gpbnb.report.sweep import load as load_rows
 

@@ -22,7 +22,8 @@ from gpbnb.bounds.guarantee import FilterGuarantee, from_guess, from_schedule, g
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.system import LinearFilter, biquad, controller, state_space
+from gpbnb.filters.structures import LinearFilter, state_space
+from gpbnb.filters.system import LinearSystem
 from gpbnb.report.display.tables import Table
 from gpbnb.report.examples import TILT_STATES, altimeter, tilt, tracker
 from gpbnb.report.guarantees.published import (
@@ -79,6 +80,11 @@ class GuaranteeCase:
     states: tuple[str, ...] = ()
 
 
+def _second_order() -> LinearFilter:
+    b, a = ["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"]
+    return LinearSystem.from_coefficients(b, a, name="a second-order section").as_filter()
+
+
 def _longitudinal() -> LinearFilter:
     given = fixif_longitudinal()
     return state_space(given["A"], given["B"], given["C"], given["D"], name="FixIF, longitudinal controller")
@@ -127,12 +133,12 @@ CASES = (
         tilt, (60, 30, 2), (8, 8), center=(45, 0, 1.5), steps=30_000, states=tuple(map(", ".join, TILT_STATES))
     ),
     GuaranteeCase(
-        lambda: biquad("0.01", "0.02", "0.01", "-1.6", "0.7"),
+        _second_order,
         measurement=1.0,
         states=("state 1, no unit", "state 2, no unit", "output, no unit"),
     ),
     GuaranteeCase(
-        lambda: controller("0.999", "0.01", "2", "5"),
+        lambda: LinearSystem.pid("2", "0.01", "5", "0.999").as_filter(),
         measurement=1.0,
         states=("integral, no unit", "last error, no unit", "output, no unit"),
     ),

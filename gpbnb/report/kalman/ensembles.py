@@ -160,7 +160,11 @@ def printed_ratios(history: History, beta: float) -> tuple[float, float, float]:
     with np.errstate(divide="ignore", invalid="ignore"):
         covariance = np.abs(history.covariance) / (report_bounds.covariance_count(n, m) * beta * np.abs(P))
         gain = np.abs(history.gain) / (report_bounds.gain_count(n, m) * beta * np.abs(K))
-        return _largest(covariance), _largest(gain), _largest(history.state_norm / _printed_state(history, beta, x, K))
+        return (
+            _largest(covariance),
+            _largest(gain),
+            _largest(np.abs(history.state).max(axis=1) / _printed_state(history, beta, x, K)),
+        )
 
 
 def _printed_state(
