@@ -17,6 +17,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
 from gpbnb.filters.steps import BlockAlgebra, LinearStep
+from gpbnb.report.kalman import exact_step, report_bounds
 
 
 class FilterCase(NamedTuple):
@@ -81,3 +82,16 @@ def rounded_step(
     )
     (x, P), (K, _), _ = step.taken((x, P), z)
     return x, K, P
+
+
+def gain_ratio(fmt: FloatFormat, case: FilterCase, steps: int = 1) -> float:
+    """Return the largest error of the gain over (108) in the last of some steps, which have the same measurement."""
+    rounded, exactly = case, case
+    for _ in range(steps):
+        x, K, P = rounded_step(fmt, rounded)
+        rounded, true = rounded._replace(x=x, P=P), exact_step.exact_step(*exactly)
+        exactly = exactly._replace(x=true.x, P=true.P)
+    beta: Any = fmt.unit_roundoff
+    bound = report_bounds.gain_count(*true.gain.shape) * beta * abs(true.gain)
+    pairs = zip(abs(K - true.gain).flat, bound.flat, strict=True)
+    return max((float(e / b) if b else float("inf") for e, b in pairs if e), default=0.0)
