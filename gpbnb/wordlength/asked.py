@@ -31,7 +31,7 @@ from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.answer import Basis, Requirement, joined
+from gpbnb.wordlength.answer import Basis, Requirement, digits_of, joined
 from gpbnb.wordlength.models import MODELS, SYSTEMS, read_model
 
 AnyFormat = FloatFormat | FixedFormat | WordFormats | BlockFormats
@@ -78,10 +78,14 @@ class Asked:
     def answer(
         self, fmt: Any, ratio: float, tried: Any, ends: bool, text: str, why: str, notes: Sequence[str], **more: Any
     ) -> Requirement:
-        """Return an answer, with its text before notes; `ends` is whether it holds for the steps of the data only."""
+        """Return an answer, with its text before notes; `ends` is whether it holds for the steps of the data only.
+
+        Without a search, nothing was tried but its format.
+        """
         notes, for_ever = tuple(filter(None, notes)), self.basis in ("guarantee", "probable") and not ends
         form = self.form if is_filter(self.model) else None
         steps = None if for_ever else self.data.steps
+        tried = tried or ((digits_of(fmt), ratio),)
         return Requirement(fmt, ratio, self.basis, steps, tried, joined(text, notes), why, notes, form, **more)
 
     def check_sizes(self, like: FloatFormat | FixedFormat) -> None:

@@ -23,18 +23,7 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, opened
 from gpbnb.filters.system import LinearSystem, unobserved
 from gpbnb.filters.words import WordFormats
-from gpbnb.wordlength.answer import (
-    PROOFS,
-    Basis,
-    Kind,
-    Requirement,
-    digits_of,
-    evidence,
-    joined,
-    judgement,
-    listed,
-    share_text,
-)
+from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, evidence, joined, judgement, listed, share_text
 from gpbnb.wordlength.asked import TASK_OF_KIND, Asked, checked_basis, checked_format, is_filter
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS, fixed_like, in_fixed_point, in_words
 from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, slowest_response
@@ -209,7 +198,7 @@ def judge(
     )
     ends, notes = judge.steps is not None, judge.warnings() if found.ratio <= 1 else ()
     text = judgement(chosen, basis, asked.data.steps, found.ratio, found.why, ends)
-    return asked.answer(chosen, found.ratio, ((digits_of(chosen), found.ratio),), ends, text, found.why, notes)
+    return asked.answer(chosen, found.ratio, (), ends, text, found.why, notes)
 
 
 # -- floating point ---------------------------------------------------------------------------------------------------
