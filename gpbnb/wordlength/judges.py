@@ -50,6 +50,7 @@ class Judge:
     steps : steps for which a bound holds; None if it holds for ever.
     over : function that returns a judge over some steps, where nothing bounds the errors for ever.
     warnings : function that returns why the errors may say little about other runs.
+    beyond : what an infinite ratio means; by default that float64 does not hold it.
     untraced : why a user's function cannot be traced; empty if it can be.
     model, form : a Kalman filter for the measurements that are present, and its form; `of_form` judges another.
     """
@@ -60,6 +61,7 @@ class Judge:
     steps: int | None = None
     over: Callable[[int], Judge] | None = None
     warnings: Callable[[], tuple[str, ...]] = tuple
+    beyond: str = ""
     untraced: str = ""
     model: AnyModel | None = None
     form: Form = Form.INNOVATION
@@ -83,7 +85,7 @@ class Judge:
         if ratio < math.inf:
             return Outcome(ratio)
         what = "an error over its tolerance" if np.isfinite(found).all() else "an output or a bound"
-        return Outcome(math.inf, f"{what} is beyond the range of float64")
+        return Outcome(math.inf, self.beyond or f"{what} is beyond the range of float64")
 
 
 def judge_for(asked: Asked, base: int = 2, most: int = 0) -> Judge:
@@ -176,7 +178,7 @@ def _of_record(model: AnyModel, data: Data, tolerances: NDArray[np.float64], for
 
     def of_form(form: Form) -> Judge:
         errors = partial(_recorded, sound, z, form, true, lacking)
-        return Judge(errors, tolerances, model=sound, form=form, of_form=of_form)
+        return Judge(errors, tolerances, beyond="the bound says nothing", model=sound, form=form, of_form=of_form)
 
     return of_form(form)
 
