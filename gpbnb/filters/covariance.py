@@ -66,13 +66,11 @@ class Repair(NamedTuple):
         return f"{self.letter}{stored} was {' and '.join(done)}"
 
 
-def in_floats(values: Any) -> bool:
-    """Whether a matrix was given in floats, whose rounding errors a repair may undo."""
-    return repair_tolerance(values) is not None
-
-
 def repair_tolerance(values: Any) -> float | None:
-    """Return the largest repair of a matrix given in floats: half the digits of their type. None for other input."""
+    """Return the largest repair of a matrix given in floats: half the digits of their type. None for other input.
+
+    Such a matrix may have rounding errors, which a repair may undo.
+    """
     dtype = getattr(values, "dtype", None)
     if isinstance(dtype, np.dtype) and np.issubdtype(dtype, np.floating):
         return max(REPAIR_TOLERANCE, math.sqrt(float(np.finfo(dtype).eps)))

@@ -26,7 +26,6 @@ from gpbnb.filters.covariance import (
     REPAIR_TOLERANCE,
     Repair,
     check_covariance,
-    in_floats,
     raised_as_stored,
     repair_tolerance,
     repaired,
@@ -222,7 +221,7 @@ class LinearModel:
                 if len(shapes) != 1:
                     raise ValueError(f"{letter}: the function gave shapes {sorted(shapes)}; needed one shape")
                 with naming(letter):
-                    values = np.array(members) if in_floats(members) else exact(members)
+                    values = exact(members) if repair_tolerance(members) is None else np.array(members)
                 object.__setattr__(self, letter, values)
 
     def _read_inputs(self) -> None:
@@ -480,15 +479,14 @@ def _arrays_once(model: LinearModel, fmt: FloatFormat | FixedFormat) -> dict[str
     return model.arrays(replace(fmt))  # a format of its own, for which no search refuses conversions
 
 
-def identity_in(fmt: FloatFormat | FixedFormat, n: int) -> FloatArray:
-    """Return the identity matrix (n, n), which every form needs."""
+def check_one(fmt: FloatFormat | FixedFormat) -> None:
+    """Reject a format without the number 1."""
     if fmt.limits is not None and not fmt.smallest <= 1 <= fmt.largest:
         cure = "at least 1 integer bit and 0 fraction bits or more" if isinstance(fmt, FixedFormat) else "a wider range"
         raise ValueError(
             f"got {format_text(fmt)}, which does not hold the number 1; needed a format that does, because every step "
             f"computes with an identity matrix; use {cure}"
         )
-    return fmt.array(np.eye(n, dtype=int))
 
 
 def stored_measurements(z: Any, fmt: FloatFormat | FixedFormat | BlockFormats) -> FloatArray:

@@ -18,7 +18,7 @@ from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.checkpoints import Checkpoints, Progress, without_factors
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import ROOTS, Form
-from gpbnb.filters.model import identity_in
+from gpbnb.filters.model import check_one
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.opening import double_doubles_of
 from gpbnb.filters.program import Program
@@ -75,7 +75,7 @@ class NonlinearRun(Progress):
         of_state, of_covariance = each[0], each[2]
         self.model, self.fmt, self.form = model, fmt, form
         for block in each:
-            identity_in(block, 1)
+            check_one(block)
         stored_in = fmt.model if isinstance(fmt, BlockFormats) else fmt
         sound = model.noise.definite_in(stored_in)
         #: Changes of the covariances, including those of the model.

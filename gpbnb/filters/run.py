@@ -21,7 +21,7 @@ from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
 from gpbnb.filters.checkpoints import Checkpoints, Progress, exactly, without_factors
 from gpbnb.filters.forms import WITH_PROGRAM, Form, form_named
-from gpbnb.filters.model import LinearModel, identity_in
+from gpbnb.filters.model import LinearModel, check_one
 from gpbnb.filters.opening import (
     Opening,
     as_packed,
@@ -126,7 +126,7 @@ class Run(Progress):
         shapes = ((n, records), (n, m), (n, n))
         self._none = tuple(np.zeros((0, *shape, *self.x.shape[2:]), self.x.dtype) for shape in shapes)
         if fmt is not None:
-            identity_in(fmt, 1)
+            check_one(fmt)
         self._compensation = np.zeros_like(self.x)
         self._running: RunningStep | None = None
         self._carried: CarriedBound | None = None

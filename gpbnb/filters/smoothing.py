@@ -40,7 +40,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import digit_unit
 from gpbnb.filters.factors import upper_factors
 from gpbnb.filters.forms import Form, form_named
-from gpbnb.filters.model import LinearModel, identity_in, in_columns
+from gpbnb.filters.model import LinearModel, check_one, in_columns
 from gpbnb.filters.repeating import RepeatedStep
 from gpbnb.filters.steps import (
     StepModel,
@@ -158,7 +158,7 @@ class FixedIntervalSmoother:
         """Run the filter forwards and the smoother backwards."""
         roots, join = self.form is Form.CARLSON, cast(Any, np.concatenate)
         (start, cycles), z = self._factored(fmt) if roots else self._stored(fmt), fmt.array(self.z)
-        identity_in(fmt, 1)
+        check_one(fmt)
         forwards = RepeatedStep(self._forwards, [fmt], start, cycles).take(z if roots else z[:, :, None])
         found = zip(*((*each.states, *each.gain) for each in forwards), strict=True)
         x, P, *passed = (join(each)[::-1] for each in found)
