@@ -170,12 +170,12 @@ def table() -> Table:
     return Table("Gravity Probe B in binary64", header, tuple(body))
 
 
-def bits(row: HorizonRow, tolerance: float = 1.0) -> int:
-    """Return the bits for which the bound of each drift and rate, scaled with the unit roundoff, meets a tolerance.
+def bits(row: HorizonRow) -> int:
+    """Return the bits for which the bound of each drift and rate, scaled with the unit roundoff, is at most 1.
 
     The bounds are nearly proportional to the unit roundoff, so this extrapolates; it is not a guarantee by itself.
     """
-    return math.ceil(row.precision + math.log2(max(row.bounds[:4]) / tolerance))
+    return math.ceil(row.precision + math.log2(max(row.bounds[:4])))
 
 
 def gravity_probe_b_bounds(precision: int, steps: int = YEAR) -> Iterator[tuple[int, list[HorizonBounds]]]:
