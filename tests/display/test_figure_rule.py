@@ -122,7 +122,7 @@ def at_the_edge(ax):
 
 
 def cut(ax):
-    ax.plot([2], [9], "o", color=style.OBSERVED, label="high")
+    ax.plot([2, 2], [9, 2], "o", color=style.OBSERVED, label="high")
 
 
 def bar(ax):
