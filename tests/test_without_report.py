@@ -74,7 +74,7 @@ def test_a_command_of_the_report_says_in_one_line_what_to_install(command, folde
     done = run(COMMAND.format([command]), folder)
     assert done.returncode == 2
     assert done.stderr == (
-        "gpbnb.report: got no joblib, matplotlib, mpmath, scipy, sympy; needed joblib, matplotlib, mpmath, scipy, "
+        "gpbnb.report: got no joblib, matplotlib, scipy, sympy; needed joblib, matplotlib, scipy, "
         "sympy; install them: pip install 'gpbnb[report]'\n"
     )
 
@@ -83,5 +83,5 @@ def test_an_import_of_the_report_says_what_to_install(folder):
     done = run("from gpbnb.report.rounding import experiment", folder)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith(
-        "ImportError: gpbnb.report: got no joblib, matplotlib, mpmath, scipy, sympy; needed"
+        "ImportError: gpbnb.report: got no joblib, matplotlib, scipy, sympy; needed"
     )

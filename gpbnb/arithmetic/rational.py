@@ -1,4 +1,4 @@
-"""Exact matrices of Fractions: conversion, inverse, norms.
+"""Exact matrices of Fractions: conversion, inverse, eigenvalues, norms.
 
 Entries may be Fractions, ints, floats (with their exact binary value) or an array of a format.
 """
@@ -78,6 +78,21 @@ def inverse_of(a: Any) -> NDArray[Any]:
     found = true_inverse(a)
     entries = [Fraction(int(entry.p), int(entry.q)) for entry in found.entries()]
     return np.array(entries, dtype=object).reshape(found.nrows(), found.ncols())
+
+
+def roots(polynomial: Any) -> NDArray[np.complex128]:
+    """Return the roots of an exact polynomial of python-flint, (n,), each to the accuracy of float64."""
+    found = [complex(root) for root, count in polynomial.complex_roots() for _ in range(count)]
+    return np.array(found, dtype=np.complex128)
+
+
+def eigenvalues(a: Any) -> NDArray[np.complex128]:
+    """Return the eigenvalues of a square matrix (n, n) of exact numbers, each to the accuracy of float64.
+
+    They are roots of the exact characteristic polynomial. In float64, rounding errors move those of a long filter by
+    as much as their distance from the unit circle, by other amounts on another machine.
+    """
+    return roots(rationals(a).charpoly())
 
 
 def max_norm(x: Any) -> Fraction:

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import eigenvalues
 from gpbnb.bounds.gains import Schedule, filter_schedule
 from gpbnb.bounds.units import largest_errors, stored_sizes, units
-from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.program import ADD, MULTIPLY, Program, matrices
 from gpbnb.filters.structures import LinearFilter
 

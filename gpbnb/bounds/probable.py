@@ -19,7 +19,6 @@ from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import FilterGuarantee, from_guess, limits
 from gpbnb.bounds.guess import linear_steps, rounding_errors, value_sizes
 from gpbnb.bounds.system import OutputBounds
-from gpbnb.filters.structures import steady_covariance
 from gpbnb.filters.system import LinearSystem
 
 
@@ -54,7 +53,8 @@ def probable_error(found: FilterGuarantee) -> NDArray[np.float64]:
     whole, gathered = np.eye(F.shape[1]), np.zeros_like(noise[0])
     for loop, added in zip(F, noise, strict=True):
         whole, gathered = loop @ whole, loop @ gathered @ loop.T + added
-    covariance = steady_covariance(whole, gathered)
+    system = np.eye(whole.size) - np.kron(whole, whole)
+    covariance = np.linalg.solve(system, gathered.ravel()).reshape(whole.shape)
     largest = np.diagonal(covariance).copy()
     for loop, added in zip(F, noise, strict=True):
         covariance = loop @ covariance @ loop.T + added

@@ -11,26 +11,13 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
+from gpbnb.arithmetic.rational import eigenvalues
 from gpbnb.filters.program import matrices
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.words import WordFormats, integer_program
 
 _FLOOR = 60.0
 """Decibels below the peak of a response down to which its changes count."""
-
-
-def eigenvalues(A: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Return the eigenvalues of a matrix, (n,), in float64.
-
-    The eigenvalues of a cascade are those of its sections. Taken from the whole matrix, four low-pass sections with
-    poles of size 0.9995 have one of size 1.017, so each group of states that influence each other is taken by itself.
-    """
-    reached = (A != 0) | np.eye(len(A), dtype=np.bool_)
-    for _ in range(len(A).bit_length()):
-        reached = reached @ reached  # in twice as many steps
-    groups = np.unique(reached & reached.T, axis=0)
-    blocks = [A[np.ix_(group, group)] for group in groups]
-    return np.concatenate([np.linalg.eigvals(block).astype(np.complex128) for block in blocks])
 
 
 class StoredResponse(NamedTuple):
@@ -80,12 +67,12 @@ def stored_response(system: LinearSystem, fmt: FloatFormat | FixedFormat | WordF
         if cause := system.unstable(data):
             raise ValueError(cause)
         stored = system.stored(data)
-    near, far = _numbers((system.A, system.B, system.C, system.D)), _numbers(stored)
-    poles, moved = eigenvalues(near[0]), eigenvalues(far[0])
+    poles, moved = eigenvalues(system.A), eigenvalues(stored[0])
     if not max(np.abs(poles).max(), np.abs(moved).max()) < 1:
         raise ValueError(f"got a filter that is not stable, as given or with {words}; needed poles of sizes below 1")
     at = _frequencies(np.concatenate([poles, moved]))
-    given, other = (np.abs(_response(each, at)) for each in (near, far))
+    near = (system.A, system.B, system.C, system.D)
+    given, other = (np.abs(_response(each, at)) for each in (_numbers(near), _numbers(stored)))
     heard = given >= given.max(axis=0) * 10 ** (-_FLOOR / 20)
     with np.errstate(divide="ignore", invalid="ignore"):
         change = np.where(heard & (given > 0), np.abs(20 * np.log10(other / given)), 0.0).max(axis=(1, 2))

@@ -16,7 +16,7 @@ from flint import ctx, fmpq, fmpq_poly
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.conversion import exact_fraction
-from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rational import exact, roots
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.structures import expanded, shortened
 
@@ -143,8 +143,12 @@ def _filtered(values: NDArray[np.float64], b: Sequence[Fraction], a: Sequence[Fr
     return found
 
 
+def _polynomial(falling: Sequence[Fraction]) -> fmpq_poly:
+    return fmpq_poly([fmpq(each.numerator, each.denominator) for each in reversed(falling)])
+
+
 def _roots(a: Sequence[Fraction]) -> list[complex]:
-    return [complex(each) for each in np.roots([1.0, *(float(each) for each in a)])]
+    return [complex(each) for each in roots(_polynomial([Fraction(1), *a]))]
 
 
 def _one_of(what: str, given: str, names: Sequence[str]) -> str:
@@ -155,7 +159,7 @@ def _one_of(what: str, given: str, names: Sequence[str]) -> str:
 
 def _factors(polynomial: Sequence[Fraction]) -> list[_Factor]:
     """Return the real factors of a polynomial in 1/z whose first coefficient is not zero, each with the first one 1."""
-    _, found = fmpq_poly([fmpq(each.numerator, each.denominator) for each in reversed(polynomial)]).factor()
+    _, found = _polynomial(polynomial).factor()
     factors = list[_Factor]()
     for each, count in found:
         entries = [Fraction(int(c.p), int(c.q)) for c in reversed(each.coeffs())]
@@ -167,8 +171,7 @@ def _factors(polynomial: Sequence[Fraction]) -> list[_Factor]:
 def _factors_in_balls(polynomial: Any) -> list[_Factor]:
     before, ctx.prec = ctx.prec, _BITS
     try:
-        roots = [root for root, _ in polynomial.complex_roots()]
-        upper = [root for root in roots if not root.imag < 0]
+        upper = [root for root, _ in polynomial.complex_roots() if not root.imag < 0]
         parts = [(exact_fraction(root.real.mid()), exact_fraction(root.imag.mid())) for root in upper]
     finally:
         ctx.prec = before
@@ -188,11 +191,13 @@ def _nearest_root(monic: Sequence[Fraction]) -> complex:
 
 
 def _factors_from_roots(given: Any, name: str) -> list[_Factor]:
-    roots = [complex(each) for each in np.ravel(np.asarray(given, dtype=np.complex128))]
-    if not np.isfinite(roots).all():
-        raise ValueError(f"got {name} {roots}; needed finite numbers")
-    real = [each for each in roots if abs(each.imag) <= _CONJUGATE * abs(each)]
-    upper, lower = ([each for each in roots if each not in real and (each.imag > 0) == sign] for sign in (True, False))
+    numbers = [complex(each) for each in np.ravel(np.asarray(given, dtype=np.complex128))]
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"got {name} {numbers}; needed finite numbers")
+    real = [each for each in numbers if abs(each.imag) <= _CONJUGATE * abs(each)]
+    upper, lower = (
+        [each for each in numbers if each not in real and (each.imag > 0) == sign] for sign in (True, False)
+    )
     for each in upper:
         mate = lower.pop(_nearest(each.conjugate(), lower)) if lower else 0j
         if abs(mate - each.conjugate()) > _CONJUGATE * abs(each):

@@ -38,6 +38,7 @@ from fractions import Fraction
 from itertools import islice
 from typing import Any, NamedTuple
 
+import mpmath
 import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
@@ -434,43 +435,41 @@ def companion(b: Sequence[Fraction], a: Sequence[Fraction]) -> tuple[NDArray[Any
     return A, B, C, exact([[top[0]]])
 
 
-def steady_covariance(A: NDArray[np.float64], Q: NDArray[np.float64]) -> NDArray[np.float64]:
-    r"""Return :math:`X = AXA^T + Q`, the covariance of a stable system in its steady state.
-
-    The sum of :math:`A^kQ(A^k)^T` over all k is added up by doubling: 2, 4, 8, … terms.
-    """
-    X, power = Q, A
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(_DOUBLINGS):
-            before, X = X, X + power @ X @ power.T
-            if not np.isfinite(X).all():
-                break
-            if np.array_equal(before, X):
-                return (X + X.T) / 2
-            power = power @ power
-    raise ValueError("its covariance does not converge")
-
-
 def balanced(matrices: Sequence[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
     """Return A, B, C and D in balanced states: their matrices of reachability and of observability are near equal.
 
-    The change of states is computed in float64 and then applied exactly, so the filter stays the same.
+    The change of states is computed with 256 bits and then applied exactly, so the filter stays the same.
     """
     A, B, C, D = matrices
-    a, b, c = (each.astype(np.float64) for each in (A, B, C))
-    try:
-        reach = np.linalg.cholesky(steady_covariance(a, b @ b.T))
-        seen = np.linalg.cholesky(steady_covariance(a.T, c.T @ c))
-        U, sizes, _ = np.linalg.svd(reach.T @ seen)
-        change = rationals(reach @ U / np.sqrt(sizes))
-        back = change.inv()
-    except (np.linalg.LinAlgError, ValueError, ZeroDivisionError) as error:
-        raise ValueError(
-            f"got a filter whose states cannot be balanced in float64: {error}; needed a stable filter of a lower "
-            "order; use another structure, for example a cascade"
-        ) from None
+    with mpmath.workprec(DESIGN.precision):
+        a, b, c = (mpmath.matrix(each.tolist()).apply(mpmath.mpmathify) for each in (A, B, C))
+        try:
+            reach = mpmath.cholesky(_gramian(a, b * b.T))
+            seen = mpmath.cholesky(_gramian(a.T, c.T * c))
+            U, sizes, _ = mpmath.svd_r(reach.T * seen)
+            if sizes[len(sizes) - 1] <= sizes[0] * 2.0**-128:
+                raise ValueError("a state has almost no part in its response")
+        except (ValueError, ZeroDivisionError) as error:
+            raise ValueError(
+                f"got a filter whose states cannot be balanced: {error}; needed a stable filter, each of whose states "
+                "is moved by the input and moves the output; use another structure, for example a cascade"
+            ) from None
+        scaled = reach * U * mpmath.diag([1 / mpmath.sqrt(size) for size in sizes])
+    change = rationals(np.array(scaled.tolist(), dtype=object))
+    back = change.inv()
     changed = (back * rationals(A) * change, back * rationals(B), rationals(C) * change)
     return (*map(_fractions, changed), D)
+
+
+def _gramian(A: Any, Q: Any) -> Any:
+    r"""Return :math:`X = AXA^T + Q`, the sum of :math:`A^kQ(A^k)^T` over all k, with 2, 4, 8, … terms."""
+    X = Q
+    for _ in range(_DOUBLINGS):
+        added = A * X * A.T
+        X, A = X + added, A * A
+        if mpmath.mnorm(added, "f") <= mpmath.eps * mpmath.mnorm(X, "f"):
+            return (X + X.T) / 2
+    raise ValueError("its covariance does not converge")
 
 
 def _fractions(matrix: fmpq_mat) -> NDArray[Any]:

@@ -23,7 +23,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.named import arithmetic, format_named
-from gpbnb.arithmetic.rational import exact, rationals
+from gpbnb.arithmetic.rational import eigenvalues, exact, rationals
 from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, naming, range_text, sized, whole_number
@@ -617,13 +617,12 @@ def unobserved(Phi: NDArray[Any], H: NDArray[Any], names: tuple[str, ...] = ()) 
 
 def _eigenvalue(A: NDArray[Any], names: tuple[str, ...], basis: NDArray[Any] | None = None) -> str:
     """Name the size of the largest eigenvalue of a matrix that is not stable, and the state that it moves most."""
-    with np.errstate(all="ignore"):
-        entries = A.astype(np.float64)
-        if not np.isfinite(entries).all():
-            return "an eigenvalue of size 1 or more"
-        values, vectors = np.linalg.eig(entries)
-        largest = int(np.abs(values).argmax())
-        moved = np.abs(vectors[:, largest] if basis is None else basis.astype(np.float64) @ vectors[:, largest])
-    size = float(np.abs(values[largest]))
+    values = eigenvalues(A)
+    largest = values[np.abs(values).argmax()]
+    size, entries = float(abs(largest)), A.astype(np.float64)
+    if not np.isfinite([size, *entries.ravel()]).all():
+        return "an eigenvalue of size 1 or more"
+    vector = np.linalg.svd(entries - largest * np.eye(len(A)))[2][-1].conj()
+    moved = np.abs(vector if basis is None else basis.astype(np.float64) @ vector)
     text = f"an eigenvalue of size {size:.6g}" if size > 1 + 1e-6 else "an eigenvalue of size 1 or more"
     return f"{text}, mostly in {named('state', int(moved.argmax()), names)}"

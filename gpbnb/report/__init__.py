@@ -2,7 +2,7 @@
 
 from importlib.util import find_spec
 
-PACKAGES = ("joblib", "matplotlib", "mpmath", "scipy", "sympy")
+PACKAGES = ("joblib", "matplotlib", "scipy", "sympy")
 """Packages of the extra ``gpbnb[report]``, which the report needs and the library does not."""
 
 _missing = [name for name in PACKAGES if find_spec(name) is None]

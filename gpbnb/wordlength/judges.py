@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import eigenvalues
 from gpbnb.arithmetic.search import Outcome
 from gpbnb.bounds.guarantee import FilterGuarantee, guarantee, guessed, sized_limits
 from gpbnb.bounds.guess import FilterLimits
@@ -24,7 +25,6 @@ from gpbnb.filters.model import LinearModel, stored_measurements
 from gpbnb.filters.named import named
 from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, nonlinear_checkpoints, opened, simulated, true_states
-from gpbnb.filters.poles import eigenvalues
 from gpbnb.filters.run import reference
 from gpbnb.filters.system import LinearSystem, is_stable, system_inputs
 from gpbnb.filters.words import WordFormats, run_words

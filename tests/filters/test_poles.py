@@ -7,7 +7,8 @@ import pytest
 from scipy import signal
 
 from gpbnb import FloatFormat, LinearSystem
-from gpbnb.filters.poles import eigenvalues, stored_response
+from gpbnb.arithmetic.rational import eigenvalues
+from gpbnb.filters.poles import stored_response
 
 
 @pytest.mark.parametrize("digits", [11, 16, 24])

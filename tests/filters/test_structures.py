@@ -12,7 +12,7 @@ from scipy import linalg, signal
 from gpbnb import BINARY16, FloatFormat, LinearSystem, required_precision
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.sections import _filtered, scaled
-from gpbnb.filters.structures import STRUCTURES, companion, reflections, steady_covariance
+from gpbnb.filters.structures import STRUCTURES, reflections
 from gpbnb.wordlength.asked import Asked, Data
 from gpbnb.wordlength.judges import judge_for
 from tests import plain_structures
@@ -161,14 +161,13 @@ def test_a_response_decays_to_zero(structure):
 
 
 @pytest.mark.parametrize("order", [2, 3, 6, 8, 12])
-def test_steady_covariance_solves_its_equation(order):
-    rng = np.random.default_rng(order)
-    b, a = random_filter(rng, order)
-    A, B = (each.astype(np.float64) for each in companion(exact(b / a[0]), exact(a / a[0])[1:])[:2])
-    Q = B @ B.T
-    found, known = steady_covariance(A, Q), linalg.solve_discrete_lyapunov(A, Q)
-    # Both solve the same system in float64; its condition is below 1e6 here.
-    np.testing.assert_allclose(found, known, rtol=1e-9, atol=1e-9 * np.abs(known).max())
+def test_balanced_states_are_as_easy_to_excite_as_to_observe(order):
+    """SciPy solves the two equations in float64, for matrices whose entries have one size."""
+    system = LinearSystem.from_sections(signal.butter(order, 0.2, output="sos"), "balanced state space")
+    A, B, C, _ = (each.astype(np.float64) for each in system.stored(FloatFormat(2, 53)))
+    reached, seen = linalg.solve_discrete_lyapunov(A, B @ B.T), linalg.solve_discrete_lyapunov(A.T, C.T @ C)
+    np.testing.assert_allclose(reached, seen, atol=1e-13)
+    np.testing.assert_allclose(reached, np.diag(np.diagonal(reached)), atol=1e-13)
 
 
 def test_a_response_is_that_of_scipy_digit_for_digit():
