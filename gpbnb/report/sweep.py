@@ -31,7 +31,7 @@ Whole = Annotated[str, "integer"]
 _KINDS = {int: "integer", float: "number"}
 
 
-def _result(cell_text: str, compute: Callable[[C], Any], cell: C) -> Any:
+def _result(commit: str, text: str, compute: Callable[[C], Any], cell: C) -> Any:
     return compute(cell)
 
 
@@ -83,13 +83,14 @@ class Sweep(Generic[C]):
     def recompute(self, folder: Path, processes: int = 1) -> Path:
         """Compute all cells, write the table into a folder and return its file.
 
-        Finished cells are saved in a subfolder until the table is written; after an interruption, the call resumes.
+        Finished cells are saved in a subfolder until the table is written. After an interruption, the call resumes,
+        unless there is another commit, whose results may differ.
         """
         saved = Memory(folder / self.name, verbose=0)
         result = saved.cache(_result, ignore=["compute", "cell"])
-        cells = self.cells()
+        cells, commit = self.cells(), machine()["commit"]
         results = Parallel(processes, return_as="generator")(
-            delayed(result)(repr(cell), self.compute, cell) for cell in cells
+            delayed(result)(commit, repr(cell), self.compute, cell) for cell in cells
         )
         found = list(zip(cells, tqdm(results, self.name, len(cells), unit="cell"), strict=True))
         rows = [row for cell, each in found for row in self.rows(cell, each)]
