@@ -58,6 +58,7 @@ class Asked:
     within: FilterLimits | None = None
     form: Form = Form.INNOVATION
     highest: int | None = None
+    progress: bool = False
 
     @classmethod
     def of(cls, model: Any, z: Any, *tasks: str, form: Any = None, seed: int = 0, **more: Any) -> Asked:

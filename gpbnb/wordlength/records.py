@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -68,6 +69,7 @@ def survey_records(
     form: Form | str | None = None,
     basis: Basis = "emulation",
     steps: int | None = None,
+    progress: bool = False,
 ) -> RecordSurvey:
     """Run a model on many records of measurements or inputs in many formats.
 
@@ -78,6 +80,7 @@ def survey_records(
         missing. A whole number requests that many simulated records of a Kalman filter with `steps` steps each and the
         seeds 0, 1, …; at most :data:`MOST_RECORDS`, and 100 million steps in all.
     formats : formats of any base, rounding and range, or their names; for a linear filter, with compiled loops.
+    progress : show a progress bar that counts records.
 
     Raises
     ------
@@ -114,7 +117,7 @@ def survey_records(
         asked[0].check_sizes(fmt)
         if isinstance(given, LinearModel | LinearSystem):
             fmt.check_compiled()
-    for each in asked:
+    for each in tqdm(asked, "records", unit="record", disable=not progress):
         judge = judge_for(each, chosen[0].base, most)
         found.append([judge.proof(fmt) for fmt in chosen])
     ratios = np.array([[each.ratio for each in row] for row in found])

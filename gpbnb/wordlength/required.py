@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from tqdm import tqdm  # type: ignore[import-untyped]
+
 from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
@@ -60,6 +62,7 @@ def required_precision(
     highest: int | None = None,
     coefficient_bits: int | None = None,
     seed: int = 0,
+    progress: bool = False,
 ) -> Requirement:
     """Find the format with the fewest digits with which a filter or a function stays within a tolerance.
 
@@ -112,6 +115,7 @@ def required_precision(
     coefficient_bits : significant bits of each coefficient of a linear system in fixed point, each with its own binary
         point; by default 15. With kind="words", the most to try, by default 24.
     seed : seed of simulated measurements.
+    progress : show a progress bar that counts runs, with kind="float".
 
     Raises
     ------
@@ -155,6 +159,7 @@ def required_precision(
         form=form,
         highest=highest,
         seed=seed,
+        progress=progress,
     )
     options = {"base": base != 2, "rounding": rounding != Rounding.NEAREST, "range": range is not None}
     if like is not None and (names := [name for name, value in options.items() if value]):
@@ -237,14 +242,15 @@ def _in_floating_point(asked: Asked, like: FloatFormat) -> Requirement:
     asked.check_sizes(like)
     lasting = is_filter(asked.model) and asked.basis in ("guarantee", "probable")
     bounds = asked.basis == "bound" or (asked.basis != "emulation" and not lasting)
+    with tqdm(desc="precisions", unit="run", disable=not asked.progress) as bar:
 
-    def search(each: Judge) -> Search[FloatFormat]:
-        proof, checks = each.proof if each.proved else None, () if lasting else CHECKED[base]
-        return Search(each.error, like, checks, bounds=bounds, largest=highest, proof=proof)
+        def search(each: Judge) -> Search[FloatFormat]:
+            proof, checks = each.proof if each.proved else None, () if lasting else CHECKED[base]
+            return Search(each.error, like, checks, bar.update, bounds, highest, proof=proof)
 
-    judge = judge_for(asked, base, highest or largest_compiled(like))
-    found, judge = for_ever_or_over(asked, judge, search, Search.is_bounded)
-    notes, cause = _advice(asked, judge, found, like, search)
+        judge = judge_for(asked, base, highest or largest_compiled(like))
+        found, judge = for_ever_or_over(asked, judge, search, Search.is_bounded)
+        notes, cause = _advice(asked, judge, found, like, search)
     return _float_answer(asked, found, judge.steps is not None, notes, cause, like)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gpbnb
-from gpbnb import required_precision
+from gpbnb import required_precision, survey_records
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
@@ -60,6 +60,16 @@ def test_the_smallest_precision_meets_the_tolerance_and_one_less_does_not(base, 
     assert (found.basis, found.steps) == ("emulation", STEPS)
     assert str(found).startswith(arithmetic(FloatFormat(base, t, rounding)))
     assert str(found).endswith("of the tolerance, observed in 60 steps")
+
+
+def test_a_bar_for_those_who_wait(capsys):
+    required_precision(MODEL, Z, 1e-4)
+    survey_records(MODEL, [Z, Z], 1e-4, ["float32"])
+    assert capsys.readouterr().err == ""
+    found = required_precision(MODEL, Z, 1e-4, progress=True)
+    assert f"{len(found.tried)}run" in capsys.readouterr().err.replace(" ", "")
+    survey_records(MODEL, [Z, Z], 1e-4, ["float32"], progress=True)
+    assert "2/2" in capsys.readouterr().err
 
 
 def test_the_bound_asks_for_more_digits_and_holds():
