@@ -83,7 +83,7 @@ def recorded_step(kind: StepKind, together: bool = False) -> DividedStep:
 def kalman_step(kind: StepKind) -> RecordedStep:
     """Record a step of a filter.
 
-    Its states are x, P and, with compensated summation, what that carries to the next step. Its results are the gain
+    Its states are x, P and, in the compensated form, the correction for the next step. Its results are the gain
     and, in forms without factors or roots, the innovation covariance.
     """
     n, m = kind.n, kind.m

@@ -562,7 +562,7 @@ def filtered_root(
 ) -> tuple[Matrix, ...]:
     """Take one step with square roots, from an estimate x (n,) and a root S (n, n), with a measurement z (m,).
 
-    Given are a root of Q and factors of R. Return x and S, the prediction, and A, B and C of the triangle.
+    SQ is a root of Q, and UR are factors of R. Return x and S, the prediction, and A, B and C of the triangle.
     """
     A, B, C = _joint_root(Phi, SQ, S, identity)
     ahead = Phi @ x

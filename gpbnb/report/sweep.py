@@ -1,7 +1,7 @@
 """A sweep is a long computation in cells, whose results are stored as one table in the folder of its chapter.
 
-A cell is a small picklable value, such as a named tuple of a model, a format and a seed. It determines its result
-on any machine. Finished cells survive an interruption. The same class recomputes a sample of the stored cells.
+A cell is a small picklable value, such as a named tuple of a model, a format and a seed. Its result depends on nothing
+else. Finished cells survive an interruption. The same class recomputes a sample of the stored cells.
 """
 
 from __future__ import annotations
