@@ -14,7 +14,6 @@ import pytest
 import gpbnb
 from gpbnb import FloatFormat, LinearSystem, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.bounds.adversary import attack, ceiling, random_errors, run_against
 from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.guess import GAIN, LOOP, gains, linear_steps, rounding_errors, value_sizes
@@ -25,6 +24,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.run import Run
 from gpbnb.filters.structures import state_space
+from gpbnb.report.guarantees.adversary import attack, ceiling, random_errors, run_against
 from gpbnb.report.guarantees.published import nile_local_level
 from gpbnb.report.kalman.exact_step import exact_step
 from tests.plain_program import steps_in_python
@@ -179,10 +179,9 @@ def test_an_attack_takes_the_candidate_within_the_limits_whose_error_is_largest_
         limits(measurement=1),
     )
     n, rng = found.schedule.program.n, np.random.default_rng(4)
-    steer = np.zeros((1, n + 1))
 
     def ran(rows: Any, pool: Any, ahead: bool = False) -> Any:
-        return [each[0] for each in run_against(found, rows[None], pool[None], steer, False, ahead=ahead)]
+        return [each[0] for each in run_against(found, rows[None], pool[None], ahead=ahead)]
 
     def errors(rows: Any, *z: float) -> Any:
         return ran(rows, np.reshape(z, (2, 1, 1)))[2]

@@ -13,12 +13,12 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY16
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.adversary import attack
 from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.bounds.guess import ROUNDING
 from gpbnb.bounds.units import units
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, reference_states
+from gpbnb.report.guarantees.adversary import attack
 from tests.surveying import survey
 
 WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])

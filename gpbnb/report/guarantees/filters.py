@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.named import rounding_text
 from gpbnb.arithmetic.rounding import rounding_named
-from gpbnb.bounds.adversary import attack, responses, shares_of
 from gpbnb.bounds.guarantee import FilterGuarantee, closed_loops, guarantee
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.report.display.tables import Table
+from gpbnb.report.guarantees.adversary import attack, responses, shares_of
 from gpbnb.report.guarantees.random_filters import (
     DETERMINISTIC,
     KINDS,

@@ -9,10 +9,10 @@ import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.adversary import responses, run_against
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import closed_loops, from_schedule, limits
 from gpbnb.filters.structures import state_space
+from gpbnb.report.guarantees.adversary import responses, run_against
 from gpbnb.report.sweep import Number, sweep_of_rows
 from gpbnb.report.sweep import load as load_rows
 
@@ -52,7 +52,7 @@ def compute(seed: int) -> SurveyRow:
     found = from_schedule(filter_schedule(state_space(A, B), fmt), limits(measurement=Z))
     if not found.for_ever:  # rounded to few digits, the loop may be unstable
         return SurveyRow(seed, n, m, base, precision, fmt.rounding.value, f"{found.radius:.4f}", 0, "0", "0", "0")
-    F, steer, worst = closed_loops(found.schedule), np.zeros((m, n + 1)), [0.0, 0.0, 0.0]
+    F, worst = closed_loops(found.schedule), [0.0, 0.0, 0.0]
     every = [responses(found.schedule, F, state, STEPS) for state in range(n)]
     for kind, runs in enumerate((RANDOM, CONSTANT, CHOSEN)):
         rows, pools = [], []
@@ -63,7 +63,7 @@ def compute(seed: int) -> SurveyRow:
             else:
                 pools.append(Z * rng.uniform(-1, 1, (STEPS, 30 if kind == 2 else 1, m)))
         pool = np.array(pools) * (1 - 2.0**-5)
-        _, _, errors = run_against(found, np.array(rows), pool, steer, False, ahead=kind == 2)
+        _, _, errors = run_against(found, np.array(rows), pool, ahead=kind == 2)
         worst[kind] = float((np.abs(errors).max(axis=(0, 1)) / found.bound).max())
     total = RANDOM + CONSTANT + CHOSEN
     ratios = [f"{each:.4g}" for each in worst]

@@ -16,7 +16,6 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import smallest_precision
-from gpbnb.bounds.adversary import attack, ceiling, random_errors
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import FilterGuarantee, from_guess, from_schedule, guarantee, guessed, limits
 from gpbnb.bounds.probable import probable_error
@@ -26,6 +25,7 @@ from gpbnb.filters.structures import LinearFilter, state_space
 from gpbnb.filters.system import LinearSystem
 from gpbnb.report.display.tables import Table
 from gpbnb.report.examples import TILT_STATES, altimeter, tilt, tracker
+from gpbnb.report.guarantees.adversary import attack, ceiling, random_errors
 from gpbnb.report.guarantees.published import (
     dyer_mcreynolds,
     dynamax_tracking,

@@ -8,7 +8,7 @@ digits.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,39 +35,23 @@ class Attack:
     Parameters
     ----------
     errors : (n,), the largest error of each state in any run, at any step.
-    ratio : largest of these over their bounds; a guarantee is violated above 1.
-    ratios : (n,), the ratio of each state.
-    runs, steps : number of runs, and steps of each.
+    ratios : (n,), these over their bounds; a guarantee is violated above 1.
     z : (steps, m), measurements of the run with the largest ratio, numbers of the format, in float64.
     state, step : where the largest ratio occurs: index of the state, and number of steps done.
     admissible : whether the exact filter stayed within its limits in all runs.
     """
 
     errors: NDArray[np.float64]
-    ratio: float
     ratios: NDArray[np.float64]
-    runs: int
-    steps: int
     z: NDArray[np.float64]
     state: int
     step: int
     admissible: bool
 
-
-class Plan(NamedTuple):
-    """How measurements are chosen in some runs, step by step."""
-
-    #: (runs, steps, n), weight of an error after each step.
-    rows: NDArray[np.float64]
-    #: (runs, steps, candidates, m), measurements; with `by_range`, innovations, to which steering is added.
-    pool: NDArray[np.float64]
-    #: (m, n + 1), with `by_range`: steer (x_predicted, share) is added to innovations, within their limit.
-    steer: NDArray[np.float64]
-    by_range: bool
-    #: number of steps in which the share rises from 0 to 1.
-    ramp: float
-    #: whether each candidate is judged by the error one step later, after a measurement from the middle of the range.
-    ahead: bool
+    @property
+    def ratio(self) -> float:
+        """The largest error over its bound."""
+        return float(self.ratios.max())
 
 
 class _Lanes:
@@ -115,21 +99,20 @@ def _product(a: Any, x: Any) -> Any:
     return product_in_order(a, x[:, None])[:, 0]
 
 
-class _Search:
-    """A filter and its exact counterpart, each in as many lanes as all runs have candidates."""
+class _Filters:
+    """A filter and its exact counterpart, each with a candidate of a run in each lane."""
 
-    def __init__(self, found: FilterGuarantee, plan: Plan) -> None:
-        given, lanes = found.schedule, plan.pool.shape[0] * plan.pool.shape[2]
-        self._given, self._plan, self._limits = given, plan, found.limits
+    def __init__(self, found: FilterGuarantee, steps: int, lanes: int) -> None:
+        given = self._given = found.schedule
         n, m = given.program.n, given.program.m
+        self._limits = np.concatenate([found.limits.measurement, found.limits.innovation, found.limits.state])
         self._rounded = _Lanes(given.fmt, given.program, lanes)
         self._expected, self._compared = _Lanes(None, _expected(n, m), lanes), _Lanes(None, _compared(n, m), lanes)
-        self._machine, self._at = tables([given.fmt]), given.rows(np.arange(plan.pool.shape[1]))
-        #: Coefficients of each step: of the rounded filter, packed, and Phi with HPhi, in double-double.
+        self._machine, self._at = tables([given.fmt]), given.rows(np.arange(steps))
         self._matrices = np.concatenate([each.reshape(len(each), -1, 2) for each in (given.Phi, given.HPhi)], axis=1)
         self._gains = given.exact.reshape(len(given.exact), n * m, 2)
 
-    def _numbers(self, values: NDArray[np.float64]) -> NDArray[Any]:
+    def stored(self, values: NDArray[np.float64]) -> NDArray[Any]:
         """Round float64, (m, lanes), into the format; in base 10, their first decimals."""
         packed = values if self._given.fmt.base != 10 else _first_decimals(values)
         found = rounded(*self._machine, packed.reshape(-1, *packed.shape[2:]))
@@ -150,41 +133,20 @@ class _Search:
         after = self._rounded.take(self._given.packed[at], x, z)
         computed, measured = np.split(double_doubles_near(np.concatenate([after, z])), [n])
         found = self._compared.take(self._gains[at], np.concatenate([predicted, seen, computed]), measured)
-        innovation, exactly, error = np.split(found, [m, m + n])
-        return after, exactly, error[..., 0], self._excess(measured[..., 0], innovation[..., 0], exactly[..., 0])
-
-    def measurements(self, k: int, predicted: NDArray[Any], seen: NDArray[Any]) -> NDArray[Any]:
-        """Return the candidates of a step, (m, lanes, ...), packed."""
-        plan, values = self._plan, self._plan.pool[:, k].reshape(predicted.shape[1], -1).T
-        if plan.by_range:
-            pull = plan.steer[:, -1:] * min(1.0, k / plan.ramp)
-            for column, each in zip(plan.steer.T[:-1, :, np.newaxis], predicted, strict=True):
-                pull = pull + column * each[:, 0]
-            most = self._limits.innovation[:, np.newaxis]
-            values = seen[..., 0] + np.minimum(np.maximum(pull + values, -most), most) * (1 - 1e-6)
-        return self._numbers(values)
-
-    def _excess(self, *sizes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the largest share of a limit that measurement, innovation and state of each candidate take."""
-        limits = self._limits.measurement, self._limits.innovation, self._limits.state
-        shares = _shares(np.abs(np.concatenate(sizes)), np.concatenate(limits)[:, np.newaxis])
-        return np.asarray(shares.max(axis=0))
-
-    def ahead(self, k: int, x: NDArray[Any], exactly: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the error after the next step, (n, lanes), with a measurement from the middle of the range."""
-        predicted, seen = self.expected(k, exactly)
-        middle = seen[..., 0] if self._plan.by_range else self.in_lanes(self._plan.pool[:, k, 0].T)
-        return self.step(k, x, self._numbers(middle), predicted, seen)[2]
-
-    def in_lanes(self, numbers: NDArray[Any]) -> NDArray[Any]:
-        """Return numbers of each run, (count, runs, ...), for each of its candidates, (count, lanes, ...)."""
-        return np.repeat(numbers, self._plan.pool.shape[2], axis=1)
+        exactly, error = np.split(found[m:], [n])
+        sizes = np.abs(np.concatenate([measured[..., 0], found[: m + n, ..., 0]]))
+        return after, exactly, error[..., 0], _shares(sizes, self._limits[:, np.newaxis], 1e10).max(axis=0)
 
 
-def _shares(sizes: NDArray[np.float64], limits: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return sizes as shares of their limits, which may be zero."""
-    found = np.where(sizes == 0, 0.0, 1e10)
+def _shares(sizes: NDArray[np.float64], limits: NDArray[np.float64], beyond: float) -> NDArray[np.float64]:
+    """Return sizes as shares of their limits: 0 for no size, and `beyond` for a size with a limit of zero."""
+    found = np.where(sizes == 0, 0.0, beyond)
     return np.asarray(np.divide(sizes, limits, out=found, where=(sizes != 0) & (limits > 0)))
+
+
+def shares_of(errors: NDArray[np.float64], bound: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the ratio of each error to its bound: 0 for no error, infinity for an error with a bound of zero."""
+    return _shares(errors, bound, np.inf)
 
 
 def _first_decimals(x: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -229,35 +191,24 @@ def attack(
     center : (n,), for limits on state and innovation: the state near which the exact filter stays; by default near
         the limits.
     plans : courses of the measurements to try for each state.
+    ramp : steps in which the exact filter is brought there.
     """
-    given, rng = found.schedule, np.random.default_rng(seed)
-    n, m = given.program.n, given.program.m
-    by_range = not np.isfinite(found.limits.measurement).all()
-    errors, best, best_z, allowed, runs = np.zeros(n), 0.0, np.zeros((steps, m)), True, 0
-    at: tuple[Any, ...] = ()
-    F, steer = closed_loops(given), _steering(found, center) if by_range else np.zeros((m, n + 1))
+    given, rng, steer = found.schedule, np.random.default_rng(seed), _steering(found, center)
+    n, F, allowed = given.program.n, closed_loops(given), True
+    errors, best, best_z, at = np.zeros(n), -1.0, np.zeros((steps, given.program.m)), (1, 0)
     for state in range(n) if states is None else states:
         rows = np.broadcast_to(responses(given, F, state, steps), (plans, steps, n))
-        pool = np.array(
-            [_pool(found, F, state, steps, candidates, plan, by_range, rng) for plan in range(plans)]
-        ).reshape(plans, steps, candidates, m)
+        pools = [_pool(found, F, state, steps, candidates, plan, rng) for plan in range(plans)]
         rise = steps / 2 if ramp is None else ramp
-        outside, z, off = run_against(found, rows, pool, steer, by_range, rise, ahead=True)
-        runs += plans
+        outside, z, off = run_against(found, rows, np.array(pools), steer, rise, ahead=True)
         allowed = allowed and not outside.any()
         for plan in np.flatnonzero(outside == 0):
             errors = np.maximum(errors, np.abs(off[plan]).max(axis=0))
             reached = shares_of(np.abs(off[plan]), found.bound)
-            if reached.max() > best or not at:
-                best, best_z, at = float(reached.max()), z[plan], np.unravel_index(reached.argmax(), reached.shape)
-    ratios, (step, state) = shares_of(errors, found.bound), at or (0, 0)
-    return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, int(state), int(step) + 1, allowed)
-
-
-def shares_of(errors: NDArray[np.float64], bound: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the ratio of each error to its bound: 0 for no error, infinity for an error with a bound of zero."""
-    beyond = np.where(errors == 0, 0.0, np.inf)
-    return np.asarray(np.divide(errors, bound, out=beyond, where=(errors != 0) & (bound != 0)))
+            if reached.max() > best:
+                k, i = np.unravel_index(reached.argmax(), reached.shape)
+                best, best_z, at = float(reached.max()), z[plan], (int(k) + 1, int(i))
+    return Attack(errors, shares_of(errors, found.bound), best_z, at[1], at[0], allowed)
 
 
 def ceiling(found: FilterGuarantee, z: NDArray[np.float64], state: int) -> float:
@@ -306,13 +257,10 @@ def random_errors(found: FilterGuarantee, steps: int, center: Any = None) -> NDA
     ----------
     center : see :func:`attack`.
     """
-    given, rng = found.schedule, np.random.default_rng([0, 1])
-    n, m = given.program.n, given.program.m
-    by_range = not np.isfinite(found.limits.measurement).all()
-    share = 0.3 * found.limits.innovation if by_range else found.limits.measurement * (1 - 1e-6)
-    pool = share * rng.uniform(-1, 1, (1, steps, 1, m))
-    steer = _steering(found, center) if by_range else np.zeros((m, n + 1))
-    outside, _, errors = run_against(found, np.zeros((1, steps, n)), pool, steer, by_range, steps / 4)
+    rng, steer, program = np.random.default_rng([0, 1]), _steering(found, center), found.schedule.program
+    share = found.limits.measurement * (1 - 1e-6) if steer is None else 0.3 * found.limits.innovation
+    pool = share * rng.uniform(-1, 1, (1, steps, 1, program.m))
+    outside, _, errors = run_against(found, np.zeros((1, steps, program.n)), pool, steer, steps / 4)
     if outside[0]:
         raise ArithmeticError(
             f"got random measurements that leave the limits at {outside[0]} steps; needed wider limits"
@@ -324,8 +272,7 @@ def run_against(
     found: FilterGuarantee,
     rows: NDArray[np.float64],
     pool: NDArray[np.float64],
-    steer: NDArray[np.float64],
-    by_range: bool,
+    steer: NDArray[np.float64] | None = None,
     ramp: float = 1.0,
     ahead: bool = False,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
@@ -336,7 +283,12 @@ def run_against(
 
     Parameters
     ----------
-    rows, pool, steer, by_range, ramp, ahead : the fields of :class:`Plan`.
+    rows : (runs, steps, n), weight of an error after each step.
+    pool : (runs, steps, candidates, m), measurements; or innovations, if there is steering.
+    steer : (m, n + 1); steer (x_predicted, share) is added to innovations, within their limit.
+    ramp : number of steps in which the share rises from 0 to 1.
+    ahead : whether each candidate is judged by the error one step later, after a measurement from the middle of the
+        range.
 
     Returns
     -------
@@ -345,18 +297,37 @@ def run_against(
     errors : (runs, steps, n).
     """
     given, (runs, steps, candidates, _) = found.schedule, pool.shape
+    filters, most = _Filters(found, steps, runs * candidates), found.limits.innovation[:, np.newaxis]
+
+    def in_lanes(numbers: NDArray[Any]) -> NDArray[Any]:
+        """Return numbers of each run, (count, runs, ...), for each of its candidates, (count, lanes, ...)."""
+        return np.repeat(numbers, candidates, axis=1)
+
+    def measurements(k: int, predicted: NDArray[Any], seen: NDArray[Any]) -> NDArray[Any]:
+        """Return the candidates of a step, (m, lanes, ...), packed."""
+        values = pool[:, k].reshape(runs * candidates, -1).T
+        if steer is not None:
+            pull = steer[:, -1:] * min(1.0, k / ramp)
+            for column, each in zip(steer.T[:-1, :, np.newaxis], predicted, strict=True):
+                pull = pull + column * each[:, 0]
+            values = seen[..., 0] + np.minimum(np.maximum(pull + values, -most), most) * (1 - 1e-6)
+        return filters.stored(values)
+
     x, x_exact = (each[:, np.newaxis] for each in (as_packed(given.fmt, given.x0), double_doubles(given.x0)))
     x, x_exact = np.repeat(x, runs, axis=1), np.repeat(x_exact, runs, axis=1)
-    search = _Search(found, Plan(rows, pool, steer, by_range, float(ramp), ahead))
     chosen, errors, outside = [], np.zeros((runs, steps, given.program.n)), np.zeros(runs, np.int64)
     for k in range(steps):
-        x, x_exact = search.in_lanes(x), search.in_lanes(x_exact)
-        predicted, seen = search.expected(k, x_exact)
-        z = search.measurements(k, predicted, seen)
-        after, exactly, error, excess = search.step(k, x, z, predicted, seen)
-        judged = search.ahead(k + 1, after, exactly) if ahead and k + 1 < steps else error
-        weights, worth = search.in_lanes(rows[:, k + (judged is not error)].T), np.zeros(len(excess))
-        for weight, each in zip(weights, judged, strict=True):
+        x, x_exact = in_lanes(x), in_lanes(x_exact)
+        predicted, seen = filters.expected(k, x_exact)
+        z = measurements(k, predicted, seen)
+        after, exactly, error, excess = filters.step(k, x, z, predicted, seen)
+        judged, weights = error, rows[:, k]
+        if ahead and k + 1 < steps:
+            predicted, seen = filters.expected(k + 1, exactly)
+            middle = in_lanes(pool[:, k + 1, 0].T) if steer is None else seen[..., 0]
+            judged, weights = filters.step(k + 1, after, filters.stored(middle), predicted, seen)[2], rows[:, k + 1]
+        worth = np.zeros(len(excess))
+        for weight, each in zip(in_lanes(weights.T), judged, strict=True):
             worth = worth + weight * each
         scores = np.where(excess > 1, -1e300 * np.minimum(excess, 1e7), worth)
         best = np.arange(runs) * candidates + scores.reshape(runs, candidates).argmax(axis=1)
@@ -374,20 +345,17 @@ def _pool(
     steps: int,
     candidates: int,
     plan: int,
-    by_range: bool,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
     """Return candidates at each step: near the largest measurements of one sign, of a response, or anywhere."""
-    m = found.schedule.program.m
-    if by_range:
+    given, m, Z = found.schedule, found.schedule.program.m, found.limits.measurement
+    if not np.isfinite(Z).all():
         share = (1.0, 0.3, 0.05)[plan % 3]
         return share * found.limits.innovation * rng.uniform(-1, 1, (steps, candidates, m))
-    Z = found.limits.measurement
     width = (0.05, 0.5, 1.0, 2.0)[plan % 4]
     signs = rng.choice((-1.0, 1.0), m) if plan < 4 else 1.0
     course = np.ones((steps, m)) * signs
     if plan >= 4:  # the input that attains the peak gain of a state
-        given = found.schedule
         back = responses(given, F, (state + plan) % given.program.n, steps)
         course = np.sign(np.einsum("ki,kim->km", back, given.exact[given.rows(np.arange(steps)), ..., 0]))
     low = np.clip(course - width, -1, 1)[:, None, :]
@@ -395,14 +363,18 @@ def _pool(
     return Z * (1 - 1e-9) * (low + (high - low) * rng.uniform(0, 1, (steps, candidates, m)))
 
 
-def _steering(found: FilterGuarantee, center: Any) -> NDArray[np.float64]:
-    """Return a regulator whose innovations bring the exact filter to a given state, from transition and gain."""
+def _steering(found: FilterGuarantee, center: Any) -> NDArray[np.float64] | None:
+    """Return a regulator whose innovations bring the exact filter to a given state; None if measurements have limits.
+
+    In x = p + K nu, it chooses nu to minimize |x - place| / limits over a few steps.
+    """
+    if np.isfinite(found.limits.measurement).all():
+        return None
     given, n, m = found.schedule, found.schedule.program.n, found.schedule.program.m
     Phi, K = given.Phi[-1, :, :, 0], given.exact[-1, :, :, 0]
     X = found.limits.state
     limits = np.where(np.isfinite(X) & (X > 0), X, 1.0)
     place = np.zeros(n) if center is None else np.asarray(center, dtype=np.float64)
-    # x = p + K nu; a regulator chooses nu to minimize |x - place| / limits over a few steps.
     P = np.diag(limits**-2.0)
     weight = np.diag(np.maximum(found.limits.innovation, 1e-150) ** -2.0) * 1e-2
     for _ in range(2000):
