@@ -68,7 +68,7 @@ from gpbnb.filters.nonlinear_system import NonlinearSystem as NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother as FixedIntervalSmoother
 from gpbnb.filters.smoothing import SmoothedRecord as SmoothedRecord
 from gpbnb.filters.system import LinearSystem as LinearSystem
-from gpbnb.filters.words import WordFormats as WordFormats
+from gpbnb.filters.word_formats import WordFormats as WordFormats
 from gpbnb.names import NAMED_FORMATS as NAMED_FORMATS
 from gpbnb.wordlength.answer import Requirement as Requirement
 from gpbnb.wordlength.bounding import guarantee as guarantee

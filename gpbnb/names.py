@@ -38,7 +38,7 @@ HOMES = {
     "Rounding": "gpbnb.arithmetic.rounding",
     "SmoothedRecord": "gpbnb.filters.smoothing",
     "TracedFunction": "gpbnb.arithmetic.traced",
-    "WordFormats": "gpbnb.filters.words",
+    "WordFormats": "gpbnb.filters.word_formats",
     "convert": "gpbnb.arithmetic.second_format",
     "emulate": "gpbnb.wordlength.emulation",
     "guarantee": "gpbnb.wordlength.bounding",

@@ -27,7 +27,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, matrices
 from gpbnb.filters.structures import LinearFilter
-from gpbnb.filters.words import WordFormats, integer_program
+from gpbnb.filters.word_formats import WordFormats
 
 KIND = "rounding guarantee 2"
 ORDER = "each product and sum rounded once, sums from left to right"
@@ -122,7 +122,7 @@ def of_operations(
     if not {*program.operations[:, 0].tolist()} <= {*_KINDS}:
         raise ValueError(f"got {made.name}, which limits its values; needed products, sums and differences only")
     drawn = not isinstance(fmt, WordFormats) and fmt.rounding is Rounding.STOCHASTIC
-    stored = integer_program(made, fmt).coefficients if isinstance(fmt, WordFormats) else made.stored(fmt)
+    stored = made.stored(fmt)
     A, B = matrices(program, stored if exact == "as stored" else made.coefficients)
     content = {
         "filter": {

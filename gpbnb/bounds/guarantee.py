@@ -35,7 +35,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LARGEST_EXPONENT, LinearModel
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.structures import LinearFilter
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain")
 """Names of the parts of a bound, in the order in which a guarantee lists them."""

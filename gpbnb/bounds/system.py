@@ -24,7 +24,7 @@ from gpbnb.bounds.limited import limited_errors
 from gpbnb.bounds.units import largest_errors
 from gpbnb.bounds.words import WordSums
 from gpbnb.filters.system import LinearSystem
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 
 
 class OutputBounds:

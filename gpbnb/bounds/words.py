@@ -32,7 +32,8 @@ from gpbnb.bounds.units import units
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, exact_functionals, matrices
 from gpbnb.filters.structures import LinearFilter
 from gpbnb.filters.system import LinearSystem, is_stable
-from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program
+from gpbnb.filters.word_formats import WordFormats
+from gpbnb.filters.words import IntegerProgram, integer_program
 
 
 def rounding_limits(made: IntegerProgram) -> NDArray[np.float64]:

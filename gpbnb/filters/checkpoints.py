@@ -26,7 +26,7 @@ def exactly(packed: NDArray[Any], fmt: FloatFormat | FixedFormat | None) -> NDAr
 
 
 class Progress(ABC):
-    """A run of a filter: how far it has come, which of its steps are saved, and why it has ended.
+    """A run of a filter or of a system: how far it has come, which of its steps are saved, and why it has ended.
 
     Checkpoint steps are 1 or more, in ascending order.
     """
@@ -48,10 +48,14 @@ class Progress(ABC):
     def blocks(self, z: Any) -> Iterator[Any]:
         """Continue by as many steps as there are measurements, (steps, m), and give their results some at a time."""
 
-    @staticmethod
     @abstractmethod
-    def estimates(found: Any) -> NDArray[np.float64]:
+    def estimates(self, found: Any) -> NDArray[np.float64]:
         """Return the estimates of some steps, (steps, n, 2), as double-double."""
+
+    @property
+    def _width(self) -> int:
+        """Number of entries of an estimate, n."""
+        return int(self.model.n)
 
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
@@ -60,7 +64,7 @@ class Progress(ABC):
 
     def states(self, z: Any) -> NDArray[np.float64]:
         """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
-        none = np.zeros((0, self.model.n, 2))
+        none = np.zeros((0, self._width, 2))
         return np.concatenate([none, *(self.estimates(each) for each in self.blocks(z))])
 
     def done(self, definite: NDArray[np.bool_], *results: Any) -> None:

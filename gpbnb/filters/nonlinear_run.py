@@ -114,8 +114,7 @@ class NonlinearRun(Progress):
         """The covariance, its factors or its root, (n, n)."""
         return self._step.states[1]
 
-    @staticmethod
-    def estimates(found: StepTaken) -> NDArray[np.float64]:
+    def estimates(self, found: StepTaken) -> NDArray[np.float64]:
         """Return the estimates of some steps, (steps, n, 2), as double-double."""
         return double_doubles_of(found.states[0])
 

@@ -76,6 +76,21 @@ def double_doubles_near(packed: NDArray[Any]) -> NDArray[np.float64]:
     return np.stack([high, low], axis=-1)
 
 
+def widened(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """Convert results of a run, (k, n, m) or (k, n, m, 2), unless they are in it, to double-doubles near them."""
+    if packed.dtype == np.float64 and packed.ndim == 4:
+        return np.ascontiguousarray(packed)
+    return double_doubles_near(packed)
+
+
+def widened_estimates(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """Convert as :func:`widened` does; decimal numbers that are too small for double-double become zero."""
+    wide = widened(packed)
+    if packed.dtype != np.float64:
+        wide[np.isnan(wide[..., 0]) & (packed[..., 1] < 0)] = 0.0
+    return wide
+
+
 def _rest(a: NDArray[np.float64], b: NDArray[np.float64], product: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ab minus the product, exactly."""
     (c, d), (f, g) = _halves(a), _halves(b)

@@ -28,7 +28,7 @@ from gpbnb.filters.opening import (
     double_doubles_of,
     opening,
 )
-from gpbnb.filters.pairs import double_doubles_near, nearest_floats
+from gpbnb.filters.pairs import nearest_floats, widened, widened_estimates
 from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
 from gpbnb.filters.stepping import RunningStep, Stop
@@ -293,8 +293,7 @@ class Run(Progress):
         if self._carried is not None:
             self._carried.checkpoint_steps = checkpoint_steps
 
-    @staticmethod
-    def estimates(found: Block) -> NDArray[np.float64]:
+    def estimates(self, found: Block) -> NDArray[np.float64]:
         """Return the estimates of some steps, (steps, n, 2), as double-double."""
         return widened_estimates(found.x)[:, :, 0]
 
@@ -381,21 +380,6 @@ class Run(Progress):
             H, UR = (self.exactly(self.letters[each]) for each in ("H", "UR"))
             K, P = without_factors(self.form, K, P, H[at % len(H)], UR[at % len(UR)])
         return Checkpoints(tuple((at + 1).tolist()), x, K, P)
-
-
-def widened(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert results of a run, (k, n, m) or (k, n, m, 2), unless they are in it, to double-doubles near them."""
-    if packed.dtype == np.float64 and packed.ndim == 4:
-        return np.ascontiguousarray(packed)
-    return double_doubles_near(packed)
-
-
-def widened_estimates(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert as :func:`widened` does; decimal numbers that are too small for double-double become zero."""
-    wide = widened(packed)
-    if packed.dtype != np.float64:
-        wide[np.isnan(wide[..., 0]) & (packed[..., 1] < 0)] = 0.0
-    return wide
 
 
 def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:

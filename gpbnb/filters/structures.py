@@ -52,6 +52,7 @@ from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.named import checked_name, naming
 from gpbnb.filters.opening import packed_array
 from gpbnb.filters.program import AT_LEAST, Program, dot, matrices_of, recorded
+from gpbnb.filters.word_formats import WordFormats
 
 DESIGN = FloatFormat(2, 256, Rounding.EVEN)
 """Format of computed coefficients that would be too long as fractions."""
@@ -61,7 +62,8 @@ LONGEST = 512
 
 
 _WORDS = (
-    "; coefficients may have a format of their own: WordFormats(data, coefficients), or --kind words in the command"
+    "; coefficients may have a format or a number of significant bits of their own: WordFormats(data, 15), or --kind "
+    "words in the command"
 )
 
 
@@ -93,12 +95,17 @@ class LinearFilter:
         except ValueError as error:
             raise ValueError(f"{self.name}: {error}") from None
 
-    def stored(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
+    def stored(self, fmt: FloatFormat | FixedFormat | WordFormats) -> NDArray[Any]:
         """Return the coefficients as a run in a format stores them, exact, (c,).
 
         In fixed point, nothing is multiplied by 1 or -1, which need not be numbers of the format. Stochastic rounding
         begins with its first random number, as in a run.
         """
+        if isinstance(fmt, WordFormats):
+            kept, limits = fmt.coefficients, self.limits_in(fmt.data)
+            found = self.stored(FloatFormat(2, kept) if isinstance(kept, int) else kept or fmt.data)
+            found[list(limits)] = [fmt.data.strict.round(each) for each in limits.values()]
+            return found
         fmt.restart()
         unit, rounded = self._stored(fmt)
         return np.where(unit, self.coefficients, np.asarray(rounded.to_fractions(), dtype=object))

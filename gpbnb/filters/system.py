@@ -9,9 +9,11 @@ emulated and bounded.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,11 +26,13 @@ from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.named import arithmetic, format_named
 from gpbnb.arithmetic.rational import eigenvalues, exact, rationals
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.checkpoints import Progress
 from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, naming, range_text, sized, whole_number
 from gpbnb.filters.opening import as_packed, packed_array, stored_start
-from gpbnb.filters.pairs import nearest_double_doubles
+from gpbnb.filters.pairs import widened_estimates
 from gpbnb.filters.program import matrices
 from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
 from gpbnb.filters.structures import (
@@ -50,6 +54,11 @@ from gpbnb.filters.structures import (
     sum_structure,
     transfer_function,
 )
+from gpbnb.filters.word_formats import WordFormats
+from gpbnb.filters.words import WordSteps, integer_program, integers_of, pairs_of
+
+SystemFormat = FloatFormat | FixedFormat | WordFormats
+"""What a linear system runs in."""
 
 BLOCK = 32
 """Usual number of inputs in a block of a sum."""
@@ -440,7 +449,7 @@ class LinearSystem:
         """Return this system as the linear filter that a guarantee needs, whose last p states are the outputs."""
         return self.made if self.made is not None else state_space(self.A, self.B, self.C, self.D, self.name)
 
-    def outputs(self, u: Any, fmt: FloatFormat | FixedFormat | str | None = None) -> NDArray[np.float64]:
+    def outputs(self, u: Any, fmt: SystemFormat | str | None = None) -> NDArray[np.float64]:
         """Return the outputs of a run with every operation rounded to a format, or without a format in double-double.
 
         Parameters
@@ -461,50 +470,28 @@ class LinearSystem:
         OverflowError : a number leaves the range of float64 or of the format's compiled loops. The message names the
             state or output, counted from 0, and the step, counted from 1.
         """
-        out = np.ascontiguousarray(self._run(u, fmt)[:, self.n :])
-        return out if fmt is None else self._widened(out)
+        return np.ascontiguousarray(self.states(u, fmt)[:, self.n :])
 
-    def states(self, u: Any, fmt: FloatFormat | FixedFormat | str) -> NDArray[np.float64]:
+    def states(self, u: Any, fmt: SystemFormat | str | None = None) -> NDArray[np.float64]:
         """Return states and outputs after each step, (steps, n + p, 2), as :meth:`outputs` computes them.
 
         Raises
         ------
         OverflowError : as for :meth:`outputs`.
         """
-        return self._widened(self._run(u, fmt), 0)
+        run = SystemRun(self, format_named(fmt))
+        found = run.states(u)
+        if run.stopped is not None:
+            raise OverflowError(run.reason)
+        return found
 
-    def _run(self, u: Any, fmt: Any) -> NDArray[Any]:
-        """Return packed states and outputs after each step, (steps, n + p)."""
-        fmt = format_named(fmt)
-        if not isinstance(fmt, FloatFormat | FixedFormat | None):
-            raise TypeError(
-                f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or a name; emulate(system, u, fmt) takes "
-                "WordFormats, too"
-            )
-        given, inputs = self.as_filter(), system_inputs(self, u)
-        start = np.concatenate([self.x0, exact([0] * self.p)])
-        if fmt is None:
-            tag: Any = DoubleDouble()
-            coefficients, z, x = (double_doubles(exact(each)) for each in (given.coefficients, inputs, start))
-        else:
-            tag = fmt.run_tag()
-            fmt.restart()
-            coefficients = given.packed(fmt)
-            with naming("inputs"):
-                z = as_packed(fmt, inputs)
-            x = packed_array(stored_start(fmt, start))
-        out, lost = LinearSteps(given.program, fmt, tag, coefficients, x).take(z)
-        if lost >= 0:
-            raise OverflowError(f"{self._value(lost)} at step {len(out) + 1}: {self.beyond(fmt)}")
-        return out
-
-    def stored(self, fmt: FloatFormat | FixedFormat) -> tuple[NDArray[Any], ...]:
+    def stored(self, fmt: SystemFormat) -> tuple[NDArray[Any], ...]:
         """Return the exact A, B, C and D of the structure after a format has rounded its coefficients."""
         made = self.as_filter()
         A, B = matrices(made.program, made.stored(fmt))
         return A[: self.n, : self.n], B[: self.n], A[self.n :, : self.n], B[self.n :]
 
-    def unstable(self, fmt: FloatFormat | FixedFormat | None = None) -> str:
+    def unstable(self, fmt: SystemFormat | None = None) -> str:
         """Return the reason why the system, as given or as stored in a format, is not stable; empty if both are stable.
 
         The test is exact. A system with an eigenvalue of absolute value 1 counts as not stable.
@@ -513,41 +500,116 @@ class LinearSystem:
             return f"the system as given is not stable, since A has {_eigenvalue(self.A, self.state_names)}"
         if fmt is not None and not is_stable(stored := self.stored(fmt)[0]):
             growing = _eigenvalue(stored, self.state_names)
-            return f"the system is stable, but as stored in {arithmetic(fmt)} it is not, since A has {growing}"
+            name = str(fmt) if isinstance(fmt, WordFormats) else arithmetic(fmt)
+            return f"the system is stable, but as stored in {name} it is not, since A has {growing}"
         return ""
 
-    def beyond(self, fmt: FloatFormat | FixedFormat | None = None) -> str:
+    def beyond(self, fmt: SystemFormat | None = None) -> str:
         """Return why a number of a run cannot be stored, and what to do about it; without a format, in float64."""
-        what = "a number beyond the range of float64"
-        if fmt is not None and (fmt.limits is not None or fmt.base == 10):
-            what = f"a number beyond the range of {arithmetic(fmt)}"
+        what, cure = "a number beyond the range of float64", "scale the numbers"
+        if isinstance(fmt, WordFormats):
+            name = arithmetic(fmt.data) if fmt == WordFormats(fmt.data) else str(fmt)
+        else:
+            name = "" if fmt is None or (fmt.limits is None and fmt.base != 10) else arithmetic(fmt)
+        if name:
+            what = f"a number beyond the range of {name}"
         if cause := self.unstable(fmt):
             return f"got {what}; {cause}, so numbers grow without end; scaling delays that, no precision prevents it"
-        cure = "scale the numbers"
-        if fmt is not None and fmt.limits is not None:
+        if isinstance(fmt, WordFormats) or (fmt is not None and fmt.limits is not None):
             cure += ", or use a format with a larger range"
         elif fmt is not None and fmt.base != 10:
             cure += ", or use base 10"
         return f"got {what}; {cure}"
 
-    def _value(self, i: int) -> str:
+    def value(self, i: int) -> str:
         """Name a state, or an output, which follow the states."""
         if i < self.n:
             return named("state", i, self.state_names)
         return named("output", i - self.n, self.output_names)
 
-    def _widened(self, outputs: NDArray[Any], first: int | None = None) -> NDArray[np.float64]:
-        """Return packed outputs (steps, p) of any format, or states from the first, as pairs of float64."""
+
+class SystemRun(Progress):
+    """A run of a linear system. An estimate of a step is its states and, behind them, its outputs.
+
+    Parameters
+    ----------
+    model : the system.
+    fmt : the format in which everything is stored and computed, or formats of words; None for double-double.
+    checkpoint_steps : as for :class:`~gpbnb.filters.run.Run`.
+    """
+
+    def __init__(self, model: LinearSystem, fmt: SystemFormat | None, checkpoint_steps: Sequence[int] = ()) -> None:
+        if not isinstance(fmt, FloatFormat | FixedFormat | WordFormats | None):
+            raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat, WordFormats or a name")
+        super().__init__(checkpoint_steps)
+        if isinstance(fmt, FixedFormat) and fmt.rounding is not Rounding.STOCHASTIC:
+            fmt = WordFormats(fmt)
+        self.model, self.fmt, self._steps = model, fmt, self._begun(model, fmt)
+
+    @staticmethod
+    def _begun(model: LinearSystem, fmt: SystemFormat | None) -> LinearSteps | WordSteps:
+        made, start = model.as_filter(), np.concatenate([model.x0, exact([0] * model.p)])
+        if isinstance(fmt, WordFormats):
+            program = integer_program(made, fmt)
+            with naming("x0"):
+                return WordSteps(program, integers_of(start, fmt.data.strict))
+        if fmt is None:
+            coefficients, x = double_doubles(made.coefficients), double_doubles(start)
+            return LinearSteps(made.program, fmt, DoubleDouble(), coefficients, x)
+        tag = fmt.run_tag()
+        fmt.restart()
+        return LinearSteps(made.program, fmt, tag, made.packed(fmt), packed_array(stored_start(fmt, start)))
+
+    @property
+    def _width(self) -> int:
+        """Number of states and outputs."""
+        return self.model.n + self.model.p
+
+    def blocks(self, z: Any) -> Iterator[NDArray[Any]]:
+        """Continue by as many steps as there are inputs, (steps, m), and give what each computes, packed."""
+        if self.stopped is not None:
+            return
+        inputs, missing = system_inputs(self.model, z), ""
         try:
-            return nearest_double_doubles(outputs)
+            packed = self._stored(inputs)
+        except OverflowError as error:
+            missing = str(error)
+            packed = self._stored(inputs[: bisect_left(range(len(inputs)), True, key=partial(self._loses, inputs))])
+        found, lost = self._steps.take(packed)
+        self.done(np.ones(len(found), np.bool_), found)
+        yield found
+        if lost >= 0:
+            self.stop(self.model.value(lost), f": {self.model.beyond(self.fmt)}")
+        elif missing:
+            self.stop("inputs", f": {missing}")
+
+    def _stored(self, inputs: NDArray[Any]) -> NDArray[Any]:
+        if isinstance(self.fmt, WordFormats):
+            return integers_of(inputs, self.fmt.data)
+        return as_packed(self.fmt, inputs)
+
+    def _loses(self, inputs: NDArray[Any], last: int) -> bool:
+        """Whether the format does not hold some inputs up to the last."""
+        try:
+            self._stored(inputs[: last + 1])
         except OverflowError:
-            for k, i in np.ndindex(outputs.shape[:2]):
-                try:
-                    nearest_double_doubles(outputs[k : k + 1, i : i + 1])
-                except OverflowError:
-                    place = self._value((self.n if first is None else first) + i)
-                    raise OverflowError(f"{place} at step {k + 1}: {self.beyond(None)}") from None
-            raise
+            return True
+        return False
+
+    def estimates(self, found: NDArray[Any]) -> NDArray[np.float64]:
+        """Return states and outputs of some steps, (steps, n + p, 2), as double-double."""
+        if isinstance(self.fmt, WordFormats):
+            return pairs_of(found, self.fmt.data.unit)
+        return widened_estimates(found[:, :, None])[:, :, 0]
+
+    def states(self, z: Any) -> NDArray[np.float64]:
+        """Continue, and return all estimates; a decimal number beyond the range of double-double ends the run, too."""
+        found = super().states(z)
+        for k, i in np.argwhere(np.isnan(found[..., 0]))[:1].tolist():
+            self.steps -= len(found) - k
+            self.stop(self.model.value(i), f": {self.model.beyond()}")
+            found = found[:k]
+        return found
 
 
 def _ascending(name: str, given: Any) -> tuple[Fraction, Fraction] | None:

@@ -14,7 +14,6 @@ output, is stored in the format of the data.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -22,17 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import backends
 from gpbnb.arithmetic.kernels.integer_steps import WordCode, WordStore, advance, advance_in_python
 from gpbnb.arithmetic.kernels.selection import MODES
-from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.rounding import Rounding, digits_text
-from gpbnb.filters.named import naming
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.program import AT_LEAST, MULTIPLY, Program
 from gpbnb.filters.structures import LinearFilter
-from gpbnb.filters.system import LinearSystem, system_inputs
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.interrupts import slices
 
 _POLICIES = ("raise", "saturate", "wrap")
@@ -43,78 +39,6 @@ _LONGEST_SUM = 63
 _FAST = 6
 """Operations that Python does on its integers in the time of one operation of exact arithmetic on arrays."""
 _done = 0
-
-
-@dataclass(frozen=True)
-class WordFormats:
-    """Number formats for data, coefficients and sums in a fixed-point processor.
-
-    Parameters
-    ----------
-    data : format of inputs, states, outputs, and of each result that is stored.
-    coefficients : format of all coefficients; or a number of significant bits, where each coefficient has its own
-        binary point. By default the format of the data.
-    sums : format of the accumulator, with at least as many fraction bits as the data; by default there is no
-        accumulator, and each product and each sum is stored in the format of the data.
-
-    Raises
-    ------
-    TypeError : a format that is not fixed point, or bits that are not a whole number.
-    ValueError : a number of bits below 1; stochastic rounding; sums with fewer fraction bits than the data.
-
-    Examples
-    --------
-    Coefficients in Q14, data in Q15, sums of 32 bits with one rounding when they are stored:
-
-    >>> from gpbnb import FixedFormat
-    >>> words = WordFormats(data=FixedFormat(0, 15), coefficients=FixedFormat(1, 14), sums=FixedFormat(2, 29))
-    >>> words.gap
-    14
-    """
-
-    data: FixedFormat
-    coefficients: FixedFormat | int | None = None
-    sums: FixedFormat | None = None
-
-    def __post_init__(self) -> None:
-        if isinstance(self.coefficients, int) and not isinstance(self.coefficients, bool):
-            if self.coefficients < 1:
-                raise ValueError(f"got {self.coefficients} bits for coefficients; needed at least 1")
-        elif self.coefficients is not None and not isinstance(self.coefficients, FixedFormat):
-            raise TypeError(f"got coefficients {self.coefficients!r}; needed a FixedFormat or a number of bits")
-        for name, fmt in (("data", self.data), ("sums", self.sums)):
-            if fmt is None and name == "sums":
-                continue
-            if not isinstance(fmt, FixedFormat):
-                raise TypeError(f"got {name} {fmt!r}; needed a FixedFormat")
-            if fmt.rounding is Rounding.STOCHASTIC:
-                raise ValueError(f"got stochastic rounding for the {name}; needed another rounding for integers")
-        if self.sums is not None and self.sums.fraction_bits < self.data.fraction_bits:
-            raise ValueError(
-                f"got sums with {self.sums.fraction_bits} fraction bits and data with {self.data.fraction_bits}; "
-                "needed at least as many for the sums"
-            )
-
-    @property
-    def accumulator(self) -> FixedFormat:
-        """The format in which products and sums are computed; the format of the data if there is no accumulator."""
-        return self.data if self.sums is None else self.sums
-
-    @property
-    def gap(self) -> int:
-        """Number of fraction bits that a sum loses when it is stored."""
-        return self.accumulator.fraction_bits - self.data.fraction_bits
-
-    def __str__(self) -> str:
-        def named(fmt: FixedFormat) -> str:
-            return f"{1 + fmt.precision} bits with {fmt.fraction_bits} after the point"
-
-        text = f"data of {named(self.data)}"
-        if isinstance(self.coefficients, FixedFormat):
-            text += f", coefficients of {named(self.coefficients)}"
-        elif self.coefficients is not None:
-            text += f", coefficients of {digits_text(self.coefficients, kind='significant')}"
-        return text + (f", sums of {named(self.sums)}" if self.sums is not None else "")
 
 
 class IntegerProgram(NamedTuple):
@@ -137,24 +61,8 @@ class IntegerProgram(NamedTuple):
 
 
 def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
-    """Store the coefficients of a filter in words; a coefficient of 1 or -1 is exact, as nothing is multiplied."""
-    program, limits = made.program, made.limits_in(words.data)
-    stored = np.empty(len(made.coefficients), dtype=object)
-    for i, value in enumerate(made.coefficients):
-        fmt = words.data if i in limits else words.coefficients if words.coefficients is not None else words.data
-        if abs(value) == 1 and i not in limits:
-            stored[i] = value
-            continue
-        try:
-            value = limits.get(i, value)
-            stored[i] = FloatFormat(2, fmt).round(value) if isinstance(fmt, int) else fmt.strict.round(value)
-        except OverflowError:
-            name = program.coefficient_names[i] if program.coefficient_names else f"coefficient {i}"
-            text = arithmetic(fmt) if isinstance(fmt, FixedFormat) else digits_text(fmt, kind="significant")
-            raise OverflowError(
-                f"got {name} = {float(value):.6g}, beyond the range of {text}; needed coefficients with more integer "
-                "bits, or a number of significant bits, as in WordFormats(data, 15)"
-            ) from None
+    """Store the coefficients of a filter in words."""
+    program, stored = made.program, made.stored(words)
     point, target = words.data.fraction_bits, words.accumulator.fraction_bits
     factors, shifts = list[int](), list[int]()
     for code, a, _ in program.operations.tolist():
@@ -168,42 +76,14 @@ def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
     return IntegerProgram(program, words, tuple(factors), tuple(shifts), stored)
 
 
-class IntegerRun(NamedTuple):
-    """States of a run on integers, and its outputs."""
-
-    states: NDArray[Any]  # (steps, n), integers in units of the data after each step, outputs last
-    unit: Fraction
-
-    def outputs(self, p: int) -> NDArray[np.float64]:
-        """Return the last p states as sums of two float64, (steps, p, 2)."""
-        integers, unit = self.states[:, len(self.states[0]) - p :], float(self.unit)
-        high = integers.astype(np.float64)
-        if integers.dtype == object:
-            low = np.vectorize(lambda n, h: float(int(n) - int(h)), otypes=[float])(integers, high)
-        else:
-            low = (integers - high.astype(np.int64)).astype(np.float64)
-        return np.stack([high * unit, low * unit], axis=-1)
-
-
-def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats) -> IntegerRun:
-    """Run a filter, which starts from zeros, or a system, from its own x0, on integers.
-
-    Inputs (steps, m) are rounded into the format of the data.
-    """
-    if isinstance(given, LinearSystem):
-        start = np.concatenate([given.x0, exact([0] * given.p)])
-        u, given = system_inputs(given, u), given.as_filter()
+def pairs_of(integers: NDArray[Any], unit: Fraction) -> NDArray[np.float64]:
+    """Return integers in some units, (...), as sums of two float64, (..., 2)."""
+    high = integers.astype(np.float64)
+    if integers.dtype == object:
+        low = np.vectorize(lambda n, h: float(int(n) - int(h)), otypes=[float])(integers, high)
     else:
-        start = exact([0] * given.program.n)
-    made = integer_program(given, words)
-    data = words.data
-    return IntegerRun(run_integers(made, integers_of(u, data), first_integers(start, data)), data.unit)
-
-
-def first_integers(x0: Any, fmt: FixedFormat) -> NDArray[Any]:
-    """Round a first state as :func:`integers_of` does."""
-    with naming("x0"):
-        return integers_of(np.asarray(x0)[None], fmt.strict)[0]
+        low = (integers - high.astype(np.int64)).astype(np.float64)
+    return np.stack([high, low], axis=-1) * float(unit)
 
 
 def integers_of(values: Any, fmt: FixedFormat) -> NDArray[Any]:
@@ -266,26 +146,34 @@ def _code(made: IntegerProgram, dtype: Any = np.int64) -> WordCode:
     )
 
 
-def run_integers(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -> NDArray[Any]:
-    """Run a program on integers; return the states after each step, (steps, n).
+class WordSteps:
+    """A linear program on integers, from a first state (n,) in units of the data."""
 
-    Inputs (steps, m) and first state (n,) are in units of the data.
-    """
-    short, count = made.is_short and u.dtype != object and x.dtype != object, len(made.program.operations)
-    advance, dtype = _way(short, len(u) * count)
-    code, states = _code(made, dtype), np.zeros((len(u) + 1, made.program.n), dtype)
-    states[0] = x.astype(dtype)
-    for part in slices(len(u), count):
-        stopped, after = np.full(part.stop - part.start, -1), slice(part.start + 1, part.stop + 1)
-        advance(code, states[part], u[part].astype(dtype, copy=False), states[after], stopped)
-        if (stopped >= 0).any():
-            step = int(np.argmax(stopped >= 0))
-            operation = int(stopped[step])
-            kind = "a product" if code.operations[operation, 0] == MULTIPLY else "a sum"
-            raise OverflowError(
-                f"overflow in {kind}, operation {operation + 1} of {count}, at step {part.start + step + 1}"
-            )
-    return states[1:].astype(np.int64 if short else object, copy=False)
+    def __init__(self, made: IntegerProgram, x: NDArray[Any]) -> None:
+        self._made, self._x = made, x
+
+    def take(self, u: NDArray[Any]) -> tuple[NDArray[Any], int]:
+        """Take a step with each of the inputs u, (steps, m), in units of the data.
+
+        Return the states of steps that have results, (steps, n), and the first output that the next step cannot
+        compute, or -1.
+        """
+        made, x, count = self._made, self._x, len(self._made.program.operations)
+        short = made.is_short and u.dtype != object and x.dtype != object
+        advance, dtype = _way(short, len(u) * count)
+        code, states, done, lost = _code(made, dtype), np.zeros((len(u) + 1, len(x)), dtype), len(u), -1
+        states[0] = x.astype(dtype)
+        for part in slices(len(u), count):
+            stopped, after = np.full(part.stop - part.start, -1), slice(part.start + 1, part.stop + 1)
+            advance(code, states[part], u[part].astype(dtype, copy=False), states[after], stopped)
+            if (stopped >= 0).any():
+                step = int(np.argmax(stopped >= 0))
+                computed_by = made.program.outputs - made.program.n - made.program.m
+                done, lost = part.start + step, int(np.argmax(computed_by >= stopped[step]))
+                break
+        found = states[1 : done + 1].astype(np.int64 if short else object, copy=False)
+        self._x = found[-1] if done else x
+        return found, lost
 
 
 def successors(

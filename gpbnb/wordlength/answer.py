@@ -14,7 +14,7 @@ from gpbnb.arithmetic.named import format_text, rounding_text
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.filters.blocks import BLOCKS, BlockFormats
 from gpbnb.filters.forms import Form
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 
 Basis = Literal["emulation", "bound", "guarantee", "probable"]
 

@@ -30,7 +30,7 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.answer import Basis, Requirement, digits_of, joined
 from gpbnb.wordlength.models import MODELS, SYSTEMS, read_model
 

@@ -17,7 +17,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import whole_number
 from gpbnb.filters.system import LinearSystem
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.asked import admitted, checked_format
 from gpbnb.wordlength.judges import largest_inputs
 from gpbnb.wordlength.models import ModelSource

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import rounding_text
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 
 NARROW = {32: 30, 64: 62}
 """Bits of a C type, and how many bits without the sign the intermediate results may have."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.machine import CODES, NAMES, operands_of
 from gpbnb.filters.program import Program
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.c_integers import Integers, literal, modulus, used_functions, word_bits
 
 WHOLE = ("floor", "ceil", "trunc", "rint")

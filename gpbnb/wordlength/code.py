@@ -41,14 +41,13 @@ from gpbnb.filters.recording import kalman_program, program_states
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.steps import HUNG_FORMS
-from gpbnb.filters.system import LinearSystem, system_inputs
-from gpbnb.filters.words import WordFormats, integer_program
+from gpbnb.filters.system import LinearSystem, SystemRun, system_inputs
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.asked import admitted, checked_format, data_of
 from gpbnb.wordlength.bounding import guarantee
 from gpbnb.wordlength.c_files import CodeSource, Sections, Vectors, checked_identifier, refuse_others, written_files
 from gpbnb.wordlength.c_numbers import CodeFloats, CodeNumbers, CodeStep, CodeWords
-from gpbnb.wordlength.emulation import longest
-from gpbnb.wordlength.judges import largest_inputs, system_pairs
+from gpbnb.wordlength.judges import largest_inputs
 from gpbnb.wordlength.models import ModelSource
 
 VECTORS = 100
@@ -103,8 +102,8 @@ def write_code(
     model : a linear system in its structure, a design, a Kalman filter, linear, extended or unscented, perhaps with
         known inputs, which follow the measurements in the code's input, or a nonlinear system, whose step is a function
         of your own; or what :func:`gpbnb.read_model` reads.
-    fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; a :class:`~gpbnb.filters.words.WordFormats`; or the name
-        of a format, such as "float32" or "Q15".
+    fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; a :class:`gpbnb.WordFormats`; or the name of a format,
+        such as "float32" or "Q15".
     folder : folder for the files, which is created if necessary. Files that gpbnb has written are replaced, others not.
     form : for a Kalman filter, "innovation", "Joseph", "UD", or one of Hung's, or "constant gain"; for a
         :class:`gpbnb.filters.design.FilterDesign`, its structure. A Kalman filter takes words of at
@@ -256,20 +255,16 @@ def prepared(given: Any, fmt: AnyFormat, form: Form | str | None, exact: bool = 
 
 def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared:
     made, program = system.as_filter(), system.as_filter().program
-    if isinstance(fmt, FloatFormat):
-        data: Any = fmt
-        stored = made.stored(fmt)[None]
-    else:
-        words = fmt if isinstance(fmt, WordFormats) else WordFormats(fmt)
-        data, stored = words.data, integer_program(made, words).coefficients[None]
+    data: Any = fmt.data if isinstance(fmt, WordFormats) else fmt
+    stored = made.stored(fmt)[None]
     if not (isinstance(fmt, WordFormats) and fmt.sums):  # with sums of their own, a sum with zero may round or overflow
         program = without_exact(program, stored)
     start = stored_start(data, system.x0).to_fractions()
 
     def emulated(u: Any, fmt: Any) -> Vectors:
         inputs = system_inputs(system, u)
-        pairs = longest(lambda steps: system_pairs(system, inputs[:steps], fmt), len(inputs))[1]
-        states = [] if pairs is None else [exactly(pairs[..., 0]) + exactly(pairs[..., 1])]
+        pairs = SystemRun(system, fmt).states(inputs)
+        states = [exactly(pairs[..., 0]) + exactly(pairs[..., 1])]
         return _vectors(data, data.array(inputs).to_fractions(), np.append(start, exactly([0] * system.p)), states)
 
     return Prepared(

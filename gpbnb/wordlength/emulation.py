@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,21 +10,19 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import Numbers
-from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import stored_measurements
 from gpbnb.filters.nonlinear_run import opened, true_states
-from gpbnb.filters.opening import stored_start
 from gpbnb.filters.smoothing import FixedIntervalSmoother
-from gpbnb.filters.system import LinearSystem, system_inputs
-from gpbnb.filters.words import WordFormats, first_integers, integer_program
+from gpbnb.filters.system import LinearSystem, SystemRun, system_inputs
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.answer import format_in_words
 from gpbnb.wordlength.asked import AnyFormat, Asked, Data, Function, checked_format, is_filter
 from gpbnb.wordlength.functions import STOPS, exact_outputs, outputs_of, referenced
-from gpbnb.wordlength.judges import measured, system_pairs
+from gpbnb.wordlength.judges import measured
 from gpbnb.wordlength.models import ModelSource
 
 
@@ -136,41 +133,12 @@ def _filter(model: Any, data: Data, fmt: Any, form: Form) -> EmulatedRun:
 def _system(system: LinearSystem, data: Data, fmt: Any) -> EmulatedRun:
     if data.z is None:
         raise ValueError(f"got a number of steps for {system.name}; needed its inputs, of shape (steps, {system.m})")
-    u, of_data = system_inputs(system, data.z), fmt.data if isinstance(fmt, WordFormats) else fmt
-    true = system.outputs(u)
-    _check_stored(system, fmt)
-    _, pairs, reason = longest(lambda steps: system_pairs(system, u[:steps], fmt), len(u))
-    if pairs is None:
-        pairs = np.zeros((0, system.n + system.p, 2))
-    numbers, n = _in_format(pairs, of_data), system.n
-    off = pairs[:, n:] - true[: len(pairs)]
-    return EmulatedRun(fmt, numbers[:, :n], numbers[:, n:], np.asarray(off.sum(axis=2)), reason)
-
-
-def _check_stored(system: LinearSystem, fmt: Any) -> None:
-    """Reject a system whose coefficients or first state the format does not hold: overflow is for results."""
-    words = WordFormats(fmt) if isinstance(fmt, FixedFormat) else fmt
-    if isinstance(words, WordFormats):
-        integer_program(system.as_filter(), words)
-        first_integers(system.x0, words.data)
-    else:
-        system.as_filter().stored(fmt)
-        stored_start(fmt, system.x0)
-
-
-def longest(run: Callable[[int], Any], steps: int) -> tuple[int, Any, str]:
-    """Return the most steps that a run takes without an overflow, what it returns, and why there are no more."""
-    try:
-        return steps, run(steps), ""
-    except OverflowError as error:
-        low, high, found, why = 0, steps, None, str(error)
-    while high - low > 1:
-        middle = (low + high) // 2
-        try:
-            found, low = run(middle), middle
-        except OverflowError as error:
-            high, why = middle, str(error)
-    return low, found, why
+    u, n = system_inputs(system, data.z), system.n
+    run, true = SystemRun(system, fmt), system.outputs(u)
+    pairs = run.states(u)
+    numbers = _in_format(pairs, fmt.data if isinstance(fmt, WordFormats) else fmt)
+    errors = np.asarray((pairs[:, n:] - true[: len(pairs)]).sum(axis=2))
+    return EmulatedRun(fmt, numbers[:, :n], numbers[:, n:], errors, run.reason)
 
 
 def _function(run: Function, data: Data, fmt: Any) -> EmulatedRun:

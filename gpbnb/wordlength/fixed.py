@@ -24,7 +24,7 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.sections import scaled
 from gpbnb.filters.structures import LinearFilter
 from gpbnb.filters.system import LinearSystem
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.answer import Requirement, evidence, joined, share_text
 from gpbnb.wordlength.asked import Asked, is_filter
 from gpbnb.wordlength.judges import Judge, for_ever_or_over, judge_for, measured, slowest_response

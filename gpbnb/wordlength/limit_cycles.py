@@ -24,7 +24,8 @@ from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.bounds.words import bounded_rounding
 from gpbnb.filters.program import ADD, SUBTRACT, Program, matrices
 from gpbnb.filters.system import is_stable
-from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_integers, successors
+from gpbnb.filters.word_formats import WordFormats
+from gpbnb.filters.words import WordSteps, integer_program, integers_of, successors
 from gpbnb.wordlength.asked import admitted
 from gpbnb.wordlength.models import ModelSource
 
@@ -154,7 +155,7 @@ def limit_cycles(
     cycles = list[LimitCycle]()
     for numbers in _cycles(successors(made, inputs.astype(np.int64), low, counts)):
         first = np.array(np.unravel_index(numbers[0], np.maximum(counts, 1))) + low
-        states = run_integers(made, np.tile(inputs, (len(numbers), 1)), first)
+        states, _ = WordSteps(made, first).take(np.tile(inputs, (len(numbers), 1)))
         cycles.append(LimitCycle(states[:, :n], states[:, n:]))
     return LimitCycles(tuple(sorted(cycles, key=lambda each: -each.period)), error[n:], rest[n:], total)
 

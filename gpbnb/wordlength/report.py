@@ -23,7 +23,7 @@ from gpbnb.filters.forms import Form, form_named
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.poles import stored_response
 from gpbnb.filters.system import LinearSystem
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.answer import Basis, Kind, Requirement, format_in_words
 from gpbnb.wordlength.asked import exactly, is_filter, kind_of, tolerances_of
 from gpbnb.wordlength.emulation import emulate

@@ -24,7 +24,7 @@ from gpbnb.filters.named import whole_number
 from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, opened
 from gpbnb.filters.system import LinearSystem, unobserved
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.answer import PROOFS, Basis, Kind, Requirement, evidence, joined, judgement, listed, share_text
 from gpbnb.wordlength.asked import TASK_OF_KIND, Asked, checked_basis, checked_format, is_filter
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS, fixed_like, in_fixed_point, in_words

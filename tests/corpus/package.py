@@ -35,7 +35,6 @@ from gpbnb import (
 from gpbnb.filters.forms import form_named
 from gpbnb.filters.nonlinear_run import opened
 from gpbnb.filters.run import LEFT_TO_RIGHT, Run, Sums
-from gpbnb.filters.words import run_words
 from tests.corpus.draw import Fixed, Float, Format, Model
 from tests.plain_steps import Coasting, Moving, Ranges, Turning
 from tests.plain_steps import drawn as random_step
@@ -169,12 +168,12 @@ def in_words(kind: str, settings: dict[str, Any], u: Any, data: Fixed, coefficie
     """The same on integers, with formats of their own for data, coefficients and sums."""
     system = system_of(kind, settings)
     try:
-        found = run_words(system, np.array(u, dtype=object), words_of(data, coefficients, sums))
+        found = system.states(np.array(u, dtype=object), words_of(data, coefficients, sums))
     except STOPS as error:
         yield {"end": ended(error)}
         return
-    for row in found.states.tolist():
-        values = [each * found.unit for each in row]
+    for row in found.tolist():
+        values = [Fraction(high) + Fraction(low) for high, low in row]
         yield {"x": values[: system.n], "y": values[system.n :]}
 
 

@@ -68,15 +68,12 @@ def test_probable_errors_are_three_standard_deviations():
     ("C", "place"),
     [
         # the state after k steps is 2**(300 k + 1), and an output is 2**(300 (k - 1) + 1) times its entry of C
-        ([[1]], "output 0 at step 5"),
+        ([[1]], "state 0 at step 4"),
         ([[1], [2**500]], "output 1 at step 3"),
-        ([[0], [1], [0]], "output 1 at step 5"),
     ],
 )
 def test_an_overflow_names_output_and_step(C, place, fmt):
     system = LinearSystem([[2**300]], [[0]], C, x0=[2])
-    if "step 5" in place and (fmt is None or fmt.base != 10):  # loops of base 10 keep states that float64 does not
-        place = "state 0 at step 4"
     assert np.isfinite(system.outputs([[0]] * (int(place[-1]) - 1), fmt)).all()
     with pytest.raises(OverflowError, match=rf"^{place}: got a (result|number) beyond the range of float64"):
         system.outputs([[0]] * 6, fmt)

@@ -12,10 +12,19 @@ from gpbnb import FixedFormat, LinearSystem
 from gpbnb.arithmetic.kernels import backends
 from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.structures import STRUCTURES
-from gpbnb.filters.words import WordFormats, integers_of, run_words
+from gpbnb.filters.system import SystemRun
+from gpbnb.filters.word_formats import WordFormats
+from gpbnb.filters.words import integers_of
 from tests.oracles import fixed, limited
 
 pytestmark = pytest.mark.usefixtures("loops_at_once")
+
+
+def integers(system, u, words):
+    """States and outputs after each step, in units of the data."""
+    (found,) = SystemRun(system, words).blocks(u)
+    return found
+
 
 MODES = ["nearest", "even", "chop", "up", "down", "odd", "half up"]
 
@@ -31,18 +40,18 @@ def test_numbers_are_rounded_to_integers_as_by_their_definition():
 def test_a_smoother_in_integers_stops_three_below_its_step():
     """y += 1097/4096 (u - y) in 16 bits with floor: 1097 · 3 < 4096, so a difference of 3 moves nothing."""
     words = WordFormats(FixedFormat(15, 0, "down"), FixedFormat(3, 12))
-    found = run_words(LinearSystem.smoother("1097/4096"), np.full((200, 1), 512), words)
-    assert found.states[-1].tolist() == [509, 509]
-    assert found.states[-100:, 1].tolist() == [509] * 100
+    found = integers(LinearSystem.smoother("1097/4096"), np.full((200, 1), 512), words)
+    assert found[-1].tolist() == [509, 509]
+    assert found[-100:, 1].tolist() == [509] * 100
 
 
 @pytest.mark.parametrize("in_python", [False, True])
-def test_overflow_names_operation_and_step(in_python, monkeypatch):
+def test_overflow_names_state_and_step(in_python, monkeypatch):
     monkeypatch.setattr(backends, "LOOPS_AFTER", 1e9 * in_python)
     system = LinearSystem.from_coefficients([1], [1, "-0.9"], "direct form I")
     words = WordFormats(FixedFormat(2, 5), FixedFormat(1, 8))
-    with pytest.raises(OverflowError, match="overflow in a sum, operation 3 of 3, at step 2"):
-        run_words(system, np.full((9, 1), 3.0), words)
+    with pytest.raises(OverflowError, match="state 0 at step 2: got a number beyond the range of data of 8 bits"):
+        system.outputs(np.full((9, 1), 3.0), words)
 
 
 @pytest.mark.parametrize("wide", [False, True])
@@ -68,7 +77,7 @@ def test_half_up_is_the_shift_of_integers_in_c(wide):
     for rounding in ("half up", "nearest"):
         data = FixedFormat(23, 0, rounding)
         words = WordFormats(data, FixedFormat(1, bits), FixedFormat(40, bits, rounding) if wide else None)
-        found = run_words(system, np.array(x)[:, None], words).states[:, -1]
+        found = integers(system, np.array(x)[:, None], words)[:, -1]
         differ[rounding] = int((found != np.array(signal)).sum())
     assert differ["half up"] == 0
     assert differ["nearest"] > 0
@@ -93,7 +102,7 @@ def test_the_output_of_a_section_is_stored_before_the_next_takes_it():
         signal = made
     sections = [[Fraction(b, 256), 1, 0, 1, Fraction(a, 256), 0] for b, a in factors]
     system = LinearSystem.from_sections(sections, "direct form I transposed")
-    assert run_words(system, np.array(u)[:, None], words).states[:, -1].tolist() == signal
+    assert integers(system, np.array(u)[:, None], words)[:, -1].tolist() == signal
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
@@ -113,7 +122,7 @@ def test_no_run_is_beyond_its_guarantee(structure, wide):
             bound = OutputBounds(system, 1.0).errors(words)[0]
         except OverflowError:
             continue
-        found, true = run_words(system, u, words).outputs(1), system.outputs(u)
+        found, true = system.outputs(u, words), system.outputs(u)
         error = np.abs((found - true).sum(axis=-1)).max()
         assert error <= bound
         shares.append(error / bound)
@@ -130,12 +139,3 @@ def test_the_range_is_proved_where_the_worst_input_just_fits():
     assert 1 / 32 <= bound[0] <= (1 / 32) * (1 + 2.0**-19)
     with pytest.raises(OverflowError, match=r"a sum, operation 3 of 3, may reach 2.03125, beyond the 1 integer bits"):
         OutputBounds(system, 1.0).errors(WordFormats(FixedFormat(1, 6), FixedFormat(2, 8)))
-
-
-@pytest.mark.parametrize("fmt", [FixedFormat(0, 15), FixedFormat(3, -1), FixedFormat(0, 15, "chop", "saturate")])
-def test_one_format_for_all_numbers_runs_as_words_do(fmt: FixedFormat) -> None:
-    """Nothing is multiplied by a coefficient of 1, which need not be a number of the format; nor need a limit."""
-    made, u = LinearSystem([["0.9"]], [["0.1"]]), np.full((9, 1), 0.5)
-    assert (made.outputs(u, fmt) == run_words(made, u, WordFormats(fmt)).outputs(1)).all()
-    limited = LinearSystem.pid("0.5", "0.1", limits=(-1, 1))
-    assert (limited.outputs(u, fmt) == run_words(limited, u, WordFormats(fmt)).outputs(2)[:, 2:]).all()

@@ -22,7 +22,7 @@ from gpbnb.bounds.system import OutputBounds, output_errors
 from gpbnb.filters.program import matrices
 from gpbnb.filters.structures import WITH_FIR
 from gpbnb.filters.system import LinearSystem
-from gpbnb.filters.words import WordFormats, integer_program, run_words
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.interrupts import interruptible
 from gpbnb.report.guarantees.filters import examine
 
@@ -83,28 +83,17 @@ def drawn_format(rng: np.random.Generator, kind: str) -> FloatFormat | FixedForm
     return WordFormats(data, int(rng.integers(10, 20)), wide if rng.integers(2) else None)
 
 
-def outputs(system: LinearSystem, fmt: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the outputs of a run, (steps, p, 2)."""
-    if isinstance(fmt, FixedFormat):
-        fmt = WordFormats(fmt)
-    if isinstance(fmt, WordFormats):
-        return np.asarray(run_words(system, u, fmt).outputs(system.p))
-    return np.asarray(system.outputs(u, fmt))
-
-
 def errors(system: LinearSystem, fmt: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the error of each output at each step, (steps, p)."""
-    off = outputs(system, fmt, u) - system.outputs(u)
+    off = system.outputs(u, fmt) - system.outputs(u)
     return np.asarray(off[..., 0] + off[..., 1])
 
 
 def response(system: LinearSystem, fmt: Any, output: int) -> NDArray[np.float64]:
     """Return what inputs add to the error of an output after the last step, due to stored coefficients, (steps, m)."""
     made, n = system.as_filter(), system.n
-    words = WordFormats(fmt) if isinstance(fmt, FixedFormat) else fmt
-    stored = integer_program(made, words).coefficients if isinstance(words, WordFormats) else made.stored(fmt)
     rows = []
-    for coefficients in (stored, made.coefficients):
+    for coefficients in (made.stored(fmt), made.coefficients):
         A, B = (each.astype(np.float64) for each in matrices(made.program, coefficients))
         row, found = np.eye(len(A))[n + output], []
         for _ in range(STEPS):

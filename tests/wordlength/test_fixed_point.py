@@ -15,7 +15,7 @@ from gpbnb.bounds.probable import probable_output_errors
 from gpbnb.bounds.system import OutputBounds
 from gpbnb.bounds.words import bounded_rounding, rounding_limits
 from gpbnb.filters.structures import state_space
-from gpbnb.filters.words import integer_program, run_words
+from gpbnb.filters.words import integer_program
 from gpbnb.wordlength.required import judge
 
 
@@ -53,13 +53,11 @@ def test_a_sum_is_rounded_whichever_operand_has_more_bits() -> None:
         assert rounding_limits(integer_program(made, words)).tolist() == [0, 0, 2.0**-11]
 
 
-@pytest.mark.parametrize(
-    ("b", "z", "place"), [("3", [1, 1.5], "a product, operation 2 of 3"), ("0.9", [3, 3], "a sum, operation 3 of 3")]
-)
-def test_overflow_is_in_a_product_or_in_a_sum(b: str, z: list[float], place: str) -> None:
+@pytest.mark.parametrize(("b", "z"), [("3", [1, 1.5]), ("0.9", [3, 3])])
+def test_overflow_is_in_a_product_or_in_a_sum(b: str, z: list[float]) -> None:
     """x = 0.9 x + b z, with numbers below four."""
-    with pytest.raises(OverflowError, match=f"overflow in {place}, at step 2"):
-        run_words(state_space([["0.9"]], [[b]]), np.array(z).reshape(-1, 1), WordFormats(FixedFormat(2, 8), 15))
+    with pytest.raises(OverflowError, match="state 0 at step 2: got a number beyond the range of data of 11 bits"):
+        LinearSystem([["0.9"]], [[b]]).outputs(np.array(z).reshape(-1, 1), WordFormats(FixedFormat(2, 8), 15))
 
 
 def near_a_power_of_two(seed):

@@ -8,7 +8,7 @@ from itertools import cycle, product
 import pytest
 
 from gpbnb import FixedFormat, LinearSystem
-from gpbnb.filters.words import WordFormats
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength import limit_cycles as module
 from gpbnb.wordlength.limit_cycles import limit_cycles
 from tests.oracles import fixed, limited

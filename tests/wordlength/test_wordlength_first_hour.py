@@ -45,7 +45,7 @@ def test_a_limit_beyond_the_data_is_their_last_number(tmp_path):
     run = emulate(pid, [0.875] * 9, words)
     assert run.y.to_fractions().max() == 1 - words.unit == 1 - run.largest.max()
     assert emulate(pid, [-0.875] * 9, words).largest.max() < words.unit
-    with pytest.raises(OverflowError, match="got high = -2, beyond the range"):
+    with pytest.raises(OverflowError, match="coefficient high: got a result of about -2; needed one from -1"):
         emulate(LinearSystem.pid("0.4", "0.25", limits=(-3, -2)), [0.5], "Q15")
     assert guarantee(pid, words, limits(measurement=0.0625), horizon=9).bound[0] >= words.unit
     found = required_precision(pid, [0.25, -0.125, 0.5], 0.01, kind="fixed", like="Q15")

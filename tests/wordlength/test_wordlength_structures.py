@@ -12,7 +12,7 @@ from scipy import signal
 from gpbnb import FixedFormat, LinearSystem, required_precision
 from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.design import FilterDesign
-from gpbnb.filters.words import WordFormats, run_words
+from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.fixed import with_fraction_bits
 
 SOS = signal.butter(4, 0.1, output="sos")
@@ -66,7 +66,7 @@ def test_fraction_bits_of_a_system(structure):
     assert observed.digits <= proved.digits <= observed.digits + 8
     for bits, ratio in observed.tried:
         if math.isfinite(ratio):
-            found = run_words(system, u, with_fraction_bits(like, bits)).outputs(1) - system.outputs(u)
+            found = system.outputs(u, with_fraction_bits(like, bits)) - system.outputs(u)
             assert ratio == pytest.approx(float(np.abs(found.sum(axis=-1)).max() / 1e-3), rel=1e-9)
     errors = OutputBounds(system, np.abs(u).max()).errors(proved.format)
     assert dict(proved.tried)[proved.digits] == pytest.approx(errors[0] / 1e-3)
