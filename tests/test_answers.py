@@ -18,6 +18,7 @@ import io
 import math
 import os
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -29,7 +30,7 @@ from enum import Enum
 from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from unittest import mock
 
 import numpy as np
@@ -127,6 +128,10 @@ def made(words):
     env = {"PATH": os.environ["PATH"], "HOME": os.environ.get("HOME", "/")}
     done = subprocess.run(asked, cwd=ROOT, env=env, capture_output=True, text=True, check=True)
     return (done.stdout + done.stderr).replace(str(ROOT), ".").replace("\\\n", "\n")
+
+
+def script(name):
+    return SimpleNamespace(**runpy.run_path(str(ROOT / "scripts" / f"{name}.py")))
 
 
 def given(content, name="given.toml"):
