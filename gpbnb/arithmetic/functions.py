@@ -69,21 +69,20 @@ def _check_divisor(y: Any) -> None:
 
 
 @stays
-def decimals(x: Any, count: int = 0) -> Any:
+def rounded(a: Any, decimals: int = 0) -> Any:
     """Round each entry to a number of decimals, ties to even, and the result once more into the format.
 
     With no decimals, the result is exact: the nearest whole number.
     """
     try:
-        places = operator.index(count)
+        places = operator.index(decimals)
     except TypeError:
-        raise TypeError(f"decimals: got {count!r}; needed a whole number") from None
+        raise TypeError(f"decimals: got {decimals!r}; needed a whole number") from None
     if abs(places) > MOST_DECIMALS:
         raise ValueError(f"decimals: got {places}; needed at most {MOST_DECIMALS:,} in size")
     if not places:
-        return elementary("rint", x)
-    rounded = np.frompyfunc(lambda value: round(value, places), 1, 1)(x.to_fractions())
-    return x.format.array(rounded)
+        return elementary("rint", a)
+    return a.format.array(np.frompyfunc(lambda value: round(value, places), 1, 1)(a.to_fractions()))
 
 
 def copysign(x: Any, y: Any) -> Any:
@@ -138,20 +137,20 @@ def kept(x: Any, found: Any, axis: int | None, keepdims: bool) -> Any:
     return found.reshape(tuple(shape))
 
 
-def mean(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
+def mean(a: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     """Return the sum from left to right, divided by the number of entries, which is first rounded into the format."""
-    count = len(lines(x, axis))
+    count = len(lines(a, axis))
     if not count:
         raise ValueError("got the mean of no entries; needed at least one")
-    return x.sum(axis, keepdims) / x.format.array(count)
+    return a.sum(axis, keepdims) / a.format.array(count)
 
 
-def var(x: Any, axis: int | None = None, ddof: int = 0, keepdims: bool = False) -> Any:
+def var(a: Any, axis: int | None = None, ddof: int = 0, keepdims: bool = False) -> Any:
     """Return the mean square of the differences from :func:`mean`; their number minus `ddof` divides the sum."""
-    rest, count = x - mean(x, axis, keepdims=True), len(lines(x, axis))
+    rest, count = a - mean(a, axis, keepdims=True), len(lines(a, axis))
     if not ddof < count:
         raise ValueError(f"got ddof={ddof} for {count} entries; needed fewer than there are entries")
-    return (rest * rest).sum(axis, keepdims) / x.format.array(count - ddof)
+    return (rest * rest).sum(axis, keepdims) / a.format.array(count - ddof)
 
 
 def interp(x: Any, at: Any, nodes: Any, values: Any) -> Any:
@@ -197,14 +196,14 @@ def convolve(x: Any, a: Any, v: Any, mode: str = "full") -> Any:
     return np.stack([a[low:high] @ turned[len(v) - 1 - k + low : len(v) - 1 - k + high] for k, low, high in spans])
 
 
-def largest(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
+def largest(a: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     """Return the largest entry; nothing is rounded."""
-    return kept(x, _chosen(x, axis, operator.gt), axis, keepdims)
+    return kept(a, _chosen(a, axis, operator.gt), axis, keepdims)
 
 
-def smallest(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
+def smallest(a: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     """Return the smallest entry; nothing is rounded."""
-    return kept(x, _chosen(x, axis, operator.lt), axis, keepdims)
+    return kept(a, _chosen(a, axis, operator.lt), axis, keepdims)
 
 
 def _chosen(x: Any, axis: int | None, better: Callable[[Any, Any], Any]) -> Any:
@@ -218,30 +217,30 @@ def _chosen(x: Any, axis: int | None, better: Callable[[Any, Any], Any]) -> Any:
     return left[0]
 
 
-def argmax(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
+def argmax(a: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     """Return the index of the largest entry, the first of equal ones."""
-    return np.argmax(x == largest(x, axis, keepdims=True), axis=axis, keepdims=keepdims)
+    return np.argmax(a == largest(a, axis, keepdims=True), axis=axis, keepdims=keepdims)
 
 
-def argmin(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
+def argmin(a: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     """Return the index of the smallest entry, the first of equal ones."""
-    return np.argmax(x == smallest(x, axis, keepdims=True), axis=axis, keepdims=keepdims)
+    return np.argmax(a == smallest(a, axis, keepdims=True), axis=axis, keepdims=keepdims)
 
 
 @stays
-def argsort(x: Any, axis: int | None = -1) -> Any:
+def argsort(a: Any, axis: int | None = -1) -> Any:
     """Return the indices that sort entries in ascending order; equal entries keep their order."""
-    given = x.reshape(-1) if axis is None else x
+    given = a.reshape(-1) if axis is None else a
     keys = given.backend.sort_keys(given.components) if given.ndim else None
     if keys is not None:
         return np.lexsort(keys, axis=-1 if axis is None else axis)
-    return np.argsort(np.asarray(x.to_fractions(), dtype=object), axis=axis, kind="stable")
+    return np.argsort(np.asarray(a.to_fractions(), dtype=object), axis=axis, kind="stable")
 
 
-def sort(x: Any, axis: int | None = -1) -> Any:
+def sort(a: Any, axis: int | None = -1) -> Any:
     """Sort entries in ascending order along an axis; nothing is rounded."""
-    order = argsort(x, axis)
-    return x.moved(lambda a: np.take_along_axis(a, order, axis=axis))
+    order = argsort(a, axis)
+    return a.moved(lambda a: np.take_along_axis(a, order, axis=axis))
 
 
 def maximum(a: Any, b: Any) -> Any:
@@ -252,6 +251,16 @@ def maximum(a: Any, b: Any) -> Any:
 def minimum(a: Any, b: Any) -> Any:
     """Return the smaller entry of two arrays at each place; nothing is rounded."""
     return np.where(a < b, a, b)
+
+
+def every(a: Any, axis: int | None = None, keepdims: bool = False) -> Any:
+    """Whether all entries differ from zero."""
+    return np.all(a != 0, axis=axis, keepdims=keepdims)
+
+
+def some(a: Any, axis: int | None = None, keepdims: bool = False) -> Any:
+    """Whether an entry differs from zero."""
+    return np.any(a != 0, axis=axis, keepdims=keepdims)
 
 
 def signbit(x: Any) -> Any:
@@ -269,19 +278,19 @@ def sign(x: Any) -> Any:
     return np.where(x > 0, 1, np.where(x < 0, -1, x.operand(0)))
 
 
-def full_like(x: Any, fill: Any) -> Any:
-    """Return an array of the shape of `x` with one number of its format at each place; nothing is rounded."""
-    return np.broadcast_to(x.operand(fill), x.shape)
+def full_like(a: Any, fill_value: Any) -> Any:
+    """Return an array of the shape of `a` with one number of its format at each place; nothing is rounded."""
+    return np.broadcast_to(a.operand(fill_value), a.shape)
 
 
-def diff(x: Any, times: int = 1, axis: int = -1) -> Any:
-    """Return the differences of neighbours, each one subtraction, ``x[k + 1] - x[k]``; repeat this `times` times."""
-    if isinstance(times, bool) or operator.index(times) < 0:
-        raise ValueError(f"diff: got n={times}; needed a whole number, at least 0")
-    if not x.ndim:
+def diff(a: Any, n: int = 1, axis: int = -1) -> Any:
+    """Return the differences of neighbours, each one subtraction, ``a[k + 1] - a[k]``; repeat this `n` times."""
+    if isinstance(n, bool) or operator.index(n) < 0:
+        raise ValueError(f"diff: got n={n}; needed a whole number, at least 0")
+    if not a.ndim:
         raise ValueError("diff: got a single number; needed at least one axis")
-    given = lines(x, axis)
-    for _ in range(times):
+    given = lines(a, axis)
+    for _ in range(n):
         given = given[1:] - given[:-1]
     return given.moved(lambda a: np.moveaxis(a, 0, axis))
 
@@ -293,22 +302,22 @@ def isclose(a: Any, b: Any, rtol: Any = 1e-5, atol: Any = 1e-8) -> Any:
     return np.asarray(abs(first - second) <= absolute + relative * abs(second), dtype=bool)[()]
 
 
-def clip(x: Any, low: Any = None, high: Any = None) -> Any:
-    """Replace entries below `low` by `low` and above `high` by `high`; nothing is rounded."""
-    if low is not None:
-        low = x.operand(low)
-        x = np.where(x < low, low, x)
-    if high is not None:
-        high = x.operand(high)
-        x = np.where(x > high, high, x)
-    return x
+def clip(a: Any, a_min: Any = None, a_max: Any = None) -> Any:
+    """Replace entries below `a_min` by `a_min` and above `a_max` by `a_max`; nothing is rounded."""
+    if a_min is not None:
+        a_min = a.operand(a_min)
+        a = np.where(a < a_min, a_min, a)
+    if a_max is not None:
+        a_max = a.operand(a_max)
+        a = np.where(a > a_max, a_max, a)
+    return a
 
 
-def cumsum(x: Any, axis: int | None = None) -> Any:
+def cumsum(a: Any, axis: int | None = None) -> Any:
     """Return partial sums from left to right; each adds one entry to the sum before."""
-    given = lines(x, axis)
+    given = lines(a, axis)
     if not len(given):
-        return x if axis is not None else given
+        return a if axis is not None else given
     backend, entries = given.backend, given.components  # which derivatives do not have, and so are refused
     if (components := backend.scan(entries)) is not None:
         whole: Any = given.from_components(backend, components, given.format)
@@ -320,11 +329,11 @@ def cumsum(x: Any, axis: int | None = None) -> Any:
     return whole if axis is None else whole.moved(lambda a: np.moveaxis(a, 0, axis))
 
 
-def trace(x: Any) -> Any:
+def trace(a: Any) -> Any:
     """Return the sum of the diagonal, from left to right."""
-    if x.ndim != 2:
-        raise ValueError(f"trace: got shape {x.shape}; needed a matrix")
-    return np.diagonal(x).sum()
+    if a.ndim != 2:
+        raise ValueError(f"trace: got shape {a.shape}; needed a matrix")
+    return np.diagonal(a).sum()
 
 
 def kron(x: Any, a: Any, b: Any) -> Any:
@@ -374,24 +383,24 @@ def _whole(exponent: Any) -> int | None:
         return None
 
 
-def norm(x: Any, order: Any = None, axis: int | None = None, keepdims: bool = False) -> Any:
+def norm(x: Any, ord: Any = None, axis: int | None = None, keepdims: bool = False) -> Any:
     """Return a norm, by default the root of the sum of squares, of all entries or along an axis.
 
-    With `order` 1 or infinity, the norm of a vector is the sum or the largest of the absolute values; that of a matrix
+    With `ord` 1 or infinity, the norm of a vector is the sum or the largest of the absolute values; that of a matrix
     is the largest column sum or row sum. Sums run from left to right.
     """
     along = x.ndim == 1 or axis is not None
-    if order is None or (order == 2 and along):
+    if ord is None or (ord == 2 and along):
         found = np.sqrt((x * x).sum(axis))
-    elif order in (1, np.inf) and (along or x.ndim == 2):
+    elif ord in (1, np.inf) and (along or x.ndim == 2):
         size = abs(x)
         if not along:
-            found = largest(size.sum(0 if order == 1 else 1))
+            found = largest(size.sum(0 if ord == 1 else 1))
         else:
-            found = size.sum(axis) if order == 1 else largest(size, axis)
+            found = size.sum(axis) if ord == 1 else largest(size, axis)
     else:
         raise ValueError(
-            f"got a norm of order {order!r} and shape {x.shape}; needed None, 1 or infinity, or 2 of a vector"
+            f"got a norm of order {ord!r} and shape {x.shape}; needed None, 1 or infinity, or 2 of a vector"
         )
     return kept(x, found, axis, keepdims)
 

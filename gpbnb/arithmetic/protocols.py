@@ -52,49 +52,10 @@ class NumPyProtocols:
 
     # -- methods of NumPy's arrays ------------------------------------------------------------------------
 
-    def mean(self, axis: int | None = None, keepdims: bool = False) -> Any:
-        """See :func:`gpbnb.arithmetic.functions.mean`."""
-        return functions.mean(self, axis, keepdims)
-
-    def max(self, axis: int | None = None, keepdims: bool = False) -> Any:
-        """See :func:`gpbnb.arithmetic.functions.largest`."""
-        return functions.largest(self, axis, keepdims)
-
-    def min(self, axis: int | None = None, keepdims: bool = False) -> Any:
-        """See :func:`gpbnb.arithmetic.functions.smallest`."""
-        return functions.smallest(self, axis, keepdims)
-
-    def argmax(self, axis: int | None = None, keepdims: bool = False) -> Any:
-        """See :func:`gpbnb.arithmetic.functions.argmax`."""
-        return functions.argmax(self, axis, keepdims)
-
-    def argmin(self, axis: int | None = None, keepdims: bool = False) -> Any:
-        """See :func:`gpbnb.arithmetic.functions.argmin`."""
-        return functions.argmin(self, axis, keepdims)
-
-    def argsort(self, axis: int | None = -1) -> Any:
-        """See :func:`gpbnb.arithmetic.functions.argsort`."""
-        return functions.argsort(self, axis)
-
-    def all(self, axis: int | None = None, keepdims: bool = False) -> Any:
-        """Whether all entries differ from zero."""
-        return np.all(np.not_equal(self, 0), axis=axis, keepdims=keepdims)
-
-    def any(self, axis: int | None = None, keepdims: bool = False) -> Any:
-        """Whether an entry differs from zero."""
-        return np.any(np.not_equal(self, 0), axis=axis, keepdims=keepdims)
-
-    def clip(self, low: Any = None, high: Any = None) -> Any:
-        """See :func:`gpbnb.arithmetic.functions.clip`."""
-        return functions.clip(self, low, high)
-
-    def cumsum(self, axis: int | None = None) -> Any:
-        """See :func:`gpbnb.arithmetic.functions.cumsum`."""
-        return functions.cumsum(self, axis)
-
-    def trace(self) -> Any:
-        """See :func:`gpbnb.arithmetic.functions.trace`."""
-        return functions.trace(self)
+    mean, max, min = functions.mean, functions.largest, functions.smallest
+    argmax, argmin, argsort = functions.argmax, functions.argmin, functions.argsort
+    all, any, clip = functions.every, functions.some, functions.clip
+    cumsum, trace = functions.cumsum, functions.trace
 
     def dot(self, other: Any) -> Any:
         """Compute ``np.dot``, with products summed from left to right."""
@@ -104,8 +65,7 @@ class NumPyProtocols:
         """Return the array itself, which is immutable and needs no copy."""
         return self
 
-    def __copy__(self) -> Any:
-        return self
+    __copy__ = copy
 
     def __deepcopy__(self, memo: Any) -> Any:
         return self
@@ -114,9 +74,7 @@ class NumPyProtocols:
         """Return the entries as a one-dimensional array, row after row."""
         return self.moved(np.ravel)
 
-    def flatten(self) -> Any:
-        """Return the entries as a one-dimensional array, row after row."""
-        return self.moved(np.ravel)
+    flatten = ravel
 
     def transpose(self, *axes: Any) -> Any:
         """Return the array with its axes in another order, by default reversed."""
@@ -257,20 +215,23 @@ class NumPyProtocols:
         of_linalg = func.__module__ == "numpy.linalg"
         algebra = cast(Any, self).format.algebra if of_linalg else {}
         function = algebra.get(name) or _FUNCTIONS.get(name)
+        given = (self, *args)
+        if function is None and name in _OF_ONE:
+            function, given = _OF_ONE[name], args
         if function is not None:
             signature = _signature(function)
             try:
-                signature.bind(self, *args, **kwargs)
+                signature.bind(*given, **kwargs)
             except TypeError as error:
-                taken = ", ".join(list(signature.parameters)[1:])
+                taken = ", ".join(list(signature.parameters)[len(given) - len(args) :])
                 raise TypeError(f"{called} of a {type(self).__name__}: {error}; needed {called}({taken})") from None
-            return function(self, *args, **kwargs)
+            return function(*given, **kwargs)
         if name in _ASSIGNMENTS:
             raise TypeError(
                 f"got {called} of a {type(self).__name__}, which cannot be changed; needed a copy with other entries: "
                 "x = x.at[i].set(value), or np.where(condition, value, x)"
             )
-        known = sorted((*algebra, "norm") if of_linalg else (*_JOINERS, *_MOVERS, *_FUNCTIONS))
+        known = sorted((*algebra, "norm") if of_linalg else (*_JOINERS, *_MOVERS, *_FUNCTIONS, *_OF_ONE))
         shown = ", ".join(f"np.linalg.{each}" for each in known) if of_linalg else ", ".join(known)
         raise TypeError(
             f"got {called} of a {type(self).__name__}; needed one of {shown}{_nearest(name, known)}; for "
@@ -311,7 +272,7 @@ def _nearest(name: str, known: Container[str]) -> str:
 
 def _nearest_attribute(name: str, known: Sequence[str]) -> str:
     """Return a hint at the intended attribute, or at the function to write in its place; empty if there is none."""
-    if name in {*_MOVERS, *_FUNCTIONS, *_UFUNCS}:
+    if name in {*_MOVERS, *_FUNCTIONS, *_OF_ONE, *_UFUNCS}:
         return f"write np.{'linalg.' if name == 'norm' else ''}{name}(x)"
     if (other := _OTHER_NAMES.get(name, name.removeprefix("nan"))) in known:
         return f"the nearest is x.{other}"
@@ -408,55 +369,49 @@ def _where(x: NumPyProtocols, condition: Any, a: Any, b: Any) -> Any:
     return x.joined(lambda components: np.where(condition, *cast(Any, components)), [a, b])
 
 
-def _append(x: NumPyProtocols, a: Any, values: Any, axis: int | None) -> Any:
-    arrays = [x.operand(each) for each in (a, values)]
+def _append(x: NumPyProtocols, arr: Any, values: Any, axis: int | None = None) -> Any:
+    arrays = [x.operand(each) for each in (arr, values)]
     if axis is None:
         arrays = [each.reshape(-1) for each in arrays]
     return np.concatenate(arrays, axis=axis or 0)
 
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "all": lambda x, a, axis=None, keepdims=False: a.all(axis, keepdims),
-    "allclose": lambda x, a, b, rtol=1e-5, atol=1e-8: bool(np.all(functions.isclose(a, b, rtol, atol))),
-    "any": lambda x, a, axis=None, keepdims=False: a.any(axis, keepdims),
-    "argmax": lambda x, a, axis=None, keepdims=False: a.argmax(axis, keepdims),
-    "argmin": lambda x, a, axis=None, keepdims=False: a.argmin(axis, keepdims),
-    "argsort": lambda x, a, axis=-1: a.argsort(axis),
+    "append": _append,
     "array_equal": _array_equal,
-    "around": lambda x, a, decimals=0: functions.decimals(a, decimals),
     "convolve": functions.convolve,
     "cross": functions.cross,
-    "diff": lambda x, a, n=1, axis=-1: functions.diff(a, n, axis),
     "dot": _dot,
-    "fix": lambda x, a: elementary("trunc", a),
-    "full_like": lambda x, a, fill_value: functions.full_like(a, fill_value),
-    "interp": functions.interp,
-    "isclose": lambda x, a, b, rtol=1e-5, atol=1e-8: functions.isclose(a, b, rtol, atol),
-    "ndim": lambda x, a: a.ndim,
-    "outer": lambda x, a, b: x.operand(a).reshape(-1, 1) * x.operand(b).reshape(1, -1),
-    "amax": lambda x, a, axis=None, keepdims=False: a.max(axis, keepdims),
-    "amin": lambda x, a, axis=None, keepdims=False: a.min(axis, keepdims),
-    "append": lambda x, arr, values, axis=None: _append(x, arr, values, axis),
-    "clip": lambda x, a, a_min=None, a_max=None: a.clip(a_min, a_max),
-    "cumsum": lambda x, a, axis=None: a.cumsum(axis),
     "einsum": functions.einsum,
+    "interp": functions.interp,
     "kron": functions.kron,
-    "max": lambda x, a, axis=None, keepdims=False: a.max(axis, keepdims),
-    "mean": lambda x, a, axis=None, keepdims=False: a.mean(axis, keepdims),
-    "min": lambda x, a, axis=None, keepdims=False: a.min(axis, keepdims),
-    "norm": lambda x, a, ord=None, axis=None, keepdims=False: functions.norm(a, ord, axis, keepdims),
-    "ones_like": lambda x, a: functions.full_like(a, 1),
-    "prod": lambda x, a, axis=None, keepdims=False: a.prod(axis, keepdims),
-    "round": lambda x, a, decimals=0: functions.decimals(a, decimals),
+    "outer": lambda x, a, b: x.operand(a).reshape(-1, 1) * x.operand(b).reshape(1, -1),
     "save": lambda x, file, arr, **options: np.save(file, np.asarray(arr), **options),
-    "sort": lambda x, a, axis=-1: functions.sort(a, axis),
     "select": lambda x, condlist, choicelist, default=0: functions.select(x, condlist, choicelist, default),
-    "shape": lambda x, a: a.shape,
-    "size": lambda x, a: a.size,
-    "sum": lambda x, a, axis=None, keepdims=False: a.sum(axis, keepdims),
-    "trace": lambda x, a: a.trace(),
-    "std": lambda x, a, axis=None, ddof=0, keepdims=False: functions.var(a, axis, ddof, keepdims).sqrt(),
-    "var": lambda x, a, axis=None, ddof=0, keepdims=False: functions.var(a, axis, ddof, keepdims),
     "where": _where,
-    "zeros_like": lambda x, a: functions.full_like(a, 0),
 }
+"""NumPy's functions that take an array of a format at any place; the array that NumPy asks comes first."""
+
+_AS_IN_NUMPY = "argmax argmin argsort clip cumsum diff full_like isclose mean norm sort trace var".split()
+_OF_ONE: dict[str, Callable[..., Any]] = {
+    **{name: getattr(functions, name) for name in _AS_IN_NUMPY},
+    "all": functions.every,
+    "allclose": lambda a, b, rtol=1e-5, atol=1e-8: bool(np.all(functions.isclose(a, b, rtol, atol))),
+    "any": functions.some,
+    "fix": lambda a: elementary("trunc", a),
+    "max": functions.largest,
+    "amax": functions.largest,
+    "min": functions.smallest,
+    "amin": functions.smallest,
+    "ndim": lambda a: a.ndim,
+    "ones_like": lambda a: functions.full_like(a, 1),
+    "prod": lambda a, axis=None, keepdims=False: a.prod(axis, keepdims),
+    "round": functions.rounded,
+    "around": functions.rounded,
+    "shape": lambda a: a.shape,
+    "size": lambda a: a.size,
+    "std": lambda a, axis=None, ddof=0, keepdims=False: functions.var(a, axis, ddof, keepdims).sqrt(),
+    "sum": lambda a, axis=None, keepdims=False: a.sum(axis, keepdims),
+    "zeros_like": lambda a: functions.full_like(a, 0),
+}
+"""NumPy's functions whose first argument is the array."""
