@@ -392,7 +392,12 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 }
 """NumPy's functions that take an array of a format at any place; the array that NumPy asks comes first."""
 
-_AS_IN_NUMPY = "argmax argmin argsort clip cumsum diff full_like isclose mean norm sort trace var".split()
+# fmt: off
+_AS_IN_NUMPY = (
+    "argmax", "argmin", "argsort", "clip", "cumsum", "diff", "full_like", "isclose", "mean", "norm", "sort", "trace",
+    "var",
+)
+# fmt: on
 _OF_ONE: dict[str, Callable[..., Any]] = {
     **{name: getattr(functions, name) for name in _AS_IN_NUMPY},
     "all": functions.every,

@@ -260,31 +260,31 @@ class Looped(Backend):
 
     def _from_backend(self, other: Backend, components: Components) -> Components | None:
         """Round numbers of a backend with significands of one or two words."""
-        if self.wide is None or not isinstance(other, Pairs | TwoWords) or other.wide is None:
+        if not isinstance(other, Pairs | TwoWords) or other.wide is None:
             return None
-        shape = components[0].shape
-        triples = tuple(_flat(part, shape) for part in other.in_two_words(components))
-        out, states = tuple(np.empty(triples[0].size, np.int64) for _ in triples), np.empty(triples[0].size, np.int8)
+        return self._converted(other.wide, other.in_two_words(components))
+
+    def _converted(self, source: Wide, given: Components, exactly: bool = False) -> Components | None:
+        """Round numbers of another format, as the components of :class:`TwoWords`."""
+        if self.wide is None:
+            return None
+        flat = tuple(_flat(part, given[0].shape) for part in given)
+        out, states = tuple(np.empty(flat[0].size, np.int64) for _ in flat), np.empty(flat[0].size, np.int8)
+        of_source = kernel(Rules(1 << source.bits if source.bits else 10, source.precision, Rounding.CHOP))
         try:
-            _along(_loops("wide").converted, (other.wide, self.wide), out[0].size, triples, out, states)
+            _along(_loops("wide").converted, (source, self.wide, exactly), states.size, flat, out, states)
+            if exactly and states.any():
+                return None
+            for i in np.flatnonzero(states == 2).tolist():
+                high, low, e = (int(part[i]) for part in flat)
+                size = (abs(high) << source.split) | low
+                value = of_source.to_fraction(-size if high < 0 else size, e)
+                m, e = self.kernel.from_ratio(value.numerator, value.denominator)
+                high, low = divmod(abs(m), 1 << self.wide.split)
+                out[0][i], out[1][i], out[2][i] = (-high if m < 0 else high), low, e
         except OverflowError:
             return None
-        hard = np.flatnonzero(states == 2)
-        pairs = zip(*other.to_exact(tuple(part.reshape(-1)[hard] for part in components)), strict=True)
-        if not self._fill(out, {int(i): other.kernel.to_fraction(*pair) for i, pair in zip(hard, pairs, strict=True)}):
-            return None
-        return self.from_two_words(tuple(part.reshape(shape) for part in out))
-
-    def _fill(self, out: Components, fractions: dict[int, Fraction]) -> bool:
-        """Put rounded Fractions at some places of components of two words; return whether none overflows."""
-        for i, value in fractions.items():
-            try:
-                m, e = self.kernel.from_ratio(value.numerator, value.denominator)
-            except OverflowError:
-                return False
-            high, low = divmod(abs(m), 1 << cast(Wide, self.wide).split)
-            out[0][i], out[1][i], out[2][i] = (-high if m < 0 else high), low, e
-        return True
+        return self.from_two_words(tuple(part.reshape(given[0].shape) for part in out))
 
     @cached_property
     def wide(self) -> Wide | None:
@@ -638,22 +638,12 @@ class TwoWords(Looped):
             m, e = np.frexp(values.astype(np.float64, copy=False))
             if not np.isfinite(m).all():
                 return None
-            return self._from_integers(np.ldexp(m, 53).astype(np.int64), e.astype(np.int64) - 53, True, exactly)
-        if kind not in "iu" or (size == 8 and ((values >= 2**63) | (values <= -(2**63))).any()):
+            m, e = np.ldexp(m, 53).astype(np.int64), e.astype(np.int64) - 53
+        elif kind not in "iu" or (size == 8 and ((values >= 2**63) | (values <= -(2**63))).any()):
             return None
-        return self._from_integers(values.astype(np.int64), np.zeros(values.shape, np.int64), False, exactly)
-
-    def _from_integers(self, m: Array, e: Array, twos: bool, exactly: bool) -> Components | None:
-        out, states = self._empty(m.size), np.empty(m.size, np.int8)
-        try:
-            given = _flat(m, m.shape), _flat(e, m.shape), twos
-            _along(_loops("wide").from_integers, (self.tag,), m.size, *given, out, states)
-        except OverflowError:
-            return None
-        if (exactly and states.any()) or (hard := np.flatnonzero(states == 2)).size > m.size // 2:
-            return None
-        fractions = {int(i): Fraction(int(m.flat[i])) * Fraction(2) ** int(e.flat[i]) for i in hard}
-        return tuple(part.reshape(m.shape) for part in out) if self._fill(out, fractions) else None
+        else:
+            m, e = values.astype(np.int64), np.zeros(values.shape, np.int64)
+        return self._converted(_BINARY, (m, np.zeros(m.shape, np.int64), e), exactly)
 
     def _from_backend(self, other: Backend, components: Components) -> Components | None:
         if isinstance(other, Floats):
@@ -688,6 +678,10 @@ class TwoWords(Looped):
         if (hard := states == 2).any():
             x[hard] = self.exact.to_float(self.to_exact(tuple(part[hard] for part in parts)))
         return x.reshape(shape)
+
+
+_BINARY: Wide = wide_tag(Rules(2, 53, Rounding.CHOP))  # type: ignore[assignment]
+"""A format of which a word is the upper part of a number."""
 
 
 @one_per_format

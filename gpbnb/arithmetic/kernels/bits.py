@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 from llvmlite import ir
@@ -12,65 +14,54 @@ from numba.extending import intrinsic
 _WIDE = ir.IntType(128)
 
 
-@intrinsic
-def fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
+def instruction(result: Any, *operands: Any) -> Callable[[Any], Any]:
+    """Decorate a function that takes the builder of a compiled function, and values of some types, with their types."""
+
+    def decorate(emit: Any) -> Any:
+        @wraps(emit)
+        def typed(typingctx: Any, *given: Any) -> Any:
+            return result(*operands), lambda context, builder, signature, args: emit(builder, *args)
+
+        return intrinsic(typed)
+
+    return decorate
+
+
+@instruction(types.float64, types.float64, types.float64, types.float64)
+def fma(builder: Any, a: Any, b: Any, c: Any) -> Any:
     """``a * b + c`` in float64, rounded once."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.fma(*args)
-
-    return types.float64(types.float64, types.float64, types.float64), codegen
+    return builder.fma(a, b, c)
 
 
-@intrinsic
-def bits(typingctx: Any, x: Any) -> Any:
+@instruction(types.int64, types.float64)
+def bits(builder: Any, x: Any) -> Any:
     """The 64 bits of a float64 as an int64."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(args[0], ir.IntType(64))
-
-    return types.int64(types.float64), codegen
+    return builder.bitcast(x, ir.IntType(64))
 
 
-@intrinsic
-def from_bits(typingctx: Any, n: Any) -> Any:
+@instruction(types.float64, types.int64)
+def from_bits(builder: Any, n: Any) -> Any:
     """The float64 with these 64 bits, given as an int64."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(args[0], ir.DoubleType())
-
-    return types.float64(types.int64), codegen
+    return builder.bitcast(n, ir.DoubleType())
 
 
-@intrinsic
-def high_product(typingctx: Any, a: Any, b: Any) -> Any:
+@instruction(types.uint64, types.uint64, types.uint64)
+def high_product(builder: Any, a: Any, b: Any) -> Any:
     """The upper 64 bits of the product of two uint64; ``a * b`` is the lower."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        product = builder.mul(builder.zext(args[0], _WIDE), builder.zext(args[1], _WIDE))
-        return builder.trunc(builder.lshr(product, ir.Constant(_WIDE, 64)), ir.IntType(64))
-
-    return types.uint64(types.uint64, types.uint64), codegen
+    product = builder.mul(builder.zext(a, _WIDE), builder.zext(b, _WIDE))
+    return builder.trunc(builder.lshr(product, ir.Constant(_WIDE, 64)), ir.IntType(64))
 
 
-@intrinsic
-def leading_zeros(typingctx: Any, n: Any) -> Any:
+@instruction(types.int64, types.uint64)
+def leading_zeros(builder: Any, n: Any) -> Any:
     """Number of zero bits above the highest set bit of a uint64, as an int64."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.ctlz(args[0], ir.Constant(ir.IntType(1), 0))
-
-    return types.int64(types.uint64), codegen
+    return builder.ctlz(n, ir.Constant(ir.IntType(1), 0))
 
 
-@intrinsic
-def trailing_zeros(typingctx: Any, n: Any) -> Any:
+@instruction(types.int64, types.uint64)
+def trailing_zeros(builder: Any, n: Any) -> Any:
     """Number of zero bits below the lowest set bit of a uint64, as an int64."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 0))
-
-    return types.int64(types.uint64), codegen
+    return builder.cttz(n, ir.Constant(ir.IntType(1), 0))
 
 
 @intrinsic

@@ -284,11 +284,6 @@ negative = opposite
 
 
 @inner(forceinline=True)
-def subtract(fmt: Any, a: Any, b: Any) -> Any:
-    return add(fmt, a, opposite(fmt, b))
-
-
-@inner(forceinline=True)
 def multiply(fmt: Any, a: Any, b: Any) -> Any:
     m1, e1 = a
     m2, e2 = b
@@ -354,7 +349,7 @@ def sqrt(fmt: Any, a: Any) -> Any:
     while rest > 2 * root:
         rest -= 2 * root + 1
         root += 1
-    # Neither a tie nor a carry can occur, as the exact kernel explains.
+    # Neither a tie nor a carry can occur: the root is below 10**t - 1/2.
     whole = np.uint64(root)
     return number(fmt, whole, (e - k) // 2, rest > root, False, rest > 0, False)
 

@@ -153,15 +153,12 @@ class ExactKernel:
         self.count += 1
         if m == 0:
             return ZERO
-        if self._unlimited and self.rounding in Rounding.documented():
-            return self._short_root(m, e)
-        # Enough digits that the root has more than t, and more than a random rounding compares.
-        shift = 2 * (self.precision + DRAW_BITS) + (e & 1)
-        n = m * self.base**shift
-        root = isqrt(n)
-        # One more digit marks an inexact root, which lies strictly between two integers.
-        sticky = int(root * root != n)
-        return self._round_integer(root * self.base + sticky, (e - shift) // 2 - 1)
+        # Enough digits that the root has t, and as many more as a random rounding compares.
+        shift = self.precision + 2 * DRAW_BITS * (self.rounding is Rounding.STOCHASTIC)
+        shift += (e - shift) & 1
+        n = 4 * m * self.power(shift)
+        root = isqrt(n)  # in halves of the last digit; one more bit marks a root between two of them
+        return self._round_quotient(2 * root + (root * root != n), 4, (e - shift) // 2)
 
     def negative(self, m: int, e: int) -> Pair:
         return (-m, e) if self._unlimited else self._within(-m, abs(m), e)
@@ -181,17 +178,6 @@ class ExactKernel:
             m2, e2 = (1 if m2 > 0 else -1), e1 - 2 * DRAW_BITS - 3
         n = m1 * self.power(e1 - e2) + m2
         return self._round_integer(n, e2) if n else ZERO
-
-    def _short_root(self, m: int, e: int) -> Pair:
-        # The root of a number with 2t - 1 or 2t digits and an even exponent has exactly t digits.
-        shift = self.precision if (e - self.precision) % 2 == 0 else self.precision - 1
-        n = m * self.power(shift)
-        root = isqrt(n)
-        # In integers, n >= (root + 1/2)**2 means n - root**2 > root. Neither a tie nor a carry can occur, because n is
-        # at most (b**t - 1) * b**t, whose root is below b**t - 1/2.
-        if self.nearest and n - root * root > root:
-            root += 1
-        return root, (e - shift) // 2
 
     def compare(self, m1: int, e1: int, m2: int, e2: int) -> int:
         """-1, 0 or 1 if the first number is less than, equal to or greater than the second."""

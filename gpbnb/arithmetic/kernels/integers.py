@@ -15,9 +15,9 @@ from numba import types
 from numba.core.datamodel import models
 from numba.core.imputils import lower_builtin
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, register_model
+from numba.extending import register_model
 
-from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros
+from gpbnb.arithmetic.kernels.bits import high_product, instruction, leading_zeros
 from gpbnb.arithmetic.kernels.compiling import inner
 
 _BITS = ir.IntType(128)
@@ -56,55 +56,36 @@ def _operator(function: Any, result: Any, second: Any, emit: Any) -> None:
     lower_builtin(function, uint128, second)(lowered)
 
 
-for _function, _name in (
-    (operator.add, "add"),
-    (operator.sub, "sub"),
-    (operator.mul, "mul"),
-    (operator.or_, "or_"),
-    (operator.and_, "and_"),
-):
-    _operator(_function, uint128, uint128, lambda builder, a, b, name=_name: getattr(builder, name)(a, b))
-for _function, _name in ((operator.lshift, "shl"), (operator.rshift, "lshr")):
-    _operator(_function, uint128, types.int64, lambda builder, a, b, name=_name: getattr(builder, name)(a, b))
-for _function, _sign in (
-    (operator.lt, "<"),
-    (operator.le, "<="),
-    (operator.gt, ">"),
-    (operator.ge, ">="),
-    (operator.eq, "=="),
-    (operator.ne, "!="),
-):
-    _operator(_function, types.boolean, uint128, lambda builder, a, b, sign=_sign: builder.icmp_unsigned(sign, a, b))
+_I = ir.IRBuilder
+for _function, _emit in (
+    (operator.add, _I.add), (operator.sub, _I.sub), (operator.mul, _I.mul), (operator.or_, _I.or_),
+    (operator.and_, _I.and_),
+):  # fmt: skip
+    _operator(_function, uint128, uint128, _emit)
+for _function, _emit in ((operator.lshift, _I.shl), (operator.rshift, _I.lshr)):
+    _operator(_function, uint128, types.int64, _emit)
+_SIGNS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
+for _name, _sign in _SIGNS.items():
+    _compared = lambda builder, a, b, sign=_sign: builder.icmp_unsigned(sign, a, b)  # noqa: E731
+    _operator(getattr(operator, _name), types.boolean, uint128, _compared)
 
 
-@intrinsic
-def wide(typingctx: Any, n: Any) -> Any:
+@instruction(uint128, types.uint64)
+def wide(builder: Any, n: Any) -> Any:
     """A uint64 as a uint128."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.zext(args[0], _BITS)
-
-    return uint128(types.uint64), codegen
+    return builder.zext(n, _BITS)
 
 
-@intrinsic
-def low_word(typingctx: Any, n: Any) -> Any:
+@instruction(types.uint64, uint128)
+def low_word(builder: Any, n: Any) -> Any:
     """The lower 64 bits of a uint128."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.trunc(args[0], _WORD)
-
-    return types.uint64(uint128), codegen
+    return builder.trunc(n, _WORD)
 
 
-@intrinsic
-def high_word(typingctx: Any, n: Any) -> Any:
+@instruction(types.uint64, uint128)
+def high_word(builder: Any, n: Any) -> Any:
     """The upper 64 bits of a uint128."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.trunc(builder.lshr(args[0], ir.Constant(_BITS, 64)), _WORD)
-
-    return types.uint64(uint128), codegen
+    return builder.trunc(builder.lshr(n, ir.Constant(_BITS, 64)), _WORD)
 
 
 @inner(forceinline=True)

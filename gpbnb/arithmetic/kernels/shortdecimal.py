@@ -31,7 +31,6 @@ from gpbnb.arithmetic.kernels.decimal import (
 
 __all__ = [
     "add", "compare", "divide", "load", "multiply", "negative", "opposite", "put", "round_", "sqrt",
-    "subtract",
 ]  # fmt: skip
 
 _DIGITS = 18  # of a sum at most: t of the larger number, and t + 2 below them
@@ -107,11 +106,6 @@ def _checked(m: Any, e: Any) -> Any:
 @inner(forceinline=True)
 def add(fmt: Any, a: Any, b: Any) -> Any:
     return _sum(fmt, _rule(fmt, _DIGITS), a, b)
-
-
-@inner(forceinline=True)
-def subtract(fmt: Any, a: Any, b: Any) -> Any:
-    return add(fmt, a, opposite(fmt, b))
 
 
 @inner(forceinline=True)

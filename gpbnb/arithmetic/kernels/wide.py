@@ -336,11 +336,6 @@ def _add_long(fmt: Any, a: Any, b: Any) -> Any:
 
 
 @inner(forceinline=True)
-def subtract(fmt: Any, a: Any, b: Any) -> Any:
-    return add(fmt, a, opposite(fmt, b))
-
-
-@inner(forceinline=True)
 def opposite(fmt: Any, a: Any) -> Any:
     return (not a[0]) & (a[1] != wide(_U0)), a[1], a[2]
 
@@ -548,12 +543,6 @@ def compare(fmt: Any, a: Any, b: Any) -> Any:
     return -larger if a[0] else larger
 
 
-@inner(forceinline=True)
-def integer(fmt: Any, n: Any) -> Any:
-    """The integer n, rounded."""
-    return rounded(fmt, n < 0, wide(np.uint64(abs(n))), False, np.int64(0))
-
-
 # -- conversion ----------------------------------------------------------------------------------------
 
 
@@ -596,29 +585,9 @@ def _from_binary(fmt: Any, n: Any, more: Any, k: Any) -> Any:
         rest = _entry(_FIVE, places - first)
         carried, low = product(low, rest)
         high = high * rest + carried
-    size = 128 + length(high) if high != wide(_U0) else length(low)
-    excess = max(((size * 1233) >> 12) + 1 - fmt.room, 0)
+    excess = _beyond_room(fmt, high, low)
     n, more = _cut(fmt, high, low, excess)
     return n, more, excess - places, True
-
-
-@compiled
-def from_integers(fmt: Any, n: int, m: Any, e: Any, twos: Any, out: Any, states: Any) -> None:
-    """Round numbers ``m * 2**e``, or ``m * base**e`` without `twos`, of int64.
-
-    states[i] is 0 if that is exact, 1 if not, 2 if the entry needs exact arithmetic. Raises OverflowError.
-    """
-    for i in range(n):
-        size = np.uint64(abs(m[i]))
-        digits, more, exponent, possible = wide(size), False, e[i], True
-        if twos:
-            digits, more, exponent, possible = _from_binary(fmt, digits, False, e[i])
-        x = zero()
-        states[i] = 2
-        if possible:
-            x = rounded(fmt, m[i] < 0, digits, more, exponent)
-            states[i] = 0 if not more and _exactly(fmt, digits, exponent, x[1], x[2]) else 1
-        out[0][i], out[1][i], out[2][i] = parts(fmt, x)
 
 
 @inner
@@ -645,9 +614,10 @@ def _in_binary(fmt: Any, m: Any, e: Any) -> Any:
 
 
 @compiled
-def converted(source: Any, fmt: Any, n: int, a: Any, out: Any, states: Any) -> None:
-    """Round numbers of one format to another, in any base; states[i] is 2 if the entry needs exact arithmetic.
+def converted(source: Any, fmt: Any, exactly: bool, n: int, a: Any, out: Any, states: Any) -> None:
+    """Round numbers of one format to another, in any base.
 
+    states[i] is 2 if the entry needs exact arithmetic, 1 if it is rounded although it must not be, `exactly`, else 0.
     Raises OverflowError.
     """
     for i in range(n):
@@ -657,8 +627,11 @@ def converted(source: Any, fmt: Any, n: int, a: Any, out: Any, states: Any) -> N
             m, more, e, possible = _in_binary(source, m, e)
             if possible:
                 m, more, e, possible = _from_binary(fmt, m, more, e)
-        x = rounded(fmt, negative, m, more, e) if possible else zero()
-        states[i] = 0 if possible else 2
+        x = zero()
+        states[i] = 2
+        if possible:
+            x = rounded(fmt, negative, m, more, e)
+            states[i] = exactly and (more or not _exactly(fmt, m, e, x[1], x[2]))
         out[0][i], out[1][i], out[2][i] = parts(fmt, x)
 
 
