@@ -227,6 +227,7 @@ def public(module):
 
 def names(section):
     """What calls of a section may use: what is public here, in LIBRARIES and ROOMS, and in the module of its name."""
+    HERE["KINDS"][-1].restart()  # so that its random roundings do not depend on other sections
     found = {}
     for path in [*LIBRARIES.split(), *(f"gpbnb.{room}" for room in ROOMS.split())]:
         module = import_module(path)

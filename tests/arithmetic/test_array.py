@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import io
 import math
-import operator
 import pickle
 from decimal import Decimal
 from fractions import Fraction
@@ -19,12 +18,10 @@ import scipy.linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from tests import oracles
 
 pytestmark = pytest.mark.usefixtures("loops_at_once")
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
-OPERATIONS = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
 D4 = FloatFormat(10, 4)
 B8 = FloatFormat(2, 8)
 
@@ -122,120 +119,6 @@ class TestText:
 class TestArithmetic:
     X = D4.array([["1.5", "-2", "0.25"], ["3", "4", "-0.5"]])
 
-    def test_plain_operands_on_either_side(self) -> None:
-        for other in [
-            2,
-            0.5,
-            "0.5",
-            Decimal("0.5"),
-            Fraction(1, 2),
-            np.float64(2),
-            np.int64(2),
-            np.array(2),
-            [2, "4", 0.5],
-            np.array([2, 4, 8]),
-            np.array([[2.0], [0.5]]),
-            [[1], [2]],
-            (4, 2, 1),
-        ]:
-            y = D4.array(other)
-            for operation in OPERATIONS.values():
-                for found, expected in (
-                    (operation(self.X, other), operation(self.X, y)),
-                    (operation(other, self.X), operation(y, self.X)),
-                ):
-                    assert isinstance(found, FloatArray)
-                    assert found.format == D4
-                    assert found.shape == expected.shape == (2, 3)
-                    assert np.all(found == expected)
-            for comparison in (operator.eq, operator.ne, operator.lt, operator.le, operator.gt, operator.ge):
-                assert np.array_equal(comparison(self.X, other), comparison(self.X, y))
-                assert np.array_equal(comparison(other, self.X), comparison(y, self.X))
-
-    def test_numpy_functions(self) -> None:
-        x, y = self.X, self.X * 2
-        for name, expected in {"add": x + y, "subtract": x - y, "multiply": x * y, "divide": x / y}.items():
-            assert np.all(getattr(np, name)(x, y) == expected)
-            assert np.all(getattr(np, name)(x.to_float(), y) == expected)
-        assert np.all(np.square(x) == x * x)
-        assert np.positive(x) is x
-        assert np.all(np.sqrt(x * x) == abs(x))
-        for name in ("equal", "not_equal", "less", "less_equal", "greater", "greater_equal"):
-            assert np.array_equal(getattr(np, name)(x, y), getattr(np, name)(x.to_float(), y.to_float()))
-        assert np.all(np.matmul(x, y.T) == x @ y.T)
-        assert np.all(np.dot(x, y.T) == x @ y.T)
-        assert np.all(np.dot(x, 2) == x * 2)
-        assert np.all(np.outer(x[0], y[1]) == x[0][:, np.newaxis] * y[1])
-        assert np.array_equal(x, x[:, :])
-        assert not np.array_equal(x, x[:1])
-        assert not np.array_equal(x, y)
-        assert (np.shape(x), np.ndim(x), np.size(x)) == ((2, 3), 2, 6)
-
-    def test_moving_entries(self) -> None:
-        x, f = self.X, self.X.to_float()
-        for move in (
-            np.transpose, np.ravel, np.squeeze, np.atleast_2d, np.atleast_1d, np.diag, np.diagonal, np.tril, np.triu,
-            np.flip, np.copy, np.vstack, np.hstack, np.concatenate, np.stack,
-            lambda a: np.reshape(a, (3, 2)), lambda a: np.expand_dims(a, 1), lambda a: np.broadcast_to(a, (2, 2, 3)),
-            lambda a: np.swapaxes(a, 0, 1), lambda a: np.moveaxis(a, 0, 1), lambda a: np.roll(a, 1, axis=1),
-            lambda a: np.repeat(a, 2, axis=0), lambda a: np.tile(a, (2, 2)), lambda a: np.take(a, [1, 0], axis=1),
-            lambda a: np.concatenate([a, a[:1]]), lambda a: np.concatenate([a, a], axis=1),
-            lambda a: np.stack([a, a], axis=1), lambda a: np.vstack([a, [1, 2, 3]]), lambda a: np.hstack((a, a)),
-            lambda a: np.where(a > 0, a, 0), lambda a: np.where([True, False, True], 1, a), lambda a: np.diag(a[0]),
-            lambda a: a.T, lambda a: a.reshape(-1), lambda a: a.reshape(3, 2), lambda a: a.reshape((6, 1)),
-        ):  # fmt: skip
-            if move in (np.vstack, np.hstack, np.concatenate, np.stack):
-                found, expected = move([x, x]), move([f, f])
-            else:
-                found, expected = move(x), move(f)
-            assert isinstance(found, FloatArray)
-            assert found.format == D4
-            assert np.array_equal(found.to_float(), expected)
-
-    def test_indexing(self) -> None:
-        for index in [
-            0,
-            -1,
-            (0, 1),
-            slice(None, None, 2),
-            (slice(None), 1),
-            (..., 0),
-            None,
-            (np.newaxis, 0),
-            [1, 0],
-            [0, 0],
-            ([0, 1], [2, 0]),
-            np.array([True, False]),
-            [[True, False, True], [False, True, False]],
-            slice(0, 0),
-            (),
-            ...,
-        ]:
-            if isinstance(index, list) and isinstance(index[0], list):
-                index = np.array(index)
-            found = self.X[index]
-            assert isinstance(found, FloatArray)
-            assert np.array_equal(found.to_float(), self.X.to_float()[index])
-
-    def test_sums_run_from_left_to_right(self) -> None:
-        # In another order: 1000 + (0.4 + 0.4) = 1001.
-        x = D4.array(["1000", "0.4", "0.4"])
-        assert str(x.sum()) == "1000"
-        assert str(x[::-1].sum()) == "1001"
-        assert str(D4.array(["1.001", "1.001", "1000"]).prod()) == "1002"
-        rng = np.random.default_rng(3)
-        x = B8.array(rng.normal(size=(4, 3, 2)))
-        arithmetic = oracles.Numbers(oracles.floating(2, 8, "nearest"))
-        f = x.to_fractions()
-        for axis in (0, 1, 2, -1):
-            expected = np.apply_along_axis(lambda line: [arithmetic.total(list(line))], axis, f).squeeze(axis)
-            for found in (x.sum(axis), x.sum(axis=axis), np.sum(x, axis), np.add.reduce(x, axis=axis)):
-                assert found.to_fractions().tolist() == expected.tolist()
-        assert x.sum().to_fractions() == np.sum(x).to_fractions() == arithmetic.total(list(f.reshape(-1)))
-        assert np.all(np.add.reduce(x) == x.sum(0))
-        assert np.all(np.multiply.reduce(x, axis=1) == np.prod(x, axis=1))
-        assert np.all(np.prod(x, axis=1) == x[:, 0] * x[:, 1] * x[:, 2])
-
     def test_copies(self) -> None:
         x = self.X[:, ::2].T
         for y in (copy.copy(x), copy.deepcopy(x), pickle.loads(pickle.dumps(x))):
@@ -270,33 +153,6 @@ class TestArithmetic:
         for name in ("shape", "format", "T", "anything"):
             with pytest.raises(AttributeError):
                 setattr(x, name, None)
-
-
-class TestMatmul:
-    def test_stacks(self) -> None:
-        rng = np.random.default_rng(6)
-        for a_shape, b_shape in [
-            ((5, 2, 3), (3, 4)),
-            ((2, 3), (5, 3, 4)),
-            ((5, 1, 2, 3), (6, 3, 4)),
-            ((5, 2, 3), (3,)),
-            ((3,), (5, 3, 4)),
-        ]:
-            a, b = D4.array(rng.normal(size=a_shape)), D4.array(rng.normal(size=b_shape))
-            found = a @ b
-            assert found.shape == np.matmul(a.to_float(), b.to_float()).shape
-            stack = np.broadcast_shapes(a_shape[:-2], b_shape[:-2])
-            for index in np.ndindex(stack):
-                left = a if a.ndim <= 2 else np.broadcast_to(a, (*stack, *a_shape[-2:]))[index]
-                right = b if b.ndim <= 2 else np.broadcast_to(b, (*stack, *b_shape[-2:]))[index]
-                assert np.array_equal(found[index], left @ right)
-
-    def test_plain_operands(self) -> None:
-        x = D4.array([[1, 2], [3, 4]])
-        for found in (x @ [1, 2], x @ np.array([1, 2])):
-            assert np.array_equal(found, [5, 11])
-        for found in ([1, 2] @ x, np.array([1, 2]) @ x):
-            assert np.array_equal(found, [7, 10])
 
 
 class TestLeavingTheFormat:

@@ -14,40 +14,6 @@ from tests.oracles import Numbers
 pytestmark = pytest.mark.usefixtures("loops_at_once")
 
 FORMATS = [BINARY32, BINARY128, FloatFormat(10, 5), FixedFormat(7, 8)]
-INDICES = [1, -1, slice(1, None), (0, 2), (slice(None), 0), [2, 0], ([0, 1], [2, 2]), ..., (..., np.newaxis, 1)]
-
-
-def test_a_copy_has_the_entries_that_an_assignment_would_give():
-    for fmt in FORMATS:
-        for index in INDICES:
-            given = np.arange(1, 10).reshape(3, 3)
-            x = fmt.array(given)
-            wanted = given.copy()
-            wanted[index] = 17
-            assert x.at[index].set(17).to_float().tolist() == wanted.tolist()
-            values = np.arange(20, 20 + given[index].size).reshape(given[index].shape)
-            wanted[index] = values
-            assert x.at[index].set(values).to_float().tolist() == wanted.tolist()
-            for name, operation in (("add", np.add), ("subtract", np.subtract), ("multiply", np.multiply)):
-                wanted = given.copy()
-                wanted[index] = operation(given[index], 3)
-                assert getattr(x.at[index], name)(3).to_float().tolist() == wanted.tolist()
-            assert x.at[index].get().to_float().tolist() == given[index].tolist()
-            assert x.to_float().tolist() == given.tolist()
-
-
-def test_operations_on_entries_are_rounded_and_masks_select():
-    x = BINARY32.array([1, 10, 100])
-    assert x.at[x > 5].divide(3).to_float().tolist() == [
-        1,
-        float(np.float32(10) / np.float32(3)),
-        float(np.float32(100 / 3)),
-    ]
-    assert x.at[[0, 0]].set([5, 7]).to_float().tolist() == [7, 10, 100]  # as NumPy's assignment
-    assert x.at[[0, 0]].add(1).to_float().tolist() == [2, 10, 100]
-    assert isinstance(FixedFormat(7, 8).array([1, 2]).at[0].set(3), type(FixedFormat(7, 8).array(1)))
-    y = x.at[0].set(BINARY32.array("1e-45").on_exact_backend())  # of another backend
-    assert y.to_float().tolist() == [float(np.float32(1e-45)), 10, 100]
 
 
 def matrices(fmt, n, seed):
