@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from gpbnb.arithmetic.bounds import above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.check import BEYOND, DERIVED, NotProvedError, prove
+from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.gains import Schedule
 from gpbnb.bounds.guess import EXCESS, FilterLimits, Guess, radius_of
 from gpbnb.filters.forms import Form
@@ -39,66 +39,73 @@ FORMS = {
     Form.UD: "ud",
 }
 _KINDS = {MULTIPLY: "multiply", ADD: "add", SUBTRACT: "subtract"}
-RAISED = (1.0, 1.001, 1.003, 1.01, 1.03, 1.1)
-"""Factors of a guess that are tried, until the checker proves one."""
-SLOW = (1.005, 1.03, 1.1, 1.5)
-"""The same for filters that settle slowly, where the checker adds effects of old errors that are alike."""
+_TRIES = 6
+"""Claims that are tried, until the checker proves one."""
+_MORE, _MORE_OF_SLOW, _MORE_OF_ALIKE = 1.03, 1.005, 1.001
+"""Factors of a claim: after a failure that does not say what is needed; and at first, for filters that settle slowly,
+where the checker adds effects of old errors that are alike, and where it takes phases together."""
+_APART_ABOVE = 1.003
+"""Share of a bound above which phases are kept apart."""
 _LONG, _MANY, _APART = 700, 10_000, 64
 """Steps after which a filter is slow; steps before those of a period, in all, from which the checker takes phases
 together; the age at which errors of two steps of a slow filter may be added, in steps."""
 _LEFT, _LEFT_SLOW = 2.0**-26, 2.0**-13
 """Share of an error that is left when the checker stops to follow it."""
-_MORE, _MORE_ALIKE, _MORE_SLOW = 2.0**-22, 0.5, 2.0**-8
+_ADDED, _ADDED_ALIKE, _ADDED_SLOW = 2.0**-22, 0.5, 2.0**-8
 """Share of a bound that the unsettled exact gain, or phases that are taken together, may add to it, by estimates that
 are far too large."""
 
 
 class Proof(NamedTuple):
-    """What was proved: a bound, and its certificate; or why nothing was."""
+    """What was proved: a bound, and its certificate."""
 
     bound: NDArray[np.float64]
     text: str
-    why: str = ""
 
 
-def first_proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
-    """Ask the checker for a guess, and for somewhat larger ones if it rejects that.
+def proved(guess: Guess, written: Callable[[Guess], dict[str, Any]]) -> Proof:
+    """Ask the checker for a guess and, if it rejects that, for one as much larger as it says; or raise ValueError.
 
-    For fixed coefficients, the checker says how much larger; otherwise some factors are tried. Phases that differ too
-    much to be taken together are then kept apart.
+    Phases of a period that differ too much to be taken together are then kept apart.
     """
-    why, content, larger = "", json.loads(written(guess)), np.ones(len(guess.bound))
-    slow = "keep" in content and max(content["keep"], content["back"], content["steps"] or 0) > _LONG
+    content, why = written(guess), ""
+    slow = "keep" in content and content["keep"] < max(content["back"], content["steps"] or 0)
     together = content.get("phases", 1) < content.get("period", 1)
-    for factor in SLOW if slow else RAISED[together:]:
-        if factor > 1:
-            content = json.loads(written(guess._replace(bound=guess.bound * larger * factor)))
-        if together and factor > RAISED[2]:
-            content["phases"] = content["period"]
+    if slow or together:
+        guess = guess._replace(bound=guess.bound * (_MORE_OF_SLOW if slow else _MORE_OF_ALIKE))
+        content = written(guess)
+    for _ in range(_TRIES):
         try:
             prove(content)
-        except NotProvedError as error:
-            why, needed = f"not proved: {error}", np.array([above(each) for each in error.shares]) * EXCESS
-            if len(needed) and str(error) == BEYOND:
-                guess = guess._replace(state=guess.state * np.maximum(needed, 1))
-            elif len(needed):
-                larger = larger * np.maximum(needed, 1)
-            elif str(error).startswith(DERIVED):
-                wider = 2 * factor - 1
-                guess = guess._replace(state=guess.state * wider, innovation=guess.innovation * wider)
+            return Proof(np.array([above(Fraction(each)) for each in content["bound"]]), json.dumps(content))
         except NotImplementedError as error:
-            return Proof(guess.bound, "", f"not covered: {error}")
-        else:
-            return Proof(np.array([above(Fraction(each)) for each in content["bound"]]), _text(content))
-    return Proof(guess.bound, "", why)
+            raise ValueError(f"not covered: {error}") from None
+        except NotProvedError as error:
+            why, shares = f"not proved: {error}", error.shares
+        apart = together and max(shares[0], default=2) > _APART_ABOVE
+        if not apart:
+            guess = _larger(guess, *shares)
+        content = written(guess)
+        if apart:
+            content["phases"], together = content["period"], False
+    raise ValueError(why)
 
 
-def proved(guess: Guess, written: Callable[[Guess], str]) -> Proof:
-    """Return the first proof that the checker finds, as :func:`first_proved`; ValueError says why there is none."""
-    proof = first_proved(guess, written)
-    if proof.why:
-        raise ValueError(proof.why)
-    return proof
+def _larger(guess: Guess, of_bound: Sequence[Fraction], of_limits: Sequence[Fraction]) -> Guess:
+    """Return a guess that exceeds what the checker needs, as larger numbers are rounded by more."""
+    if not of_bound and not of_limits:
+        return guess._replace(bound=guess.bound * _MORE)
+    n, m = len(guess.bound), len(guess.innovation)
+    more = np.ones(2 * n + m)
+    more[: len(of_bound)] = [above(x) for x in of_bound]
+    more[n : n + len(of_limits)] = [above(x) for x in of_limits]
+    more = np.maximum(more + np.minimum((more - 1) / 2, 1e-3), 1) * EXCESS
+    bound, state, innovation = np.split(more, [n, 2 * n])
+    return guess._replace(
+        bound=guess.bound * bound * min(max(state.max(), innovation.max()), 1.001),  # larger limits round by more
+        state=guess.state * state,
+        innovation=guess.innovation * innovation,
+    )
 
 
 def _head(name: str, bound: Any, steps: int | None, back: int) -> dict[str, Any]:
@@ -111,16 +118,14 @@ def of_operations(
     measurement: Any,
     guess: Guess,
     steps: int | None,
-    exact: str = "as stored",
-) -> str:
-    """Return the certificate of a filter with fixed coefficients as JSON.
+    exact: str,
+) -> dict[str, Any]:
+    """Return the certificate of a filter with fixed coefficients.
 
     Limits of the inputs (m,) are those as given; the states are compared with an exact filter "as stored" or "as
     given".
     """
     program = made.program
-    if not {*program.operations[:, 0].tolist()} <= {*_KINDS}:
-        raise ValueError(f"got {made.name}, which limits its values; needed products, sums and differences only")
     drawn = not isinstance(fmt, WordFormats) and fmt.rounding is Rounding.STOCHASTIC
     stored = made.stored(fmt)
     A, B = matrices(program, stored if exact == "as stored" else made.coefficients)
@@ -142,11 +147,13 @@ def of_operations(
         "limits": {"measurement": texts(measurement)},
         "derived": {"state": texts(guess.state)},
     }
-    return _text(_head(made.name, guess.bound, steps, guess.lags) | content)
+    return _head(made.name, guess.bound, steps, guess.lags) | content
 
 
-def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | None, F: NDArray[np.float64]) -> str:
-    """Return the certificate of a Kalman filter, for limits as given and closed loops F (steps, n, n), as JSON."""
+def of_filter(
+    given: Schedule, asked: FilterLimits, guess: Guess, steps: int | None, F: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Return the certificate of a Kalman filter, for limits as given and closed loops F (steps, n, n)."""
     model = given.origin
     if not isinstance(model, LinearModel) or given.form is None:
         raise ValueError("got a schedule without a Kalman filter; needed both the model and its form")
@@ -159,9 +166,9 @@ def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | N
         back = _back(period, _LEFT, bound, state)
         slow = back > _LONG
         back = _back(period, _LEFT_SLOW, bound, state) if slow else back
-        stay = _stay(given, innovation, (_MORE_SLOW if slow else _MORE) * decay * bound)
+        stay = _stay(given, innovation, (_ADDED_SLOW if slow else _ADDED) * decay * bound)
         phases = (
-            _alike(period, model.cycle, state, _MORE_ALIKE * decay * bound)
+            _alike(period, model.cycle, state, _ADDED_ALIKE * decay * bound)
             if len(period) * back > _MANY
             else len(period)
         )
@@ -180,11 +187,7 @@ def of_filter(given: Schedule, asked: FilterLimits, guess: Guess, steps: int | N
         "derived": {"state": texts(state), "innovation": texts(innovation)},
         "keep": _APART if slow else back or steps,
     } | repeated
-    return _text(_head(model.name, bound, steps, back) | content)
-
-
-def _text(content: dict[str, Any]) -> str:
-    return json.dumps(content, indent=None, separators=(", ", ": "))
+    return _head(model.name, bound, steps, back) | content
 
 
 def texts(values: Any) -> Any:

@@ -65,7 +65,7 @@ from fractions import Fraction
 from functools import reduce
 from itertools import combinations, combinations_with_replacement, cycle, islice, repeat
 from math import inf, isqrt, lcm, nextafter
-from operator import add, le, mul, sub
+from operator import add, mul, sub
 from typing import Any
 
 # What a file looks like: a tuple lists words, a list holds any number of entries, and a set stands for one or none.
@@ -99,18 +99,17 @@ FILES = {
 }
 NUMBER = re.compile(r"-?[0-9]{1,4000}([./][0-9]{1,4000})?", re.ASCII)
 MULTIPLY, ADD, SUBTRACT = "multiply", "add", "subtract"
-BEYOND, LARGER = "a state may exceed its limit", "the error may exceed its bound"
-DERIVED = "a state or an innovation may exceed its limit"
+LARGER, DERIVED = "the error may exceed its bound", "a state or an innovation may exceed its limit"
 BLOCK, PEAK = 8, 128  # steps that are taken together, for speed; bits of the shares in (6)
 
 
 class NotProvedError(Exception):
-    """A claim that is wrong, or that this program cannot prove; with the shares of its bounds that it needs."""
+    """A claim that is wrong, or that cannot be proved; with the shares of its bounds and its limits that are needed."""
 
-    shares: Any = ()
+    shares: Any = ((), ())
 
 
-def need(truth: Any, message: str, shares: Any = ()) -> None:
+def need(truth: Any, message: str, shares: Any = ((), ())) -> None:
     if not truth:
         error = NotProvedError(message)
         error.shares = shares
@@ -136,10 +135,6 @@ def read(given: Any, schema: Any, name: str = "") -> Any:
     return [read(x, schema[0], name) for x in given] if rows else schema(given)
 
 
-def format_schema(given: Any) -> Any:
-    return FIXED if "overflow" in given else FLOAT
-
-
 def up(n: int, d: int) -> int:
     return -(-n // d)
 
@@ -153,8 +148,9 @@ def size(a: Any, b: Any) -> Any:
     return sum(map(mul, map(abs, a), b))
 
 
-def scaled(columns: Any, sizes: Any) -> Any:
-    return [[x * s for x in g] for g, s in zip(columns, sizes, strict=True)]
+def scaled(columns: Any, sizes: Any, unit: int = 0) -> Any:
+    """Columns times sizes; rounded down to whole numbers of units, if there is one."""
+    return [[x * s // unit if unit else x * s for x in g] for g, s in zip(columns, sizes, strict=True)]
 
 
 def turned(a: Any) -> Any:
@@ -173,10 +169,6 @@ def around(a: Any, b: Any) -> Any:
 
 def diagonal(n: int, x: Any = 1) -> Any:
     return [[x * (i == j) for j in range(n)] for i in range(n)]
-
-
-def times(columns: Any, sizes: Any, unit: int) -> Any:
-    return [[x * s // unit for x in g] for g, s in zip(columns, sizes, strict=True)]
 
 
 class Arithmetic:
@@ -575,7 +567,8 @@ class Linear:
         different = [row for row in {tuple(x): x for x, _ in split}.values() if sum(map(bool, row)) > 1]
         inputs = scaled(turned(self.B), self.Z)
         shares, wholes = peaks(self.A, inputs, different, self.X, self.steps, self.back)
-        need(max(shares[:n]) <= 1 << PEAK, BEYOND, [Fraction(x, 1 << PEAK) for x in shares[:n]])
+        most = [Fraction(x, 1 << PEAK) for x in shares[:n]]
+        need(max(most) <= 1, "a state may exceed its limit", ((), most))
         caps = {tuple(r): Fraction(s, 1 << PEAK) * w for r, s, w in zip(different, shares[n:], wholes, strict=True)}
         found = []
         for row, whole in split:
@@ -632,12 +625,11 @@ class Linear:
         columns = scaled(groups, groups.values()) + scaled(turned(B), self.storing)
         shares, _ = peaks(A, columns, [], self.b, self.steps, self.back)
         if (A, B) != (self.A, self.B):
-            zero = [[0] * n for _ in range(n)]
-            both = list(map(add, A, each(sub, A, self.A))) + list(map(add, zero, self.A))
+            both = list(map(add, A, each(sub, A, self.A))) + [[0] * n + row for row in self.A]
             inputs = scaled(turned(each(sub, B, self.B) + self.B), self.Z)
             more, _ = peaks(both, inputs, [], self.b + self.X, self.steps, self.back)
             shares = list(map(add, shares, more))
-        need(max(shares) <= 1 << PEAK, LARGER, [Fraction(x, 1 << PEAK) for x in shares])
+        need(max(shares) <= 1 << PEAK, LARGER, ([Fraction(x, 1 << PEAK) for x in shares], ()))
 
 
 def inverse(given: Any) -> tuple[Any, int]:
@@ -714,9 +706,17 @@ class ErrorSet:
     def __init__(self, sizes: Any, seen: Any, loops: int, message: str, start: Any = ()) -> None:
         self.sizes, self.loops, self.message, self.n, self.steps = sizes, loops, message, len(sizes), 0
         self.limits, self.groups = [x << loops for x in sizes + seen], [(1, 1)] if start else []
+        self.shares, self.beyond = [Fraction(0)] * len(self.limits), ""
         self.units = [(max(sizes) << 60) // max(s, 1) for s in sizes]
         self.x = [list(start[i : i + 1]) for i in range(self.n)]
         self.M, self.box, self.one = diagonal(self.n, 0), [0] * self.n, diagonal(self.n, 1 << loops)
+
+    def claim(self, i: int, most: int, where: str) -> None:
+        """Compare a row with its limit. If it is not far beyond, go on, so that a failure says what all rows need."""
+        if most > self.limits[i]:
+            self.beyond = self.beyond or f"{self.message}{where}"
+            need(most < 2 * self.limits[i], self.beyond)
+            self.shares[i] = max(self.shares[i], Fraction(most, self.limits[i]))
 
     def image(self, row: Any) -> list[int]:
         """A row, in units of 2**-loops, times each segment."""
@@ -753,9 +753,9 @@ class ErrorSet:
         sizes, rows, added = [up(x, 1 << loops) for x in before], one, [0] * self.n
         known = [(0, row, x) for row, x in zip(one, before, strict=True)]
         for j, (F, own, slack, seen) in enumerate(steps, 1):
-            for row, limit in zip(seen, self.limits[self.n :], strict=False):
+            for i, row in enumerate(seen, self.n):
                 (effect,), (far,) = self.effects([row], steps[: j - 1])
-                need(self.most(far) + effect <= limit, f"{self.message} before step {self.steps + j}")
+                self.claim(i, self.most(far) + effect, f" before step {self.steps + j}")
             rows, new = self.through(F, rows), [sum(map(abs, x)) + y for *x, y in zip(*own, slack, strict=True)]
             added = [up(size(row, added), 1 << loops) + x for row, x in zip(F, new, strict=True)]
             for i, row in enumerate(rows):
@@ -764,18 +764,14 @@ class ErrorSet:
                 if near(row, ends, whole - k, sizes) + (added[i] << loops) > self.limits[i]:
                     (effect,), (far,) = self.effects([one[i]], steps[:j])
                     known[i] = j, far, self.most(far)
-                    need(known[i][2] + effect <= self.limits[i], f"{self.message} after step {self.steps + j}")
-        self.move(P)
+                    self.claim(i, known[i][2] + effect, f" after step {self.steps + j}")
+        moved = list(map(self.image, P))
+        self.x = [[s >> loops for s in x] for x in moved]
+        self.box = [up(size(row, self.box), 1 << loops) + len(moved[0]) for row in P]
+        self.M = each(lambda x, y: (x >> 2 * loops) + y, around(P, self.M), diagonal(self.n, self.n))
         self.steps, self.groups = self.steps + whole, self.groups + groups
         self.box = list(map(add, self.box, box))
         self.x = [x + [g[i] for g in columns] for i, x in enumerate(self.x)]
-
-    def move(self, F: Any) -> None:
-        """Take the image of the set, and round its numbers."""
-        moved, loops = list(map(self.image, F)), self.loops
-        self.x = [[s >> loops for s in x] for x in moved]
-        self.box = [up(size(row, self.box), 1 << loops) + len(moved[0]) for row in F]
-        self.M = each(lambda x, y: (x >> 2 * loops) + y, around(F, self.M), diagonal(self.n, self.n))
 
     def pairs(self, keep: int) -> Any:
         """Add columns of steps that are alike, as they are old; return segments that contain what this leaves out."""
@@ -800,7 +796,7 @@ class ErrorSet:
                 merged += old
                 groups.append((count, steps))
         self.x, self.groups, self.box = turned(merged) if merged else [[] for _ in self.x], groups, [0] * self.n
-        return times(diagonal(self.n), box, 1) + left
+        return scaled(diagonal(self.n), box, 1) + left
 
     def absorb(self, keep: int) -> None:
         """Let the ellipsoid contain the box and old segments; the numbers t of (1) are the lengths of all."""
@@ -839,9 +835,9 @@ class ErrorSet:
                     a, b = (list(map(mul, r, box)) for r in (row, known[i][0]))
                     if near(row, [(sum(map(mul, a, b)), *known[i])], sum(map(mul, b, b)) or 1, box) > limit - x:
                         known[i] = row, self.most(row)
-                        need(known[i][1] <= limit - x, f"{self.message} later")
-        found = [x + size(row, self.sizes) for x, row in zip(sums, rows, strict=True)]
-        need(all(map(le, found, self.limits)), f"{self.message}, in phase {phase} of the period")
+                        self.claim(i, known[i][1] + x, " later")
+        for i, (x, row) in enumerate(zip(sums, rows, strict=True)):
+            self.claim(i, x + size(row, self.sizes), f", in phase {phase} of the period")
 
 
 class Filter:
@@ -894,10 +890,10 @@ class Filter:
         F = each(lambda x: (x << self.loops) // step.one, turned(columns[:n]))
         seen = [[(row.get(i, 0) << self.loops) // step.one for i in range(n + m, first)] for (row,) in seen]
         K = each(lambda x: (x << self.exact.bits) // step.one, turned(columns[n : n + m]))
-        inputs = times(columns[n : n + m], self.Z, step.one) if self.derived else []
+        inputs = scaled(columns[n : n + m], self.Z, step.one) if self.derived else []
         Phi = each(lambda x: x * step.one // self.a.unit, turned(Phi))
-        both = list(filter(any, times(each(sub, columns[n + m : first], Phi), self.X, step.one)))
-        return P, (F, K, times(found, found.values(), step.one), inputs, both, seen if self.derived else [])
+        both = list(filter(any, scaled(each(sub, columns[n + m : first], Phi), self.X, step.one)))
+        return P, (F, K, scaled(found, found.values(), step.one), inputs, both, seen if self.derived else [])
 
     def coefficients(self) -> Any:
         """The parts of each step, without end; the covariance is emulated until it recurs, as claimed."""
@@ -919,7 +915,7 @@ class Filter:
         exact = self.exact
         gains = exact.gains(self.first, self.given["below"], self.given["above"])
         for (F, K, errors, inputs, both, seen), (gain, far) in zip(self.coefficients(), gains, strict=False):
-            both = both + times(turned(each(sub, K, gain)), self.V, 1 << exact.bits)
+            both = both + scaled(turned(each(sub, K, gain)), self.V, 1 << exact.bits)
             off = [size(row, self.V) + sum(self.V) for row in far]
             slack = [2 + len(errors) + 2 * self.n + 3 * self.m + up(x, 1 << exact.bits) for x in off]
             far, near = ([x + 2 * (sum(s) >> self.loops) + 2 for x in slack] for s in (self.b, self.X))
@@ -946,6 +942,8 @@ class Filter:
                 alike = [reach.hull(steps[phase::phases]) for phase in range(phases)]
                 for phase in range(phases):
                     reach.later(alike, phase, back)
+        for reach in sets:
+            need(not reach.beyond, reach.beyond, (sets[0].shares, sets[1].shares if self.derived else ()))
 
 
 def prove(given: Any) -> str:
@@ -954,11 +952,13 @@ def prove(given: Any) -> str:
         fmt, made = given["format"], given["filter"]
         kind = read(made["kind"], ("kalman", "linear"), "kind")
         words = ("data", "sums", "coefficients") if "data" in fmt and kind == "linear" else ()
-        shape = {key: format_schema(fmt[key]) for key in words} if words else format_schema(fmt)
+        formats = [fmt[key] for key in words] or [fmt]
+        shapes = [FIXED if "overflow" in each else FLOAT for each in formats]
+        shape = dict(zip(words, shapes, strict=True)) if words else shapes[0]
         content = read(given, FILES[kind] | {"filter": FILTERS[kind], "format": shape})
         if kind == "kalman" and fmt["rounding"] == "stochastic":
             raise NotImplementedError("stochastic rounding of a covariance")
-        scale = 3 * max(each["precision"] for each in ([fmt[key] for key in words] if words else [fmt])) + 40
+        scale = 3 * max(each["precision"] for each in formats) + 40
         proof: Any = Filter if kind == "kalman" else Linear
         while scale < 20_000:
             try:

@@ -27,9 +27,10 @@ from gpbnb.arithmetic.bounds import all_above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
-from gpbnb.bounds.certificate import first_proved, of_filter, of_operations
+from gpbnb.bounds.certificate import of_filter, proved
 from gpbnb.bounds.gains import MOST, Schedule, schedule
-from gpbnb.bounds.guess import FilterLimits, Guess, constant_guess, filter_guess, linear_steps, loop_radius
+from gpbnb.bounds.guess import FilterLimits, Guess, filter_guess, linear_steps, loop_radius
+from gpbnb.bounds.system import Recursion
 from gpbnb.bounds.units import stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LARGEST_EXPONENT, LinearModel
@@ -209,7 +210,7 @@ def guarantee(
         states; at most 1,000,000. A proof takes more steps in proportion to a larger number.
     horizon : the number of steps that the bound covers if no bound holds for ever.
     """
-    return _answered(guessed(model, fmt, within, form, most, horizon))
+    return _proved(guessed(model, fmt, within, form, most, horizon))
 
 
 def guessed(
@@ -242,78 +243,76 @@ def guessed(
 
 def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000) -> FilterGuarantee:
     """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`."""
-    return _answered(from_guess(given, within, horizon))
+    return _proved(from_guess(given, within, horizon))
 
 
 def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000, effort: float = EFFORT) -> FilterGuarantee:
     """Return what :func:`from_schedule` is going to prove, without a proof; `effort` limits what it may take."""
-    within = sized_limits(within, given.program.n, given.program.m, given.x0)
-    radius = loop_radius(given) if given.settled else math.nan
+    n, m = given.program.n, given.program.m
+    within = sized_limits(within, n, m, given.x0)
+    radius, stored = loop_radius(given) if given.settled else math.nan, stored_sizes(given.fmt, within.measurement)
     why, for_ever = given.why, given.settled and radius < 1
     if given.settled and not for_ever:
         why = f"the closed loop is not stable: an error grows by a factor of {radius:.6g} a step"
     steps = None if for_ever else horizon if given.settled else min(horizon, given.steps)
-    slow = "" if isinstance(given.origin, LinearFilter) else _too_slow(given, steps, radius, effort)
-    if slow:
-        none = np.full(given.program.n, np.inf)
-        found = Guess(none, none, np.full(given.program.m, np.inf), np.zeros((given.program.n, 3)), why=slow)
-    else:
-        found = _guess(given, within, steps)
-    if not np.isfinite(found.bound).all():
-        steps = 0
-        if for_ever:
-            why = "no bound was found: in this precision, an error causes rounding errors as large as itself"
-        if found.why:
-            why = found.why
-        elif given.fmt.limits is not None:
-            why = f"no bound was found within the range of {arithmetic(given.fmt)}: a number may exceed the largest"
-    derived = FilterLimits(found.state, found.innovation, stored_sizes(given.fmt, within.measurement))
+    try:
+        if isinstance(given.origin, LinearFilter):
+            found = _recursion(given, within, steps).guess(given.fmt)
+        else:
+            _check_effort(given, steps, radius, effort)
+            found = filter_guess(given, within._replace(measurement=stored), steps)
+    except (ValueError, OverflowError) as error:
+        none = np.full(n, np.inf)
+        found, steps, why = Guess(none, none, np.full(m, np.inf), np.zeros((n, 3))), 0, str(error)
+    derived = FilterLimits(found.state, found.innovation, stored)
     return FilterGuarantee(
         found.bound, steps, why, given.fmt, parts=found.parts, limits=derived, schedule=given, radius=radius,
         asked=within, lags=found.lags,
     )  # fmt: skip
 
 
-def _too_slow(given: Schedule, steps: int | None, radius: float, effort: float) -> str:
-    """Say that a proof would take too many steps, before it is tried; nothing if it may be tried."""
+def _check_effort(given: Schedule, steps: int | None, radius: float, effort: float) -> None:
+    """Reject a proof that would take too many steps, before it is tried."""
     n, m = given.program.n, given.program.m
     most = int(effort / (120 + n**2 * (n + m)))
     if steps is not None:
-        return "" if steps <= most else f"a proof takes each of {steps} steps; needed at most {most} steps"
+        if steps > most:
+            raise ValueError(f"a proof takes each of {steps} steps; needed at most {most} steps")
+        return
     period = given.steps - given.first
     later = math.ceil(math.log(2.0**-26) / math.log(min(max(radius, 1e-3), 1 - 1e-15))) * period
-    if given.first + later / 4 <= most:
-        return ""
-    return (
-        f"the filter is too slow for a proof: its gain takes {given.first} steps to settle, and errors take {later} "
-        f"to decay, of which four count as one; needed at most {most} steps; take more process noise, so that it "
-        "forgets sooner, or a larger most="
-    )
+    if given.first + later / 4 > most:
+        raise ValueError(
+            f"the filter is too slow for a proof: its gain takes {given.first} steps to settle, and errors take "
+            f"{later} to decay, of which four count as one; needed at most {most} steps; take more process noise, so "
+            "that it forgets sooner, or a larger most="
+        )
 
 
-def _guess(given: Schedule, within: FilterLimits, steps: int | None) -> Guess:
-    if isinstance(given.origin, LinearFilter):
-        return constant_guess(given.origin, given.fmt, within.measurement, steps)
-    stored = within._replace(measurement=stored_sizes(given.fmt, within.measurement))
-    return filter_guess(given, stored, steps)
+def _recursion(given: Schedule, within: FilterLimits, steps: int | None) -> Recursion:
+    assert isinstance(given.origin, LinearFilter)
+    return Recursion(given.origin, within.measurement, steps, as_given=False)
 
 
-def _answered(found: FilterGuarantee) -> FilterGuarantee:
+def _proved(found: FilterGuarantee) -> FilterGuarantee:
     """Prove a guarantee; return it with its certificate, or without a bound."""
     given, steps = found.schedule, found.steps
     if not np.isfinite(found.bound).all():
         return found
     guess = Guess(found.bound, found.limits.state, found.limits.innovation, found.parts, found.lags)
-    if isinstance(given.origin, LinearFilter):
-        made, inputs = given.origin, found.asked.measurement
-        proof = first_proved(guess, lambda claim: of_operations(made, given.fmt, inputs, claim, steps))
-    else:
-        F = closed_loops(given)
-        proof = first_proved(guess, lambda claim: of_filter(given, found.asked, claim, steps, F))
-    if proof.why:
-        return replace(found, bound=np.full(given.program.n, np.inf), steps=0, why=proof.why)
-    shares = found.parts * (proof.bound / np.where(found.bound > 0, found.bound, 1))[:, None]
-    return replace(found, bound=proof.bound, parts=shares, text=proof.text)
+    F = closed_loops(given)
+
+    def written(claim: Guess) -> dict[str, Any]:
+        if isinstance(given.origin, LinearFilter):
+            return _recursion(given, found.asked, steps).certificate(given.fmt, claim)
+        return of_filter(given, found.asked, claim, steps, F)
+
+    try:
+        bound, text = proved(guess, written)
+    except ValueError as error:
+        return replace(found, bound=np.full(given.program.n, np.inf), steps=0, why=str(error))
+    shares = found.parts * (bound / np.where(found.bound > 0, found.bound, 1))[:, None]
+    return replace(found, bound=bound, parts=shares, text=text)
 
 
 def closed_loops(given: Schedule) -> NDArray[np.float64]:

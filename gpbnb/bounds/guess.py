@@ -15,6 +15,7 @@ which is raised until it bounds the sizes that it assumed. All of this is plain 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,11 +23,11 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import eigenvalues
-from gpbnb.bounds.gains import Schedule, filter_schedule
-from gpbnb.bounds.units import largest_errors, stored_sizes, units
-from gpbnb.filters.program import ADD, MULTIPLY, Program, matrices
-from gpbnb.filters.structures import LinearFilter
+from gpbnb.bounds.gains import Schedule
+from gpbnb.bounds.units import largest_errors, units
+from gpbnb.filters.program import ADD, MULTIPLY, Program
 
 Array = NDArray[np.float64]
 
@@ -71,7 +72,22 @@ class Guess(NamedTuple):
     innovation: Array  # (m,), likewise
     parts: Array  # (n, 3), of each bound, where it is largest
     lags: int = 1  # how many earlier steps are summed one by one, for fixed coefficients
-    why: str = ""  # why there is no bound, if more is known than that
+
+
+def no_bound(fmt: FloatFormat | FixedFormat) -> str:
+    """Say why a bound that should exist was not found."""
+    if fmt.limits is None:
+        return "no bound was found: in this precision, an error causes rounding errors as large as itself"
+    return f"no bound was found within the range of {arithmetic(fmt)}: a number may exceed the largest"
+
+
+class LinearValues(NamedTuple):
+    """The values of some steps as linear functions of states and measurements."""
+
+    factors: Array  # (operations, steps), size of the coefficient of each product
+    rows: Any  # (values, steps, n + m), each value as a function of states and measurements, in long double
+    effects: Array  # (values, steps, n), of an error of each value on the states after the step
+    exact: NDArray[np.bool_]  # (values, steps), whether the operation of a value never rounds
 
 
 class Steps(NamedTuple):
@@ -88,13 +104,11 @@ class Steps(NamedTuple):
     HPhi: Array  # (steps, m, n), what a measurement is expected to be
 
 
-def linear_steps(given: Schedule, at: NDArray[np.int64]) -> Steps:
-    """Return some rows of a schedule as linear functions."""
-    program, wide = given.program, np.longdouble
-    n, first = program.n, program.n + program.m
-    c = given.coefficients[at].astype(wide).sum(axis=-1).T
-    count, steps, powers = first + len(program.operations), len(at), units(given.fmt).exact
-    rows = np.zeros((count, steps, first), wide)
+def linear_values(program: Program, coefficients: Array, powers: Array) -> LinearValues:
+    """Return the values of steps with coefficients (steps, c, 2); a product by one of some powers is exact."""
+    first, c = program.n + program.m, coefficients.astype(np.longdouble).sum(axis=-1).T
+    count, steps = first + len(program.operations), c.shape[1]
+    rows = np.zeros((count, steps, first), np.longdouble)
     rows[np.arange(first), :, np.arange(first)] = 1
     factors, exact = np.zeros((count - first, steps)), np.ones((count, steps), dtype=bool)
     zero = np.zeros((count, steps), dtype=bool)
@@ -107,11 +121,17 @@ def linear_steps(given: Schedule, at: NDArray[np.int64]) -> Steps:
         else:
             rows[v] = rows[a] + rows[b] if code == ADD else rows[a] - rows[b]
             zero[v], exact[v] = zero[a] & zero[b], zero[a] | zero[b]
+    return LinearValues(factors, rows, error_effects(program, c.astype(np.float64)), exact)
+
+
+def linear_steps(given: Schedule, at: NDArray[np.int64]) -> Steps:
+    """Return some rows of a schedule as linear functions."""
+    program, n, wide = given.program, given.program.n, np.longdouble
+    factors, rows, effects, exact = linear_values(program, given.coefficients[at], units(given.fmt).exact)
     whole = rows[program.outputs].transpose(1, 0, 2)
     Phi, HPhi, K = (each[at].astype(wide).sum(axis=-1) for each in (given.Phi, given.HPhi, given.exact))
     loop, gain = whole[:, :, :n] - Phi + whole[:, :, n:] @ HPhi, whole[:, :, n:] - K
     floats = (each.astype(np.float64) for each in (whole[:, :, :n], whole[:, :, n:], loop, gain, HPhi))
-    effects = error_effects(program, c.astype(np.float64))
     return Steps(factors, rows.astype(np.float64), effects, exact, *floats)
 
 
@@ -132,8 +152,8 @@ def error_effects(program: Program, coefficients: Array) -> Array:
     return found
 
 
-def _times(a: Array, x: Array) -> Array:
-    """Multiply sizes of factors by limits, some of which may be infinite."""
+def sizes_within(a: Array, x: Array) -> Array:
+    """Return the largest sizes of rows times numbers within limits, some of which may be infinite."""
     return np.where(a == 0, 0.0, np.abs(a) * np.where(a == 0, 0.0, x)).sum(axis=-1)
 
 
@@ -141,20 +161,37 @@ def value_sizes(steps: Steps, within: FilterLimits) -> Array:
     """Return the largest size of each value of the exact filter, (values, steps)."""
     n = steps.F.shape[1]
     of_state, of_input = steps.rows[..., :n], steps.rows[..., n:]
-    known = _times(of_state + np.einsum("vkm,kmn->vkn", of_input, steps.HPhi), within.state)
-    seen = _times(of_state, within.state) + _times(of_input, within.measurement)
-    return np.minimum(known + _times(of_input, within.innovation), seen)
+    known = sizes_within(of_state + np.einsum("vkm,kmn->vkn", of_input, steps.HPhi), within.state)
+    seen = sizes_within(of_state, within.state) + sizes_within(of_input, within.measurement)
+    return np.minimum(known + sizes_within(of_input, within.innovation), seen)
+
+
+Largest = Callable[[int, Array], Array]
+"""Function that returns the largest rounding error of an operation, from the largest sizes of its result, (steps,)."""
+
+
+def float_errors(program: Program, fmt: FloatFormat | FixedFormat, steps: Steps | LinearValues) -> Largest:
+    """Return the largest errors of rounding each result into one format."""
+    first, table = program.n + program.m, units(fmt)
+
+    def largest(o: int, sizes: Array) -> Array:
+        error, exact = largest_errors(fmt, sizes), steps.exact[first + o]
+        if program.operations[o, 0] != MULTIPLY:
+            exact = exact | (sizes <= table.aligned)
+        return np.where(exact & np.isfinite(error), 0.0, error)
+
+    return largest
 
 
 def rounding_errors(
-    program: Program, fmt: FloatFormat | FixedFormat, steps: Steps, sizes: Array, ends: Array, b: Array
+    program: Program, steps: Steps | LinearValues, sizes: Array, ends: Array, b: Array, largest: Largest
 ) -> Array:
     """Return the largest rounding error of each operation, (operations, steps).
 
     Sizes, (values, steps), are those without the errors b of the states; `ends`, (n,), those of states after the step
     with their errors.
     """
-    n, first, table = program.n, program.n + program.m, units(fmt)
+    n, first = program.n, program.n + program.m
     moved = np.abs(steps.rows[..., :n]) @ b
     sizes = sizes + moved
     before, h = np.zeros(sizes.shape), np.zeros(sizes.shape)
@@ -164,9 +201,7 @@ def rounding_errors(
         for i in np.flatnonzero(program.outputs == v):
             size = np.minimum(size, ends[i])
         noise = np.where(before[v] + moved[v] > 0, _NOISE, -_NOISE)  # limits are often powers of the base
-        error = largest_errors(fmt, size * (1 + noise))
-        exact = steps.exact[v] | (code != MULTIPLY) & (size <= table.aligned)
-        h[v] = np.where(exact & np.isfinite(error), 0.0, error)
+        h[v] = largest(v - first, size * (1 + noise))
         before[v] += h[v]
     return h[first:]
 
@@ -228,7 +263,7 @@ def gains(F: Array, G: Array, rows: Array, steps: int | None, lags: int) -> Arra
             once = np.abs(P) @ T
             if not np.isfinite(once).all():
                 return np.full(sums.shape, np.inf)
-            if blocks is None and (once > _LOSS * T).any():
+            if blocks is None and (once.sum(axis=1) > _LOSS * T.sum(axis=1)).any():
                 raise ValueError(
                     f"the system decays too slowly for a bound: its response is not negligible after {lags} steps; "
                     "shorten its memory, or split it into sections"
@@ -255,84 +290,6 @@ def raised(bounded: Any, n: int) -> Array:
             new = positive(b)
         b = np.maximum(b, new) * (1 + 2.0**-30)
     return np.full(n, np.inf)
-
-
-class Loops(NamedTuple):
-    """Matrices of a filter with fixed coefficients, as stored and as given, in float64."""
-
-    F: Array  # (n, n), as stored
-    K: Array  # (n, m), as stored
-    A: Array  # (n, n), of the exact filter
-    B: Array  # (n, m), of the exact filter
-    of_state: Array  # (n, n), F - A
-    of_input: Array  # (n, m), K - B
-    storing: Array  # (m,), largest error of storing an input
-    kept: Array  # (m,), largest size of a stored input
-
-
-def loops(program: Program, stored: Any, given: Any, storing: Array, kept: Array) -> Loops:
-    """Return the matrices of a program with stored coefficients and, for the exact filter, with others."""
-    (F, K), (A, B) = matrices(program, stored), matrices(program, given)
-    f, k, a, b, of_state, of_input = (each.astype(np.float64) for each in (F, K, A, B, F - A, K - B))
-    return Loops(f, k, a, b, of_state, of_input, storing, kept)
-
-
-class Inputs(NamedTuple):
-    """What inputs do to a filter with fixed coefficients, whatever is rounded."""
-
-    state: Array  # (n,), largest size of each state of the exact filter
-    values: Array  # (rows,), largest size of functions of state and input
-    errors: Array  # (n,), of each state due to storing coefficients and inputs
-
-
-def of_inputs(given: Loops, Z: Array, rows: Array, steps: int | None, lags: int) -> Inputs:
-    """Bound what inputs within limits do; `rows` (rows, n + m) are functions of state and input."""
-    n = len(given.F)
-    sums = gains(given.A, given.B * Z, rows[:, :n], steps, lags).sum(axis=1)
-    state = positive(sums[:n] * EXCESS)
-    values = np.minimum(sums[n:] * EXCESS, _times(rows[:, :n], state)) + _times(rows[:, n:], given.kept)
-    errors = gains(given.F, given.K * given.storing, rows[:0, :n], steps, lags).sum(axis=1)
-    if given.of_state.any() or given.of_input.any():
-        both = np.block([[given.F, given.of_state], [np.zeros((n, n)), given.A]])
-        inputs = np.vstack([given.of_input, given.B]) * Z
-        errors += gains(both, inputs, np.zeros((0, 2 * n)), steps, lags)[:n].sum(axis=1)
-    return Inputs(state, values, errors)
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def constant_guess(
-    made: LinearFilter, fmt: FloatFormat | FixedFormat, measurement: Array, steps: int | None, as_given: bool = False
-) -> Guess:
-    """Guess the bound of a filter with fixed coefficients, within limits (m,) of the inputs before they are stored.
-
-    It is compared with the filter and the inputs as stored or as given.
-    """
-    program, schedule = made.program, filter_schedule(made, fmt)
-    n, stored = program.n, made.stored(fmt)
-    kept = stored_sizes(fmt, measurement)
-    Z = measurement if as_given else kept
-    storing = largest_errors(fmt, measurement) * as_given
-    given = loops(program, stored, made.coefficients if as_given else stored, storing, kept)
-    none, slowest = np.full(n, np.inf), max(radius_of(given.A), radius_of(given.F))
-    if steps is None and slowest >= 1:
-        return Guess(none, none, Z, np.zeros((n, 3)))
-    step = linear_steps(schedule, np.zeros(1, dtype=np.int64))
-    effects = step.effects[n + program.m :, 0].T
-    lags = max(lags_of(given.A, given.B * Z, steps), lags_of(given.F, effects, steps))
-    try:
-        inputs = of_inputs(given, Z, step.rows[:, 0], steps, lags)
-        of_roundings = gains(given.F, effects, np.zeros((0, n)), steps, lags)
-    except ValueError as slow:
-        return Guess(none, none, Z, np.zeros((n, 3)), why=str(slow))
-
-    def bounded(b: Array) -> Array:
-        h = rounding_errors(program, fmt, step, inputs.values[:, None], inputs.state + b, b)[:, 0]
-        return np.asarray(_times(of_roundings, h) + inputs.errors)
-
-    b = raised(bounded, n)
-    parts = np.zeros((n, 3))
-    parts[:, ROUNDING] = b
-    return Guess(b, inputs.state, Z, parts, lags)
 
 
 # -- loops that change ------------------------------------------------------------------------------------------------
@@ -398,24 +355,21 @@ def summed(chosen: Course, F: Array, G: Array, part: NDArray[np.int64], starts: 
 
 @np.errstate(over="ignore", invalid="ignore")
 def filter_guess(given: Schedule, within: FilterLimits, steps: int | None) -> Guess:
-    """Guess the bound of a filter whose gain repeats, or over some steps."""
+    """Guess the bound of a filter whose gain repeats, or over some steps; ValueError says why there is none."""
     program, n, m = given.program, given.program.n, given.program.m
-    none = Guess(np.full(n, np.inf), np.full(n, np.inf), np.full(m, np.inf), np.zeros((n, 3)))
-    radius = 0.0 if steps is not None else loop_radius(given)
-    if radius >= 1:
-        return none
-    chosen = course(given, steps, radius)
+    chosen = course(given, steps, 0.0 if steps is not None else loop_radius(given))
     each = linear_steps(given, chosen.at)
     known = derived_limits(given, chosen, each, within)
     if not all(np.isfinite(limit).all() for limit in known[:2]):
-        return none
+        raise ValueError(no_bound(given.fmt))
     exact = each.loop * known.state, each.gain * known.innovation
     part = np.array([ROUNDING] * len(program.roots) + [LOOP] * n + [GAIN] * m)
     sizes, found, before = value_sizes(each, known), np.zeros((0, n, 3)), np.zeros(0)
+    largest = float_errors(program, given.fmt, each)
 
     def bounded(b: Array) -> Array:
         nonlocal found, before
-        h = rounding_errors(program, given.fmt, each, sizes, known.state + b, b)
+        h = rounding_errors(program, each, sizes, known.state + b, b, largest)
         if not np.isfinite(h).all():
             return np.full(n, np.inf)
         if not np.array_equal(h, before):
@@ -425,7 +379,7 @@ def filter_guess(given: Schedule, within: FilterLimits, steps: int | None) -> Gu
 
     b = raised(bounded, n)
     if not np.isfinite(b).all():
-        return none._replace(state=known.state, innovation=known.innovation)
+        raise ValueError(no_bound(given.fmt))
     worst = found[found.sum(axis=2).argmax(axis=0), np.arange(n)]
     return Guess(b, known.state, known.innovation, worst)
 

@@ -17,7 +17,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import FilterGuarantee, from_guess, limits
-from gpbnb.bounds.guess import linear_steps, rounding_errors, value_sizes
+from gpbnb.bounds.guess import float_errors, linear_steps, rounding_errors, value_sizes
 from gpbnb.bounds.system import OutputBounds
 from gpbnb.filters.system import LinearSystem
 
@@ -39,7 +39,7 @@ def separate_roundings(found: FilterGuarantee) -> StepRoundings:
     given, program = found.schedule, found.schedule.program
     steps = linear_steps(given, np.arange(given.first, given.steps))
     sizes, ends = value_sizes(steps, found.limits), found.limits.state + found.bound
-    h = rounding_errors(program, given.fmt, steps, sizes, ends, found.bound)
+    h = rounding_errors(program, steps, sizes, ends, found.bound, float_errors(program, given.fmt, steps))
     return StepRoundings(steps.F, steps.effects[program.n + program.m :].transpose(1, 2, 0), h.T)
 
 

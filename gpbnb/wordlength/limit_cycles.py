@@ -3,7 +3,7 @@ r"""Limit cycles and dead bands of filters in fixed point: found by an exhaustiv
 With a constant input, a stable filter without rounding comes to rest at :math:`x^* = (I - A)^{-1}Bu`. With rounding it
 ends in a cycle of states: at rest beside :math:`x^*`, in a *dead band* in which small differences are rounded away, or
 in an oscillation. Every such cycle is nothing but rounding error, so it stays within the bound of
-:func:`gpbnb.bounds.words.bounded_rounding` around :math:`x^*`, as long as nothing overflows. This box holds finitely
+:func:`gpbnb.bounds.system.bounded_rounding` around :math:`x^*`, as long as nothing overflows. This box holds finitely
 many states. If they are not too many, each is tried.
 """
 
@@ -21,7 +21,7 @@ from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.named import format_named
 from gpbnb.arithmetic.rational import exact, rationals
-from gpbnb.bounds.words import bounded_rounding
+from gpbnb.bounds.system import bounded_rounding
 from gpbnb.filters.program import ADD, SUBTRACT, Program, matrices
 from gpbnb.filters.system import is_stable
 from gpbnb.filters.word_formats import WordFormats

@@ -16,7 +16,7 @@ from gpbnb import FloatFormat, LinearSystem, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
-from gpbnb.bounds.guess import GAIN, LOOP, gains, linear_steps, rounding_errors, value_sizes
+from gpbnb.bounds.guess import GAIN, LOOP, float_errors, gains, linear_steps, rounding_errors, value_sizes
 from gpbnb.bounds.probable import probable_error, separate_roundings
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.linear_steps import LinearSteps
@@ -92,7 +92,9 @@ def test_the_error_is_what_its_terms_add_up_to(form: Form) -> None:
     program, n = given.program, model.n
     within = limits(state=100, innovation=100, measurement=100)
     found = linear_steps(given, np.arange(7))
-    h = rounding_errors(program, fmt, found, value_sizes(found, within), np.full(2, 101.0), np.ones(2))
+    h = rounding_errors(
+        program, found, value_sizes(found, within), np.full(2, 101.0), np.ones(2), float_errors(program, fmt, found)
+    )
     rng, x, true, P = np.random.default_rng(3), [Fraction(0)] * n, [Fraction(0)] * n, stored.P0
     for k in range(7):
         z = [fmt.round(float(v)) for v in rng.uniform(-50, 50, 2)]

@@ -12,18 +12,18 @@ from gpbnb import BINARY64, LinearSystem, WordFormats, emulate, guarantee, limit
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.probable import probable_output_errors
-from gpbnb.bounds.system import OutputBounds
-from gpbnb.bounds.words import bounded_rounding, rounding_limits
+from gpbnb.bounds.system import OutputBounds, bounded_rounding
+from gpbnb.bounds.words import rounding_limits
 from gpbnb.filters.structures import state_space
 from gpbnb.filters.words import integer_program
 from gpbnb.wordlength.required import judge
 
 
 def test_a_negative_product_reaches_as_far_as_its_rounded_operand() -> None:
-    """w = u + 3/4 w_: 4 without rounding, and 1/4 of storing and 1/4 of the product in each step make 2 more."""
+    """w = u + 3/4 w_: 4 without rounding, and 7/4 more: 1/4 of the product in each step, and of storing before it."""
     words = WordFormats(FixedFormat(3, 1), FixedFormat(3, 2))
     system = LinearSystem.from_coefficients([-2, "0.5"], [1, "-0.75"], "direct form II")
-    with pytest.raises(OverflowError, match=r"operation 3 of 5, may reach 12, beyond the 3 .* of the data; 4 hold it"):
+    with pytest.raises(OverflowError, match=r"operation 3 of 5, may reach 11.5, beyond the 3 .* data; 4 hold it"):
         OutputBounds(system, 1).errors(words)
 
 

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.machine import CODES
 from gpbnb.bounds.gains import Schedule
-from gpbnb.bounds.guess import FilterLimits, Steps, columns, linear_steps, rounding_errors, value_sizes
+from gpbnb.bounds.guess import FilterLimits, Steps, columns, float_errors, linear_steps, rounding_errors, value_sizes
 
 Array = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ def disturbances(
     of_state, of_input = signless.rows[..., :n] @ (X + b), signless.rows[..., n:]
     cancelled = of_state + np.einsum("vkm,km->vk", of_input, HPhi @ X + V)
     sizes = value_sizes(steps, within) + _NOISE * cancelled
-    h = rounding_errors(program, given.fmt, steps, sizes, (X + b) * _UP, b) * _UP
+    h = rounding_errors(program, steps, sizes, (X + b) * _UP, b, float_errors(program, given.fmt, steps)) * _UP
     exact, rest = given.exact[..., 0], given.exact[..., 1]
     gain = (steps.K - exact) - rest
     slack = _NOISE * np.einsum("vki,vk->ki", signless.effects[first:], h)

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gpbnb.bounds.guarantee import FilterGuarantee
-from gpbnb.bounds.guess import FilterLimits, columns, linear_steps, rounding_errors, value_sizes
+from gpbnb.bounds.guess import FilterLimits, columns, float_errors, linear_steps, rounding_errors, value_sizes
 from gpbnb.filters.program import ADD, MULTIPLY
 from gpbnb.report.display.tables import Table, short
 from gpbnb.report.guarantees.table import FORMAT, case_guarantee, case_named
@@ -52,7 +52,8 @@ def ours(found: FilterGuarantee) -> list[float]:
     """Bound the rounding errors of one step by our columns."""
     given, program, b = found.schedule, found.schedule.program, found.bound
     step = linear_steps(given, np.array([given.steps - 1]))
-    h = rounding_errors(program, given.fmt, step, value_sizes(step, found.limits), found.limits.state + b, b)
+    largest = float_errors(program, given.fmt, step)
+    h = rounding_errors(program, step, value_sizes(step, found.limits), found.limits.state + b, b, largest)
     return [float(x) for x in np.abs(columns(program, step, h))[0].sum(axis=1)]
 
 
