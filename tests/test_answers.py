@@ -35,6 +35,11 @@ from unittest import mock
 
 import numpy as np
 import pytest
+from matplotlib import pyplot as plt
+from matplotlib.collections import Collection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.text import Text
 
 import gpbnb
 from gpbnb.__main__ import main as top
@@ -42,7 +47,9 @@ from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.bounds.check import main as check
 from gpbnb.filters.blocks import BLOCKS
 from gpbnb.filters.design import FilterDesign
+from gpbnb.report.ledger import checking, judge
 from gpbnb.report.ledger import command as ledger
+from gpbnb.report.ledger.statements import statement
 from gpbnb.report.stored import main as sweeps
 from gpbnb.wordlength import report
 from gpbnb.wordlength.__main__ import main
@@ -134,6 +141,37 @@ def script(name):
     return SimpleNamespace(**runpy.run_path(str(ROOT / "scripts" / f"{name}.py")))
 
 
+def true_values(topic):
+    """For each domain of a topic in the ledger a hash of its values, without the domains that take seconds."""
+    found = {}
+    for key, row in checking.TOPICS[topic].items():
+        if row.domain and row.domain not in found and row.domain.partition("(")[0] not in SLOW:
+            names = {**judge._NAMES, "printed": statement(key), "document": statement(key).document, **row.topic}
+            values = judge._value(row.domain, names)
+            found[row.domain] = hashed(written(values if isinstance(values, Mapping) else list(values)))
+    return "\n".join(f"{domain}: {values}" for domain, values in found.items())
+
+
+def drawn(figure):
+    """What a figure draws, axes by axes: the numbers, colours and names of its lines and areas, and its texts."""
+    figure.canvas.draw()
+    found = []
+    for ax in figure.axes:
+        found.append([ax.get_xlim(), ax.get_ylim(), ax.get_xscale(), ax.get_yscale()])
+        for each in ax.findobj():
+            if isinstance(each, Line2D):
+                found.append([each.get_label(), each.get_color(), each.get_ls(), each.get_marker(), each.get_xydata()])
+            elif isinstance(each, Text) and each.get_text():
+                found.append([each.get_text(), each.get_color(), each.get_fontsize()])
+            elif isinstance(each, Patch):
+                found.append([each.get_label(), each.get_facecolor(), each.get_ls(), each.get_path().vertices])
+            elif isinstance(each, Collection):
+                parts = [path.vertices for path in each.get_paths()]
+                found.append([each.get_label(), each.get_facecolor(), each.get_offsets(), *parts])
+    plt.close(figure)
+    return found
+
+
 def given(content, name="given.toml"):
     """Write a file; return its name."""
     Path(name).write_bytes(content.encode() if isinstance(content, str) else content)
@@ -180,6 +218,10 @@ def for_each(function, *values):
     return found
 
 
+SLOW = (
+    *("approach", "reliability", "splits", "joint_use", "index_ranges", "two_parts", "solved_columns"),
+    *("density_of_noise", "recursively", "five_sources"),
+)
 D4, B8 = gpbnb.FloatFormat(10, 4), gpbnb.FloatFormat(2, 8)
 HERE = {
     "D4": D4,
