@@ -49,7 +49,7 @@ class Data(NamedTuple):
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked about a model, apart from the formats to try."""
+    """What is asked about a model, apart from the formats to try; a search calls `ran` after each run."""
 
     model: Any
     data: Data
@@ -58,7 +58,7 @@ class Asked:
     within: FilterLimits | None = None
     form: Form = Form.INNOVATION
     highest: int | None = None
-    progress: bool = False
+    ran: Callable[[], object] = lambda: None
 
     @classmethod
     def of(cls, model: Any, z: Any, *tasks: str, form: Any = None, seed: int = 0, **more: Any) -> Asked:

@@ -139,7 +139,7 @@ class _FixedSearch:
     def search(self, largest: int) -> Search[FixedFormat]:
         """Search up to some fraction bits."""
         proof = partial(self.error, prove=True) if self.judge.proved else None
-        return Search(self.error, self.like, (), largest=largest, least=self.least, proof=proof)
+        return Search(self.error, self.like, (), self.asked.ran, largest=largest, least=self.least, proof=proof)
 
     def answer(self) -> Requirement:
         """Return the smallest number of fraction bits that meets the tolerance."""
@@ -205,7 +205,7 @@ class _FixedSearch:
             words_of = lambda each: replace(self.words_of(each), coefficients=bits.precision)  # noqa: E731
             return replace(self, words_of=words_of, other=self.judge).error(fmt)
 
-        found = Search(error, FloatFormat(2, 2), (), largest=LONGEST_COEFFICIENT)
+        found = Search(error, FloatFormat(2, 2), (), self.asked.ran, largest=LONGEST_COEFFICIENT)
         if found.fmt is None:
             return ""
         stored = digits_text(given, kind="significant") if isinstance(given, int) else arithmetic(given)
@@ -337,7 +337,7 @@ def in_words(asked: Asked, rounding: Rounding, bits: int) -> Requirement:
     words = cast(WordFormats, data.format)
 
     def least(error: Callable[[Any], Any], like: Any, largest: int, fewest: int = 2) -> Any:
-        return Search(lambda fmt: judge.proof(error(fmt)), like, (), largest=largest, least=fewest).fmt
+        return Search(lambda fmt: judge.proof(error(fmt)), like, (), asked.ran, largest=largest, least=fewest).fmt
 
     if (found := least(lambda fmt: exact_sums(made, words.data, fmt.precision), FloatFormat(2, 2), bits)) is not None:
         words = exact_sums(made, words.data, found.precision)

@@ -115,7 +115,7 @@ def required_precision(
     coefficient_bits : significant bits of each coefficient of a linear system in fixed point, each with its own binary
         point; by default 15. With kind="words", the most to try, by default 24.
     seed : seed of simulated measurements.
-    progress : show a progress bar that counts runs, with kind="float".
+    progress : show a progress bar that counts runs.
 
     Raises
     ------
@@ -159,7 +159,6 @@ def required_precision(
         form=form,
         highest=highest,
         seed=seed,
-        progress=progress,
     )
     options = {"base": base != 2, "rounding": rounding != Rounding.NEAREST, "range": range is not None}
     if like is not None and (names := [name for name, value in options.items() if value]):
@@ -169,13 +168,15 @@ def required_precision(
     for name, (kinds, why) in _NOT_FOR.items():
         if given[name] is not None and kind in kinds:
             raise ValueError(f'got {name}={given[name]} and kind "{kind}"; needed none: {why}')
-    if kind in ("fixed", "words"):
-        bits = None if coefficient_bits is None else whole_number("coefficient_bits", coefficient_bits, 1, 53)
-        if kind == "words":
-            return in_words(asked, rounding_named(rounding), bits or MOST_COEFFICIENT_BITS)
-        return in_fixed_point(asked, fixed_like(like, asked.model), rounding_named(rounding), bits)
-    kind_like = _float_like(like, base, rounding_named(rounding), range)
-    return (_of_blocks if kind == "blocks" else _in_floating_point)(asked, kind_like)
+    with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
+        asked = replace(asked, ran=bar.update)
+        if kind in ("fixed", "words"):
+            bits = None if coefficient_bits is None else whole_number("coefficient_bits", coefficient_bits, 1, 53)
+            if kind == "words":
+                return in_words(asked, rounding_named(rounding), bits or MOST_COEFFICIENT_BITS)
+            return in_fixed_point(asked, fixed_like(like, asked.model), rounding_named(rounding), bits)
+        kind_like = _float_like(like, base, rounding_named(rounding), range)
+        return (_of_blocks if kind == "blocks" else _in_floating_point)(asked, kind_like)
 
 
 def judge(
@@ -242,15 +243,14 @@ def _in_floating_point(asked: Asked, like: FloatFormat) -> Requirement:
     asked.check_sizes(like)
     lasting = is_filter(asked.model) and asked.basis in ("guarantee", "probable")
     bounds = asked.basis == "bound" or (asked.basis != "emulation" and not lasting)
-    with tqdm(desc="precisions", unit="run", disable=not asked.progress) as bar:
 
-        def search(each: Judge) -> Search[FloatFormat]:
-            proof, checks = each.proof if each.proved else None, () if lasting else CHECKED[base]
-            return Search(each.error, like, checks, bar.update, bounds, highest, proof=proof)
+    def search(each: Judge) -> Search[FloatFormat]:
+        proof, checks = each.proof if each.proved else None, () if lasting else CHECKED[base]
+        return Search(each.error, like, checks, asked.ran, bounds, highest, proof=proof)
 
-        judge = judge_for(asked, base, highest or largest_compiled(like))
-        found, judge = for_ever_or_over(asked, judge, search, Search.is_bounded)
-        notes, cause = _advice(asked, judge, found, like, search)
+    judge = judge_for(asked, base, highest or largest_compiled(like))
+    found, judge = for_ever_or_over(asked, judge, search, Search.is_bounded)
+    notes, cause = _advice(asked, judge, found, like, search)
     return _float_answer(asked, found, judge.steps is not None, notes, cause, like)
 
 
@@ -411,12 +411,12 @@ def _of_blocks(asked: Asked, like: FloatFormat) -> Requirement:
     asked.check_sizes(like)
     judge = judge_for(replace(asked, form=form))
     most = replace(like, precision=largest_compiled(like))
-    found = Search(judge.error, like, CHECKED[like.base])
+    found = Search(judge.error, like, CHECKED[like.base], asked.ran)
 
     def lowered(formats: BlockFormats, name: str) -> int | None:
         """Return the smallest precision of a block, up to that which it has; None if this is not enough."""
         top = getattr(formats, name).precision
-        search = Search(lambda fmt: judge.error(formats.with_block(name, fmt)), like, (), largest=top)
+        search = Search(lambda fmt: judge.error(formats.with_block(name, fmt)), like, (), asked.ran, largest=top)
         return None if search.fmt is None else search.fmt.precision
 
     alone = {name: lowered(BlockFormats.uniform(most), name) for name in BLOCKS}

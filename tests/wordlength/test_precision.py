@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -68,6 +69,9 @@ def test_a_bar_for_those_who_wait(capsys):
     assert capsys.readouterr().err == ""
     found = required_precision(MODEL, Z, 1e-4, progress=True)
     assert f"{len(found.tried)}run" in capsys.readouterr().err.replace(" ", "")
+    for kind in ("fixed", "blocks"):
+        required_precision(MODEL, Z, 1e-2, kind=kind, progress=True)
+        assert re.search(r"[1-9]\d*run", capsys.readouterr().err.replace(" ", ""))
     survey_records(MODEL, [Z, Z], 1e-4, ["float32"], progress=True)
     assert "2/2" in capsys.readouterr().err
 
