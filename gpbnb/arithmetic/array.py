@@ -280,25 +280,22 @@ class FloatArray(ComponentArray, NumPyProtocols):
             raise ZeroDivisionError(
                 f"got a division by zero{at}; needed a divisor other than zero; test x == 0 before dividing"
             )
-        backend, (a, b) = _common((a, b))
-        components = backend.apply(name, a.components, b.components)
-        return (
-            self._binary(name, a.on_exact_backend(), b)
-            if components is None
-            else self.from_components(backend, components, self.format)
-        )
+        return self._applied(name, a, b)
+
+    def _applied(self, name: str, *arrays: FloatArray) -> FloatArray:
+        """Apply an operation of the backend, or of the exact one if that has no result."""
+        backend, found = _common(arrays)
+        components = backend.apply(name, *(each.components for each in found))
+        if components is None:
+            return self._applied(name, *(each.on_exact_backend() for each in found))
+        return self.from_components(backend, components, self.format)
 
     def multiply_add(self, factor: Any, addend: Any) -> FloatArray:
         """Return ``self * factor + addend``, rounded once for each entry, as a processor's fused multiply-add does."""
         arrays = [self, self.operand(factor), self.operand(addend)]
         broadcast("multiply_add", arrays[0].shape, arrays[1].shape)
         broadcast("multiply_add", np.broadcast_shapes(arrays[0].shape, arrays[1].shape), arrays[2].shape)
-        backend, found = _common(arrays)
-        components = backend.apply("fused", *(array.components for array in found))
-        if components is None:
-            backend, found = self.format.exact_backend, [array.on_exact_backend() for array in arrays]
-            components = backend.apply("fused", *(array.components for array in found))
-        return self.from_components(backend, components, self.format)
+        return self._applied("fused", *arrays)
 
     def _unary(self, name: str) -> FloatArray:
         if name == "sqrt" and (negative := _first(self.components[0] < 0)) is not None:
@@ -306,12 +303,7 @@ class FloatArray(ComponentArray, NumPyProtocols):
             raise NegativeRootError(
                 f"got the square root of a negative number{at}; needed x >= 0; test x < 0 before, or take abs(x)"
             )
-        components = self.backend.apply(name, self.components)
-        return (
-            self.on_exact_backend()._unary(name)
-            if components is None
-            else self.from_components(self.backend, components, self.format)
-        )
+        return self._applied(name, self)
 
     def __add__(self, other: Any) -> FloatArray:
         return self._binary("add", self, other)

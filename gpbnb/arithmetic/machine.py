@@ -111,12 +111,9 @@ def _row(fmt: Any, tag: Any, whole: NDArray[np.int64], numbers: NDArray[np.float
     if isinstance(tag, tags.Wide):
         whole[:14] = (*tag[:7], *tag.lowest, *tag.largest, tag.saturates)
         return "words"
-    if isinstance(tag, tags.PAIRS):
-        if isinstance(tag, tags.Decimal):
-            whole[:6] = tag.precision, tag.mode, tag.least, tag.largest, tag.small, 0
-        else:
-            mode = AWAY if tag.nearest else ZERO
-            whole[:6] = tag.precision, mode, -tags.FARTHEST, tags.FARTHEST, tags.UNLIMITED, 1
+    if isinstance(tag, tags.Decimal):
+        short = tag.precision <= tags.LARGEST_SHORT and tag.mode in (AWAY, ZERO) and tag.small == tags.UNLIMITED
+        whole[:6] = tag.precision, tag.mode, tag.least, tag.largest, tag.small, short
         return "pairs"
     bits, precision, mode, *limits, _ = tag
     whole[:3], numbers[:] = (bits, precision, mode), limits

@@ -14,7 +14,7 @@ import numpy as np
 from gpbnb.arithmetic.conversion import exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import ExactKernel, kernel
-from gpbnb.arithmetic.kernels.selection import Accumulator, compiled_tag, run_tag
+from gpbnb.arithmetic.kernels.selection import compiled_tag, run_tag
 from gpbnb.arithmetic.kernels.tags import Float, Tag, random_state
 from gpbnb.arithmetic.rounding import Order, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.text import at_entry
@@ -80,7 +80,7 @@ class NumberFormat(ABC, Generic[Made]):
         return kernel(self.rules)
 
     def run_tag(
-        self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
+        self, fused: bool = False, sums: NumberFormat[Any] | None = None, order: Order = "left", block: int = 32
     ) -> Tag:
         """Return the tag of the arithmetic from which a run draws random numbers, if it has any.
 
@@ -90,7 +90,7 @@ class NumberFormat(ABC, Generic[Made]):
         """
         if sums is None:
             return run_tag(self.rules, fused, order, block)
-        own, other = self.run_tag(), sums.run_tag(fused, order=order, block=block)
+        own, other = compiled_tag(self.rules), run_tag(sums.rules, fused, order, block)
         if not (isinstance(own, Float) and isinstance(other, Float)):
             raise ValueError(f"got sums kept in {sums} with numbers in {self}; needed base 2 or 16 for both")
         if other.precision < own.precision:

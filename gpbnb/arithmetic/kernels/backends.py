@@ -309,6 +309,20 @@ class Looped(Backend):
         _along(_loops("elementwise").compared, (kind, formats.address), order.size, x, y, order)
         return order.reshape(shape)
 
+    def to_float(self, components: Components) -> Array:
+        shape, size = components[0].shape, components[0].size
+        if self._early(size):
+            return self.exact.to_float(self.to_exact(components))
+        flat, x, states = tuple(_flat(part, shape) for part in components), np.empty(size), np.empty(size, np.int8)
+        self._to_floats(flat, x, states)
+        if (hard := states == 2).any():
+            x[hard] = self.exact.to_float(self.to_exact(tuple(part[hard] for part in flat)))
+        return x.reshape(shape)
+
+    def _to_floats(self, flat: Components, x: Array, states: Array) -> None:
+        """Set x to the nearest float64, and states to 2 where they need exact arithmetic."""
+        raise NotImplementedError
+
     def matmul(self, a: Components, b: Components) -> Components | None:
         """Multiply matrices, in the first kind of numbers that holds all results."""
         (rows, count), columns = a[0].shape, b[0].shape[1]
@@ -600,15 +614,8 @@ class Pairs(Compiled):
         sign = np.sign(m)
         return m, sign * e, sign
 
-    def to_float(self, components: Components) -> Array:
-        if self._early(components[0].size):
-            return self.exact.to_float(self.to_exact(components))
-        m, e = (_flat(part, components[0].shape) for part in components)
-        x, states = np.empty(m.size), np.empty(m.size, np.int8)
-        _along(_loops("radix").to_floats, (), m.size, m, e, x, states)
-        if (hard := states == 2).any():
-            x[hard] = self.exact.to_float((m[hard].astype(object), e[hard].astype(object)))
-        return x.reshape(components[0].shape)
+    def _to_floats(self, flat: Components, x: Array, states: Array) -> None:
+        _along(_loops("radix").to_floats, (), x.size, *flat, x, states)
 
 
 class TwoWords(Looped):
@@ -668,16 +675,8 @@ class TwoWords(Looped):
         sign = np.sign(high)
         return sign * low, high, sign * e, sign
 
-    def to_float(self, components: Components) -> Array:
-        shape = components[0].shape
-        if self._early(components[0].size):
-            return self.exact.to_float(self.to_exact(components))
-        x, states = np.empty(math.prod(shape)), np.empty(math.prod(shape), np.int8)
-        parts = tuple(_flat(part, shape) for part in components)
-        _along(_loops("wide").to_floats, (self.tag,), x.size, parts, x, states)
-        if (hard := states == 2).any():
-            x[hard] = self.exact.to_float(self.to_exact(tuple(part[hard] for part in parts)))
-        return x.reshape(shape)
+    def _to_floats(self, flat: Components, x: Array, states: Array) -> None:
+        _along(_loops("wide").to_floats, (self.tag,), x.size, flat, x, states)
 
 
 _BINARY: Wide = wide_tag(Rules(2, 53, Rounding.CHOP))  # type: ignore[assignment]

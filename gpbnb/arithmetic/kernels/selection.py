@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import Any, Protocol, cast, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 
@@ -31,13 +31,6 @@ _UNLIMITED = 2**60  # stands for an unlimited exponent in base 10
 _HALFWAY = 2**63  # of the random numbers of a seed
 
 
-class Accumulator(Protocol):
-    """A format that can accumulate sums of products."""
-
-    def run_tag(self, fused: bool = False, *, order: Order = "left", block: int = 32) -> tags.Tag:
-        """Return the tag of its arithmetic."""
-
-
 def tag_of(rules: Rules) -> Any:
     """Return the tag of a format's arithmetic, or None if it has no compiled loops.
 
@@ -47,8 +40,6 @@ def tag_of(rules: Rules) -> Any:
         return None
     if rules.base != 10:
         return _float_tag(rules)
-    if rules.limits is None and rules.rounding in Rounding.documented() and rules.precision <= tags.LARGEST_SHORT:
-        return tags.ShortDecimal(rules.precision, rules.rounding is Rounding.NEAREST)
     return _decimal_tag(rules)
 
 
@@ -238,13 +229,8 @@ def run_tag(rules: Rules, fused: bool, order: Order = "left", block: int = 32) -
     plain = compiled_tag(rules)
     if not fused and order == "left":
         return plain
-    tag = fusing_tag(rules)
+    tag = None if rules.base == 10 or is_binary64(rules) else _float_tag(rules, fusing=True)
     if tag is None:
         what = "fused multiply-add" if fused else f"{order} sums"
         raise ValueError(f"got {what} in {_described(rules)}; needed up to 52 bits, or up to 13 base-16 digits")
     return tag
-
-
-def fusing_tag(rules: Rules) -> tags.Float | None:
-    """Return the tag for fused multiply-add, or sums in another order, of float64, if there is one."""
-    return None if rules.base not in (2, 16) or is_binary64(rules) else _float_tag(rules, fusing=True)

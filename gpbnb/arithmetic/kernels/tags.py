@@ -152,6 +152,4 @@ def random_state(tag: Any) -> Any:
     return tag.random if isinstance(tag, Float) and tag.mode == RANDOM else None
 
 
-PAIRS = (Decimal, ShortDecimal)
-
-Tag = Float | Decimal | ShortDecimal | DoubleDouble | Wide
+Tag = Float | Decimal | DoubleDouble | Wide
