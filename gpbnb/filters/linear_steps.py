@@ -49,7 +49,7 @@ class LinearSteps:
         Return the states of steps that have results, (steps, n, ...), and the first output that the next step cannot
         compute, or -1.
         """
-        loop = self._loop
+        loop, z = self._loop, np.ascontiguousarray(z)
         loop.keep(loop.after)
         out, done = np.empty((len(z), len(self._after), *z.shape[2:]), z.dtype), 0
         most = next(slices(len(z), len(self._rows)), slice(0)).stop
