@@ -75,23 +75,6 @@ def test_a_table_renders_with_its_math_and_prose_unharmed():
 
 
 @pytest.mark.parametrize(
-    ("math", "safe"),
-    [
-        (r"|a|", r"\vert a\vert"),
-        (r"\|A\|_1", r"\Vert A\Vert _1"),
-        (r"|a_1||b_1|", r"\vert a_1\vert \vert b_1\vert"),
-        (r"a\\|b|", r"a\\\vert b\vert"),
-        (r"\left|x\right|", r"\left\vert x\right\vert"),
-        (r"\beta\{n|a|\}", r"\beta\{n\vert a\vert \}"),
-    ],
-)
-def test_bars_within_math(math, safe):
-    entry = replace(ENTRY, text=f"${math}$")
-    _, body = rendered(table([Row(entry, FINDINGS["verified"])]).markdown())
-    assert [found.strip() for found in body[2][0]] == [safe]
-
-
-@pytest.mark.parametrize(
     "prose", ["a*b*c", "u_j_k", "A~, b~_j ~~x~~", "[1] `x` <y> <https://z>", r"a\b", "#1 {x} |y| &lt;"]
 )
 def test_prose_is_not_markup(prose):
