@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -73,7 +73,7 @@ def in_fixed_point(
     if data is None:
         data = FixedFormat(_integer_bits(asked), LARGEST_FRACTION, rounding)
     asked.check_sizes(data)
-    search = _FixedSearch(asked, data, like is None)
+    search = _FixedSearch(asked, _judge(asked, data), data, like is None)
     if of_system and like is None:
         bits, blamed = coefficient_bits or COEFFICIENT_BITS, "coefficient_bits, or --coefficients in the command"
         search = replace(search, words_of=lambda fmt: WordFormats(fmt, bits), blamed=blamed)
@@ -84,32 +84,31 @@ def in_fixed_point(
     return search.answer()
 
 
+def _judge(asked: Asked, like: FixedFormat) -> Judge:
+    return judge_for(asked, 2, LARGEST_FRACTION + max(like.integer_bits, 0))
+
+
 @dataclass(frozen=True)
 class _FixedSearch:
     """A search over fraction bits, with as many integer bits as each run needs.
 
     Parameters
     ----------
+    judge : what answers the question.
     like : a format with the integer bits, the rounding and the overflow of those to try.
     widens : whether a format in which a number overflows gets more integer bits.
     words_of : function that returns what is run for a format of the data.
     blamed : what sets the bits of coefficients.
-    other : what answers the question, if this is not the first search for it.
     more : integer bits that a number of fraction bits needs beyond those of `like`.
     """
 
     asked: Asked
+    judge: Judge
     like: FixedFormat
     widens: bool
     words_of: Callable[[FixedFormat], Any] = lambda fmt: fmt
     blamed: str = ""
-    other: Judge | None = None
     more: dict[int, int] = field(default_factory=dict)
-
-    @cached_property
-    def judge(self) -> Judge:
-        """What answers the question."""
-        return self.other or judge_for(self.asked, 2, LARGEST_FRACTION + max(self.like.integer_bits, 0))
 
     @property
     def made(self) -> LinearFilter | None:
@@ -152,9 +151,9 @@ class _FixedSearch:
                 largest = max(compiled, self.least)
                 most = f"{digits_text(largest, kind='fraction')} are the most with compiled loops"
         found, judge = for_ever_or_over(
-            asked, self.judge, lambda each: replace(self, other=each).search(largest), Search.is_bounded
+            asked, self.judge, lambda each: replace(self, judge=each).search(largest), Search.is_bounded
         )
-        return replace(self, other=judge)._answer(found, largest, most)
+        return replace(self, judge=judge)._answer(found, largest, most)
 
     def _answer(self, found: Search[FixedFormat], largest: int, most: str) -> Requirement:
         asked, ratios, reasons, ends = self.asked, dict(found.tried), found.reasons, self.judge.steps is not None
@@ -203,7 +202,7 @@ class _FixedSearch:
 
         def error(bits: FloatFormat) -> Outcome:
             words_of = lambda each: replace(self.words_of(each), coefficients=bits.precision)  # noqa: E731
-            return replace(self, words_of=words_of, other=self.judge).error(fmt)
+            return replace(self, words_of=words_of).error(fmt)
 
         found = Search(error, FloatFormat(2, 2), (), self.asked.ran, largest=LONGEST_COEFFICIENT)
         if found.fmt is None:
@@ -226,7 +225,7 @@ class _FixedSearch:
             return text and f"errors add up because the system is slow: its {text}"
         asked = replace(self.asked, model=other)
         like = replace(self.like, integer_bits=_integer_bits(asked)) if self.widens else self.like
-        better = replace(self, asked=asked, like=like, other=None, more={})
+        better = replace(self, asked=asked, judge=_judge(asked, like), like=like, more={})
         if largest < better.least:
             return ""
         found = better.search(largest)
@@ -248,13 +247,15 @@ def _compiled_fraction(like: FixedFormat) -> int:
     return fraction
 
 
-def _integer_bits(asked: Asked) -> int:
-    """Return the integer bits that a model and its data need at least."""
+def _integer_bits(asked: Asked, stored: bool = False) -> int:
+    """Return the integer bits that a model and its data need at least, or only what a linear system stores of them."""
     model, data = asked.model, asked.data
     if isinstance(model, LinearSystem):
         if data.z is None:
             return 0 if asked.within is None else bits_for(float(np.max(asked.within.measurement)))
-        return _holding_limits(model, bits_for(float(_sizes(model, data.z).max())))
+        program, of_values = model.as_filter().program, _sizes(model, data.z)
+        kept = np.concatenate([np.ones(program.n + program.m, np.bool_), ~(program.wide & stored)])
+        return _holding_limits(model, bits_for(float(of_values[kept].max())))
     sizes = [0.0]
     if is_filter(model):
         noise = model.noise if isinstance(model, NonlinearModel) else model
@@ -328,9 +329,9 @@ def exact_sums(made: LinearFilter, data: FixedFormat, coefficient_bits: int) -> 
 
 def in_words(asked: Asked, rounding: Rounding, bits: int) -> Requirement:
     """Lower the formats of data, coefficients and sums of a linear system in this order."""
-    made, like = asked.model.as_filter(), FixedFormat(_stored_integer_bits(asked), LARGEST_FRACTION, rounding)
+    made, like = asked.model.as_filter(), FixedFormat(_integer_bits(asked, stored=True), LARGEST_FRACTION, rounding)
     blamed = "coefficient_bits=, which is the most to try"
-    search = _FixedSearch(asked, like, True, lambda fmt: exact_sums(made, fmt, bits), blamed)
+    search = _FixedSearch(asked, _judge(asked, like), like, True, lambda fmt: exact_sums(made, fmt, bits), blamed)
     data, judge = search.answer(), search.judge
     if data.format is None:
         return data
@@ -353,13 +354,3 @@ def in_words(asked: Asked, rounding: Rounding, bits: int) -> Requirement:
     known, _ = evidence(asked.basis, asked.data.steps, judge.steps is not None)
     text, notes = f"{words}: {share_text(ratio)}, {known}", judge.warnings()
     return replace(data, format=words, ratio=ratio, text=joined(text, notes), why="", notes=notes)
-
-
-def _stored_integer_bits(asked: Asked) -> int:
-    """Return the integer bits of what a run without rounding stores; sums need not fit."""
-    model = asked.model
-    if asked.data.z is None:
-        return _integer_bits(asked)
-    program, sizes = model.as_filter().program, _sizes(model, asked.data.z)
-    kept = np.concatenate([np.ones(program.n + program.m, np.bool_), ~program.wide])
-    return _holding_limits(model, bits_for(float(sizes[kept].max())))
