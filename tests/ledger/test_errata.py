@@ -1,9 +1,8 @@
-"""The errata page: the picture of the argument, a square for each statement, and root errors."""
+"""The errata page: the picture of the argument, and root errors; answers.txt has a square for each statement."""
 
 from __future__ import annotations
 
 import re
-from collections import Counter
 
 import matplotlib.pyplot as plt
 import pytest
@@ -12,7 +11,6 @@ from gpbnb.report import ledger
 from gpbnb.report.display import style
 from gpbnb.report.ledger import argument, load_roots
 from gpbnb.report.ledger.finding import Verdict
-from gpbnb.report.ledger.page import address
 
 
 @pytest.fixture(scope="module")
@@ -61,27 +59,6 @@ def test_the_picture_follows_the_rule_of_figures_and_shows_the_counts(rows):
     assert html == argument.chain_of_errors(rows).html
     assert html.startswith("<figure><img alt=")
     assert "data:image/svg+xml," in html
-
-
-SQUARE = re.compile(r'<a class="square square-([\w-]+)" href="([^"]+)" aria-label="([^"]*)"></a>')
-
-
-def shape(row):
-    """The verdict in the class of a square; an error of the scan has a name that readers know."""
-    return {"ocr": "scan-error"}.get(row.outcome, row.outcome.replace(" ", "-"))
-
-
-def test_each_statement_has_one_square_with_its_verdict(rows):
-    found = SQUARE.findall(ledger.squares(rows).html)
-    assert Counter((link, kind) for kind, link, _ in found) == Counter(
-        (address(row.statement), shape(row)) for row in rows
-    )
-    assert all(words.strip() for *_, words in found)
-
-
-def test_the_key_counts_every_verdict(rows):
-    key = re.findall(r'square-([\w-]+)"></span>[^<]*\((\d+)\)', ledger.squares(rows).html)
-    assert {kind: int(count) for kind, count in key} == Counter(map(shape, rows))
 
 
 def test_each_wrong_statement_follows_from_a_root_error(rows):

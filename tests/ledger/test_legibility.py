@@ -1,7 +1,5 @@
 """Author or scan: the rule, and the data to which it is applied."""
 
-from dataclasses import replace
-
 import pytest
 
 from gpbnb.report import ledger
@@ -52,15 +50,3 @@ def test_each_damage_belongs_to_a_statement_and_each_witness_is_right(rows):
 def test_the_scan_is_charged_exactly_where_there_is_a_witness(rows):
     charged_to_scan = {key for key, row in rows.items() if row.finding.verdict is Verdict.OCR}
     assert charged_to_scan == {damage.id for damage in DAMAGES.values() if damage.witness}
-
-
-def test_an_entry_shows_the_characters_of_a_damaged_scan(rows):
-    row = rows["hung1982.IV.eq9"]
-    page = next(page for page in ledger.PAGES if page.holds(row.statement))
-    html = ledger.ledger_page([row], page).html
-    assert '<p class="scan"><code>r33 Cut Swt Yy; = (9); -62 -Sut Cut Z,</code></p>' in html
-    assert html.index('class="scan"') < html.index("<details>")
-    html = ledger.ledger_page([replace(row, finding=compare(True, "1"))], page).html
-    assert html.index('class="scan"') > html.index("<details>")  # a right statement needs nobody to charge
-    legible = rows["hung1982.IV.six-frames"]
-    assert 'class="scan"' not in ledger.ledger_page([legible], page).html
