@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from functools import cache
@@ -58,6 +59,31 @@ class ComponentArray:
     def size(self) -> int:
         """Number of entries."""
         return self.components[0].size
+
+
+_Operator = Callable[["FloatArray", Any], "FloatArray"]
+
+
+def operators(name: str) -> tuple[_Operator, _Operator]:
+    """Return the methods of an operation for an array on its left and on its right side."""
+    return lambda self, other: self._binary(name, self, other), lambda self, other: self._binary(name, other, self)
+
+
+def calls(function: Callable[[Any, Any], Any]) -> tuple[_Operator, _Operator]:
+    """Return the methods that call a function of two arrays, for an array on its left and on its right side."""
+
+    def left(self: FloatArray, other: Any) -> Any:
+        return function(self, self.operand(other))
+
+    def right(self: FloatArray, other: Any) -> Any:
+        return function(self.operand(other), self)
+
+    return left, right
+
+
+def _comparison(operation: Callable[[Any, Any], Any]) -> Callable[[FloatArray, Any], Any]:
+    """Return the method that compares as an operation on orders, -1, 0 or 1, and zero does."""
+    return lambda self, other: self._compare(other, lambda order: operation(order, 0))
 
 
 class FloatArray(ComponentArray, NumPyProtocols):
@@ -305,53 +331,19 @@ class FloatArray(ComponentArray, NumPyProtocols):
             )
         return self._applied(name, self)
 
-    def __add__(self, other: Any) -> FloatArray:
-        return self._binary("add", self, other)
-
-    def __radd__(self, other: Any) -> FloatArray:
-        return self._binary("add", other, self)
-
-    def __sub__(self, other: Any) -> FloatArray:
-        return self._binary("subtract", self, other)
-
-    def __rsub__(self, other: Any) -> FloatArray:
-        return self._binary("subtract", other, self)
-
-    def __mul__(self, other: Any) -> FloatArray:
-        return self._binary("multiply", self, other)
-
-    def __rmul__(self, other: Any) -> FloatArray:
-        return self._binary("multiply", other, self)
-
-    def __truediv__(self, other: Any) -> FloatArray:
-        return self._binary("divide", self, other)
-
-    def __rtruediv__(self, other: Any) -> FloatArray:
-        return self._binary("divide", other, self)
-
-    def __matmul__(self, other: Any) -> FloatArray:
-        return _matmul(self, self.operand(other))
-
-    def __rmatmul__(self, other: Any) -> FloatArray:
-        return _matmul(self.operand(other), self)
+    __add__, __radd__ = operators("add")
+    __sub__, __rsub__ = operators("subtract")
+    __mul__, __rmul__ = operators("multiply")
+    __truediv__, __rtruediv__ = operators("divide")
+    __matmul__, __rmatmul__ = calls(lambda a, b: _matmul(a, b))
+    __mod__, __rmod__ = calls(remainder)
+    __floordiv__, __rfloordiv__ = calls(floor_divide)
 
     def __pow__(self, other: Any) -> FloatArray:
         return power(self, other)
 
     def __rpow__(self, other: Any) -> FloatArray:
         return power(self.operand(other), self)
-
-    def __mod__(self, other: Any) -> FloatArray:
-        return remainder(self, self.operand(other))
-
-    def __rmod__(self, other: Any) -> FloatArray:
-        return remainder(self.operand(other), self)
-
-    def __floordiv__(self, other: Any) -> FloatArray:
-        return floor_divide(self, self.operand(other))
-
-    def __rfloordiv__(self, other: Any) -> FloatArray:
-        return floor_divide(self.operand(other), self)
 
     def __neg__(self) -> FloatArray:
         return self._unary("negative")
@@ -415,23 +407,9 @@ class FloatArray(ComponentArray, NumPyProtocols):
         backend, (a, b) = _common((self, b))
         return holds(backend.compare(a.components, b.components))[()]
 
-    def __eq__(self, other: object) -> Any:
-        return self._compare(other, lambda order: order == 0)
-
-    def __ne__(self, other: object) -> Any:
-        return self._compare(other, lambda order: order != 0)
-
-    def __lt__(self, other: Any) -> Any:
-        return self._compare(other, lambda order: order < 0)
-
-    def __le__(self, other: Any) -> Any:
-        return self._compare(other, lambda order: order <= 0)
-
-    def __gt__(self, other: Any) -> Any:
-        return self._compare(other, lambda order: order > 0)
-
-    def __ge__(self, other: Any) -> Any:
-        return self._compare(other, lambda order: order >= 0)
+    __eq__, __ne__ = _comparison(operator.eq), _comparison(operator.ne)
+    __lt__, __le__ = _comparison(operator.lt), _comparison(operator.le)
+    __gt__, __ge__ = _comparison(operator.gt), _comparison(operator.ge)
 
     def __bool__(self) -> bool:
         if self.size != 1:

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.array import FloatArray, calls, operators
 from gpbnb.arithmetic.elementary import elementary
 from gpbnb.arithmetic.functions import lines
 
@@ -175,23 +175,9 @@ class Dual(FloatArray):
 
     # Python prefers the reflected operators of a derived class only if it defines them itself.
 
-    def __radd__(self, other: Any) -> Dual:
-        return self._binary("add", other, self)
-
-    def __rsub__(self, other: Any) -> Dual:
-        return self._binary("subtract", other, self)
-
-    def __rmul__(self, other: Any) -> Dual:
-        return self._binary("multiply", other, self)
-
-    def __rtruediv__(self, other: Any) -> Dual:
-        return self._binary("divide", other, self)
-
-    def __matmul__(self, other: Any) -> Dual:
-        return _product(self, self.operand(other))
-
-    def __rmatmul__(self, other: Any) -> Dual:
-        return _product(self.operand(other), self)
+    __radd__, __rsub__ = operators("add")[1], operators("subtract")[1]
+    __rmul__, __rtruediv__ = operators("multiply")[1], operators("divide")[1]
+    __matmul__, __rmatmul__ = calls(lambda a, b: _product(a, b))
 
     def __pow__(self, other: Any) -> Any:
         if isinstance(other, Dual):
