@@ -47,8 +47,9 @@ from gpbnb.arithmetic.number_format import NumberFormat
 from gpbnb.bounds.check import main as check
 from gpbnb.filters.blocks import BLOCKS
 from gpbnb.filters.design import FilterDesign
-from gpbnb.report.ledger import checking, judge
+from gpbnb.report.ledger import checking
 from gpbnb.report.ledger import command as ledger
+from gpbnb.report.ledger import judge as judging
 from gpbnb.report.ledger.statements import statement
 from gpbnb.report.stored import main as sweeps
 from gpbnb.wordlength import report
@@ -146,8 +147,8 @@ def true_values(topic):
     found = {}
     for key, row in checking.TOPICS[topic].items():
         if row.domain and row.domain not in found and row.domain.partition("(")[0] not in SLOW:
-            names = {**judge._NAMES, "printed": statement(key), "document": statement(key).document, **row.topic}
-            values = judge._value(row.domain, names)
+            names = {**judging._NAMES, "printed": statement(key), "document": statement(key).document, **row.topic}
+            values = judging._value(row.domain, names)
             found[row.domain] = hashed(written(values if isinstance(values, Mapping) else list(values)))
     return "\n".join(f"{domain}: {values}" for domain, values in found.items())
 
