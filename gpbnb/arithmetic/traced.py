@@ -343,6 +343,11 @@ def _matched(name: str, a: Any, b: Any) -> Sequence[Places]:
     return np.broadcast_arrays(x, y)
 
 
+def _combination(table: int) -> Callable[[TracedTruth, Any], Any]:
+    """Return the method that combines truth values a and b: the bit 2 a + b of a table is the result."""
+    return lambda self, other: self._combined(other, table)
+
+
 class TracedTruth(ComponentArray):
     """An array of truth values that each run finds anew."""
 
@@ -378,24 +383,9 @@ class TracedTruth(ComponentArray):
         places = _matched("truth values", self, self._operand(other))
         return TracedTruth(self.format, self.format.tape.record("combine", *places, table))
 
-    # The bit 2 a + b of a table is the result for truth values a and b.
-
-    def __and__(self, other: Any) -> TracedTruth:
-        return self._combined(other, 0b1000)
-
-    def __or__(self, other: Any) -> TracedTruth:
-        return self._combined(other, 0b1110)
-
-    def __xor__(self, other: Any) -> TracedTruth:
-        return self._combined(other, 0b0110)
-
-    def __eq__(self, other: object) -> Any:
-        return self._combined(other, 0b1001)
-
-    def __ne__(self, other: object) -> Any:
-        return self._combined(other, 0b0110)
-
+    __and__, __or__, __xor__ = _combination(0b1000), _combination(0b1110), _combination(0b0110)
     __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
+    __eq__, __ne__ = _combination(0b1001), _combination(0b0110)
 
     def __invert__(self) -> TracedTruth:
         return self._combined(self, 0b0001)
