@@ -163,9 +163,10 @@ def drawn(figure):
             if isinstance(each, Line2D):
                 found.append([each.get_label(), each.get_color(), each.get_ls(), each.get_marker(), each.get_xydata()])
             elif isinstance(each, Text) and each.get_text():
-                found.append([each.get_text(), each.get_color(), each.get_fontsize()])
+                found.append([each.get_text(), each.get_color(), each.get_fontsize(), np.array(each.get_position())])
             elif isinstance(each, Patch):
-                found.append([each.get_label(), each.get_facecolor(), each.get_ls(), each.get_path().vertices])
+                look = each.get_label(), each.get_facecolor(), each.get_ls(), each.get_visible()
+                found.append([*look, each.get_path().vertices])
             elif isinstance(each, Collection):
                 parts = [path.vertices for path in each.get_paths()]
                 found.append([each.get_label(), each.get_facecolor(), each.get_offsets(), *parts])
