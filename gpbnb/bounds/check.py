@@ -202,7 +202,10 @@ class Arithmetic:
 
     def last_place(self, q: int) -> int:
         """The exponent of the last digit of a number of q units."""
-        return self.finest if q < self.low else max(self.finest, bisect_right(self.tops, q))
+        place = self.finest if q < self.low else max(self.finest, bisect_right(self.tops, q))
+        if place >= len(self.powers):
+            raise OverflowError
+        return place
 
     def error(self, most: int, aligned: bool) -> int:
         """The largest error of rounding results of at most so many units; sums have no digit below the finest."""
@@ -766,12 +769,10 @@ class ErrorSet:
                     known[i] = j, far, self.most(far)
                     self.claim(i, known[i][2] + effect, f" after step {self.steps + j}")
         moved = list(map(self.image, P))
-        self.x = [[s >> loops for s in x] for x in moved]
-        self.box = [up(size(row, self.box), 1 << loops) + len(moved[0]) for row in P]
+        self.x = [[s >> loops for s in x] + [g[i] for g in columns] for i, x in enumerate(moved)]
+        self.box = [up(size(row, self.box), 1 << loops) + len(moved[0]) + x for row, x in zip(P, box, strict=True)]
         self.M = each(lambda x, y: (x >> 2 * loops) + y, around(P, self.M), diagonal(self.n, self.n))
         self.steps, self.groups = self.steps + whole, self.groups + groups
-        self.box = list(map(add, self.box, box))
-        self.x = [x + [g[i] for g in columns] for i, x in enumerate(self.x)]
 
     def pairs(self, keep: int) -> Any:
         """Add columns of steps that are alike, as they are old; return segments that contain what this leaves out."""
@@ -927,8 +928,7 @@ class Filter:
         if self.derived:
             rooms = [v - z - 2 * self.missed for v, z in zip(self.V, self.Z, strict=True)]
             sets.append(ErrorSet(self.X, rooms, self.loops, DERIVED, self.model.x0))
-        moves, back = self.moves(), self.given["back"]
-        k, keep = 0, self.given["keep"]
+        moves, k, keep, back = self.moves(), 0, self.given["keep"], self.given["back"]
         while k < self.first:  # longer blocks where sets have more segments
             block = min(max(BLOCK, isqrt(min(k, 2000))), self.first - k)
             for reach, steps in zip(sets, turned(islice(moves, block)), strict=False):
@@ -967,10 +967,10 @@ def prove(given: Any) -> str:
                 form = f"{made.get('form', 'fixed coefficients')}, {fmt}"
                 when = f"{given['steps'] or 'any number of'} steps within {given['limits']}"
                 return f"{given['name']!r} ({form}): after {when}, rounding has moved states by at most {bound}"
-            except (OverflowError, IndexError):
+            except OverflowError:
                 scale = scale * 3 // 2
-        raise NotImplementedError("numbers need too fine a unit, or are not there")
-    except (KeyError, TypeError, ValueError, ZeroDivisionError, AttributeError) as error:
+        raise NotImplementedError("numbers need too fine a unit")
+    except (LookupError, TypeError, ValueError, ZeroDivisionError, AttributeError) as error:
         raise NotProvedError(f"the file is no certificate: {error!r}") from error
 
 
