@@ -222,7 +222,8 @@ def for_each(function, *values):
 
 SLOW = (
     *("approach", "reliability", "splits", "joint_use", "index_ranges", "two_parts", "solved_columns"),
-    *("density_of_noise", "recursively", "five_sources"),
+    *("density_of_noise", "recursively", "five_sources", "shortcut", "much_less", "not_completely", "exact_errors"),
+    "chains",
 )
 D4, B8 = gpbnb.FloatFormat(10, 4), gpbnb.FloatFormat(2, 8)
 HERE = {

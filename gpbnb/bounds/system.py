@@ -98,10 +98,7 @@ class Recursion:
         found, Z = self._sums(stored, units(data).exact), inputs if self._as_given else kept
         rows, n = found.step.rows[:, 0], program.n
         state = positive(found.state @ Z * EXCESS)
-        if not np.isfinite(state).all():
-            over = "" if self._steps is None else f" over {self._steps} steps"
-            cure = "take fewer steps" if over else "scale the inputs"
-            raise OverflowError(f"got a system whose largest gain{over} is beyond the range of float64; {cure}")
+        self._check_gain(state)
         sizes = np.minimum(found.values @ Z * EXCESS, sizes_within(rows[:, :n], state))
         sizes = sizes + sizes_within(rows[:, n:], kept)
         of_inputs = found.storing @ storing + found.errors @ Z
@@ -118,6 +115,13 @@ class Recursion:
             raise ValueError(no_bound(data))
         return Guess(b, state, Z, b[:, None] * (np.arange(3) == ROUNDING), found.lags)
 
+    def _check_gain(self, reached: Array) -> None:
+        """Reject a system that multiplies its inputs by more than float64 holds."""
+        if not np.isfinite(reached).all():
+            over = "" if self._steps is None else f" over {self._steps} steps"
+            cure = "take fewer steps" if over else "scale the inputs"
+            raise OverflowError(f"got a system whose largest gain{over} is beyond the range of float64; {cure}")
+
     def _sums(self, stored: Any, powers: Array) -> _Sums:
         key = tuple(stored)
         if key in self._known:
@@ -130,6 +134,7 @@ class Recursion:
         step = linear_values(program, double_doubles(stored)[None], powers)
         step = step._replace(rows=step.rows.astype(np.float64))
         columns = np.hstack([K, step.effects[n + program.m :, 0].T])
+        self._check_gain(B * self._inputs)
         lags = max(lags_of(A, B * self._inputs, steps), lags_of(F, columns[:, program.m :], steps))
         sums = gains(A, B, step.rows[:, 0, :n], steps, lags)
         later, errors = gains(F, columns, np.zeros((0, n)), steps, lags), np.zeros((n, program.m))
