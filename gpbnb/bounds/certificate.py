@@ -64,9 +64,10 @@ class Proof(NamedTuple):
 
 
 def proved(guess: Guess, written: Callable[[Guess], dict[str, Any]]) -> Proof:
-    """Ask the checker for a guess and, if it rejects that, for one as much larger as it says; or raise ValueError.
+    """Let the checker prove a guess or, if it refuses, a larger one, by as much as it says is missing.
 
-    Phases of a period that differ too much to be taken together are then kept apart.
+    Phases of a period that differ too much to be taken together are then kept apart. ValueError says why nothing is
+    proved.
     """
     content, why = written(guess), ""
     slow = "keep" in content and content["keep"] < max(content["back"], content["steps"] or 0)

@@ -59,7 +59,7 @@ class WordErrors:
     def check_range(self, ends: NDArray[np.float64]) -> None:
         """Raise OverflowError if a result may be beyond its format; what wraps need not fit before it is stored.
 
-        The largest sizes of the states after the step, `ends` (n,), include all roundings.
+        `ends` (n,) are the largest sizes of the states after the step, with all roundings.
         """
         program, words = self._made.program, self._made.words
         ends_of = dict(zip((program.outputs - program.n - program.m).tolist(), ends.tolist(), strict=True))
