@@ -10,7 +10,7 @@ import pytest
 
 from gpbnb.arithmetic.rational import exact
 from gpbnb.report.guarantees import certificates, comparison, survey, table
-from gpbnb.report.guarantees.peak_gain import error_coefficients
+from gpbnb.report.guarantees.comparison import error_coefficients
 from gpbnb.report.guarantees.published import dynamax_tracking, filterpy_fusion, fixif_longitudinal, px4_landing_target
 from tests.oracles import floating
 

@@ -21,8 +21,8 @@ from gpbnb.arithmetic.bounded import BoundedError
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, rationals, true_inverse
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds import inverse as bounds
-from gpbnb.report.inversion import procedure, theory
+from gpbnb.bounds.inverse import a_posteriori, true_error
+from gpbnb.report.inversion import bounds, procedure, theory
 from gpbnb.report.stored_table import Column
 from gpbnb.report.sweep import Sweep
 
@@ -71,7 +71,7 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
         except ValueError:  # the bound does not exist here
             if name not in BETTER[1:]:
                 raise
-    error = bounds.true_error(computing.x, inverse)
+    error = true_error(computing.x, inverse)
     condition = float(column_sum_norm(rationals(a))) * float(column_sum_norm(inverse))
     return InverseTrial(family, a, computing.x, pivot, condition, error, evaluated)
 
@@ -105,7 +105,7 @@ _BETTER: dict[str, Callable[[_Computing], Any]] = {
     "Wilkinson": lambda c: bounds.wilkinson(c.factors, c.x),
     "Higham": lambda c: bounds.higham(c.factors, c.x),
     "ball": lambda c: bounds.ball(c.a, c.x),
-    "a posteriori": lambda c: bounds.a_posteriori(c.a, c.x),
+    "a posteriori": lambda c: a_posteriori(c.a, c.x),
 }
 BETTER = tuple(_BETTER)
 ALL_BOUNDS = (*map(str, PRINTED), *BETTER)
