@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.loop import drop_decayed
 from gpbnb.filters.forms import Form
+from gpbnb.filters.stepping import RunningStep, StepsTaken, Stop
 from gpbnb.filters.steps import FACTORED, combined_gain
+from gpbnb.filters.words import WordSteps
 
 
 def exactly(packed: NDArray[Any], fmt: FloatFormat | FixedFormat | None) -> NDArray[Any]:
@@ -66,6 +69,39 @@ class Progress(ABC):
         """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
         none = np.zeros((0, self._width, 2))
         return np.concatenate([none, *(self.estimates(each) for each in self.blocks(z))])
+
+    def repeat(
+        self,
+        steps: RunningStep | WordSteps,
+        states: Sequence[NDArray[Any]],
+        own: NDArray[Any],
+        fault: Callable[[Stop], tuple[str, str]],
+        unlimited: bool = True,
+    ) -> Iterator[StepsTaken]:
+        """Take a step for each row of packed numbers, (steps, entries, ...), and give the results of some at a time.
+
+        Formats without a range run in float64. Where a step would leave it, for example because an estimate decays
+        below 2**-960, entries of the estimate below 2**-700 become zero first. A step that has no result ends the run.
+
+        Parameters
+        ----------
+        states : arrays that hold the states before and after the steps; the first is the estimate, the second, if there
+            is one, does not decay.
+        fault : returns in words what ends the run, and a cure.
+        unlimited : whether the format of the estimate has no range.
+        """
+        at = 0
+        while at < len(own) and self.stopped is None:
+            found = steps.take(self.steps, states, own[at : at + steps.longest])
+            at += len(found.definite)
+            for i, state in enumerate(states):
+                found.given[i] = found.given[i].reshape(-1, *state.shape)
+                state[:] = found.given[i][-1] if len(found.definite) else state
+            self.done(found.definite, *found.given)
+            resumes = found.stop is not None and found.stop.fault.overflows and unlimited
+            if found.stop is not None and not (resumes and drop_decayed(states[0], *states[2:])):
+                self.stop(*fault(found.stop))
+            yield found
 
     def done(self, definite: NDArray[np.bool_], *results: Any) -> None:
         """Count some steps, all definite or not, and keep their results, (steps, ...), at the checkpoint steps."""

@@ -3,7 +3,7 @@ r"""One step of a filter as a program: rounded operations in the order in which 
 A step is written for arrays of any kind, as in :mod:`gpbnb.filters.steps` and :mod:`gpbnb.filters.structures`, and
 recorded once. All of these use the same rows, so they cannot disagree:
 
-* :mod:`gpbnb.filters.linear_steps` and :mod:`gpbnb.filters.recording` run them in any format;
+* :mod:`gpbnb.filters.recording` brings them on the machine, which runs them in any format;
 * :mod:`gpbnb.bounds` follows the effect of a rounding error in each operation on the result of the step;
 * :func:`matrices` computes the linear function of (x, z) that the step approximates;
 * :mod:`gpbnb.filters.words` runs them on integers, with formats of their own for coefficients, data and sums;

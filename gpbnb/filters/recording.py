@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
-from gpbnb.arithmetic.machine import packed_one
+from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of, packed_one
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat
@@ -25,6 +25,46 @@ from gpbnb.filters.forms import ROOTS, Form
 from gpbnb.filters.program import Program, entries
 from gpbnb.filters.stepping import DividedStep, RecordedStep, divided, record_step
 from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep, StepTaken
+
+
+@lru_cache(maxsize=64)
+def system_step(program: Program, in_order: bool = False, whole: bool = False) -> DividedStep:
+    """Return a step of a linear program; the cycle of its coefficients has one member.
+
+    Operations that do not need each other run together if they have one code, which takes half the time, unless they
+    stay in order because each draws a random number. A stop names the number of the first output that needs the
+    operation. The whole step also gives each of its values.
+    """
+    rows, tape = program.rows, Tape(program.n + program.m + len(program.coefficients))
+    places = np.arange(program.sizes[0]), np.arange(program.sizes[1])
+    groups = [np.array([o]) for o in range(len(rows))] if in_order else _independent(program)
+    computes = (rows[:, 4] == program.after[:, None]) & (rows[:, 0] != CODES["compare"])
+    computed_by = np.where(computes, np.arange(len(rows)), -1).max(axis=1, initial=-1)
+    for group in groups:
+        some, name = rows[group], NAMES[int(rows[group[0], 0])]
+        given = [some[:, 1 + i] for i in range(3 if name in ("compare", "choose") else 2)]
+        for mapped, masks in zip(places, OPERANDS, strict=True):
+            given = [mapped[each] if masks[some[0, 0], i] else each for i, each in enumerate(given)]
+        needing = np.argmax(computed_by >= group[:, None], axis=1).tolist()
+        tape.labels += zip(range(len(tape.instructions), len(rows)), map(str, needing), strict=False)
+        places[name == "compare"][some[:, 4]] = tape.record(name, *given)
+    after, results = [places[0][program.after]], [places[0][program.places]] * whole
+    of_step = [program.states], [program.inputs], [program.coefficients]
+    step = RecordedStep(tape, tape.instructions, tape.formats, *of_step, after, results, definite=1)
+    return divided(step, together=True)
+
+
+def _independent(program: Program) -> list[NDArray[np.int64]]:
+    """Return rows of one code that do not need each other, in an order in which each follows those that it needs."""
+    numbers, truths, level = [0] * program.sizes[0], [0] * program.sizes[1], list[int]()
+    for code, *given, out in program.rows.tolist():
+        taken = zip((numbers, truths), operands_of(code, *given), strict=True)
+        level.append(1 + max(levels[place] for levels, places in taken for place in places))
+        (truths if code == CODES["compare"] else numbers)[out] = level[-1]
+    keys = program.rows[:, 0], np.array(level, np.int64)
+    order = np.lexsort(keys)
+    edges = np.flatnonzero(np.any([np.diff(each[order]) != 0 for each in keys], axis=0))
+    return np.split(order, edges + 1)
 
 
 class Known(NamedTuple):

@@ -13,7 +13,6 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
-from gpbnb.arithmetic.loop import drop_decayed
 from gpbnb.arithmetic.machine import OVERFLOW, ZERO_DIVISOR, ZERO_PIVOT
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Limits, Order, Rounding
@@ -31,7 +30,7 @@ from gpbnb.filters.opening import (
 from gpbnb.filters.pairs import nearest_floats, widened, widened_estimates
 from gpbnb.filters.recording import recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
-from gpbnb.filters.stepping import RunningStep, Stop
+from gpbnb.filters.stepping import RunningStep, StepsTaken, Stop
 from gpbnb.filters.steps import FACTORED, HUNG_FORMS
 
 LEAST_SHARE = 2.0**-60
@@ -190,7 +189,8 @@ class Run(Progress):
         return self._saved(2)
 
     def _saved(self, which: int) -> NDArray[Any]:
-        return (self.kept() or self._none)[which]
+        kept, none = self.kept(), self._none[which]
+        return kept[(0, -1, 1)[which]].reshape(-1, *none.shape[1:]) if kept else none
 
     @property
     def bounded(self) -> bool:
@@ -303,22 +303,12 @@ class Run(Progress):
         return packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
 
     def advance(self, z: NDArray[Any]) -> Iterator[Block]:
-        """Take one step per packed measurement, (steps, m, columns of x), and give the results of a block at a time.
-
-        Formats without a range run in float64. Where a step would leave it, for example because an estimate decays
-        below 2**-960, entries of the estimate below 2**-700 become zero first. A step that has no result ends the run.
-        """
+        """Take one step per packed measurement, (steps, m, columns of x), and give the results of a block at a time."""
         if self._running is None:
             self._running = self._opened()
-        at = 0
-        while at < len(z) and self.stopped is None:
-            found = self._take(self._running, z[at : at + self._running.longest])
-            at += len(found.x)
-            self.done(found.definite, found.x, found.K, found.P)
-            resumes = found.stop is not None and found.stop.fault.overflows and self._limits is None
-            if found.stop is not None and not (resumes and drop_decayed(self.x, self._compensation)):
-                self.stop(*self._fault(found.stop))
-            yield found
+        states = [self.x, self.P, self._compensation][: self._running.states]
+        for found in self.repeat(self._running, states, z, self._fault, self._limits is None):
+            yield self._block(found)
 
     @property
     def _limits(self) -> Limits | None:
@@ -347,16 +337,11 @@ class Run(Progress):
         tables = [each.reshape(len(each), at.size, *each.shape[1 + at.ndim :]) for each, at in cycles]
         return RunningStep(parts, formats, tables, self.records, self.tag)
 
-    def _take(self, steps: RunningStep, z: NDArray[Any]) -> Block:
-        """Take some steps, and keep the estimate and the covariance after the last."""
-        states = [self.x, self.P, self._compensation][: steps.states]
-        found = steps.take(self.steps, states, z)
-        shapes = [*(each.shape for each in states), self.G.shape[1:]]
-        given = [each.reshape(len(each), *shape) for each, shape in zip(found.given, shapes, strict=True)]
-        if len(given[0]):
-            for state, each in zip(states, given, strict=False):
-                state[:] = each[-1]
-        return Block(given[0], given[-1], given[1], found.definite, found.stop)
+    def _block(self, found: StepsTaken) -> Block:
+        x, K, P = (
+            found.given[which].reshape(-1, *none.shape[1:]) for which, none in zip((0, -1, 1), self._none, strict=True)
+        )
+        return Block(x, K, P, found.definite, found.stop)
 
     def _formats(self) -> tuple[list[Any], tuple[int, ...], tuple[Any, ...]]:
         """Return all formats; the numbers of those of the blocks and of the model; how sums are computed."""

@@ -308,6 +308,8 @@ class RunningStep:
     ) -> tuple[NDArray[Any], NDArray[np.bool_], Stop | None]:
         """Return what the early part computes in some steps."""
         early = self._early
+        if not len(self._parts.early.rows) and not len(self._kept_at):
+            return np.empty((count, 0, *early.values.shape[1:])), np.ones(count, np.bool_), None
         if self._last is None or not np.array_equal(self._last, states):
             self._repeated = None
             early.states = states

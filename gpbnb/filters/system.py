@@ -23,18 +23,19 @@ from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.kernels.tags import DoubleDouble
+from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.arithmetic.named import arithmetic, format_named
 from gpbnb.arithmetic.rational import eigenvalues, exact, rationals
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.checkpoints import Progress
-from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.named import checked_name, checked_names, named, naming, range_text, sized, whole_number
 from gpbnb.filters.opening import as_packed, packed_array, stored_start
 from gpbnb.filters.pairs import widened_estimates
 from gpbnb.filters.program import matrices
+from gpbnb.filters.recording import system_step
 from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
+from gpbnb.filters.stepping import RunningStep, Stop
 from gpbnb.filters.structures import (
     CASCADES,
     DIRECT,
@@ -544,21 +545,26 @@ class SystemRun(Progress):
         super().__init__(checkpoint_steps)
         if isinstance(fmt, FixedFormat) and fmt.rounding is not Rounding.STOCHASTIC:
             fmt = WordFormats(fmt)
-        self.model, self.fmt, self._steps = model, fmt, self._begun(model, fmt)
+        self.model, self.fmt = model, fmt
+        self._steps, self._states = self._begun(model, fmt)
 
     @staticmethod
-    def _begun(model: LinearSystem, fmt: SystemFormat | None) -> LinearSteps | WordSteps:
+    def _begun(model: LinearSystem, fmt: SystemFormat | None) -> tuple[RunningStep | WordSteps, NDArray[Any]]:
+        """Return what takes steps, and the first states."""
         made, start = model.as_filter(), np.concatenate([model.x0, exact([0] * model.p)])
         if isinstance(fmt, WordFormats):
             program = integer_program(made, fmt)
             with naming("x0"):
-                return WordSteps(program, integers_of(start, fmt.data.strict))
+                return WordSteps(program), integers_of(start, fmt.data.strict)
         if fmt is None:
+            tag: Tag = DoubleDouble()
             coefficients, x = double_doubles(made.coefficients), double_doubles(start)
-            return LinearSteps(made.program, fmt, DoubleDouble(), coefficients, x)
-        tag = fmt.run_tag()
-        fmt.restart()
-        return LinearSteps(made.program, fmt, tag, made.packed(fmt), packed_array(stored_start(fmt, start)))
+        else:
+            tag = fmt.run_tag()
+            fmt.restart()
+            coefficients, x = made.packed(fmt), packed_array(stored_start(fmt, start))
+        step = system_step(made.program, in_order=fmt is not None and fmt.rounding is Rounding.STOCHASTIC)
+        return RunningStep(step, [fmt], [coefficients[None]], tag=tag), x
 
     @property
     def _width(self) -> int:
@@ -575,13 +581,14 @@ class SystemRun(Progress):
         except OverflowError as error:
             missing = str(error)
             packed = self._stored(inputs[: bisect_left(range(len(inputs)), True, key=partial(self._loses, inputs))])
-        found, lost = self._steps.take(packed)
-        self.done(np.ones(len(found), np.bool_), found)
-        yield found
-        if lost >= 0:
-            self.stop(self.model.value(lost), f": {self.model.beyond(self.fmt)}")
-        elif missing:
+        for found in self.repeat(self._steps, [self._states], packed, self._fault):
+            yield found.given[0]
+        if missing and self.stopped is None:
             self.stop("inputs", f": {missing}")
+
+    def _fault(self, stop: Stop) -> tuple[str, str]:
+        """Name the state or output that a step cannot compute, and a cure."""
+        return self.model.value(int(stop.quantity)), f": {self.model.beyond(self.fmt)}"
 
     def _stored(self, inputs: NDArray[Any]) -> NDArray[Any]:
         if isinstance(self.fmt, WordFormats):

@@ -13,7 +13,8 @@ output, is stored in the format of the data.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -24,9 +25,11 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.kernels import backends
 from gpbnb.arithmetic.kernels.integer_steps import WordCode, WordStore, advance, advance_in_python
 from gpbnb.arithmetic.kernels.selection import MODES
+from gpbnb.arithmetic.machine import OVERFLOW, Fault
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.program import AT_LEAST, MULTIPLY, Program
+from gpbnb.filters.stepping import StepsTaken, Stop
 from gpbnb.filters.structures import LinearFilter
 from gpbnb.filters.word_formats import WordFormats
 from gpbnb.interrupts import slices
@@ -146,34 +149,37 @@ def _code(made: IntegerProgram, dtype: Any = np.int64) -> WordCode:
     )
 
 
-class WordSteps:
-    """A linear program on integers, from a first state (n,) in units of the data."""
+class WordSteps(NamedTuple):
+    """A linear program that is repeated on integers, in units of the data."""
 
-    def __init__(self, made: IntegerProgram, x: NDArray[Any]) -> None:
-        self._made, self._x = made, x
+    made: IntegerProgram
 
-    def take(self, u: NDArray[Any]) -> tuple[NDArray[Any], int]:
-        """Take a step with each of the inputs u, (steps, m), in units of the data.
+    @property
+    def longest(self) -> int:
+        """The largest number of steps taken at once."""
+        return sys.maxsize
 
-        Return the states of steps that have results, (steps, n), and the first output that the next step cannot
-        compute, or -1.
+    def take(self, first: int, states: Sequence[NDArray[Any]], own: NDArray[Any]) -> StepsTaken:
+        """Take a step for each row of the inputs (steps, m), from one array of states, (n,).
+
+        A step without a result names the number of the first output that it cannot compute.
         """
-        made, x, count = self._made, self._x, len(self._made.program.operations)
+        made, (x,), u, count = self.made, states, own, len(self.made.program.operations)
         short = made.is_short and u.dtype != object and x.dtype != object
         advance, dtype = _way(short, len(u) * count)
-        code, states, done, lost = _code(made, dtype), np.zeros((len(u) + 1, len(x)), dtype), len(u), -1
-        states[0] = x.astype(dtype)
+        code, found, done, stop = _code(made, dtype), np.zeros((len(u) + 1, len(x)), dtype), len(u), None
+        found[0] = x.astype(dtype)
         for part in slices(len(u), count):
             stopped, after = np.full(part.stop - part.start, -1), slice(part.start + 1, part.stop + 1)
-            advance(code, states[part], u[part].astype(dtype, copy=False), states[after], stopped)
+            advance(code, found[part], u[part].astype(dtype, copy=False), found[after], stopped)
             if (stopped >= 0).any():
                 step = int(np.argmax(stopped >= 0))
                 computed_by = made.program.outputs - made.program.n - made.program.m
-                done, lost = part.start + step, int(np.argmax(computed_by >= stopped[step]))
+                row = int(stopped[step])
+                done, stop = part.start + step, Stop(Fault(row, OVERFLOW), str(np.argmax(computed_by >= row)))
                 break
-        found = states[1 : done + 1].astype(np.int64 if short else object, copy=False)
-        self._x = found[-1] if done else x
-        return found, lost
+        found = found[1 : done + 1].astype(np.int64 if short else object, copy=False)
+        return StepsTaken([found], np.ones(done, np.bool_), stop)
 
 
 def successors(

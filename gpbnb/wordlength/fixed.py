@@ -18,10 +18,11 @@ from gpbnb.arithmetic.named import BINARY64, arithmetic, format_named
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding, digits_text
 from gpbnb.arithmetic.search import Outcome, Search
-from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.nonlinear import NonlinearModel
+from gpbnb.filters.recording import system_step
 from gpbnb.filters.sections import scaled
+from gpbnb.filters.stepping import RunningStep
 from gpbnb.filters.structures import LinearFilter
 from gpbnb.filters.system import LinearSystem
 from gpbnb.filters.word_formats import WordFormats
@@ -277,12 +278,17 @@ def _holding_limits(system: LinearSystem, bits: int) -> int:
 def _sizes(system: LinearSystem, z: Any) -> NDArray[np.float64]:
     """Return the largest size of each value of a linear system without rounding."""
     start = np.concatenate([system.x0.astype(np.float64), np.zeros(system.p)])
-    made = system.as_filter()
-    steps = LinearSteps(made.program, BINARY64, BINARY64.run_tag(), made.coefficients.astype(np.float64), start)
-    try:
-        return steps.largest(np.ascontiguousarray(np.asarray(z, dtype=np.float64)))
-    except OverflowError:
-        raise OverflowError(f"the run without rounding: {system.beyond()}") from None
+    made, given = system.as_filter(), np.asarray(z, dtype=np.float64)
+    coefficients = made.coefficients.astype(np.float64)
+    steps, at = RunningStep(system_step(made.program, whole=True), [BINARY64], [coefficients[None]]), 0
+    sizes = np.zeros(len(made.program.places))
+    while at < len(given):
+        (states, values), _, stop = steps.take(at, [start], given[at : at + steps.longest])
+        if stop is not None:
+            raise OverflowError(f"the run without rounding: {system.beyond()}")
+        start, at = states[-1], at + len(states)
+        np.maximum(sizes, np.abs(values).max(axis=0), out=sizes)
+    return sizes
 
 
 def bits_for(largest: float) -> int:

@@ -155,7 +155,7 @@ def limit_cycles(
     cycles = list[LimitCycle]()
     for numbers in _cycles(successors(made, inputs.astype(np.int64), low, counts)):
         first = np.array(np.unravel_index(numbers[0], np.maximum(counts, 1))) + low
-        states, _ = WordSteps(made, first).take(np.tile(inputs, (len(numbers), 1)))
+        (states,), *_ = WordSteps(made).take(0, [first], np.tile(inputs, (len(numbers), 1)))
         cycles.append(LimitCycle(states[:, :n], states[:, n:]))
     return LimitCycles(tuple(sorted(cycles, key=lambda each: -each.period)), error[n:], rest[n:], total)
 

@@ -19,10 +19,11 @@ from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
 from gpbnb.bounds.guess import GAIN, LOOP, float_errors, gains, linear_steps, rounding_errors, value_sizes
 from gpbnb.bounds.probable import probable_error, separate_roundings
 from gpbnb.filters.forms import WITH_PROGRAM, Form
-from gpbnb.filters.linear_steps import LinearSteps
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
+from gpbnb.filters.recording import system_step
 from gpbnb.filters.run import Run
+from gpbnb.filters.stepping import RunningStep
 from gpbnb.filters.structures import state_space
 from gpbnb.report.guarantees.adversary import attack, ceiling, random_errors, run_against
 from gpbnb.report.guarantees.published import nile_local_level
@@ -74,9 +75,10 @@ def test_the_program_gives_the_digits_of_the_filter(form: Form, fmt: FloatFormat
     run.take(z)
     x, found = as_packed(fmt, given.x0), []
     for row, each in zip(given.rows(np.arange(steps)), z, strict=True):
-        states, lost = LinearSteps(given.program, fmt, run.tag, given.packed[row], x).take(as_packed(fmt, each[None]))
-        assert lost < 0
-        x = states[0]
+        steps_of = RunningStep(system_step(given.program), [fmt], [given.packed[row][None]], tag=run.tag)
+        (states,), _, stop = steps_of.take(0, [x], as_packed(fmt, each[None]))
+        assert stop is None
+        x = states[0].reshape(x.shape)
         found.append(x)
     assert np.array_equal(run.exactly(np.array(found)), run.checkpoints().x)
 
