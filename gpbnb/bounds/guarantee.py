@@ -194,6 +194,7 @@ def guarantee(
     form: Form | str = Form.INNOVATION,
     most: int | None = None,
     horizon: int = 1_000,
+    proved: bool = True,
 ) -> FilterGuarantee:
     """Bound the effect of rounding on the estimates of a Kalman filter, for every admissible measurement sequence.
 
@@ -209,19 +210,8 @@ def guarantee(
     most : the largest number of steps to emulate while the gain settles, 20,000 by default, and fewer for more than 17
         states; at most 1,000,000. A proof takes more steps in proportion to a larger number.
     horizon : the number of steps that the bound covers if no bound holds for ever.
+    proved : whether the bound is proved, or only guessed.
     """
-    return _proved(guessed(model, fmt, within, form, most, horizon))
-
-
-def guessed(
-    model: LinearModel,
-    fmt: FloatFormat | FixedFormat,
-    within: FilterLimits,
-    form: Form | str = Form.INNOVATION,
-    most: int | None = None,
-    horizon: int = 1_000,
-) -> FilterGuarantee:
-    """Return what :func:`guarantee` is going to prove, without a proof."""
     if not isinstance(model, LinearModel):
         raise TypeError(
             f"got a {type(model).__name__}; needed a LinearModel; for a linear system, ask required_precision(..., "
@@ -235,19 +225,19 @@ def guessed(
     if model.steps is not None:
         most, horizon = min(MOST if most is None else most, model.steps), min(horizon, model.steps)
     effort = EFFORT * max(MOST if most is None else most, MOST) / MOST
-    found = from_guess(schedule(model, fmt, form, most, horizon), within, horizon, effort)
+    found = from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, False, effort)
     if model.steps is not None and found.steps in (None, model.steps):
         found = replace(found, steps=model.steps, why=f"{model.name} describes no more")
-    return found
+    return _proved(found) if proved else found
 
 
-def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000) -> FilterGuarantee:
-    """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`."""
-    return _proved(from_guess(given, within, horizon))
+def from_schedule(
+    given: Schedule, within: FilterLimits, horizon: int = 1_000, proved: bool = True, effort: float = EFFORT
+) -> FilterGuarantee:
+    """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`.
 
-
-def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000, effort: float = EFFORT) -> FilterGuarantee:
-    """Return what :func:`from_schedule` is going to prove, without a proof; `effort` limits what it may take."""
+    `effort` limits what a proof may take.
+    """
     n, m = given.program.n, given.program.m
     within = sized_limits(within, n, m, given.x0)
     radius, stored = loop_radius(given) if given.settled else math.nan, stored_sizes(given.fmt, within.measurement)
@@ -265,10 +255,11 @@ def from_guess(given: Schedule, within: FilterLimits, horizon: int = 1_000, effo
         none = np.full(n, np.inf)
         found, steps, why = Guess(none, none, np.full(m, np.inf), np.zeros((n, 3))), 0, str(error)
     derived = FilterLimits(found.state, found.innovation, stored)
-    return FilterGuarantee(
+    guess = FilterGuarantee(
         found.bound, steps, why, given.fmt, parts=found.parts, limits=derived, schedule=given, radius=radius,
         asked=within, lags=found.lags,
     )  # fmt: skip
+    return _proved(guess) if proved else guess
 
 
 def _check_effort(given: Schedule, steps: int | None, radius: float, effort: float) -> None:

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.gains import filter_schedule
-from gpbnb.bounds.guarantee import FilterGuarantee, from_guess, limits
+from gpbnb.bounds.guarantee import FilterGuarantee, from_schedule, limits
 from gpbnb.bounds.guess import float_errors, linear_steps, rounding_errors, value_sizes
-from gpbnb.bounds.system import OutputBounds
+from gpbnb.bounds.system import Recursion
 from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.word_formats import WordFormats
 
 
 class StepRoundings(NamedTuple):
@@ -63,9 +64,16 @@ def probable_error(found: FilterGuarantee) -> NDArray[np.float64]:
 
 
 def probable_output_errors(
-    system: LinearSystem, fmt: FloatFormat | FixedFormat, largest: NDArray[np.float64]
+    system: LinearSystem, largest: NDArray[np.float64], fmt: FloatFormat | FixedFormat | WordFormats
 ) -> NDArray[np.float64]:
-    """Estimate the error of each output, (p,): three deviations of roundings, and bounds of errors of storing."""
-    whole, made, n = OutputBounds(system, largest).guessed(fmt), system.as_filter(), system.n
-    found = from_guess(filter_schedule(made, fmt), limits(measurement=largest))
-    return np.asarray(whole - found.bound[n:] + 3 * probable_error(found)[n:])
+    """Estimate the error of each output, (p,): three deviations of roundings, and bounds of errors of storing.
+
+    Words have one format, that of their data.
+    """
+    fmt = fmt.data if isinstance(fmt, WordFormats) else fmt
+    if cause := system.unstable(fmt):
+        raise ValueError(cause)
+    made = system.as_filter()
+    whole = Recursion(made, largest, None).guess(fmt).bound
+    found = from_schedule(filter_schedule(made, fmt), limits(measurement=largest), proved=False)
+    return np.asarray(whole - found.bound + 3 * probable_error(found))[system.n :]

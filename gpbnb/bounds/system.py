@@ -18,6 +18,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.named import arithmetic
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.certificate import Proof, of_operations, proved
 from gpbnb.bounds.guess import (
     EXCESS,
@@ -165,27 +166,26 @@ class OutputBounds:
         self._largest = np.broadcast_to(all_above(largest), (system.m,))
         self._linear = Recursion(made, self._largest, steps) if made.program.is_linear else None
 
-    def guessed(self, fmt: FloatFormat | FixedFormat | WordFormats) -> Array:
-        """Return what :meth:`errors` is going to prove, without a proof."""
-        return self.errors(fmt, proved=False)
-
     def errors(self, fmt: FloatFormat | FixedFormat | WordFormats, proved: bool = True) -> Array:
         """Bound the error of each output, (p,), from the system as given, due to rounding and storing."""
-        if self._linear is None and not isinstance(fmt, WordFormats):
-            return limited_errors(self._system, fmt, self._largest, self._steps)
-        found: Any = self.proof(fmt) if proved else self._recursion(fmt).guess(fmt)
-        return np.asarray(found.bound[self._system.n :])
+        return self.proof(fmt, proved).bound
 
-    def proof(self, fmt: FloatFormat | FixedFormat | WordFormats) -> Proof:
-        """Return the bounds of states and outputs of a linear system with their certificate; see :meth:`errors`."""
-        return self._recursion(fmt).proof(fmt)
-
-    def _recursion(self, fmt: FloatFormat | FixedFormat | WordFormats) -> Recursion:
-        if self._linear is None:
-            raise ValueError(f"got {self._system.name}, which limits its values; needed a linear system for a bound")
-        if self._steps is None and not isinstance(fmt, WordFormats) and (cause := self._system.unstable(fmt)):
+    def proof(self, fmt: FloatFormat | FixedFormat | WordFormats, proved: bool = True) -> Proof:
+        """Return the bounds of :meth:`errors` with their certificate, which is empty if there is none."""
+        system, linear, n = self._system, self._linear, self._system.n
+        if linear is None:
+            if isinstance(fmt, WordFormats) and fmt != WordFormats(fmt.data):
+                raise ValueError(f"got {system.name}, which limits its values; needed a linear system for a bound")
+            fmt = fmt.data if isinstance(fmt, WordFormats) else fmt
+            return Proof(limited_errors(system, fmt, self._largest, self._steps), "")
+        if isinstance(fmt, FixedFormat) and fmt.rounding is not Rounding.STOCHASTIC:
+            fmt = WordFormats(fmt)  # as a run takes it
+        if self._steps is None and (cause := system.unstable(None if isinstance(fmt, WordFormats) else fmt)):
             raise ValueError(cause)
-        return self._linear
+        if not proved:
+            return Proof(linear.guess(fmt).bound[n:], "")
+        found = linear.proof(fmt)
+        return found._replace(bound=found.bound[n:])
 
 
 def output_errors(

@@ -67,16 +67,11 @@ def guarantee(
 
 def _of_system(system: LinearSystem, fmt: Any, largest: NDArray[np.float64], horizon: int) -> Guarantee:
     linear = system.as_filter().program.is_linear
-    words = WordFormats(fmt) if linear and isinstance(fmt, FixedFormat) else fmt
     why = system.unstable() if linear else ""
-    steps = horizon if why else None
-    for tried in (steps, horizon) if not linear else (steps,):
+    for steps in (horizon,) if why else (None,) if linear else (None, horizon):
         try:
-            bounds = OutputBounds(system, largest, tried)
-            if not linear and not isinstance(words, WordFormats):
-                return Guarantee(bounds.errors(fmt), tried, why, fmt)
-            proof = bounds.proof(words)
-            return Guarantee(proof.bound[system.n :], tried, why, fmt, proof.text)
+            bound, text = OutputBounds(system, largest, steps).proof(fmt)
+            return Guarantee(bound, steps, why, fmt, text)
         except (ValueError, OverflowError) as error:
             why = str(error)
     return Guarantee(np.full(system.p, np.inf), 0, why, fmt)

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.bounds import all_above
-from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import eigenvalues
 from gpbnb.arithmetic.search import Outcome
-from gpbnb.bounds.guarantee import FilterGuarantee, guarantee, guessed, sized_limits
+from gpbnb.bounds.guarantee import guarantee, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.bounds.probable import probable_error, probable_output_errors
 from gpbnb.bounds.system import OutputBounds
@@ -27,7 +26,6 @@ from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, nonlinear_checkpoints, opened, simulated, true_states
 from gpbnb.filters.run import reference
 from gpbnb.filters.system import LinearSystem, is_stable, system_inputs
-from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.answer import Basis
 from gpbnb.wordlength.asked import Asked, Data, is_filter, tolerances_of
 from gpbnb.wordlength.functions import referenced
@@ -244,7 +242,7 @@ def _for_ever(
         outside = _outside(_seen(model, z, sized))
 
     def over(steps: int | None) -> Judge:
-        guess, proof = (partial(_bounded, model, sized, form, steps, basis, each) for each in (guessed, guarantee))
+        guess, proof = (partial(_bounded, model, sized, form, steps, basis, each) for each in (False, True))
         if basis == "probable":
             return Judge(guess, tolerances, warnings=lambda: outside)
         return Judge(guess, tolerances, proof, steps, over if steps is None else None, lambda: outside)
@@ -258,12 +256,12 @@ def _bounded(
     form: Any,
     steps: int | None,
     basis: Basis,
-    bounded: Callable[..., FilterGuarantee],
+    proved: bool,
     fmt: Any,
 ) -> Found:
     """Return the bound of each state for ever or over some steps, or three deviations of its probable error."""
     try:
-        found = bounded(model, fmt, within, form, steps, steps or 1)
+        found = guarantee(model, fmt, within, form, steps, steps or 1, proved)
     except ValueError as error:
         return Outcome(math.inf, str(error))
     except OverflowError as error:
@@ -336,23 +334,12 @@ def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, w
     linear = system.as_filter().program.is_linear
 
     def over(steps: int | None) -> Judge:
-        known = OutputBounds(system, most, steps)
-
-        def bounds(proved: bool) -> Callable[[Any], Found]:
-            def found(fmt: Any) -> NDArray[np.float64]:
-                one = fmt.data if isinstance(fmt, WordFormats) and fmt == WordFormats(fmt.data) else fmt
-                if basis == "probable":
-                    return probable_output_errors(system, one, most)
-                if isinstance(one, FixedFormat) and linear:
-                    one = WordFormats(one)
-                return known.errors(one) if proved else known.guessed(one)
-
-            return reasoned(found)
-
         if basis == "probable":
-            return Judge(bounds(False), tolerances, warnings=lambda: outside)
-        later = over if steps is None and not linear else None
-        return Judge(bounds(False), tolerances, bounds(True), steps, later, lambda: outside)
+            probable = partial(probable_output_errors, system, most)
+            return Judge(reasoned(probable), tolerances, warnings=lambda: outside)
+        known, later = OutputBounds(system, most, steps), over if steps is None and not linear else None
+        guess, proof = (reasoned(partial(known.errors, proved=each)) for each in (False, True))
+        return Judge(guess, tolerances, proof, steps, later, lambda: outside)
 
     return over(data.steps if linear and not is_stable(system.A) else None)
 

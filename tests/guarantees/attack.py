@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.system import OutputBounds, output_errors
+from gpbnb.bounds.system import output_errors
 from gpbnb.filters.program import matrices
 from gpbnb.filters.structures import WITH_FIR
 from gpbnb.filters.system import LinearSystem
@@ -141,11 +141,7 @@ def linear(seed: int) -> Attacked:
     system, most = drawn_system(rng)
     fmt = drawn_format(rng, kind)
     try:
-        if isinstance(fmt, FloatFormat):
-            bound = output_errors(system, fmt, most)
-        else:
-            words = WordFormats(fmt) if isinstance(fmt, FixedFormat) else fmt
-            bound = OutputBounds(system, most).errors(words)
+        bound = output_errors(system, fmt, most)
     except (ValueError, OverflowError):
         return Attacked(kind, 0, 0.0)
     runs, largest = 0, 0.0

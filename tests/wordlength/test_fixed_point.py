@@ -114,7 +114,7 @@ def test_a_probable_error_is_less_than_a_bound_and_refused_in_words() -> None:
     system, asked = LinearSystem([["0.9"]], [["0.1"]]), {"z": [0.5] * 20, "tolerance": "1/100"}
     given = asked | {"within": limits(measurement=1)}
     probable, bound = (judge(system, "Q3.12", **given, basis=basis).ratio for basis in ("probable", "guarantee"))
-    assert probable == pytest.approx(probable_output_errors(system, FixedFormat(3, 12), np.ones(1))[0] * 100)
+    assert probable == pytest.approx(probable_output_errors(system, np.ones(1), FixedFormat(3, 12))[0] * 100)
     assert probable < bound / 2
     found = required_precision(system, **given, kind="fixed", like="Q3.9", basis="probable")
     assert dict(found.tried)[found.digits] <= 1 < dict(found.tried)[found.digits - 1]

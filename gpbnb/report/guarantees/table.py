@@ -17,7 +17,7 @@ from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.bounds.gains import filter_schedule
-from gpbnb.bounds.guarantee import FilterGuarantee, from_guess, from_schedule, guarantee, guessed, limits
+from gpbnb.bounds.guarantee import FilterGuarantee, from_schedule, guarantee, limits
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
@@ -223,14 +223,12 @@ def case_guarantee(
     case: GuaranteeCase, made: LinearModel | LinearFilter, fmt: FloatFormat, proved: bool = True
 ) -> FilterGuarantee:
     """Compute the guarantee of a case, whose filter is `made`, in a format; or only guess it."""
-    bounded, of_filter = (guarantee, from_schedule) if proved else (guessed, from_guess)
     if isinstance(made, LinearModel):
         within = limits(state=case.state, innovation=case.innovation)
         if case.horizon is not None:
-            return bounded(made, fmt, within, case.form, most=case.horizon, horizon=case.horizon)
-        return bounded(made, fmt, within, case.form, most=100_000, horizon=1)
-    schedule = filter_schedule(made, fmt)
-    return of_filter(schedule, limits(measurement=case.measurement))
+            return guarantee(made, fmt, within, case.form, case.horizon, case.horizon, proved)
+        return guarantee(made, fmt, within, case.form, 100_000, 1, proved)
+    return from_schedule(filter_schedule(made, fmt), limits(measurement=case.measurement), proved=proved)
 
 
 def _bits(
