@@ -10,7 +10,7 @@ import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
 
 import numpy as np
 import pytest
@@ -30,12 +30,13 @@ ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "NUMBA_
 def test_what_changed_or_was_damaged_is_compiled_again(tmp_path, monkeypatch):
     """A change in a folder of kernels concerns all functions, another one those of its file."""
     path = tmp_path / "own.py"
+    monkeypatch.setitem(sys.modules, "own", ModuleType("own"))  # numba looks for the module of what it loads
 
     def compiled(factor: int, kernels: bytes = b"") -> list[float]:
         text = f"def multiple(n):\n    @compiled\n    def f(x):\n        return n * x + {factor}\n    return f\n"
         path.write_text(f"from gpbnb.arithmetic.kernels.compiling import compiled\n{text}")
         monkeypatch.setattr(compiling, "_KERNELS", kernels)
-        two, three = map(runpy.run_path(str(path))["multiple"], (2.0, 3.0))
+        two, three = map(runpy.run_path(str(path), run_name="own")["multiple"], (2.0, 3.0))
         assert (two(5.0), three(5.0)) == (10.0 + factor, 15.0 + factor)
         return sum(each.stats.cache_misses.total() for each in (two, three))
 
