@@ -124,15 +124,19 @@ class Numbers:
 
     def run(self, ready: list[Any]) -> bool:
         """Run operations and calls; return whether the machine holds every result."""
+        far = machine.is_far(self.kind, self.values)
         for code, count, call in ready:
-            if count and self.evaluate(code) < count:
-                return False
+            if count:
+                done, far = machine.evaluated(self.memory, self.kind, self.tables, code, far)
+                if done < count:
+                    return False
             if call is not None:
                 given = (self.unpacked(self.values[each], each.shape, self.formats[0]) for each in call.operands)
                 packed = self.packed(call.function(*given))
                 if packed is None:
                     return False
                 self.hold(call.results, packed)
+                far = far or machine.is_far(self.kind, packed)
         return True
 
     def first_without_result(self, rows: NDArray[Any], formats: NDArray[np.int64]) -> int:

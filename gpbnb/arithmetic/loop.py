@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.interpreting import Numbers
-from gpbnb.arithmetic.kernels.tags import Quick
 from gpbnb.arithmetic.machine import Addresses, code_of, functions, is_far
 from gpbnb.interrupts import slices
 
@@ -80,20 +79,16 @@ class Loop(Numbers):
     def hold(self, places: Any, numbers: NDArray[Any]) -> None:
         """Set numbers that stay as they are, the same in all lanes, (count, ...)."""
         super().hold(places, numbers)
-        self._distant["held"] |= self._far(numbers)
+        self._distant["held"] |= is_far(self.kind, numbers)
 
     def feed(self, cycles: Sequence[tuple[int, NDArray[Any]]]) -> None:
         """Take numbers (members, count, ...) of which each step has one member, at places from one on."""
         self._cycles = [(place, np.ascontiguousarray(numbers)) for place, numbers in cycles]
-        self._distant["fed"] = any(self._far(numbers) for _, numbers in self._cycles)
+        self._distant["fed"] = any(is_far(self.kind, numbers) for _, numbers in self._cycles)
 
     def keep(self, places: NDArray[np.int64]) -> None:
         """Let :meth:`take` return the results at some places."""
         self._kept = len(places), self.memory.pieces(places)
-
-    def _far(self, numbers: NDArray[Any]) -> bool:
-        """Whether numbers may be too small or too large for quick computation."""
-        return isinstance(self.kind, Quick) and is_far(numbers)
 
     def compare_from(self, states: NDArray[Any], cycle: int) -> None:
         """Begin to look for states that repeat."""
@@ -150,7 +145,8 @@ class Loop(Numbers):
             held, self._before, after,
         )
         # fmt: on
-        far = any(self._distant.values()) or any(map(self._far, (self.states, *(numbers for _, numbers in own))))
+        given = self.states, *(numbers for _, numbers in own)
+        far = any(self._distant.values()) or any(is_far(self.kind, each) for each in given)
         self._notes[machine.DONE] = 0
         with contextlib.suppress(OverflowError, ZeroDivisionError):
             row = self._advance(steps, run, functions(self.kind, far, memory))

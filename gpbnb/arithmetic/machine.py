@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -57,6 +57,14 @@ def operands_of(code: int, *given: int) -> tuple[list[int], list[int]]:
 def takes_numbers(codes: NDArray[Any]) -> NDArray[np.bool_]:
     """Return which operands of each operation are places of numbers, (o, 3)."""
     return np.asarray(OPERANDS[0][codes])
+
+
+@cache
+def _loops() -> Any:
+    """Return the compiled loops, which take a second to import."""
+    from gpbnb.arithmetic.kernels import machine
+
+    return machine
 
 
 class Addresses:
@@ -218,14 +226,12 @@ _FEWEST, _MANY = 4, 24
 
 def _together(rows: NDArray[Any]) -> NDArray[np.int64]:
     """Return for each row 4 times the number of its run, plus how it runs; 0 if it runs on its own."""
-    from gpbnb.arithmetic.kernels import machine
-
     found, number = np.zeros(len(rows), np.int64), 0
     for begin, end in independent(rows):
         if end - begin >= _FEWEST and rows[begin, 0] <= CODES["multiply"]:
             for first, last, along in _stretches(rows[begin:end, 1:3], begin):
                 number += 1
-                found[first:last] = 4 * number + (machine.NEIGHBOURS if along else machine.GATHERED)
+                found[first:last] = 4 * number + (_loops().NEIGHBOURS if along else _loops().GATHERED)
     return found
 
 
@@ -282,8 +288,16 @@ class Memory:
         return self.width * np.stack([numbers[begins], np.diff(begins, append=len(numbers))], axis=1)
 
 
-def is_far(numbers: NDArray[Any]) -> bool:
-    """Whether some numbers are too small or too large for quick computation."""
+_FEW_NUMBERS = 24
+"""Numbers that Python compares faster than NumPy."""
+
+
+def is_far(kind: Any, numbers: NDArray[Any]) -> bool:
+    """Whether some numbers are too small or too large for quick computation, if a kind has it."""
+    if not isinstance(kind, tags.Quick):
+        return False
+    if numbers.size < _FEW_NUMBERS:
+        return any(not tags.QUICK_LEAST <= abs(x) <= 1 / tags.QUICK_LEAST for x in numbers.ravel().tolist() if x)
     sizes = np.abs(numbers)
     if sizes.min(initial=1) >= tags.QUICK_LEAST and sizes.max(initial=1) <= 1 / tags.QUICK_LEAST:
         return False
@@ -299,31 +313,32 @@ def functions(kind: Any, far: bool, memory: Memory) -> Iterator[int]:
 
     Numbers that may be too small or too large for quick computation are `far`.
     """
-    from gpbnb.arithmetic.kernels import machine
-
     quick, short = isinstance(kind, tags.Quick), len(memory.values) < _FEW_PLACES
     alone = memory.lanes == 1 and not (short and isinstance(kind, tags.DoubleDouble))
     if not (quick and far):
-        yield machine.address(kind, alone)
+        yield _loops().address(kind, alone)
     if quick:
-        yield machine.address(tags.Careful(), alone)
+        yield _loops().address(tags.Careful(), alone)
 
 
 def evaluate(memory: Memory, kind: Any, formats: Any, code: Any) -> int:
     """Run operations once in each lane; return how many have results, 0 if the machine does not tell."""
-    return _once(kind, formats, code, memory, isinstance(kind, tags.Quick) and is_far(memory.values))
+    return evaluated(memory, kind, formats, code, is_far(kind, memory.values))[0]
 
 
-def _once(kind: Any, formats: Any, code: Any, memory: Memory, far: bool) -> int:
-    from gpbnb.arithmetic.kernels import machine
+def evaluated(memory: Memory, kind: Any, formats: Any, code: Any, far: bool = False) -> tuple[int, bool]:
+    """Run operations as :func:`evaluate` does; also return whether numbers may then be `far`.
 
-    done = 0
+    Those are too small or too large for quick computation.
+    """
+    done, once, given = 0, _loops().once, (formats.address, code.table.address, memory.table.address, memory.lanes)
     with contextlib.suppress(OverflowError, ZeroDivisionError):
         for execute in functions(kind, far, memory):
-            done = machine.once(execute, formats.address, code.table.address, memory.table.address, memory.lanes)
+            done = once(execute, *given)
             if done == code.rows:
                 break
-    return int(done)
+            far = True
+    return int(done), far
 
 
 _NO_TRUTHS = np.array([0, 1], np.uint8)
@@ -338,7 +353,7 @@ def rounded(kind: Any, formats: Any, numbers: NDArray[Any]) -> NDArray[Any] | No
         values = np.zeros(((2 + sums) * count, *part.shape[1:]), part.dtype)
         values[:count] = part
         # However small or large they are, quick computation rounds them, or tells that it cannot.
-        if _once(kind, formats, _of_rounding(count, sums), Memory(values, _NO_TRUTHS), False) < count:
+        if evaluated(Memory(values, _NO_TRUTHS), kind, formats, _of_rounding(count, sums))[0] < count:
             return None
         found.append(values[-count:])
     return found[0] if len(found) == 1 else np.concatenate(found)
@@ -351,7 +366,7 @@ def accumulate(kind: Any, formats: Any, name: str, numbers: NDArray[Any]) -> boo
     for part in slices(len(numbers) - 1, memory.width):
         at, count = np.arange(part.start, part.stop, dtype=np.uint32), part.stop - part.start
         table = Addresses(at, at + 1, at, at + 1, np.array([0, count]), code, none, none, np.empty(0), 1, count)
-        if _once(kind, formats, Code(table, count), memory, False) < count:
+        if evaluated(memory, kind, formats, Code(table, count))[0] < count:
             return False
     return True
 
@@ -361,10 +376,8 @@ _AT_ONCE = 1 << 14  # numbers that stay in the processor's cache
 
 @lru_cache(maxsize=64)
 def _of_rounding(count: int, sums: bool) -> Code:
-    from gpbnb.arithmetic.kernels import machine
-
     at, none = np.arange(count, dtype=np.uint32), np.zeros(1, np.int64)
     b, out = at + np.uint32(count * sums), at + np.uint32(count * (1 + sums))
     begins, codes = np.array([0, count]), np.array([CODES["add" if sums else "round"]])
-    together = none + (machine.NEIGHBOURS if sums else machine.ONE_BY_ONE)
+    together = none + (_loops().NEIGHBOURS if sums else _loops().ONE_BY_ONE)
     return Code(Addresses(at, b, at, out, begins, codes, none, together, np.empty(0), 1, count), count)
