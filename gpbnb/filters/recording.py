@@ -64,7 +64,7 @@ def _independent(program: Program) -> list[NDArray[np.int64]]:
     keys = program.rows[:, 0], np.array(level, np.int64)
     order = np.lexsort(keys)
     edges = np.flatnonzero(np.any([np.diff(each[order]) != 0 for each in keys], axis=0))
-    return np.split(order, edges + 1)
+    return [each for each in np.split(order, edges + 1) if len(each)]
 
 
 class Known(NamedTuple):

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 from gpbnb import required_precision
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, limits
 from gpbnb.bounds.probable import probable_error
+from gpbnb.filters.program import recorded
+from gpbnb.filters.structures import LinearFilter
 from gpbnb.filters.system import LinearSystem, is_stable
 
 SMALL = LinearSystem([["0.9", "0.2"], [0, "-0.5"]], [["0.1"], [1]], [[1, "0.3"]], [["0.25"]])
@@ -77,6 +80,13 @@ def test_an_overflow_names_output_and_step(C, place, fmt):
     assert np.isfinite(system.outputs([[0]] * (int(place[-1]) - 1), fmt)).all()
     with pytest.raises(OverflowError, match=rf"^{place}: got a (result|number) beyond the range of float64"):
         system.outputs([[0]] * 6, fmt)
+
+
+@pytest.mark.parametrize("fmt", [None, FloatFormat(2, 24), FloatFormat(10, 8), FixedFormat(3, 8)])
+def test_a_step_without_operations_delays(fmt):
+    program = recorded(lambda c, x, u: [u[0], x[0]], 2, 1, 0, p=1)
+    delay = LinearSystem.from_filter(LinearFilter(program, exact([])))
+    assert delay.outputs([[1], [2], [3]], fmt)[:, 0, 0].tolist() == [0, 1, 2]
 
 
 # -- stability -------------------------------------------------------------------------------------------------------
