@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,25 +39,22 @@ Function = Callable[..., Any]
 """A function ``run(fmt, z)``, or ``run(fmt)`` without z, that returns the outputs of all steps in the format."""
 
 
-class Data(NamedTuple):
-    """What a model is run with: measurements or inputs, (steps, m), or their number; and the seed to simulate them."""
-
-    z: Any
-    steps: int
-    seed: int = 0
-
-
 @dataclass(frozen=True)
 class Asked:
-    """What is asked about a model, apart from the formats to try; a search calls `ran` after each run."""
+    """What is asked about a model, apart from the formats to try; a search calls `ran` after each run.
+
+    The measurements or inputs z are (steps, m), or None if they are simulated with the seed, or if there are none.
+    """
 
     model: Any
-    data: Data
+    z: Any
+    steps: int
     tolerance: Any = math.inf
     basis: Basis = "emulation"
     within: FilterLimits | None = None
     form: Form = Form.INNOVATION
     highest: int | None = None
+    seed: int = 0
     ran: Callable[[], object] = lambda: None
 
     @classmethod
@@ -66,7 +63,7 @@ class Asked:
         basis = checked_basis(more.get("basis", "emulation"))
         given = admitted(model, TASK_OF_BASIS[basis], *tasks, "" if form is None else "have a form")
         chosen = form_named(Form.INNOVATION if form is None else form)
-        found = cls(given, data_of(given, z, seed), form=chosen, **more)
+        found = cls(given, *data_of(given, z, seed), form=chosen, seed=int(seed), **more)
         if found.within is not None and not isinstance(found.within, FilterLimits):
             raise TypeError(f"got within={found.within!r}; needed the result of limits(...)")
         if found.within is not None and basis in ("emulation", "bound"):
@@ -85,7 +82,7 @@ class Asked:
         """
         notes, for_ever = tuple(filter(None, notes)), self.basis in ("guarantee", "probable") and not ends
         form = self.form if is_filter(self.model) else None
-        steps = None if for_ever else self.data.steps
+        steps = None if for_ever else self.steps
         tried = tried or ((digits_of(fmt), ratio),)
         return Requirement(fmt, ratio, self.basis, steps, tried, joined(text, notes), why, notes, form, **more)
 
@@ -251,17 +248,17 @@ def admitted(model: Any, *tasks: str) -> Any:
     return found
 
 
-def data_of(model: Any, z: Any, seed: int = 0) -> Data:
-    """Return what a model is run with: (steps, m), (steps,) for one measurement or input, or a number of steps."""
+def data_of(model: Any, z: Any, seed: int = 0) -> tuple[Any, int]:
+    """Return measurements or inputs, (steps, m), and their number, from these, from (steps,), or from a number."""
     if isinstance(z, str | Path) or z is None:
         raise ValueError(f"got {z!r} for z; needed measurements or inputs, (steps, m), or a number of steps")
     simulated = not isinstance(z, list | tuple) and not hasattr(z, "to_fractions") and np.ndim(z) == 0
-    if (seed := whole_number("seed", seed, 0)) and not (simulated and is_filter(model)):
+    if whole_number("seed", seed, 0) and not (simulated and is_filter(model)):
         raise ValueError(
             f"got seed {seed} where nothing is simulated; needed none: a seed is for the measurements of a Kalman "
             "filter that are given as a number of steps"
         )
     if simulated:
-        return Data(None, whole_number("steps", z, most=MOST_STEPS), seed)
+        return None, whole_number("steps", z, most=MOST_STEPS)
     given = in_columns(z, getattr(model, "m", 0))
-    return Data(given, len(given))
+    return given, len(given)

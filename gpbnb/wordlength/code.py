@@ -150,8 +150,8 @@ def write_code(
         raise ValueError("got exact=False in fixed point; needed BINARY32 or BINARY64, which C's functions take")
     found = prepared(given, chosen, form, exact)
     source = CodeSource(numbers_for(found.step, chosen), name)
-    data = data_of(given, VECTORS if inputs is None else inputs)
-    z = found.inputs(data.steps) if data.z is None else data.z
+    z, steps = data_of(given, VECTORS if inputs is None else inputs)
+    z = found.inputs(steps) if z is None else z
     if within is not None and found.bounded is None:
         raise ValueError(f"got limits for {given.name}; needed none: functions of your own have no bound")
     vectors = found.emulate(z, chosen)

@@ -20,7 +20,7 @@ from gpbnb.filters.smoothing import FixedIntervalSmoother
 from gpbnb.filters.system import LinearSystem, SystemRun, system_inputs
 from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.answer import format_in_words
-from gpbnb.wordlength.asked import AnyFormat, Asked, Data, Function, checked_format, is_filter
+from gpbnb.wordlength.asked import AnyFormat, Asked, checked_format, is_filter
 from gpbnb.wordlength.functions import STOPS, exact_outputs, outputs_of, referenced
 from gpbnb.wordlength.judges import measured
 from gpbnb.wordlength.models import ModelSource
@@ -103,12 +103,9 @@ def emulate(
     words = "have formats for data, coefficients and sums" if isinstance(fmt, WordFormats) else ""
     blocks = "have formats for blocks" if isinstance(fmt, BlockFormats) else ""
     asked = Asked.of(model, z, words, blocks, form=form, seed=seed)
-    given, data = asked.model, asked.data
-    if is_filter(given):
-        return _filter(given, data, fmt, asked.form)
-    if isinstance(given, LinearSystem):
-        return _system(given, data, fmt)
-    return _function(given, data, fmt)
+    if is_filter(asked.model):
+        return _filter(asked, fmt)
+    return (_system if isinstance(asked.model, LinearSystem) else _function)(asked, fmt)
 
 
 def _in_format(pairs: NDArray[np.float64], fmt: Any) -> FloatArray:
@@ -120,20 +117,21 @@ def _in_format(pairs: NDArray[np.float64], fmt: Any) -> FloatArray:
     return found
 
 
-def _filter(model: Any, data: Data, fmt: Any, form: Form) -> EmulatedRun:
-    sound, z = measured(model, data)
-    run = opened(sound, fmt, form)
+def _filter(asked: Asked, fmt: Any) -> EmulatedRun:
+    sound, z = measured(asked)
+    run = opened(sound, fmt, asked.form)
     states, true = run.states(stored_measurements(z, fmt)), true_states(sound, z)
     x = _in_format(states, fmt.state if isinstance(fmt, BlockFormats) else fmt)
     errors = np.asarray((states - true[: len(states)]).sum(axis=2))
     repairs = tuple(str(each) for each in run.repairs)
-    return EmulatedRun(fmt, x, None, errors, run.reason, run.indefinite, form, repairs)
+    return EmulatedRun(fmt, x, None, errors, run.reason, run.indefinite, asked.form, repairs)
 
 
-def _system(system: LinearSystem, data: Data, fmt: Any) -> EmulatedRun:
-    if data.z is None:
+def _system(asked: Asked, fmt: Any) -> EmulatedRun:
+    system = asked.model
+    if asked.z is None:
         raise ValueError(f"got a number of steps for {system.name}; needed its inputs, of shape (steps, {system.m})")
-    u, n = system_inputs(system, data.z), system.n
+    u, n = system_inputs(system, asked.z), system.n
     run, true = SystemRun(system, fmt), system.outputs(u)
     pairs = run.states(u)
     numbers = _in_format(pairs, fmt.data if isinstance(fmt, WordFormats) else fmt)
@@ -141,13 +139,13 @@ def _system(system: LinearSystem, data: Data, fmt: Any) -> EmulatedRun:
     return EmulatedRun(fmt, numbers[:, :n], numbers[:, n:], errors, run.reason)
 
 
-def _function(run: Function, data: Data, fmt: Any) -> EmulatedRun:
-    made, z, true, _ = referenced(run, data, 1.0, fmt.base, fmt.precision)
+def _function(asked: Asked, fmt: Any) -> EmulatedRun:
+    made, z, true, _ = referenced(replace(asked, tolerance=1.0), fmt.base, fmt.precision)
     try:
         found = outputs_of(made, fmt, z, None)
     except STOPS as fault:
         return EmulatedRun(fmt, None, None, np.zeros((0, true.shape[1])), f"the function stops: {fault}")
     errors = (exact_outputs(found) - true).astype(np.float64)
-    if isinstance(run, FixedIntervalSmoother):
-        return EmulatedRun(fmt, found, None, errors, form=form_named(run.form))
+    if isinstance(made, FixedIntervalSmoother):
+        return EmulatedRun(fmt, found, None, errors, form=form_named(made.form))
     return EmulatedRun(fmt, None, found, errors)

@@ -166,7 +166,7 @@ class _FixedSearch:
                 return f"{text} {'fails' if bits == 1 else 'fail'}: {reasons[bits]}{cure}"
             return f"{text} {'gives' if bits == 1 else 'give'} {ratios[bits]:.3g} times the tolerance"
 
-        known, needed = evidence(asked.basis, asked.data.steps, ends)
+        known, needed = evidence(asked.basis, asked.steps, ends)
         if found.fmt is None:
             cause = self.blame(largest) or self.unstable()
             why = cause or f"{rejection(largest)}; {most}"
@@ -222,7 +222,7 @@ class _FixedSearch:
         largest = LARGEST_FRACTION - 1 if fmt is None else fmt.fraction_bits - 1
         if other is None:
             slow = self.made is not None and fmt is None and self.judge.proved is not None
-            text = slowest_response(self.asked.model, self.asked.data.steps) if slow else ""
+            text = slowest_response(self.asked.model, self.asked.steps) if slow else ""
             return text and f"errors add up because the system is slow: its {text}"
         asked = replace(self.asked, model=other)
         like = replace(self.like, integer_bits=_integer_bits(asked)) if self.widens else self.like
@@ -250,11 +250,11 @@ def _compiled_fraction(like: FixedFormat) -> int:
 
 def _integer_bits(asked: Asked, stored: bool = False) -> int:
     """Return the integer bits that a model and its data need at least, or only what a linear system stores of them."""
-    model, data = asked.model, asked.data
+    model, z = asked.model, asked.z
     if isinstance(model, LinearSystem):
-        if data.z is None:
+        if z is None:
             return 0 if asked.within is None else bits_for(float(np.max(asked.within.measurement)))
-        program, of_values = model.as_filter().program, _sizes(model, data.z)
+        program, of_values = model.as_filter().program, _sizes(model, z)
         kept = np.concatenate([np.ones(program.n + program.m, np.bool_), ~(program.wide & stored)])
         return _holding_limits(model, bits_for(float(of_values[kept].max())))
     sizes = [0.0]
@@ -263,9 +263,9 @@ def _integer_bits(asked: Asked, stored: bool = False) -> int:
         sizes += [
             abs(float(each)) for letter in ("Phi", "H", "Q", "R", "x0", "P0") for each in getattr(noise, letter).flat
         ]
-        data = data._replace(z=measured(model, data)[1])
-    if data.z is not None and not hasattr(data.z, "to_fractions"):
-        sizes.append(float(np.abs(np.asarray(data.z, dtype=np.float64)).max()))
+        _, z = measured(asked)
+    if z is not None and not hasattr(z, "to_fractions"):
+        sizes.append(float(np.abs(np.asarray(z, dtype=np.float64)).max()))
     return bits_for(max(sizes))
 
 
@@ -357,6 +357,6 @@ def in_words(asked: Asked, rounding: Rounding, bits: int) -> Requirement:
             words = narrow
             break
     ratio = judge.proof(words).ratio
-    known, _ = evidence(asked.basis, asked.data.steps, judge.steps is not None)
+    known, _ = evidence(asked.basis, asked.steps, judge.steps is not None)
     text, notes = f"{words}: {share_text(ratio)}, {known}", judge.warnings()
     return replace(data, format=words, ratio=ratio, text=joined(text, notes), why="", notes=notes)

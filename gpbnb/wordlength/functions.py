@@ -22,7 +22,7 @@ from gpbnb.arithmetic.traced import TracedFunction
 from gpbnb.filters.model import real_numbers
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.smoothing import FixedIntervalSmoother
-from gpbnb.wordlength.asked import Data, Function, tolerances_of
+from gpbnb.wordlength.asked import Asked, tolerances_of
 
 SPARE_BITS = 37
 """Bits that the reference has beyond the highest precision; a second run that checks it has half as many again."""
@@ -58,9 +58,9 @@ class Referenced(NamedTuple):
             return Outcome(math.inf, f"the function stops: {fault}", isinstance(fault, OverflowError))
 
 
-def referenced(run: Function, data: Data, tolerance: Any, base: int, most: int) -> Referenced:
+def referenced(asked: Asked, base: int, most: int) -> Referenced:
     """Compute the reference of a function in more digits than `most`, and again in half as many again."""
-    inputs, steps = None if data.z is None else real_numbers(data.z), data.steps
+    run, inputs, steps = asked.model, None if asked.z is None else real_numbers(asked.z), asked.steps
     if isinstance(run, FixedIntervalSmoother):
         if inputs is not None or steps != len(run.z):
             raise ValueError(f"got z for a smoother, which has its record; needed its number of steps, {len(run.z)}")
@@ -69,7 +69,7 @@ def referenced(run: Function, data: Data, tolerance: Any, base: int, most: int) 
     made = run if isinstance(run, Prepared) else TracedFunction(run)
     digits = max(most, largest_by_default(base)) + math.ceil(SPARE_BITS / math.log2(base))
     short, true = (_reference(made, FloatFormat(base, each), inputs, steps) for each in (digits, digits * 3 // 2))
-    tolerances = tolerances_of(tolerance, true.shape[1], "outputs")
+    tolerances = tolerances_of(asked.tolerance, true.shape[1], "outputs")
     off = float((_largest(short - true) / tolerances).max())
     if not off <= SETTLED:
         raise ValueError(

@@ -26,8 +26,7 @@ from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
 from gpbnb.filters.nonlinear_run import check_form, nonlinear_checkpoints, opened, simulated, true_states
 from gpbnb.filters.run import reference
 from gpbnb.filters.system import LinearSystem, is_stable, system_inputs
-from gpbnb.wordlength.answer import Basis
-from gpbnb.wordlength.asked import Asked, Data, is_filter, tolerances_of
+from gpbnb.wordlength.asked import Asked, is_filter, tolerances_of
 from gpbnb.wordlength.functions import referenced
 
 Found = NDArray[np.float64] | Outcome
@@ -88,16 +87,12 @@ class Judge:
 
 def judge_for(asked: Asked, base: int = 2, most: int = 0) -> Judge:
     """Check a question, and return what answers it; `base` and `most` digits are for a function's reference."""
-    model, data, basis = asked.model, asked.data, asked.basis
-    if isinstance(model, LinearSystem):
-        return _of_system(model, data, asked.tolerance, basis, asked.within)
-    if not is_filter(model):
-        given = referenced(model, data, asked.tolerance, base, most)
-        return Judge(given.errors, given.tolerances, untraced=given.untraced)
-    tolerances = tolerances_of(asked.tolerance, model.n, "states")
-    if basis in ("emulation", "bound"):
-        return _of_record(model, data, tolerances, asked.form, basis == "bound")
-    return _for_ever(model, data, tolerances, basis, asked.form, asked.within)
+    if isinstance(asked.model, LinearSystem):
+        return _of_system(asked)
+    if is_filter(asked.model):
+        return (_of_record if asked.basis in ("emulation", "bound") else _for_ever)(asked)
+    given = referenced(asked, base, most)
+    return Judge(given.errors, given.tolerances, untraced=given.untraced)
 
 
 def for_ever_or_over(
@@ -106,7 +101,7 @@ def for_ever_or_over(
     """Ask a judge for a bound for ever or, if it has none, over the steps of the data; return that judge, too."""
     found = ask(judge)
     if not has_bound(found) and judge.over is not None:
-        later = judge.over(asked.data.steps)
+        later = judge.over(asked.steps)
         if has_bound(ended := ask(later)):
             return ended, later
     return found, judge
@@ -129,9 +124,9 @@ def reasoned(errors: Callable[[Any], Found]) -> Callable[[Any], Found]:
 # -- Kalman filters ---------------------------------------------------------------------------------------------------
 
 
-def measured(model: AnyModel, data: Data) -> tuple[AnyModel, NDArray[Any]]:
+def measured(asked: Asked) -> tuple[AnyModel, NDArray[Any]]:
     """Return a model for the measurements that are present, and the measurements (steps, m), perhaps simulated."""
-    z = _simulated(model, data) if data.z is None else data.z
+    model, z = asked.model, _simulated(asked) if asked.z is None else asked.z
     sound, filled = model.without_missing(z)
     found = np.asarray(filled)
     if found.ndim != 2 or found.shape[1] != model.m or not len(found):
@@ -142,7 +137,7 @@ def measured(model: AnyModel, data: Data) -> tuple[AnyModel, NDArray[Any]]:
     if found.dtype.kind == "f" and not np.isfinite(found).all():
         k, i = np.argwhere(~np.isfinite(found))[0]
         which = named("measurement", int(i), model.measurement_names)
-        if data.z is None:
+        if asked.z is None:
             raise ValueError(
                 f"the simulated measurements grow beyond float64 by step {k + 1}: {model.name} is not stable; give "
                 "measurements, or fewer steps"
@@ -154,31 +149,31 @@ def measured(model: AnyModel, data: Data) -> tuple[AnyModel, NDArray[Any]]:
     return sound, found
 
 
-def _simulated(model: AnyModel, data: Data) -> NDArray[Any]:
+def _simulated(asked: Asked) -> NDArray[Any]:
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            return simulated(model, data.steps, data.seed)
+            return simulated(asked.model, asked.steps, asked.seed)
     except OverflowError:
         raise ValueError(
-            f"the simulated measurements of {model.name} grow beyond float64: it is not stable; give measurements, or "
-            "fewer steps"
+            f"the simulated measurements of {asked.model.name} grow beyond float64: it is not stable; give "
+            "measurements, or fewer steps"
         ) from None
 
 
-def _of_record(model: AnyModel, data: Data, tolerances: NDArray[np.float64], form: Form, bounded: bool) -> Judge:
+def _of_record(asked: Asked) -> Judge:
     """Judge the errors of one run with a measurement record, or its bounds."""
-    sound, z = measured(model, data)
+    tolerances, bounded = tolerances_of(asked.tolerance, asked.model.n, "states"), asked.basis == "bound"
+    sound, z = measured(asked)
     if not bounded and isinstance(sound, NonlinearModel):
-        check_form(sound, form)
+        check_form(sound, asked.form)
     true = None if bounded else true_states(sound, z)
-
     lacking = cache(lambda: _without_variance(sound, z))
 
     def of_form(form: Form) -> Judge:
         errors = partial(_recorded, sound, z, form, true, lacking)
         return Judge(errors, tolerances, beyond="the bound says nothing", model=sound, form=form, of_form=of_form)
 
-    return of_form(form)
+    return of_form(asked.form)
 
 
 def _recorded(
@@ -221,28 +216,28 @@ def _without_variance(model: Any, z: NDArray[Any]) -> str:
     return f"; the model gives {' and '.join(lacking)} no variance, {cure}" if lacking else ""
 
 
-def _for_ever(
-    model: LinearModel, data: Data, tolerances: Any, basis: Basis, form: Form, within: FilterLimits | None
-) -> Judge:
+def _for_ever(asked: Asked) -> Judge:
     """Judge the guarantee for all measurements within limits, or three deviations of the probable error."""
-    if within is None:
+    model, basis, form = asked.model, asked.basis, asked.form
+    tolerances = tolerances_of(asked.tolerance, model.n, "states")
+    if asked.within is None:
         raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
-    sized = sized_limits(within, model.n, model.m, model.x0)
+    sized = sized_limits(asked.within, model.n, model.m, model.x0)
     if form not in WITH_PROGRAM:
         raise ValueError(f'got the {form} form and basis "{basis}"; needed one of {", ".join(map(str, WITH_PROGRAM))}')
     if model.steps is not None:
         raise ValueError(f'got a model of {model.steps} steps and basis "{basis}"; needed one that goes on for ever')
     outside: tuple[str, ...] = ()
-    if data.z is not None:
-        sound, z = measured(model, data)
+    if asked.z is not None:
+        sound, z = measured(asked)
         if sound is not model:
             raise ValueError(
                 f'got missing measurements and basis "{basis}"; needed none: it does not depend on a record'
             )
-        outside = _outside(_seen(model, z, sized))
+        outside = _outside(_seen(asked.model, z, sized))
 
     def over(steps: int | None) -> Judge:
-        guess, proof = (partial(_bounded, model, sized, form, steps, basis, each) for each in (False, True))
+        guess, proof = (partial(_bounded, asked, sized, steps, each) for each in (False, True))
         if basis == "probable":
             return Judge(guess, tolerances, warnings=lambda: outside)
         return Judge(guess, tolerances, proof, steps, over if steps is None else None, lambda: outside)
@@ -250,18 +245,10 @@ def _for_ever(
     return over(None)
 
 
-def _bounded(
-    model: LinearModel,
-    within: FilterLimits,
-    form: Any,
-    steps: int | None,
-    basis: Basis,
-    proved: bool,
-    fmt: Any,
-) -> Found:
+def _bounded(asked: Asked, within: FilterLimits, steps: int | None, proved: bool, fmt: Any) -> Found:
     """Return the bound of each state for ever or over some steps, or three deviations of its probable error."""
     try:
-        found = guarantee(model, fmt, within, form, steps, steps or 1, proved)
+        found = guarantee(asked.model, fmt, within, asked.form, steps, steps or 1, proved)
     except ValueError as error:
         return Outcome(math.inf, str(error))
     except OverflowError as error:
@@ -270,7 +257,7 @@ def _bounded(
         return Outcome(math.inf, f"overflow: {error}", True)
     if not found.for_ever and found.steps != steps:
         return Outcome(math.inf, found.why, "exceed the largest" in found.why)
-    return 3 * probable_error(found) if basis == "probable" else found.bound
+    return 3 * probable_error(found) if asked.basis == "probable" else found.bound
 
 
 def _seen(model: LinearModel, z: NDArray[Any], within: FilterLimits) -> dict[str, tuple[Any, Any, Any]]:
@@ -302,10 +289,11 @@ def _outside(seen: dict[str, tuple[Any, Any, Any]]) -> tuple[str, ...]:
 # -- linear systems ---------------------------------------------------------------------------------------------------
 
 
-def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, within: FilterLimits | None) -> Judge:
-    tolerances, u = tolerances_of(tolerance, system.p, "outputs"), None
-    if data.z is not None:
-        u = system_inputs(system, data.z)
+def _of_system(asked: Asked) -> Judge:
+    system, basis, within = asked.model, asked.basis, asked.within
+    tolerances, u = tolerances_of(asked.tolerance, system.p, "outputs"), None
+    if asked.z is not None:
+        u = system_inputs(system, asked.z)
     elif within is None:
         how = "" if basis == "emulation" else '; or basis "guarantee" and within=limits(measurement=...)'
         raise ValueError(
@@ -341,7 +329,7 @@ def _of_system(system: LinearSystem, data: Data, tolerance: Any, basis: Basis, w
         guess, proof = (reasoned(partial(known.errors, proved=each)) for each in (False, True))
         return Judge(guess, tolerances, proof, steps, later, lambda: outside)
 
-    return over(data.steps if linear and not is_stable(system.A) else None)
+    return over(asked.steps if linear and not is_stable(system.A) else None)
 
 
 def largest_inputs(system: LinearSystem, within: FilterLimits) -> NDArray[np.float64]:

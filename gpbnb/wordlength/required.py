@@ -203,7 +203,7 @@ def judge(
         lambda outcome: not math.isinf(outcome.ratio),
     )
     ends, notes = judge.steps is not None, judge.warnings() if found.ratio <= 1 else ()
-    text = judgement(chosen, basis, asked.data.steps, found.ratio, found.why, ends)
+    text = judgement(chosen, basis, asked.steps, found.ratio, found.why, ends)
     return asked.answer(chosen, found.ratio, (), ends, text, found.why, notes)
 
 
@@ -302,7 +302,7 @@ def _of_linear_system(asked: Asked, found: Search[FloatFormat], like: FloatForma
         if _is_long(system):
             unit = digit_unit(like.base)
             notes.append(f"second-order sections usually need fewer {unit}: their coefficients move the poles less")
-        elif asked.basis != "emulation" and (slow := slowest_response(system, asked.data.steps)):
+        elif asked.basis != "emulation" and (slow := slowest_response(system, asked.steps)):
             notes.append(f"errors add up because the system is slow: its {slow}")
         return notes, ""
     if asked.basis == "probable":
@@ -363,7 +363,7 @@ def _float_answer(
     asked: Asked, found: Search[FloatFormat], ends: bool, notes: list[str], cause: str, like: FloatFormat
 ) -> Requirement:
     fmt, tried, base = found.fmt, dict(found.tried), like.base
-    known, needed = evidence(asked.basis, asked.data.steps, ends)
+    known, needed = evidence(asked.basis, asked.steps, ends)
     processors = list[tuple[str, float]]()
     for name, each in _processors_with(fmt):
         if each.precision <= found.largest and not any(ratio <= 1 for _, ratio in processors):

@@ -13,7 +13,7 @@ from gpbnb import BINARY16, FloatFormat, LinearSystem, required_precision
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.sections import _filtered, scaled
 from gpbnb.filters.structures import STRUCTURES, reflections
-from gpbnb.wordlength.asked import Asked, Data
+from gpbnb.wordlength.asked import Asked
 from gpbnb.wordlength.judges import judge_for
 from tests import plain_structures
 
@@ -50,7 +50,7 @@ def test_no_run_is_beyond_its_bound(structure):
     for fmt in FORMATS:
         b, a = random_filter(rng, int(rng.integers(1, 6)))
         system = LinearSystem.from_coefficients(b, a, structure)
-        bound = judge_for(Asked(system, Data([[1.0]], 1), 1.0, "guarantee")).error(fmt).ratio
+        bound = judge_for(Asked(system, [[1.0]], 1, 1.0, "guarantee")).error(fmt).ratio
         if math.isinf(bound):
             continue
         response = system.outputs(np.eye(150, 1))[:, 0, 0]

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from gpbnb import FixedFormat, LinearSystem, WordFormats, required_precision
-from gpbnb.wordlength.asked import Asked, Data
+from gpbnb.wordlength.asked import Asked
 from gpbnb.wordlength.fixed import MOST_COEFFICIENT_BITS
 from gpbnb.wordlength.judges import judge_for
 
 
 def words_error(system, z, tolerance, basis="emulation"):
-    return judge_for(Asked(system, Data(z, len(z)), tolerance, basis)).proof
+    return judge_for(Asked(system, z, len(z), tolerance, basis)).proof
 
 
 ALPHA = Fraction(1097, 4096)
