@@ -6,12 +6,13 @@ Errors and bounds are compared as exact Fractions, so even the smallest violatio
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 import math
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
 from typing import Any, cast
 
 import numpy as np
@@ -122,9 +123,9 @@ def chain_trial(matrices: Sequence[FloatArray]) -> Trial:
     An entry of the product is a sum over paths, each with one entry from every factor. A path passes through at
     most as many roundings as all factors but the last have columns.
     """
-    computed, true = matrices[0], matrices[0].to_fractions()
-    for matrix in matrices[1:]:
-        computed, true = computed @ matrix, true @ matrix.to_fractions()
+    computed = functools.reduce(operator.matmul, matrices)
+    wholes, units = zip(*(integers(matrix.to_fractions()) for matrix in matrices), strict=True)
+    true = functools.reduce(operator.matmul, wholes) * math.prod(units)
     roundings, beta = sum(matrix.shape[1] for matrix in matrices[:-1]), computed.format.unit_roundoff
     norms = math.prod(column_sum_norm(matrix) for matrix in matrices)
     bounds = {"(31)": roundings * beta * column_sum_norm(true), "(32)": roundings * beta * norms}
@@ -177,12 +178,20 @@ def random_numbers(
     draws exponents over a range of twice the precision. "cancelling" draws mixed signs and replaces the last number
     along the last axis by minus the rounded sum of the others.
     """
+    return _numbers(fmt, kind, *_drawn(rng, fmt, shape, kind))
+
+
+def _drawn(rng: np.random.Generator, fmt: FloatFormat, shape: tuple[int, ...], kind: str) -> Any:
+    """Draw significands and exponents."""
     limit = fmt.base**fmt.precision
     significands = rng.integers(limit // fmt.base, limit, shape)
     if kind != "like signs":
         significands = significands * rng.choice([-1, 1], shape)
     far = fmt.precision if kind == "far exponents" else 0
-    exponents = rng.integers(-far, far + 1, shape) if far else np.zeros(shape, np.int64)
+    return significands, rng.integers(-far, far + 1, shape) if far else np.zeros(shape, np.int64)
+
+
+def _numbers(fmt: FloatFormat, kind: str, significands: Any, exponents: Any) -> FloatArray:
     numbers = FloatArray.from_pairs(significands.astype(object), exponents.astype(object), fmt)
     if kind == "cancelling":
         head = numbers[..., :-1]
@@ -199,29 +208,29 @@ SURVEYED = tuple(
 )
 
 
-@cache
+@functools.cache
 def survey(trial: str, repeats: int = 10, seed: int = 1984) -> tuple[Trial, ...]:
     """Run random trials of one computation over the formats :data:`SURVEYED`, several sizes and kinds of data."""
     sizes = (2, 3, 5, 10) if trial in ("sum", "product", "dot") else (1, 2, 3)
     # Factors cannot cancel in a product, and its divisors must not be zero.
     kinds = KINDS[:3] if trial == "product" else KINDS
     rng, trials = np.random.default_rng(seed), []
+    compute, shapes = _TRIALS[trial]
     for fmt, size, kind in itertools.product(SURVEYED, sizes, kinds):
-
-        def new(*shape: int, fmt: FloatFormat = fmt, kind: str = kind) -> FloatArray:
-            return random_numbers(rng, fmt, shape, kind)
-
-        trials += [_DRAWS[trial](new, size) for _ in range(repeats)]
+        drawn = [[_drawn(rng, fmt, shape, kind) for shape in shapes(size)] for _ in range(repeats)]
+        inputs = [_numbers(fmt, kind, *map(np.stack, zip(*same, strict=True))) for same in zip(*drawn, strict=True)]
+        trials += [compute(*given) for given in zip(*inputs, strict=True)]
     return tuple(trials)
 
 
-_DRAWS: dict[str, Callable[[Callable[..., FloatArray], int], Trial]] = {
-    "sum": lambda new, n: sum_trial(new(n)),
-    "product": lambda new, n: product_trial(new(n), new(n // 2)),
-    "dot": lambda new, n: dot_trial(new(n), new(n)),
-    "matrix sum": lambda new, n: matrix_sum_trial(new(n, n), new(n, n)),
-    "chain": lambda new, n: chain_trial([new(n, n) for _ in range(4)]),
-    "example": lambda new, n: example_trial(*(new(n, n) for _ in range(4))),
+#: The function of each trial, and the shapes of its inputs for a size.
+_TRIALS: dict[str, tuple[Callable[..., Trial], Callable[[int], list[tuple[int, ...]]]]] = {
+    "sum": (sum_trial, lambda n: [(n,)]),
+    "product": (product_trial, lambda n: [(n,), (n // 2,)]),
+    "dot": (dot_trial, lambda n: [(n,)] * 2),
+    "matrix sum": (matrix_sum_trial, lambda n: [(n, n)] * 2),
+    "chain": (lambda *matrices: chain_trial(matrices), lambda n: [(n, n)] * 4),
+    "example": (example_trial, lambda n: [(n, n)] * 4),
 }
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import product
 from typing import Any
 
@@ -54,7 +54,7 @@ class Case:
         """Return an expression of the derivation with the values of this case."""
         return expression.subs({OMEGA: self.omega, T: self.period, P: self.steady})
 
-    @property
+    @cached_property
     def phi(self) -> sp.Matrix:
         """The transition matrix of (4) over a cycle."""
         return derivation.transition_matrix().applyfunc(self.number)
@@ -88,6 +88,7 @@ def at(now: Any, before: Any) -> Callable[[Any], Any]:
     return value
 
 
+@cache
 def constants(case: Case) -> Names:
     """Return the letters that every equation may use."""
     phi = case.phi
@@ -123,7 +124,7 @@ def covariances(case: Case, before: sp.Matrix) -> Names:
     """Return covariances before and after a cycle, from those before it."""
     step, added = extended(case)
     after = step * before * step.T + added
-    names = constants(case)
+    names = dict(constants(case))
     for i, j in product(range(3), repeat=2):
         names[f"P_{i + 1}{j + 1}"] = at(after[i, j], before[i, j])
         names[f"DeltaP_{i + 1}{j + 1}"] = at(after[i, j] - before[i, j], None)
@@ -165,6 +166,7 @@ def steady(case: Case) -> Names:
     return {**names, "P_12_inf": fixed[c12], "P_31_inf": fixed[c13], "t_inf": sp.oo}
 
 
+@cache
 def closed_form(case: Case, cycles: int) -> sp.Expr:
     """Return the error variance after some cycles from the covariances of single cycles' errors, without (10)-(34).
 
@@ -192,6 +194,7 @@ def errors_of_cycles(case: Case) -> tuple[sp.Expr, sp.Expr]:
     return r0, case.steady * sp.exp(-w * period) * before * after
 
 
+@cache
 def walk_rate(case: Case) -> sp.Expr:
     """Return the growth of the error variance per second after many cycles, (r_0 + 2 r_1/(1-φ))/T."""
     r0, r1 = errors_of_cycles(case)
@@ -330,8 +333,12 @@ def driven(case: Case) -> Names:
 
 
 def _integral(term: Any, bounds: list[Any]) -> Any:
-    variable, first, last = bounds
-    return sp.Matrix(term).applyfunc(lambda entry: sp.integrate(sp.expand(entry), (variable, first, last)))
+    return sp.Matrix(term).applyfunc(lambda entry: _integrated(entry, *bounds))
+
+
+@cache
+def _integrated(entry: sp.Expr, variable: sp.Symbol, first: sp.Expr, last: sp.Expr) -> sp.Expr:
+    return sp.integrate(sp.expand(entry), (variable, first, last))
 
 
 def transition_in_time(case: Case) -> Any:
@@ -564,9 +571,7 @@ def exponential() -> Names:
 
 def gaps_of_37(printed: Statement) -> list[float]:
     """Return the lowest power of μ in the difference of neighbouring sides of (37), without the terms of the dots."""
-    cut = sum(((-MU) ** k / sp.factorial(k) for k in range(7)), start=sp.S.Zero)
-    links = printed.links({"mu": MU, "dots": sp.S.Zero})
-    return [_order(sp.cancel(sp.together((link.left - link.right).subs(sp.exp(-MU), cut)))) for link in links]
+    return [_order(link.left - link.right) for link in printed.links({"mu": MU, "dots": sp.S.Zero})]
 
 
 def steps_of_37(printed: Statement) -> bool:
@@ -575,8 +580,11 @@ def steps_of_37(printed: Statement) -> bool:
     return printed.equates and min(first, third, fourth) >= 2 and min(second, last) == float("inf")
 
 
-def _order(gap: sp.Expr) -> float:
-    """Return the lowest exponent of μ in a quotient of polynomials."""
+@cache
+def _order(difference: sp.Expr) -> float:
+    """Return the lowest exponent of μ in an expression in μ and exp(-μ), whose series is cut."""
+    cut = sum(((-MU) ** k / sp.factorial(k) for k in range(7)), start=sp.S.Zero)
+    gap = sp.cancel(sp.together(difference.subs(sp.exp(-MU), cut)))
     if gap == 0:
         return float("inf")
     numerator, denominator = (sp.Poly(part, MU) for part in sp.fraction(gap))

@@ -360,6 +360,7 @@ def _cited(document: str, number: Any, part: int = 1) -> tuple[sp.Expr, sp.Expr]
     return relation.sides[0].value({"matrix": sp.Matrix}), relation.value({"matrix": sp.Matrix})
 
 
+@cache
 def _substituted(document: str, number: int, row: int, phrase: str) -> bool:
     """Whether the equations that a phrase names, in a line of (71), give an equation to first order."""
     unknown, epsilon = sp.Symbol(f"x_hat[{row}]"), sp.Symbol("epsilon")
@@ -369,7 +370,7 @@ def _substituted(document: str, number: int, row: int, phrase: str) -> bool:
     found, stated = (sp.solve(a - b, unknown) for a, b in pairs)
     difference = found[0] - stated[0] if found else sp.Integer(1)
     orders = (difference.subs(epsilon, 0), difference.diff(epsilon).subs(epsilon, 0))
-    return all(sp.simplify(each) == 0 for each in orders)
+    return all(sp.cancel(each) == 0 for each in orders)
 
 
 def substitution(document: str, number: int) -> Names:

@@ -135,9 +135,17 @@ def complex_pair(x: sp.Expr, y: sp.Expr, angle: sp.Expr) -> tuple[sp.Expr, sp.Ex
 
 def low_frequency(signal: sp.Expr, offset: sp.Expr) -> sp.Expr:
     """Return the mean over the roll phase, which a filter keeps of a signal rolled and derolled with a phase offset."""
+    return _mean_of_product().subs(_OFFSET, offset) * signal
+
+
+_OFFSET = sp.Symbol("offset", real=True)
+
+
+@cache
+def _mean_of_product() -> sp.Expr:
     angle = sp.Symbol("angle", real=True)
-    product = sp.expand(sp.cos(angle) * sp.cos(angle + offset), trig=True)
-    return sp.integrate(product, (angle, 0, 2 * sp.pi)) / (2 * sp.pi) * signal
+    product = sp.expand(sp.cos(angle) * sp.cos(angle + _OFFSET), trig=True)
+    return sp.integrate(product, (angle, 0, 2 * sp.pi)) / (2 * sp.pi)
 
 
 def with_pair() -> list[Names]:
