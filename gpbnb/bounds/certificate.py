@@ -22,7 +22,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.gains import Schedule
-from gpbnb.bounds.guess import EXCESS, FilterLimits, Guess, radius_of
+from gpbnb.bounds.guess import EXCESS, FilterLimits, Guess, product_of, radius_of
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, matrices
@@ -163,7 +163,7 @@ def of_filter(
     repeated = {"repeat": 0, "period": 1, "phases": 1, "first": 0, "below": [], "above": []}
     if steps is None:
         period = F[given.first :]
-        decay = 1 - min(radius_of(_product(period)) ** (1 / len(period)), 1 - 1e-6)
+        decay = 1 - min(radius_of(product_of(period)) ** (1 / len(period)), 1 - 1e-6)
         back = _back(period, _LEFT, bound, state)
         slow = back > _LONG
         back = _back(period, _LEFT_SLOW, bound, state) if slow else back
@@ -271,7 +271,7 @@ def _interval(
     added = np.zeros((stored.n, stored.n))
     for a, more in zip(A, noise, strict=True):
         added = a @ added @ a.T + more
-    whole = _product(A)
+    whole = product_of(A)
     P, now = _limit(whole, added), given.covariances[first - 1]
     variances = np.maximum(np.diag(P), 1e-30 * max(np.diag(P).max(), 1e-300))
     unit = np.sqrt(np.outer(variances, variances))
@@ -308,11 +308,3 @@ def _limit(F: NDArray[np.float64], added: NDArray[np.float64]) -> NDArray[np.flo
     for _ in range(60):
         X, F = X + F @ X @ F.T, F @ F
     return np.asarray((X + X.T) / 2)
-
-
-def _product(F: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the product of all closed loops of a period."""
-    whole = np.eye(F.shape[1])
-    for each in F:
-        whole = each @ whole
-    return whole

@@ -80,8 +80,12 @@ class Schedule:
 
     def rows(self, k: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the row of each step, counted from 0."""
-        period = max(self.steps - self.first, 1)
-        return np.where(k < self.steps, k, self.first + (k - self.first) % period)
+        return periodic(k, self.first, self.steps - self.first)
+
+
+def periodic(k: NDArray[np.int64], first: int, period: int) -> NDArray[np.int64]:
+    """Return each number, or that below `first` + `period` which it repeats."""
+    return np.where(k < first + period, k, first + (k - first) % max(period, 1))
 
 
 def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Schedule:
@@ -163,7 +167,7 @@ def schedule(
     steps = true.run.steps
     if not steps:
         raise ValueError(f"got {model.name} in {format_text(fmt)}; needed a first step that can be computed exactly")
-    rows = _rows(steps, repeat, period)
+    rows = np.arange(steps) if repeat is None or period is None else periodic(np.arange(steps), repeat, period)
     program, packed = packed_coefficients(run, rows)
     phases = np.arange(steps)
     Phi = double_doubles(stored.Phi)[phases % len(stored.Phi)]
@@ -175,14 +179,6 @@ def schedule(
         program, fmt, nearest_double_doubles(packed), packed, Phi, HPhi, exact, x0, true.first, true.settled, repeat,
         period, why, true.run.C[:steps], model, form,
     )  # fmt: skip
-
-
-def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int64]:
-    """Return, for each step, the emulated step with the same coefficients."""
-    k = np.arange(steps)
-    if repeat is None or period is None:
-        return k
-    return np.where(k < repeat + period, k, repeat + (k - repeat) % period)
 
 
 def _emulated(

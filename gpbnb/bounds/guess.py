@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import eigenvalues
-from gpbnb.bounds.gains import Schedule
+from gpbnb.bounds.gains import Schedule, periodic
 from gpbnb.bounds.units import largest_errors, units
 from gpbnb.filters.program import ADD, MULTIPLY, Program
 
@@ -305,8 +306,7 @@ class Course(NamedTuple):
 
     def rows(self, k: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the place in `at` of some steps, counted from 0."""
-        last = len(self.at) - 1
-        return np.minimum(np.where(k <= last, k, self.first + (k - self.first) % max(last + 1 - self.first, 1)), last)
+        return np.minimum(periodic(k, self.first, len(self.at) - self.first), len(self.at) - 1)
 
 
 def course(given: Schedule, steps: int | None, radius: float) -> Course:
@@ -386,10 +386,13 @@ def filter_guess(given: Schedule, within: FilterLimits, steps: int | None) -> Gu
 
 def loop_radius(given: Schedule) -> float:
     """Return the growth of an error per step, averaged over a period."""
-    F, whole = linear_steps(given, np.arange(given.first, given.steps)).F, np.eye(given.program.n)
-    for each in F:
-        whole = each @ whole
-    return float(radius_of(whole) ** (1 / len(F)))
+    F = linear_steps(given, np.arange(given.first, given.steps)).F
+    return float(radius_of(product_of(F)) ** (1 / len(F)))
+
+
+def product_of(F: Array) -> Array:
+    """Return the product of the loops of consecutive steps."""
+    return np.asarray(reduce(lambda whole, each: each @ whole, F, np.eye(F.shape[1])))
 
 
 def derived_limits(given: Schedule, chosen: Course, each: Steps, within: FilterLimits) -> FilterLimits:
