@@ -209,6 +209,12 @@ def stepped(step):
     return prepared(gpbnb.NonlinearSystem(step, [1]), gpbnb.BINARY32, None)
 
 
+def replaced(module, call, **made):
+    """What a call returns with other functions in a module of the report, which need not compute for minutes."""
+    with mock.patch.multiple(f"gpbnb.report.{module}", **made):
+        return call()
+
+
 def for_each(function, *values):
     """The answer to each value, or its refusal."""
     found = []

@@ -101,6 +101,7 @@ def test_a_row_is_verified_or_has_its_verdict_with_its_texts_filled_in():
     right, other = judgement(PRINTED), judgement(OTHER)
     assert (right.verdict, right.recomputed, right.note) == (Verdict.VERIFIED, "${x}=2$, holds in all 1 instances", "a")
     assert (other.verdict, other.note, other.agrees) == (Verdict.MISPRINT, "b", False)
+    assert row(domain="true()", verdict="wrong", recomputed="x", note="a")(OTHER).note == "a"
 
 
 def test_another_condition_must_hold_as_well():
@@ -134,3 +135,4 @@ def test_what_has_no_known_sign_does_not_hold(symbol):
     x = sp.Symbol("x", real=True)
     assert not holds(Link(x, symbol, sp.Integer(1)))
     assert not holds(Link(x**2 - x, symbol, sp.Integer(0)))
+    assert not holds(Link(sp.I, symbol, sp.Integer(0)))
