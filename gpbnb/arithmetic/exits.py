@@ -29,6 +29,7 @@ INSTEAD = {
     "to_float()": _STEPS,
     "to_fractions()": _STEPS,
     "to_pairs()": _STEPS,
+    "to_bits()": _STEPS,
     "tolist()": "write x[i] for an entry, which stays in the format",
     "item()": "write x[i] for an entry, which stays in the format",
     "float()": "write np.sqrt(x), np.exp(x) and so on instead of functions of math, compare x itself, and collect "
