@@ -155,15 +155,19 @@ def true_values(topic):
     return "\n".join(f"{domain}: {values}" for domain, values in found.items())
 
 
+def parameters(function):
+    """Those without a default."""
+    return [each for each in inspect.signature(function).parameters.values() if each.default is each.empty]
+
+
 def returned(topic):
     """What each function of the checks of a topic returns that takes no argument, and is no domain, as a hash."""
     checks, found = checking.TOPICS[topic].values(), {}
-    domains = {row.domain for row in checks}
+    others = {*SLOW, *ROUNDED, *(row.domain.removesuffix("()") for row in checks)}
     for name, each in next(iter(checks)).topic.items():
-        function = inspect.unwrap(each) if callable(each) else None
-        if inspect.isfunction(function) and ".checks." in function.__module__ and f"{name}()" not in domains:
-            if name not in {*SLOW, *ROUNDED} and function.__code__.co_argcount == len(function.__defaults__ or ()):
-                found[name] = hashed(written(each()))
+        plain = inspect.unwrap(each) if callable(each) and name not in others else None
+        if inspect.isfunction(plain) and ".checks." in plain.__module__ and not parameters(plain):
+            found[name] = hashed(written(each()))
     return found
 
 
