@@ -15,9 +15,8 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.loop import drop_decayed
 from gpbnb.filters.forms import Form
-from gpbnb.filters.stepping import RunningStep, StepsTaken, Stop
+from gpbnb.filters.stepping import Repeats, StepsTaken, Stop
 from gpbnb.filters.steps import FACTORED, combined_gain
-from gpbnb.filters.words import WordSteps
 
 
 def exactly(packed: NDArray[Any], fmt: FloatFormat | FixedFormat | None) -> NDArray[Any]:
@@ -72,7 +71,7 @@ class Progress(ABC):
 
     def repeat(
         self,
-        steps: RunningStep | WordSteps,
+        steps: Repeats,
         states: Sequence[NDArray[Any]],
         own: NDArray[Any],
         fault: Callable[[Stop], tuple[str, str]],

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import compress
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -208,6 +208,17 @@ class StepsTaken(NamedTuple):
     given: list[NDArray[Any]]
     definite: NDArray[np.bool_]
     stop: Stop | None
+
+
+class Repeats(Protocol):
+    """A step that is repeated on packed numbers."""
+
+    @property
+    def longest(self) -> int:
+        """The largest number of steps taken at once."""
+
+    def take(self, first: int, states: Sequence[NDArray[Any]], own: NDArray[Any]) -> StepsTaken:
+        """Take one step for each row of the step's own numbers; see :meth:`RunningStep.take`."""
 
 
 class RunningStep:

@@ -35,7 +35,7 @@ from gpbnb.filters.pairs import widened_estimates
 from gpbnb.filters.program import matrices
 from gpbnb.filters.recording import system_step
 from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
-from gpbnb.filters.stepping import RunningStep, Stop
+from gpbnb.filters.stepping import Repeats, RunningStep, Stop
 from gpbnb.filters.structures import (
     CASCADES,
     DIRECT,
@@ -549,7 +549,7 @@ class SystemRun(Progress):
         self._steps, self._states = self._begun(model, fmt)
 
     @staticmethod
-    def _begun(model: LinearSystem, fmt: SystemFormat | None) -> tuple[RunningStep | WordSteps, NDArray[Any]]:
+    def _begun(model: LinearSystem, fmt: SystemFormat | None) -> tuple[Repeats, NDArray[Any]]:
         """Return what takes steps, and the first states."""
         made, start = model.as_filter(), np.concatenate([model.x0, exact([0] * model.p)])
         if isinstance(fmt, WordFormats):
