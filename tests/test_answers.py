@@ -278,6 +278,10 @@ HERE = {
     "ONE": np.ones((2, 2)),
     "rows": lambda n: D4.array(np.arange(1, n * n + 1).reshape(n, n)),
     "WALK": gpbnb.LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]]),
+    "TURNING": gpbnb.LinearModel(  # cycles of two and three steps
+        *([[1, "0.5"], [0, 1]], [[[1, 0], [0, 1]], [[1, 1], [0, 2]]], [["0.25", 0], [0, 1]]),
+        *([[[1, "0.5"], ["0.5", 1]], [[1, 0], [0, 4]], [[2, -1], [-1, 1]]], [0, 0], [[1, 0], [0, 1]]),
+    ),
     "SMALL": small_filter.model(),
     "Z": small_filter.measurements(),
     "SYSTEM": gpbnb.LinearSystem([["0.9"]], [["0.1"]]),
