@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from alterations import COMPARISON, altered
+from test_answers import LEDGER, assert_stored
 
 from gpbnb.report.ledger import TOPICS as EXAMINED
 from gpbnb.report.ledger import Row, examine, judge, rows
@@ -45,6 +46,10 @@ def test_the_checks_of_a_topic_find_what_is_stored(topic):
     assert [row for row in computed if row != Row(row.statement, stored.get(row.statement.id))] == [], (
         "if the new findings are right, run `make findings`"
     )
+
+
+def test_the_true_values_are_those_that_are_stored():
+    assert_stored(*LEDGER)
 
 
 def test_every_statement_has_a_stored_finding_and_nothing_else_is_stored():
