@@ -257,7 +257,7 @@ SLOW = (
     *("approach", "reliability", "splits", "joint_use", "index_ranges", "two_parts", "solved_columns"),
     *("density_of_noise", "recursively", "five_sources", "shortcut", "much_less", "not_completely", "exact_errors"),
     *("chains", "open_studies", "model_is_right", "coarse_is_wider", "shortcut_text", "examples_in_four_digits"),
-    "_misprints",
+    *("_misprints", "all_pairs", "filter_study", "walk_errors", "expected_squares", "sources_4_and_5", "optimum"),
 )
 ROUNDED = "drift_error", "deroll_errors", "errors_of_the_set", "_folded", "recursion", "rolled_spins"
 """What returns only rounding errors of float64, which differ from machine to machine."""
