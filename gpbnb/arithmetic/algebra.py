@@ -6,6 +6,7 @@ Compiled loops and other fast versions are tested against these functions by ``=
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
@@ -75,6 +76,11 @@ def rounded_algebra(numbers: Callable[[Any], Matrix], rounded: Callable[[Any], A
         partial(inverse_in_order, rounded=rounded),
         rounded,
     )
+
+
+def algebra_of(fmt: Any) -> Algebra:
+    """Return the algebra of arrays of a format, or of arrays that record their operations."""
+    return Algebra(fmt.eye, operator.matmul)
 
 
 def _exact_inverse(a: Matrix, identity: Matrix) -> Inverse:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.algebra import algebra_of
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
@@ -27,7 +28,7 @@ from gpbnb.filters.opening import as_packed
 from gpbnb.filters.pairs import nearest_double_doubles
 from gpbnb.filters.program import Program, innovation_program, loop_program, matrices, sequential_program
 from gpbnb.filters.run import Run
-from gpbnb.filters.steps import decorrelated
+from gpbnb.filters.steps import decorrelated, reduction
 from gpbnb.filters.structures import LinearFilter
 
 MOST, WORK = 20_000, 1e8
@@ -108,7 +109,7 @@ def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Sched
 
 def _closed_loop(K: Any, H: Any, Phi: Any) -> Any:
     """Return (I - KH)Φ, in the order of the filter."""
-    return (K.format.eye(len(Phi)) - K @ H) @ Phi
+    return reduction(algebra_of(K.format), K, H) @ Phi
 
 
 def check_deterministic(fmt: FloatFormat | FixedFormat) -> None:

@@ -25,12 +25,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.algebra import algebra_of
 from gpbnb.arithmetic.interpreting import Call
 from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of
 from gpbnb.arithmetic.tape import Tape, exact_result, known_truth
 from gpbnb.arithmetic.traced import TracedFormat
-from gpbnb.filters.steps import decorrelated, innovation_of_one
+from gpbnb.filters.steps import corrected, decorrelated, innovation_of_one, looped
 
 MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST = tags.MULTIPLY, tags.ADD, tags.SUBTRACT, tags.AT_LEAST, tags.AT_MOST
 """Codes of operations of a linear program; AT_LEAST and AT_MOST limit a value by a coefficient, as a controller limits
@@ -230,7 +231,7 @@ def loop_program(n: int, m: int) -> Program:
 
     def step(c: Any, x: Any, z: Any) -> Any:
         F, K = matrices_of(c, (n, n), (n, m))
-        return F @ x + K @ z
+        return looped(algebra_of(c.format), F, K, x, z)
 
     return recorded(step, n, m, n * (n + m))
 
@@ -243,8 +244,7 @@ def innovation_program(n: int, m: int, p: int = 0) -> Program:
 
     def step(c: Any, x: Any, z: Any) -> list[Any]:
         Phi, H, K = matrices_of(c, (n, n), (m, n), (n, m))
-        u = Phi @ x[:n]
-        after = u + K @ (z - H @ u)
+        after = corrected(algebra_of(c.format), H, K, Phi @ x[:n], z)
         return [*after, *after[:p]]
 
     names = entries("Phi", n, n) + entries("H", m, n) + entries("K", n, m)

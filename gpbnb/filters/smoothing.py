@@ -23,14 +23,13 @@ Rauch, Tung & Striebel 1965; Bierman 1977, ch. X.
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from gpbnb.arithmetic.algebra import Algebra
+from gpbnb.arithmetic.algebra import algebra_of
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.fixed import FixedFormat
@@ -189,15 +188,11 @@ class FixedIntervalSmoother:
             identity = fmt.array(np.eye(self.model.n, dtype=int))
             x, P, *kept = filtered_root(Phi, H, Q, R, x, P, z, identity)
         else:
-            x, P, *kept = filtered(_algebra(fmt), form_named(self.form), StepModel(Phi, H, Q, R), x, P, z)
+            x, P, *kept = filtered(algebra_of(fmt), form_named(self.form), StepModel(Phi, H, Q, R), x, P, z)
         return StepTaken((x, P), tuple(kept), True)
 
     def _backwards(self, formats: Sequence[Any], states: tuple[Any, ...], given: Sequence[Any]) -> StepTaken:
         (fmt,), (*kept, Phi) = formats, given
         if self.form is Form.CARLSON:
             return StepTaken(smoothed_root(*kept, *states), (), True)
-        return StepTaken(smoothed(_algebra(fmt), Phi, kept[:2], *kept[2:], *states), (), True)
-
-
-def _algebra(fmt: Any) -> Algebra:
-    return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), operator.matmul)
+        return StepTaken(smoothed(algebra_of(fmt), Phi, kept[:2], *kept[2:], *states), (), True)

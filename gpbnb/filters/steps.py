@@ -2,7 +2,7 @@ r"""One step of a filter in every form, over numbers of any kind, also over numb
 
 With covariances, the order of operations is that of hung1984: predicted covariance (100), gain (99), covariance (101),
 then the estimate by the innovation (98) or by the closed loop (109)-(111). Forms with factors or square roots take one
-measurement after the other; roots need ``sqrt``. Only :func:`predicted` to :func:`corrected` take states and
+measurement after the other; roots need ``sqrt``. Only :func:`predicted` to :func:`looped` take states and
 measurements as columns.
 """
 
@@ -170,6 +170,11 @@ def corrected(algebra: Algebra, H: Matrix, K: Matrix, ahead: Matrix, z: Matrix) 
 def corrected_by(algebra: Algebra, K: Matrix, ahead: Matrix, difference: Matrix) -> Matrix:
     """Return :math:`x_p + Ky` for the predicted estimate and an innovation y, as a nonlinear filter has it."""
     return algebra.rounded(ahead + algebra.times(K, difference))
+
+
+def looped(algebra: Algebra, F: Matrix, K: Matrix, x: Matrix, z: Matrix) -> Matrix:
+    r"""Return :math:`Fx + Kz` for the closed loop F and the estimate of the step before; (111)."""
+    return algebra.rounded(algebra.times(F, x) + algebra.times(K, z))
 
 
 # -- with factors and roots --------------------------------------------------------------------------------------------
@@ -488,7 +493,7 @@ class LinearStep:
         if form in HUNG_FORMS:
             W = reduction(blocks.covariance, stored.covariance(K), stored.covariance(H))
             loop = blocks.state.times(stored.state(W), stored.state(given["Phi"]))
-            x = blocks.state.rounded(self._times(loop, x) + self._times(own, z))
+            x = looped(blocks.state, loop, own, x[:, None], z[:, None])[:, 0]
         elif form is Form.COMPENSATED:
             x, *carried = self._compensated(x, carried[0], own, z)
         else:
