@@ -453,6 +453,7 @@ LEDGER = "shown", "true values of the ledger"
 """Computed in the process that judges them, in tests/ledger/test_verdicts.py."""
 
 
+# Sections of the command, of searches and of guarantees take up to 5 s, as they answer dozens of whole questions.
 @pytest.mark.parametrize(("stored", "section"), [each for each in CALLS if each != LEDGER])
 def test_a_call_gives_what_is_stored(stored, section):
     assert_stored(stored, section)

@@ -5,6 +5,7 @@ import io
 import json
 import os
 import pty
+import stat
 import subprocess
 import sys
 import termios
@@ -98,6 +99,13 @@ def test_output_file_is_replaced_as_a_whole(ledger, tmp_path):
     assert target.read_bytes() == ledger(*CHOSEN).stdout
     assert link.is_symlink()
     assert {path.name for path in target.parent.iterdir()} == {"ledger.csv", "link.csv"}
+
+
+def test_a_pipe_is_refused_and_stays(ledger, tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    done = ledger(*CHOSEN, "--output", str(tmp_path / "pipe.csv"))
+    assert (done.returncode, b"needed a regular file" in done.stderr) == (2, True)
+    assert stat.S_ISFIFO((tmp_path / "pipe.csv").stat().st_mode)
 
 
 def test_the_command_itself_shows_its_progress_on_a_terminal_and_lets_a_reader_leave():

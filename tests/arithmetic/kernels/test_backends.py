@@ -296,3 +296,11 @@ def test_the_first_guess_of_a_reciprocal_may_be_two_too_large(y: int) -> None:
     tops = [y - 1 - random.randrange(2 ** random.randrange(1, 112)) for _ in range(200)]
     found = fmt.array(tops) / fmt.array(y)
     assert found.to_fractions().tolist() == [fmt.round(Fraction(x, y)) for x in tops]
+
+
+@pytest.mark.usefixtures("loops_at_once")
+def test_each_entry_of_an_operand_counts() -> None:
+    with pytest.raises(ValueError, match="holds exactly"):
+        _ = FloatFormat(2, 60).array([0, 0]) + np.array([1, 2**62 + 1])
+    x = BINARY32.array([1, 2, 3])
+    assert x.multiply_add(x, BINARY32.zeros((2, 3))).to_float().tolist() == [[1, 4, 9], [1, 4, 9]]
