@@ -327,9 +327,9 @@ def evaluate(memory: Memory, kind: Any, formats: Any, code: Any) -> int:
 
 
 def evaluated(memory: Memory, kind: Any, formats: Any, code: Any, far: bool = False) -> tuple[int, bool]:
-    """Run operations as :func:`evaluate` does; also return whether numbers may then be `far`.
+    """Run operations as :func:`evaluate` does.
 
-    Those are too small or too large for quick computation.
+    Also return whether numbers may then be too small or too large for quick computation; `far` says it of those before.
     """
     done, once, given = 0, _loops().once, (formats.address, code.table.address, memory.table.address, memory.lanes)
     with contextlib.suppress(OverflowError, ZeroDivisionError):

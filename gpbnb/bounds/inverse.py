@@ -49,7 +49,7 @@ def below_one(name: str, first: Fraction, ratio: Fraction, base: int) -> float:
     """Return first / (1 - ratio), rounded up; the ratio, which has a name, must be below 1."""
     if ratio >= 1:
         raise ValueError(
-            f"{name} must be below 1 to prove a bound; got {float(ratio):.3g}. Use more {digit_unit(base)}."
+            f"{name} must be below 1 to prove a bound; got {above(ratio):.3g}. Use more {digit_unit(base)}."
         )
     return above(first / (1 - ratio))
 

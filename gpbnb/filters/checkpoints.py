@@ -95,7 +95,8 @@ class Progress(ABC):
             at += len(found.definite)
             for i, state in enumerate(states):
                 found.given[i] = found.given[i].reshape(-1, *state.shape)
-                state[:] = found.given[i][-1] if len(found.definite) else state
+                if len(found.definite):
+                    state[:] = found.given[i][-1]
             self.done(found.definite, *found.given)
             resumes = found.stop is not None and found.stop.fault.overflows and unlimited
             if found.stop is not None and not (resumes and drop_decayed(states[0], *states[2:])):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
-from gpbnb.arithmetic.algebra import Algebra, inverse_in_order
+from gpbnb.arithmetic.algebra import Algebra
 from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of, packed_one
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
@@ -31,8 +31,8 @@ from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep, StepTake
 def system_step(program: Program, in_order: bool = False, whole: bool = False) -> DividedStep:
     """Return a step of a linear program; the cycle of its coefficients has one member.
 
-    Operations that do not need each other run together if they have one code, which takes half the time, unless they
-    stay in order because each draws a random number. A stop names the number of the first output that needs the
+    Operations of one code that do not need each other run together, in half the time; `in_order` keeps all in order, as
+    random numbers require, which each draws in turn. A stop names the number of the first output that needs the
     operation. The whole step also gives each of its values.
     """
     rows, tape = program.rows, Tape(program.n + program.m + len(program.coefficients))
@@ -229,4 +229,4 @@ def _algebra(fmt: Any, fused: bool, order: Order, block: int, sums: Any) -> Alge
         def times(a: Any, b: Any) -> Any:
             return fmt.array(linalg.matmul(sums.array(a), sums.array(b), order, fused, block))
 
-    return Algebra(lambda n: fmt.array(np.eye(n, dtype=int)), times, inverse_in_order)
+    return Algebra(fmt.eye, times)
