@@ -15,20 +15,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.algebra import algebra_of
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.lanes import recorded
 from gpbnb.arithmetic.named import format_text
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form, form_with_program
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.pairs import nearest_double_doubles
-from gpbnb.filters.program import Program, innovation_program, loop_program, matrices, sequential_program
+from gpbnb.filters.program import Program, matrices
 from gpbnb.filters.run import Run
-from gpbnb.filters.steps import decorrelated, reduction
 from gpbnb.filters.structures import LinearFilter
 
 MOST, WORK = 20_000, 1e8
@@ -107,11 +104,6 @@ def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Sched
     )  # fmt: skip
 
 
-def _closed_loop(K: Any, H: Any, Phi: Any) -> Any:
-    """Return (I - KH)Φ, in the order of the filter."""
-    return reduction(algebra_of(K.format), K, H) @ Phi
-
-
 def check_deterministic(fmt: FloatFormat | FixedFormat) -> None:
     """Reject stochastic rounding of a filter that computes its gain."""
     if fmt.rounding is Rounding.STOCHASTIC:
@@ -169,7 +161,7 @@ def schedule(
     if not steps:
         raise ValueError(f"got {model.name} in {format_text(fmt)}; needed a first step that can be computed exactly")
     rows = np.arange(steps) if repeat is None or period is None else periodic(np.arange(steps), repeat, period)
-    program, packed = packed_coefficients(run, rows)
+    packed = run.coefficients()[rows]
     phases = np.arange(steps)
     Phi = double_doubles(stored.Phi)[phases % len(stored.Phi)]
     cycle = np.lcm(len(stored.H), len(stored.Phi))
@@ -177,8 +169,8 @@ def schedule(
     HPhi = double_doubles(products)[phases % cycle]
     exact = true.run.G[:steps].reshape(steps, model.n, model.m, 2)
     return Schedule(
-        program, fmt, nearest_double_doubles(packed), packed, Phi, HPhi, exact, x0, true.first, true.settled, repeat,
-        period, why, true.run.C[:steps], model, form,
+        run.linear_program(), fmt, nearest_double_doubles(packed), packed, Phi, HPhi, exact, x0, true.first,
+        true.settled, repeat, period, why, true.run.C[:steps], model, form,
     )  # fmt: skip
 
 
@@ -202,42 +194,6 @@ def _emulated(
         if done < steps or steps >= most:
             return run, None, None
         steps = min(most, 4 * steps)
-
-
-def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> tuple[Program, NDArray[Any]]:
-    """Return the program of a run and its coefficients, row by row, at some of the run's checkpoints.
-
-    The first checkpoint is for step `before` + 1.
-    """
-    n, m, last = run.model.n, run.model.m, int(rows.max()) + 1
-    Phi, H = run.letters["Phi"], run.letters["H"]
-    K = np.ascontiguousarray(run.G[:last])
-    tail = K.shape[3:]
-
-    def flat(matrices: NDArray[Any]) -> NDArray[Any]:
-        """Return the entries of the matrix of each step, with one row for each step."""
-        return matrices[rows].reshape(len(rows), -1, *tail)
-
-    def of_cycle(matrices: NDArray[Any]) -> NDArray[Any]:
-        return matrices[(before + rows) % len(matrices)].reshape(len(rows), -1, *tail)
-
-    if run.form in (Form.HUNG, Form.HUNG_SECOND_GAIN):
-        every = before + np.arange(last)
-        loop = recorded(_closed_loop, (n, m), (m, n), (n, n))
-        (F,) = loop.run(run.fmt, K, H[every % len(H)], Phi[every % len(Phi)])
-        return loop_program(n, m), np.concatenate([flat(F), flat(K)], axis=1)
-    if run.form is Form.UD:
-        UR = run.letters["UR"]
-        every = np.arange(int(np.lcm(len(H), len(UR))))
-        rows_of = recorded(decorrelated, (m, m), (m, n))
-        (D,) = rows_of.run(run.fmt, UR[every % len(UR)], H[every % len(H)])
-        U = np.array(UR)
-        for i in range(m):  # the diagonal stores variances in place of ones
-            U[:, i, : i + 1] = 0
-        parts = [of_cycle(each) for each in (Phi, U, D)]
-        return sequential_program(n, m), np.concatenate([*parts, flat(K)], axis=1)
-    parts = [of_cycle(each) for each in (Phi, H)]
-    return innovation_program(n, m), np.concatenate([*parts, flat(K)], axis=1)
 
 
 # -- the exact gain ---------------------------------------------------------------------------------------------------

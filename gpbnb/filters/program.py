@@ -31,7 +31,7 @@ from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of
 from gpbnb.arithmetic.tape import Tape, exact_result, known_truth
 from gpbnb.arithmetic.traced import TracedFormat
-from gpbnb.filters.steps import corrected, decorrelated, innovation_of_one, looped
+from gpbnb.filters.steps import corrected
 
 MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST = tags.MULTIPLY, tags.ADD, tags.SUBTRACT, tags.AT_LEAST, tags.AT_MOST
 """Codes of operations of a linear program; AT_LEAST and AT_MOST limit a value by a coefficient, as a controller limits
@@ -226,16 +226,6 @@ def dot(coefficients: Any, values: Any) -> Any:
     return total
 
 
-def loop_program(n: int, m: int) -> Program:
-    r"""Program of Hung's form (1984), (111): :math:`\hat F x + \hat K z`; coefficients F (n, n), K (n, m)."""
-
-    def step(c: Any, x: Any, z: Any) -> Any:
-        F, K = matrices_of(c, (n, n), (n, m))
-        return looped(algebra_of(c.format), F, K, x, z)
-
-    return recorded(step, n, m, n * (n + m))
-
-
 def innovation_program(n: int, m: int, p: int = 0) -> Program:
     r"""Innovation form, (98): :math:`u + \hat K(z - Hu)`, :math:`u = \Phi x`; coefficients Φ (n, n), H (m, n), K.
 
@@ -254,23 +244,6 @@ def innovation_program(n: int, m: int, p: int = 0) -> Program:
 def entries(letter: str, *shape: int) -> list[str]:
     """Name the entries of a matrix as C does, from 0."""
     return [letter + "".join(f"[{i}]" for i in index) for index in np.ndindex(shape)]
-
-
-def sequential_program(n: int, m: int) -> Program:
-    """Program of the UD form, which decorrelates the measurements and takes them one by one.
-
-    Coefficients Φ (n, n), the decorrelating factor U (m, m, its strict upper part), decorrelated H (m, n), and the gain
-    of each measurement, K (n, m).
-    """
-
-    def step(c: Any, x: Any, z: Any) -> Any:
-        Phi, U, H, K = matrices_of(c, (n, n), (m, m), (m, n), (n, m))
-        x = Phi @ x
-        for h, k, measured in zip(H, K.T, decorrelated(U, z), strict=True):
-            x = x + k * innovation_of_one(h, measured, x)
-        return x
-
-    return recorded(step, n, m, n * n + m * m + 2 * n * m)
 
 
 def without_exact(program: Program, coefficients: NDArray[Any]) -> Program:

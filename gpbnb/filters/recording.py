@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.algebra import Algebra
-from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of, packed_one
+from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of, packed_one, takes_numbers
 from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat
@@ -117,6 +117,47 @@ def recorded_step(kind: StepKind, together: bool = False) -> DividedStep:
     """Return a step of a filter, divided into what depends on the measurements and what does not, unless together."""
     step = kalman_step(kind)
     return divided(step._replace(results=step.results[:1]), together)
+
+
+def entries_taken(parts: DividedStep) -> list[NDArray[np.int64]]:
+    """Return which entries of each matrix of the model the operations that depend on the measurements take."""
+    rows = parts.rest.rows
+    taken = rows[:, 1:4][takes_numbers(rows[:, 0])]
+    return [np.flatnonzero(np.isin(at, taken)) for at in parts.step.cycles]
+
+
+def linear_program(parts: DividedStep, letters: Iterable[str]) -> Program:
+    """Return the operations that depend on the measurements, whose matrices of the model are named by their letters.
+
+    Coefficients are the entries of the model that they take, what the other operations share with them, and zero.
+    """
+    step, rest, shared = parts.step, parts.rest, parts.step.tape.sizes[0] + np.arange(len(parts.shared))
+    names, taken = list[str](), list[NDArray[np.int64]]()
+    for letter, at, each in zip(letters, step.cycles, entries_taken(parts), strict=True):
+        names += np.array(entries(letter, *at.shape))[each].tolist()
+        taken.append(at.ravel()[each])
+    gain = dict(zip(step.results[0].ravel().tolist(), entries("K", *step.results[0].shape), strict=True))
+    names += [gain.get(each, f"c[{i}]") for i, each in enumerate(parts.shared.tolist())]
+    given = np.concatenate([rest.states, *step.own, *taken, shared])
+    number = np.zeros(step.tape.sizes[0] + len(shared), np.int64)
+    number[given] = np.arange(1, 1 + len(given))
+    zero = 1 + len(given)
+    number[rest.rows[:, 4]] = zero + np.arange(1, 1 + len(rest.rows))
+    rows, after = rest.rows.astype(np.int64), number[rest.after]
+    rows[:, 1:] = number[rows[:, 1:]]
+    for i in np.flatnonzero(after == 0).tolist():  # a state that becomes zero
+        after[i] = zero + len(rows) + 1
+        rows = np.concatenate([rows, [[CODES["multiply"], zero, 1 + i, 0, after[i]]]])
+    states, inputs, coefficients = np.split(np.arange(1, 1 + zero), np.cumsum([len(rest.states), step.own[0].size]))
+    return Program(
+        rows,
+        (1 + zero + len(rows), 2),
+        states,
+        inputs,
+        coefficients,
+        after,
+        coefficient_names=(*names, "zero"),
+    )
 
 
 @lru_cache(maxsize=64)

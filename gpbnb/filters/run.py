@@ -28,9 +28,10 @@ from gpbnb.filters.opening import (
     opening,
 )
 from gpbnb.filters.pairs import nearest_floats, widened, widened_estimates
-from gpbnb.filters.recording import recorded_step, step_kind
+from gpbnb.filters.program import Program
+from gpbnb.filters.recording import entries_taken, linear_program, recorded_step, step_kind
 from gpbnb.filters.reference import precise_steps
-from gpbnb.filters.stepping import RunningStep, StepsTaken, Stop
+from gpbnb.filters.stepping import DividedStep, RunningStep, StepsTaken, Stop
 from gpbnb.filters.steps import FACTORED, HUNG_FORMS
 
 LEAST_SHARE = 2.0**-60
@@ -190,7 +191,7 @@ class Run(Progress):
 
     def _saved(self, which: int) -> NDArray[Any]:
         kept, none = self.kept(), self._none[which]
-        return kept[(0, -1, 1)[which]].reshape(-1, *none.shape[1:]) if kept else none
+        return kept[(0, -2, 1)[which]].reshape(-1, *none.shape[1:]) if kept else none
 
     @property
     def bounded(self) -> bool:
@@ -328,18 +329,37 @@ class Run(Progress):
         return f"{what} in {stop.quantity}", cure
 
     def _opened(self) -> RunningStep:
-        """Record a step, and load it in the formats of the run."""
-        model, (formats, blocks, sums) = self.letters, self._formats()
-        kind = step_kind(self.form, model, formats[0], blocks, sums)
+        """Load a step in the formats of the run."""
+        parts = self._recorded()
+        return RunningStep(parts, self._formats()[0], self._tables(parts), self.records, self.tag)
+
+    def _recorded(self) -> DividedStep:
+        formats, blocks, sums = self._formats()
+        kind = step_kind(self.form, self.letters, formats[0], blocks, sums)
         draws = any(each is not None and each.rounding is Rounding.STOCHASTIC for each in formats)
-        parts = recorded_step(kind, together=draws and self.records == 1)
-        cycles = zip(model.values(), parts.step.cycles, strict=True)
-        tables = [each.reshape(len(each), at.size, *each.shape[1 + at.ndim :]) for each, at in cycles]
-        return RunningStep(parts, formats, tables, self.records, self.tag)
+        return recorded_step(kind, together=draws and self.records == 1)
+
+    def _tables(self, parts: DividedStep) -> list[NDArray[Any]]:
+        """Return the matrices of the model, (p, entries, ...), for the cycles of a step."""
+        cycles = zip(self.letters.values(), parts.step.cycles, strict=True)
+        return [each.reshape(len(each), at.size, *each.shape[1 + at.ndim :]) for each, at in cycles]
+
+    def linear_program(self) -> Program:
+        """Return how a step computes the estimate from the measurements."""
+        return linear_program(self._recorded(), self.letters)
+
+    def coefficients(self) -> NDArray[Any]:
+        """Return those of :meth:`linear_program` at the checkpoint steps reached so far, (c, entries, ...), packed."""
+        parts, at = self._recorded(), self.checkpoint_steps[: self.saved] - 1
+        tables = (table[at % len(table)] for table in self._tables(parts))
+        of_model = [table[:, each] for table, each in zip(tables, entries_taken(parts), strict=True)]
+        shared = self.kept()[-1].reshape(len(at), -1, *of_model[0].shape[2:])
+        zero = np.zeros((len(at), 1, *shared.shape[2:]), shared.dtype)
+        return np.concatenate([*of_model, shared, zero], axis=1)
 
     def _block(self, found: StepsTaken) -> Block:
         x, K, P = (
-            found.given[which].reshape(-1, *none.shape[1:]) for which, none in zip((0, -1, 1), self._none, strict=True)
+            found.given[which].reshape(-1, *none.shape[1:]) for which, none in zip((0, -2, 1), self._none, strict=True)
         )
         return Block(x, K, P, found.definite, found.stop)
 

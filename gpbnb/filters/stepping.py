@@ -201,7 +201,8 @@ class StepsTaken(NamedTuple):
 
     Parameters
     ----------
-    given : states, and the rest that a step gives, each (steps, entries, ...).
+    given : states, and the rest that a step gives, each (steps, entries, ...); of a divided step also what its second
+        part takes from the first.
     definite : (steps,).
     """
 
@@ -312,7 +313,8 @@ class RunningStep:
         self._last = None  # the early part is ahead of the rest
         if done == count:
             self._last = kept[-1, shared : shared + len(of_early.after)] if done else before
-        return StepsTaken([results[i] for i in range(len(sizes))], definite[:done] & held, stop)
+        all_results = [*(results[i] for i in range(len(sizes))), kept[:done, :shared]]
+        return StepsTaken(all_results, definite[:done] & held, stop)
 
     def _early_steps(
         self, first: int, count: int, states: NDArray[Any]

@@ -47,7 +47,7 @@ def test_the_script_has_the_operations_of_the_filter() -> None:
     text, stored = gappa.script(found), {row.state: row for row in gappa.load() if row.name.startswith("tracker")}
     given = found.schedule
     Phi, HPhi = given.Phi[-1, :, :, 0], given.HPhi[-1, :, :, 0]
-    K = given.coefficients[-1, -2:, :1]
+    K = given.coefficients[-1, [given.program.coefficient_names.index(f"K[{i}][0]") for i in range(2)], :1]
     rng = np.random.default_rng(41)
     outputs = given.program.outputs.tolist()
     for _ in range(50):

@@ -89,7 +89,7 @@ def test_in_fixed_point_only_products_are_rounded():
     fmt = FixedFormat(8, 12, EVEN)
     found = guarantee(WALK, fmt, WITHIN)
     schedule = found.schedule
-    half, gain = 2.0**-13, schedule.coefficients[-1, -1, 0]
+    half, gain = 2.0**-13, schedule.coefficients[-1, schedule.program.coefficient_names.index("K[0][0]"), 0]
     off = abs(gain - schedule.exact[-1, 0, 0, 0]) * 10
     assert found.bound[0] == pytest.approx((half + off) / gain, rel=0.02)
     assert found.parts[0, ROUNDING] == pytest.approx(half / gain, rel=0.01)

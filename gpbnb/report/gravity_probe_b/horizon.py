@@ -18,7 +18,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.bounds.gains import Schedule, packed_coefficients
+from gpbnb.bounds.gains import Schedule
 from gpbnb.bounds.guarantee import limits, sized_limits
 from gpbnb.bounds.guess import FilterLimits
 from gpbnb.filters.forms import Form
@@ -107,7 +107,7 @@ def bounds_in_blocks(
                     f"{model.name} in {fmt}: the filter stopped or its covariance lost definiteness by "
                     f"step {done + count}"
                 )
-        program, packed = packed_coefficients(run, np.arange(count), done)
+        program, packed = run.linear_program(), run.coefficients()
         at = done + np.arange(count)
         exact = true.G[:count].reshape(count, program.n, program.m, 2)
         of_model = Phi[at % len(Phi)], HPhi[at % len(HPhi)]

@@ -115,12 +115,8 @@ def other_gains(drawn: Drawn, found: FilterGuarantee) -> int:
     steps = STEPS if found.steps is None else min(STEPS, found.steps)
     run = Run(drawn.model, drawn.fmt, drawn.form, range(1, steps + 1))
     run.take(np.zeros((steps, drawn.model.m)))
-    at, count = given.rows(np.arange(run.steps)), drawn.model.n * drawn.model.m
-    gains = run.G[: run.steps].reshape(run.steps, count, *run.G.shape[3:])
-    same = gains == given.packed[at, -count:]
-    if same.ndim == 3:
-        same = same.all(axis=2)
-    return int((~same.all(axis=1)).sum())
+    same = run.coefficients() == given.packed[given.rows(np.arange(run.steps))]
+    return int((~same.reshape(run.steps, -1).all(axis=1)).sum())
 
 
 def inputs(drawn: Drawn, found: FilterGuarantee, rng: np.random.Generator) -> Iterator[tuple[str, NDArray[np.float64]]]:

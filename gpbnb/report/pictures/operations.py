@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
-import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
 from gpbnb.bounds.contributions import Contributions, contributions
 from gpbnb.bounds.guarantee import FilterGuarantee
-from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, innovation_program
+from gpbnb.filters.forms import Form
+from gpbnb.filters.program import ADD, MULTIPLY, SUBTRACT, Program, values_of
+from gpbnb.filters.run import Run
 from gpbnb.report.display import style
 from gpbnb.report.examples import tracker
 from gpbnb.report.guarantees.certificates import tracker_guarantee
@@ -27,54 +28,38 @@ _SIGNS = {ADD: "+", SUBTRACT: "−"}
 
 
 class ListedValue(NamedTuple):
-    """A value of a step.
+    """A value of a step: a state or a measurement before it, or the result of an operation.
 
     Parameters
     ----------
-    operation : number of the operation that computes it; -1 for a state or a measurement before the step.
     name : its name, a letter with or without a subscript.
     formula : its operation in terms of earlier names; empty for a state or a measurement.
     operands : places in the list of the values that the operation takes.
     """
 
-    operation: int
     name: str
     formula: str
     operands: tuple[int, ...]
 
 
-def listing(program: Program, coefficients: Sequence[Any]) -> list[ListedValue]:
-    """List the operations of a step that may round, after the values before the step.
-
-    A product with zero or one is exact, and so is a sum with zero: the list has the operand in place of the result.
-
-    Parameters
-    ----------
-    program : a linear program whose coefficients have names.
-    coefficients : its coefficients; None stands for one that is neither zero nor one.
-    """
+def listing(program: Program) -> list[ListedValue]:
+    """List the values before a step, then its operations; coefficients have names."""
     n, m = program.n, program.m
-    lines = [ListedValue(-1, _indexed("x", k, n), "", ()) for k in range(n)]
-    lines += [ListedValue(-1, _indexed("z", k, m), "", ()) for k in range(m)]
-    place: list[int | None] = [*range(n + m)]  # of each value; None for zero
+    lines = [
+        ListedValue(_indexed(name, k, count), "", ()) for name, count in (("x", n), ("z", m)) for k in range(count)
+    ]
     results = {int(value): k for k, value in enumerate(program.outputs)}
     letters = iter("abcdefghijklmnopqrstuvw")
     for o, (code, left, right) in enumerate(program.operations.tolist()):
-        operands = [place[right]] if code == MULTIPLY else [place[left], place[right]]
-        known = [at for at in operands if at is not None]
-        factor = coefficients[left] if code == MULTIPLY else None
-        if not known or factor == 0:
-            place.append(None)
-        elif factor == 1 or (code != MULTIPLY and len(known) == 1):
-            place.append(known[0])
+        operands = values_of(code, left, right)
+        names = [lines[at].name for at in operands]
+        if code == MULTIPLY:
+            formula = f"{_coefficient(program.coefficient_names[left], m)} {names[0]}"
         else:
-            names = [lines[at].name for at in known]
-            made = _coefficient(program.coefficient_names[left], m) if code == MULTIPLY else ""
-            formula = f"{made} {names[0]}" if made else f" {_SIGNS[code]} ".join(names)
-            result = results.get(n + m + o)
-            name = next(letters) if result is None else f"{_indexed('x', result, n)}′"
-            lines.append(ListedValue(o, name, formula, tuple(known)))
-            place.append(len(lines) - 1)
+            formula = f" {_SIGNS[code]} ".join(names)
+        result = results.get(n + m + o)
+        name = next(letters) if result is None else f"{_indexed('x', result, n)}′"
+        lines.append(ListedValue(name, formula, operands))
     return lines
 
 
@@ -90,22 +75,18 @@ def _coefficient(name: str, m: int) -> str:
 
 
 @cache
-def _lines() -> tuple[ListedValue, ...]:
-    model = tracker()
-    entries = [*np.ravel(model.Phi), *np.ravel(model.H)]
-    program = innovation_program(model.n, model.m)
-    return tuple(listing(program, [*entries, *[None] * (model.n * model.m)]))
-
-
-@cache
 def _found() -> tuple[FilterGuarantee, Contributions]:
     found = tracker_guarantee()
     return found, contributions(found)
 
 
+def _lines() -> list[ListedValue]:
+    return listing(Run(tracker(), FORMAT, Form.INNOVATION, ()).linear_program())
+
+
 def units(lines: Sequence[ListedValue], states: Sequence[str], measurement: str) -> list[str]:
     """Return the unit of each value: sums have that of their operands, and a product that of the sum that takes it."""
-    found = ["" if line.operation >= 0 else measurement for line in lines]
+    found = ["" if line.formula else measurement for line in lines]
     found[: len(states)] = states
     for k, line in enumerate(lines):
         if line.name.endswith("′"):
@@ -124,8 +105,8 @@ def step_data() -> dict[str, Any]:
     found, each = _found()
     lines = _lines()
     rows = []
-    for line, unit in zip(lines, units(lines, [*STATES.values()], "m"), strict=True):
-        o = line.operation
+    for k, (line, unit) in enumerate(zip(lines, units(lines, [*STATES.values()], "m"), strict=True)):
+        o = k - found.schedule.program.n - found.schedule.program.m
         row: dict[str, Any] = {"name": line.name, "formula": line.formula, "operands": line.operands, "unit": unit}
         if o >= 0:
             row["error"] = short_number(each.errors[o])
