@@ -56,10 +56,6 @@ def texts(path: Path) -> list[str]:
 each_notebook = pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 
 
-def test_there_are_notebooks():
-    assert PATHS
-
-
 def test_every_page_is_in_the_contents():
     """A page that is in none is not built."""
     contents = (BOOK.parent / "_toc.yml").read_text(encoding="utf-8")
@@ -163,23 +159,6 @@ def long_numbers(cell: dict) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize(
-    ("number", "digits"),
-    [("0.639965805573098", 15), ("0.639966", 6), ("-0.0012345678", 8), ("12345678", 0), ("5.0", 0), ("1.5e-300", 2)],
-)
-def test_digits_are_counted(number, digits):
-    assert [significant_digits(each) for each in NUMBER.findall(f"x = {number}, or so")] == [digits]
-
-
-def test_a_long_number_is_found_in_every_kind_of_output():
-    text = "1.2345678"
-    for output in (
-        {"output_type": "stream", "name": "stdout", "text": [f"x {text}\n"]},
-        {"output_type": "display_data", "data": {"text/html": [f"<td title='9.87654321'>{text}</td>"]}},
-    ):
-        assert long_numbers({"outputs": [output]}) == [text]
-
-
 @each_notebook
 def test_outputs_have_no_digits_that_differ_between_processors(path):
     exact = {number for name, numbers in EXACT.items() if name == path.stem for number in numbers}
@@ -203,46 +182,6 @@ def names(source: str) -> tuple[set[str], set[str]]:
         if isinstance(node, (ast.Import, ast.ImportFrom)):
             defined |= {alias.asname or alias.name.split(".")[0] for alias in node.names}
     return read, defined
-
-
-def unseen(cells: list[dict]) -> list[str]:
-    """Names in cells that are shown, which no cell defines that a reader can see or unfold."""
-    known, missing = set(dir(builtins)), []
-    for cell in cells:
-        if not tags(cell) & {"remove-cell", "remove-input"}:
-            read, defined = names("".join(cell["source"]))
-            if "hide-input" not in tags(cell):
-                missing += sorted(read - defined - known)
-            known |= defined
-    return missing
-
-
-def test_a_name_from_a_removed_cell_is_unseen():
-    def cell(source: str, *given: str) -> dict:
-        return {"source": [source], "metadata": {"tags": [*given]}}
-
-    assert unseen([cell("import math", "remove-cell"), cell("print(math.pi)")]) == ["math"]
-    assert unseen([cell("import math", "hide-input"), cell("print(math.pi, [x for x in range(3)])")]) == []
-    assert unseen([cell("print(math.pi)", "hide-input")]) == []
-
-
-@each_notebook
-def test_every_name_of_the_package_that_a_cell_imports_exists(path):
-    for cell in code_cells(path):
-        for node in ast.walk(ast.parse("".join(cell["source"]))):
-            if isinstance(node, ast.Import | ast.ImportFrom) and "gpbnb" in ast.unparse(node):
-                exec(ast.unparse(node))
-
-
-@each_notebook
-def test_a_reader_finds_every_name_of_a_visible_cell(path):
-    assert unseen(code_cells(path)) == []
-
-
-@each_notebook
-def test_imports_may_be_folded_but_never_removed(path):
-    removed = ["".join(cell["source"]) for cell in code_cells(path) if "remove-cell" in tags(cell)]
-    assert [source for source in removed if re.search(r"^(?:import|from) ", source, re.MULTILINE)] == []
 
 
 # A form, a rounding or a basis as the code calls it; a letter of a formula may be called chop.

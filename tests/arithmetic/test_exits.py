@@ -14,8 +14,6 @@ import statistics
 import struct
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from fractions import Fraction
-from functools import partial
 
 import numpy as np
 import pytest
@@ -26,7 +24,7 @@ import scipy.ndimage
 import scipy.signal
 import scipy.special
 
-from gpbnb import BINARY64, FixedFormat, FloatArray, FloatFormat, convert, linalg, peek, required_precision
+from gpbnb import BINARY64, FixedFormat, FloatArray, FloatFormat, linalg, peek
 from gpbnb.arithmetic import rational
 from gpbnb.arithmetic.exits import kept_in, lifted
 
@@ -157,23 +155,6 @@ def test_every_exit_is_refused():
             assert attempt(name, FMT) == ""
 
 
-def test_a_message_says_what_to_write():
-    with kept_in(FMT) as fmt:
-        x = fmt.array(NUMBERS)
-        for leave, words in (
-            (
-                np.asarray,
-                r"got a NumPy array of a FloatArray .*write fmt.array\(\[a, b\]\) .*np.stack; to look at x, write ",
-            ),
-            (lambda x: math.sqrt(x[0]), r"got float\(\) of a FloatArray .* write np.sqrt\(x\), np.exp\(x\)"),
-            (lambda x: int(x[0]), r"got int\(\) of a FloatArray .* choose by comparisons, np.where"),
-            (str, r"got text of a FloatArray .*gpbnb.peek\(x, print\)"),
-            (BINARY64.array, r"got a conversion from .*precision=11.* to .*precision=53.*linalg.matmul"),
-        ):
-            with pytest.raises(TypeError, match=words):
-                leave(x)
-
-
 STAYS = {
     "arithmetic": lambda x: (x + 1) * x - x / 2,
     "power": lambda x: np.power(x, 2) + x**3,
@@ -259,34 +240,3 @@ def test_peeked_numbers_arrive_after_the_run_unless_nothing_is_searched():
             pool.submit(lambda: peek(x[1], lambda each: seen.append(float(each)))).result(60)
         assert len(seen) == 1
     assert seen[1:] == [(FMT.array(NUMBERS) / 3).to_float().tolist(), "inner 0.5", 0.75]
-
-
-def loop(fmt, wanted, plant=None):
-    """A proportional controller of a plant, which is in the same format unless another is given."""
-    exact = plant or fmt
-    x, found = exact.array(0), []
-    for each in wanted:
-        found.append((each - convert(x, fmt)) * fmt.array("0.7"))
-        x = x + (convert(found[-1], exact) - x) * exact.array("0.1")
-    return found
-
-
-def test_a_plant_in_another_format_is_not_rounded_with_its_controller():
-    """The largest distance of the output from one in Fractions, in the format found and with one bit less."""
-    x, true = Fraction(0), []
-    for _ in range(50):
-        true.append((1 - x) * Fraction(7, 10))
-        x += (true[-1] - x) / 10
-    ask = partial(required_precision, z=[1] * 50, tolerance="1/1000", kind="fixed")
-    apart = ask(lambda fmt, z: loop(fmt, z, FloatFormat(2, 100)))
-    assert (apart.digits, ask(loop).digits) == (10, 11)
-    for bits, met in ((10, True), (9, False)):
-        u = loop(FixedFormat(1, bits), np.ones(50), FloatFormat(2, 100))
-        errors = [abs(each.to_fractions() - exact) for each, exact in zip(u, true, strict=True)]
-        assert (max(errors) <= Fraction(1, 1000)) is met
-    slowly = required_precision(lambda fmt, z: loop(fmt, z, FloatFormat(2, 100)), [1] * 3, 0.01)
-    assert "operation by operation: it converts numbers to another format" in str(slowly)
-
-
-def test_a_number_is_converted_to_a_named_format():
-    assert convert(BINARY64.array("0.1"), "Q3.12").to_fractions() == FixedFormat(3, 12).round("0.1")

@@ -36,17 +36,6 @@ def test_linear_algebra_of_numpy_pivots_as_lapack():
             assert np.linalg.norm(b).to_fractions() == loops.root(loops.dot(b.to_fractions(), b.to_fractions()))
 
 
-def test_other_names_of_numpys_linear_algebra_are_refused_with_those_there_are():
-    x = BINARY32.eye(2)
-    for function in (np.linalg.eig, np.linalg.svd, np.linalg.qr, np.linalg.pinv, np.linalg.cond, np.linalg.slogdet):
-        with pytest.raises(
-            TypeError, match=f"got np.linalg.{function.__name__} of a FloatArray; needed one of np.linalg.ch"
-        ):
-            function(x)
-    assert np.linalg.trace(x) == 2
-    assert np.linalg.solve(np.eye(2), BINARY32.array([1, 2])).to_float().tolist() == [1, 2]
-
-
 class Frame:
     """What pandas gives: an array that has made whole numbers float64, and exact objects where they are asked for."""
 

@@ -121,12 +121,6 @@ class Small:
 small = cache(Small)
 
 
-def test_formats_of_the_processor_without_subnormal_numbers_have_none() -> None:
-    for each in (named.BINARY32, named.BINARY64):
-        fmt = replace(each, subnormal=False)
-        assert (fmt.array([fmt.smallest]) / 2).tolist() == [0]
-
-
 def same(found: Any, m: Any, e: Any) -> bool:
     """Whether an array has these significands and exponents, both normalized."""
     return all(np.array_equal(*parts) for parts in zip(found.to_pairs(), (m, e), strict=True))

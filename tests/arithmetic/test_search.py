@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 
 import pytest
 
@@ -83,45 +82,3 @@ def test_where_there_is_no_bound_above_an_answer_it_stays_and_a_missed_one_refut
 
     found = Search(error, FloatFormat(10, 5), (7, 16), bounds=True)
     assert (found.fmt, found.undecided) == (FloatFormat(10, answer), undecided)
-
-
-def test_what_is_found_must_also_be_proved():
-    """5 digits are found, 8 proved; the proof that fails counts as missed."""
-    proved: list[int] = []
-
-    def proof(fmt):
-        proved.append(fmt.precision)
-        return Outcome(0.5) if fmt.precision >= 8 else Outcome(3.0, "not proved")
-
-    found = Search(lambda fmt: Outcome(1 + (fmt.precision < 5)), FloatFormat(10, 5), (), proof=proof)
-    assert found.fmt == FloatFormat(10, 8)
-    assert dict(found.tried)[proved[0]] == 3.0
-    assert found.why.endswith("not proved")
-    assert found.error(FloatFormat(10, 6)).ratio == 3.0
-
-
-@pytest.mark.parametrize("base", [2, 3, 10, 16])
-@pytest.mark.parametrize("power", [1, 7, 40, 300])
-def test_without_a_largest_the_range_grows(base, power):
-    bound = Fraction(1, 7**power)
-    found = smallest_precision(lambda fmt: fmt.unit_roundoff <= bound, base, monotone=True)
-    below = Fraction(1) if found.precision == 1 else FloatFormat(base, found.precision - 1).unit_roundoff
-    assert found.unit_roundoff <= bound < below
-
-
-def test_the_reason_is_that_of_the_highest_precision_below_the_answer_that_has_one():
-    def error(fmt):
-        t = fmt.precision
-        return (
-            (0.5, "", False)
-            if t >= 40
-            else (2.0, "", False)
-            if t == 39
-            else (math.inf, f"the run stops at step {t}", False)
-        )
-
-    found = Search(error, FloatFormat(2, 5), ())
-    stopped = [digits for digits, _ in found.tried if digits < 39]
-    assert len(stopped) > 1
-    assert found.why == f"in {max(stopped)} bits the run stops at step {max(stopped)}"
-    assert Search(lambda fmt: Outcome(0.5), FloatFormat(2, 5), ()).why == ""

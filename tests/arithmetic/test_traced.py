@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, FixedFormat, FloatFormat, peek, required_precision
+from gpbnb import BINARY32, FixedFormat, FloatFormat, peek
 from gpbnb.arithmetic import linalg, tape
 from gpbnb.arithmetic.machine import CODES
 from gpbnb.arithmetic.traced import TracedFunction
@@ -212,46 +212,6 @@ def test_what_cannot_be_traced_runs_as_it_is_and_says_why(function, reason):
     assert traced.reason.startswith(reason)
     assert traced.refusal == traced.reason
     assert "in line" in traced.reason or "peek" in reason or "returns" in reason
-
-
-def test_constants_must_be_exact_where_the_function_demands_it():
-    for constant in (0.1, [0.5, 0.1], np.array([0.5, 0.1])):
-        traced = TracedFunction(lambda fmt, z, constant=constant: z * constant)
-        with pytest.raises(ValueError, match=r"got the operand 0.1; needed a number that .* holds exactly"):
-            traced(BINARY32, [1])
-    traced = TracedFunction(lambda fmt, z: z * 0.1)
-    assert traced(FloatFormat(2, 60), [2]).to_float().tolist() == [0.2]
-    assert traced.reason == ""
-
-
-def test_a_trace_belongs_to_shapes_and_takes_new_numbers():
-    calls = []
-
-    def summed(fmt, z):
-        calls.append(z.shape)
-        total = fmt.array(0)
-        for each in z:
-            total = total + each
-        return total
-
-    traced = TracedFunction(summed)
-    for numbers_ in ([1, 2], [5, 6], [1, 2, 3]):
-        assert traced(BINARY32, numbers_).to_float() == sum(numbers_)
-    assert calls == [(2,), (3,)]
-
-
-def test_the_search_says_whether_it_was_traced():
-    found = required_precision(pi_controller, Z, 1e-3)
-    assert found.notes == ()
-    assert found.digits > 5
-
-    def branching(fmt, z):
-        return [x if x > 0 else x / 3 for x in z]
-
-    found = required_precision(branching, Z, 1e-2)
-    assert "; the function ran operation by operation: it branches on a comparison" in str(found)
-    bits = required_precision(pi_controller, Z, 1e-3, kind="fixed", like=FixedFormat(4, 1))
-    assert bits.digits > 5
 
 
 @pytest.mark.parametrize("function", [lambda _, x, y: np.remainder(x, y), TracedFunction(lambda _, x, y: x % y)])

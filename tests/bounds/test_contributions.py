@@ -9,7 +9,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.bounds.contributions import contributions
-from gpbnb.bounds.guarantee import PARTS, guarantee, limits
+from gpbnb.bounds.guarantee import guarantee, limits
 from gpbnb.bounds.probable import separate_roundings
 from gpbnb.filters.forms import Form
 from gpbnb.report.examples import cyclic, tracker
@@ -79,22 +79,6 @@ def test_each_share_is_the_error_followed_through_exact_steps(found):
             *_, end = followed(found, operation, back + 1, -1 - back)
             total += of_steps[(-1 - back) % period, operation] * np.abs(end)
         assert given.sums[:, operation] == pytest.approx(total, rel=1e-6, abs=1e-30)
-
-
-def test_the_shares_of_the_tracker_are_nearly_its_whole_bound():
-    """Its bound is largest after the gain has settled, and hardly anything but these roundings adds to it."""
-    model, within = TRACKER
-    found = guarantee(model, FloatFormat(2, 24), within)
-    rounding = found.parts[:, PARTS.index("roundings of the estimate")]
-    assert contributions(found).sums.sum(axis=1) == pytest.approx(rounding, rel=2e-3)  # the gain still changes a little
-
-
-def test_a_rounding_is_as_large_as_the_estimate_with_its_error_may_be():
-    """The error takes estimates beyond a power of two, from where on roundings are twice as large."""
-    found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1024 - 2**-10, 32 - 2**-10], innovation=8))
-    program = found.schedule.program
-    (errors,) = separate_roundings(found)[2]
-    assert errors[program.outputs - program.n - program.m].tolist() == [2.0**-14, 2.0**-19]
 
 
 def test_a_filter_that_never_settles_is_refused():

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import gpbnb
 from gpbnb import FloatFormat, LinearSystem, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.gains import filter_schedule, schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
-from gpbnb.bounds.guess import GAIN, LOOP, float_errors, gains, linear_steps, rounding_errors, value_sizes
+from gpbnb.bounds.guess import GAIN, float_errors, gains, linear_steps, rounding_errors, value_sizes
 from gpbnb.bounds.probable import probable_error, separate_roundings
 from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
@@ -156,12 +155,6 @@ def test_sums_by_squares_are_those_of_every_step(radius: float, steps: int | Non
     assert (found <= gain * (1.5 if steps is None else 1.15)).all()
 
 
-def test_a_sum_over_all_steps_is_the_geometric_one() -> None:
-    """In blocks of 16 steps, each of which leaves 0.85 of the last."""
-    (found,) = gains(np.full((1, 1), 0.99), np.ones((1, 1)), np.zeros((0, 1)), None, 16)
-    assert found == pytest.approx(100, rel=1e-12)
-
-
 # -- the guarantee ----------------------------------------------------------------------------------------------------
 
 
@@ -209,69 +202,6 @@ def test_the_error_of_the_gain_matters() -> None:
     assert found.bound[0] - found.parts[0, GAIN] < outcome.errors[0] <= found.bound[0]
 
 
-def test_roundings_of_the_stored_loop_matter() -> None:
-    """Hung's form stores (I - KH)Φ rounded: their errors act on the state at every step."""
-    model = LinearModel(*(exact([[v]]) for v in ("1", "1", "0.01", "1")), exact(["0"]), exact([["1"]]))
-    fmt = FloatFormat(2, 12)
-    found = guarantee(model, fmt, limits(state=100, innovation=100), form=Form.HUNG)
-    assert found.parts[0, LOOP] > 0.05 * found.bound[0]
-    other = guarantee(model, fmt, limits(state=100, innovation=100), form=Form.INNOVATION)
-    assert other.parts[0, LOOP] == 0
-
-
-@pytest.mark.parametrize(
-    ("model", "fmt", "says"),
-    [
-        (tracker(Q=exact([["0", "0"], ["0", "0"]])), FloatFormat(2, 53), "did not settle"),
-        (
-            LinearModel(*(exact([[v]]) for v in ("2", "0", "0.1", "1")), exact(["0"]), exact([["1"]])),
-            FloatFormat(2, 11),
-            "did not settle|left the range",
-        ),
-    ],
-)
-def test_where_there_is_no_bound_for_ever_it_says_why(model: LinearModel, fmt: FloatFormat, says: str) -> None:
-    found = guarantee(model, fmt, limits(state=10, innovation=10), most=300, horizon=50)
-    assert not found.for_ever
-    assert found.steps is not None
-    assert found.steps > 0
-    assert any(part in found.why for part in says.split("|"))
-
-
-def test_a_covariance_that_loses_definiteness_ends_the_bound() -> None:
-    model = tracker(R=exact([["1e-12"]]), P0=exact([["1e4", "0"], ["0", "1e4"]]), H=exact([["1", "0.5"]]))
-    found = guarantee(model, FloatFormat(2, 11), limits(state=10, innovation=10))
-    assert not found.for_ever
-    assert "lost definiteness" in found.why or "singular" in found.why
-    stored = model.rounded(FloatFormat(2, 11))
-    run = Run(stored, FloatFormat(2, 11), Form.INNOVATION, range(1, 9))
-    run.take(run.fmt.array(np.zeros((8, 1))))
-    assert found.schedule.steps == run.indefinite == 2
-    assert not run.stopped
-
-
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(2, 12, Rounding.CHOP)], ids=str)
-def test_a_second_order_section(fmt: FloatFormat) -> None:
-    found = from_schedule(
-        filter_schedule(LinearSystem.from_coefficients(["0.01", "0.02", "0.01"], [1, "-1.6", "0.7"]).as_filter(), fmt),
-        limits(measurement=1),
-    )
-    outcome = attack(found, 100, 100)
-    assert 0.3 < outcome.ratio <= 1
-
-
-def test_the_probable_error_is_that_of_independent_roundings() -> None:
-    """Against a simulation of the same noise: to four standard errors, with noise correlated over 20 steps."""
-    found = guarantee(tracker(), FloatFormat(2, 24), limits(state=[1000, 30], innovation=8))
-    rng, count = np.random.default_rng(6), len(found.schedule.program.operations)
-    F, G, h = (each[-1] for each in separate_roundings(found))
-    e, total, steps = np.zeros((2, 200)), np.zeros(2), 400
-    for k in range(2 * steps):
-        e = F @ e + G @ (h[:, None] * rng.uniform(-1, 1, (count, 200)))
-        total += (e**2).mean(axis=1) / steps if k >= steps else 0
-    assert np.allclose(np.sqrt(total), probable_error(found), rtol=4 * np.sqrt(2 * 20 / (200 * steps)))
-
-
 def test_the_probable_error_of_a_periodic_model_is_the_largest_of_its_steps() -> None:
     found = guarantee(rolling(), FloatFormat(2, 24), limits(state=100, innovation=10))
     F, effects, errors = separate_roundings(found)
@@ -311,36 +241,3 @@ def test_the_ceiling_adds_up_roundings_by_the_size_of_their_results():
         total = 0.5625 * total + sum(half[math.frexp(each)[1]] for each in sizes)
         x = sum(products)
     assert ceiling(found, z, 0) == pytest.approx(total, rel=1e-12)
-
-
-def test_outputs_and_delays_have_a_guarantee():
-    """A delayed copy of a state has no disturbance of its own, nor has an output without a direct term."""
-    A, B = [["0.5625", 0, 0], [1, 0, 0], [0, 1, 0]], [["0.4375"], [0], [0]]
-    schedule = filter_schedule(state_space(A, B, [[0, 0, 1]], [[0]]), FloatFormat(2, 11))
-    found = from_schedule(schedule, limits(measurement=1.0))
-    assert found.for_ever
-    assert found.limits.state == pytest.approx(np.ones(4), rel=1e-6)
-    assert found.bound == pytest.approx(np.full(4, found.bound[0]), rel=1e-6)
-    outcome = attack(found, 200, 50)
-    assert 0.1 < outcome.ratio <= 1
-
-
-def test_a_filter_that_forgets_too_slowly_for_a_proof_is_told_so():
-    """With its first variance, the gain K = 2**-20 stays, and an error decays by 1 - K a step."""
-    K = 2.0**-20
-    model = LinearModel([[1]], [[1]], [[K * K]], [[1 - K]], [0], [[K - K * K]])
-    found = guarantee(model, FloatFormat(2, 53), limits(state=1, innovation=1))
-    later = math.ceil(26 * math.log(2) / -math.log1p(-K))
-    assert f"its gain takes 1 steps to settle, and errors take {later} to decay, of which four" in found.why
-    assert (found.steps, found.bound.tolist()) == (0, [math.inf])
-
-
-def test_an_input_that_is_always_zero_is_bounded():
-    found = gpbnb.guarantee(LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 24), limits(measurement=0))
-    assert found.steps is None
-    assert 0 <= found.bound[0] < 2.0**-24
-
-
-def test_random_errors_are_finite_if_one_measurement_has_a_limit() -> None:
-    found = guarantee(rolling(), FloatFormat(2, 24), limits(state=100, innovation=100, measurement=[50, math.inf]))
-    assert 0 < np.abs(random_errors(found, 20)).max() < found.bound.max()

@@ -17,10 +17,6 @@ from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.run import Run, reference_states
 
 
-def scalar(**changes: Any) -> LinearModel:
-    return LinearModel(**({"Phi": [["1/2"]], "H": [[1]], "Q": [[1]], "R": [[1]], "x0": [0], "P0": [[1]]} | changes))
-
-
 def two_states(**changes: Any) -> LinearModel:
     given = {
         "Phi": [["1/2", 0], ["1/4", "1/3"]], "H": [[1, 1]], "Q": [[1, 0], [0, 1]], "R": [["0.75"]], "x0": [0, 0],
@@ -74,15 +70,6 @@ def test_a_filter_that_measures_nothing(rounding: Rounding, form: Form, x0: list
         assert (error.max(axis=0) <= found.bound).all()
         if within.state[0] > 1:
             assert (found.bound < 1e-9).all() == (x0 == [0, 0])  # the checker rounds outwards
-
-
-@pytest.mark.parametrize("fmt", [FloatFormat(2, 11, emin=-14, emax=15), FixedFormat(3, 8)], ids=str)
-def test_numbers_beyond_the_range_have_no_bound(fmt: Any) -> None:
-    """Columns of infinite limits, some of which have no effect: 0 times infinity is not used."""
-    found = guarantee(scalar(), fmt, limits(measurement=1e6))
-    assert not found.for_ever
-    assert np.isinf(found.bound).all()
-    assert "may exceed the largest" in found.why
 
 
 # -- inputs of a linear system as a format stores them ----------------------------------------------------------------

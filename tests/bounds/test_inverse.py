@@ -57,19 +57,3 @@ class TestSmallestPrecision:
         first = next(t for t in meets if t + 1 in meets)
         assert found.fmt == FloatFormat(base, first, rounding)
         assert errors[first] <= Fraction(found.error) <= errors[first] * (1 + Fraction(1, 2**52))
-
-    def test_an_answer_reads_as_a_sentence(self):
-        found = bounds.smallest_precision([[2, 1], [1, 3]], 1e-3)
-        assert repr(found) == str(found) == "9 bits: 0.73 of the tolerance, by comparison with the exact inverse"
-        assert str(bounds.smallest_precision([[4]], 0.1, 10)).startswith("2 decimal digits: 0 of the tolerance, ")
-
-    def test_none_is_enough(self):
-        with pytest.raises(
-            ValueError,
-            match=r"at most 8 decimal digits .* relative error of at most 1e-12; the least error is 0.00162\.",
-        ):
-            bounds.smallest_precision(self.HILBERT, 1e-12, 10, largest=8)
-        # The default limit is 60 digits; these two rows differ only in the 70th.
-        for base, most in ((10, "60 decimal digits"), (2, "200 bits"), (16, "50 base-16 digits")):
-            with pytest.raises(ValueError, match=f"at most {most} .* in {most} got a zero piv"):
-                bounds.smallest_precision([["1", "1"], ["1", "1." + 69 * "0" + "1"]], 1e-3, base)

@@ -11,10 +11,9 @@ import pytest
 from gpbnb import FixedFormat, FloatFormat, LinearModel, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.bounds.gains import schedule
-from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
-from gpbnb.report.wordlengths.study import companion_run
 
 # -- the guarantee is for that filter ---------------------------------------------------------------------------------
 
@@ -84,31 +83,3 @@ def test_the_coefficients_of_a_guarantee_are_those_of_the_run(fmt: FloatFormat) 
                 continue
             given = schedule(model, fmt, form, 40)
             assert np.array_equal(given.packed[:6], run.coefficients())
-
-
-def test_companions_are_for_the_run_of_the_model_as_given(monkeypatch: Any) -> None:
-    opened = []
-    start = Run.__init__
-
-    def noted(self: Run, model: LinearModel, fmt: Any, *arguments: Any, **options: Any) -> None:
-        start(self, model, fmt, *arguments, **options)
-        if self.form is Form.UD:
-            opened.append((self.exactly(self.letters["UQ"]), self.exactly(self.P)))
-
-    (model,) = _raised_models(NINE, 1)
-    user = Run(model, NINE, Form.UD, ())
-    monkeypatch.setattr(Run, "__init__", noted)
-    companion_run(model, np.zeros((2, model.m)), NINE, Form.UD)
-    ((UQ, P),) = opened
-    assert np.array_equal(UQ, user.exactly(user.letters["UQ"]))
-    assert np.array_equal(P, user.exactly(user.P))
-    assert user.repairs == Run(model, NINE, Form.POTTER, ()).repairs
-
-
-def test_a_covariance_that_must_not_be_raised_has_neither_run_nor_guarantee() -> None:
-    model = raised_while_factored(repair=False)
-    with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
-        Run(model, NINE, Form.UD, ())
-    with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
-        guarantee(model, NINE, WITHIN, form=Form.UD)
-    assert guarantee(model, NINE, WITHIN, form=Form.INNOVATION).for_ever

@@ -2,40 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
-
 import numpy as np
 import pytest
 
-from gpbnb import required_precision
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY16
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.guarantee import guarantee, limits
-from gpbnb.bounds.guess import ROUNDING
 from gpbnb.bounds.units import units
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, reference_states
 from gpbnb.report.guarantees.adversary import attack
-from tests.surveying import survey
 
-WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-WITHIN = limits(state=100, innovation=10)
 # Filters in other rounding modes take long to compile; tests/arithmetic compares every mode with Fractions.
 EVEN = Rounding.EVEN
-
-
-def test_a_range_that_suffices_changes_nothing():
-    z = np.round(np.random.default_rng(5).standard_normal((50, 1)) * 2**20) / 2**20
-    ranged = required_precision(WALK, z, 0.01, rounding="even", range=(-126, 127))
-    assert ranged.tried == required_precision(WALK, z, 0.01, rounding="even").tried
-    assert (ranged.format.emin, ranged.format.emax, ranged.format.rounding) == (-126, 127, EVEN)
-    digits = [7, 9]
-    assert survey(WALK, z, 0.01, digits, rounding="even", emin=-126, emax=127) == survey(
-        WALK, z, 0.01, digits, rounding="even"
-    )
 
 
 # -- guarantees -------------------------------------------------------------------------------------------
@@ -82,34 +63,3 @@ def test_a_filter_in_fixed_point_has_a_guarantee(form):
     assert 0.1 < against.ratio <= 1
     finer = guarantee(CAR, FixedFormat(8, 20, EVEN), ROAD, form=form)
     assert (finer.bound < found.bound / 50).all()
-
-
-def test_in_fixed_point_only_products_are_rounded():
-    """The bound of x + K (z - x) in the steady state: the rounding of one product, and the error of the gain."""
-    fmt = FixedFormat(8, 12, EVEN)
-    found = guarantee(WALK, fmt, WITHIN)
-    schedule = found.schedule
-    half, gain = 2.0**-13, schedule.coefficients[-1, schedule.program.coefficient_names.index("K[0][0]"), 0]
-    off = abs(gain - schedule.exact[-1, 0, 0, 0]) * 10
-    assert found.bound[0] == pytest.approx((half + off) / gain, rel=0.02)
-    assert found.parts[0, ROUNDING] == pytest.approx(half / gain, rel=0.01)
-    table = units(fmt)
-    assert (table.powers.tolist(), table.errors.tolist()) == ([256 - 2.0**-12], [half])
-    assert table.aligned == math.inf
-    assert units(BINARY16).aligned == 2.0**-13
-    assert units(FixedFormat(8, 12, Rounding.DOWN)).errors.tolist() == [2 * half]
-
-
-# -- formats of any exponent ------------------------------------------------------------------------------
-
-
-def in_units(exponent):
-    """The car, in units of 2**-exponent."""
-    square = Fraction(4) ** exponent
-    return LinearModel(CAR.Phi, CAR.H, CAR.Q * square, CAR.R * square, CAR.x0, CAR.P0 * square)
-
-
-@pytest.mark.parametrize(("form", "basis"), [("innovation", "bound"), ("Joseph", "emulation"), ("UD", "bound")])
-def test_units_far_from_one_change_nothing(form, basis):
-    answers = {required_precision(in_units(e), 12, 0.01 * 2.0**e, form=form, basis=basis).tried for e in (0, 210, -210)}
-    assert len(answers) == 1

@@ -5,12 +5,11 @@ from __future__ import annotations
 import html
 import json
 import re
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
-from gpbnb.report.display.tables import MOST_ROWS, Table, scientific, short
+from gpbnb.report.display.tables import MOST_ROWS, Table, short
 
 
 def cells(line):
@@ -37,20 +36,6 @@ def test_cells_are_escaped_as_prose_and_as_math(text, cell):
     line = table.markdown().splitlines()[2]
     assert line == f"| {cell} |"
     assert cells(line) == [cell.strip()]
-
-
-def test_no_cell_can_break_the_table():
-    texts = ("|", r"\|", "$|$", "a\n|\nb", r"$\left|x\right|$")
-    table = Table("t", ("h",) * len(texts), (texts,))
-    assert [len(cells(line)) for line in table.markdown().splitlines()] == [len(texts)] * 3
-
-
-@pytest.mark.parametrize(
-    ("value", "figures", "text"),
-    [(82, 2, r"$8.2\times10^{1}$"), (Fraction(1, 3), 3, r"$3.33\times10^{-1}$"), (1, 2, "$1.0$")],
-)
-def test_scientific_numbers(value, figures, text):
-    assert scientific(value, figures) == text
 
 
 @pytest.mark.parametrize(

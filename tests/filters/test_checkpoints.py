@@ -5,7 +5,6 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
-import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
@@ -34,12 +33,6 @@ def test_a_difference_below_what_double_double_resolves_is_correctly_rounded():
     assert 0 < abs(off) < 2.0**-107
     assert [each.ravel().tolist() for each in run.minus(true)] == [[off]] * 3
     assert true.to_float("K").ravel().tolist() == [0.1, 0.1]
-
-
-def test_runs_are_compared_at_equal_steps():
-    x = np.ones((1, 2))
-    with pytest.raises(ValueError, match=r"\(3,\) for the runs and \(2,\) for the reference; needed equal steps"):
-        saved((3,), x, None).minus(saved((2,), x, None))
 
 
 def test_the_parts_of_a_double_double_are_added_exactly():

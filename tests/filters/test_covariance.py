@@ -7,9 +7,8 @@ import pytest
 from scipy.linalg import expm
 
 from gpbnb.arithmetic.definiteness import factor
-from gpbnb.arithmetic.named import BINARY16
 from gpbnb.arithmetic.rational import exact
-from gpbnb.filters.covariance import REPAIR_TOLERANCE, Repair
+from gpbnb.filters.covariance import REPAIR_TOLERANCE
 from gpbnb.filters.model import LinearModel
 
 
@@ -67,14 +66,6 @@ def not_quite(n):
     return next(Q for Q in TEXTBOOK if len(Q) == n and model(Q).repairs)
 
 
-def test_half_the_digits_of_the_type_are_repaired():
-    """1e-5 is more than half of the digits of float64, 1.5e-8, and less than half of those of float32, 3.5e-4."""
-    Q = np.array([[1, 0.5], [0.5 + 1e-5, 1]])
-    assert model(Q.astype(np.float32)).repairs
-    with pytest.raises(ValueError, match="needed a symmetric matrix"):
-        model(Q)
-
-
 def test_a_repair_is_off_for_exact_input_and_on_demand():
     Q = not_quite(2)
     as_fractions = exact(Q)
@@ -84,14 +75,3 @@ def test_a_repair_is_off_for_exact_input_and_on_demand():
     with pytest.raises(ValueError, match="got Q with"):
         model(Q, repair=False)
     assert model(as_fractions, repair=True).repairs == model(Q).repairs
-
-
-def test_a_repair_says_what_it_did():
-    both = Repair("Q", 0, 1e-9, 2e-9)
-    assert str(both) == (
-        "Q was made symmetric (it missed that by 1e-09 of its variances) and made semidefinite (its variances were "
-        "raised by 2e-09 of themselves)"
-    )
-    stored = Repair("R", 0, 0.0, 0.25, BINARY16)
-    text = "R, stored in BINARY16, was made definite (its variances were raised by 0.2 of themselves)"
-    assert str(stored) == text

@@ -7,10 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import BINARY32, BINARY64, FloatFormat, LinearModel, LinearSystem, emulate, required_precision
+from gpbnb import BINARY32, BINARY64, FloatFormat, LinearModel, emulate, required_precision
 from gpbnb.arithmetic.kernels import tags
 from gpbnb.filters.forms import Form
-from gpbnb.filters.run import Run, Sums
+from gpbnb.filters.run import Run
 from gpbnb.filters.stepping import RunningStep
 
 STEPS = 400
@@ -86,19 +86,6 @@ def impulse(steps):
     return z
 
 
-@pytest.mark.parametrize(
-    "options",
-    [{}, {"base": 10}, {"base": 16}, {"form": "UD"}, {"basis": "bound"}, {"basis": "bound", "base": 10}],
-    ids=str,
-)
-def test_silence_after_a_record_changes_no_answer(options):
-    """The errors are largest while the estimate is large, so that a short record has the same answer."""
-    long, short = (required_precision(DECAYING, impulse(steps), 1e-3, highest=12, **options) for steps in (MANY, 100))
-    assert long.met
-    assert long.format == short.format
-    assert dict(long.tried)[long.digits] == pytest.approx(dict(short.tried)[long.digits], rel=1e-9)
-
-
 def test_an_estimate_has_its_digits_until_it_becomes_zero():
     fmt = FloatFormat(2, 20)
     run = Run(DECAYING, fmt, "innovation", range(1, MANY + 1))
@@ -110,21 +97,6 @@ def test_an_estimate_has_its_digits_until_it_becomes_zero():
     for k in range(1, ended):
         ahead = fmt.round(fmt.round("0.9") * Fraction(x[k - 1]))
         assert Fraction(x[k]) == fmt.round(ahead - fmt.round(Fraction(K[k]) * ahead))
-
-
-def test_two_estimates_decay_at_their_own_time_and_a_late_measurement_counts():
-    model = LinearModel(
-        [["0.5", 0], [0, "0.9"]], np.eye(2), [["0.01", 0], [0, "0.01"]], np.eye(2), [1, 1], np.eye(2), name="two"
-    )
-    z = np.zeros((MANY, 2))
-    z[-1] = 1
-    late = Run(model, FloatFormat(2, 20), "innovation", ()).states(z)
-    first = int(np.argmax(late[:, 0, 0] == 0))
-    assert first < int(np.argmax(late[:, 1, 0] == 0)) < MANY - 1
-    assert (late[-1, :, 0] > 0).all()
-    checkpoints = Run(model, FloatFormat(2, 20), "innovation", (first, MANY))
-    checkpoints.take(z)
-    assert (checkpoints.checkpoints().to_float("x") == late[[first - 1, -1], :, 0]).all()
 
 
 def test_covariances_go_on_where_an_estimate_becomes_zero_before_they_repeat():
@@ -156,16 +128,6 @@ def test_a_decimal_estimate_decays_through_subnormal_numbers_to_zero(subnormal):
     assert required_precision(DECAYING, impulse(3000), 1e-3, base=10, range=(-95, 96)).met
 
 
-def test_an_output_of_a_system_decays_into_subnormal_decimals():
-    fmt, x, y = FloatFormat(10, 4, "even", emin=-6, emax=6), Fraction(1), []
-    for _ in range(40):
-        y.append(x)
-        x = fmt.round(Fraction(9, 16) * x)
-    found = LinearSystem([["9/16"]], [[1]], x0=[1]).outputs(np.zeros((40, 1)), fmt)[:, 0]
-    assert [fmt.round(Fraction(high) + Fraction(low)) for high, low in found] == y
-    assert y[-1] == fmt.smallest
-
-
 def test_no_random_number_is_drawn_twice_in_a_run():
     """Factors, gain and estimate draw from one sequence; shared numbers would correlate their roundings."""
     tracker = LinearModel(
@@ -180,17 +142,3 @@ def test_no_random_number_is_drawn_twice_in_a_run():
     once = int(state[1])
     run.take(np.full((20, 2), 0.7))
     assert int(state[1]) - once == once - opened > 0
-
-
-def test_random_sums_are_drawn_step_by_step():
-    """No covariance is taken for a repeated one, and steps taken at once have the digits of steps taken alone."""
-    model = LinearModel([["0.9"]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-    z = np.ones((100, 1))
-    sums = Sums(fmt=FloatFormat(2, 12, "stochastic"))
-    together, alone = (Run(model, FloatFormat(2, 12), "innovation", range(1, 101), sums) for _ in range(2))
-    together.take(z)
-    for k in range(len(z)):
-        alone.take(z[k : k + 1])
-    assert len(np.unique(together.C[50:])) > 2
-    for one, other in ((together.X, alone.X), (together.C, alone.C)):
-        assert (one == other).all()

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from small_filter import measurements, model
 
-from gpbnb import FixedFormat, FixedIntervalSmoother, FloatFormat, LinearModel, required_precision
+from gpbnb import FixedIntervalSmoother, FloatFormat, LinearModel, required_precision
 from gpbnb.arithmetic.algebra import EXACT
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.forms import Form
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.filters.steps import StepModel, filtered, smoothed
-
-FORMS = ("innovation", "Joseph", "square root")
 
 
 def cyclic():
@@ -24,11 +22,6 @@ def cyclic():
     given = model()
     turned_over = given.Phi[0][::-1, ::-1]
     return model(Phi=[given.Phi[0], turned_over], Q=[given.Q[0], given.Q[0] * Fraction(3, 2)])
-
-
-def scalar():
-    """One state and one measurement."""
-    return LinearModel([["0.9"]], [["1.1"]], [["0.3"]], [["0.7"]], ["0.4"], [["2.3"]])
 
 
 def least_squares(given, z, present):
@@ -150,38 +143,3 @@ def test_the_search_is_right_by_the_exact_smoother(form, bits):
         else:
             assert ratio == pytest.approx(float(error) / 0.01, rel=1e-9)  # the search compares with 237 bits
     assert dict(found.tried)[bits] <= 1 < dict(found.tried)[bits - 1]
-
-
-def test_missing_measurements_are_searched():
-    z = measurements()
-    z[2] = math.nan
-    given = model()
-    assert required_precision(FixedIntervalSmoother(given, z), len(z), 0.01).digits == 9
-    masked = np.ma.masked_invalid(z)
-    by_mask, by_nan = (FixedIntervalSmoother(given, each)(FloatFormat(10, 7)).to_fractions() for each in (masked, z))
-    assert (by_mask == by_nan).all()
-
-
-@pytest.mark.parametrize(("form", "bits"), [("innovation", 12), ("square root", 10)])
-def test_fixed_point(form, bits):
-    """Estimates are multiples of the last place, and the answer counts fraction bits."""
-    z = measurements(5, 1)
-    read = FixedIntervalSmoother(scalar(), z, form)
-    found = required_precision(read, 5, 0.001, kind="fixed", like=FixedFormat(5, 8))
-    assert found.digits == bits
-    x, _ = least_squares(scalar(), z, ~np.isnan(z))
-    errors = [float(np.abs(read(FixedFormat(5, each)).to_fractions() - x).max()) for each in (bits - 1, bits, bits + 1)]
-    assert max(errors[1:]) <= 0.001 < errors[0]
-    assert all((value * 2**bits).denominator == 1 for value in read(FixedFormat(5, bits)).to_fractions().flat)
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_random_roundings_are_the_same_in_each_run(form):
-    read, fmt = FixedIntervalSmoother(scalar(), measurements()[:, :1], form), FloatFormat(2, 12, "stochastic")
-    assert np.array_equal(read(fmt), read(fmt))
-
-
-def test_a_format_without_the_number_one_is_refused():
-    small = LinearModel([["0.5"]], [["0.5"]], [["0.1"]], [["0.2"]], ["0.1"], [["0.1"]])
-    with pytest.raises(ValueError, match="does not hold the number 1"):
-        FixedIntervalSmoother(small, [["0.1"]] * 3)(FixedFormat(0, 20))

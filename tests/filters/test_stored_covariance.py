@@ -8,7 +8,6 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import required_precision
 from gpbnb.arithmetic.definiteness import is_definite
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
@@ -70,17 +69,6 @@ def test_the_variances_are_raised_no_more_than_necessary():
     assert "Q, stored in 24 bits" in str(repair)
 
 
-def test_without_repair_an_indefinite_covariance_is_refused():
-    fmt = FloatFormat(2, 24)
-    given = next(each for each in MODELS if each.rounded(fmt).repairs)
-    model = LinearModel(given.Phi, given.H, given.Q, given.R, given.x0, given.P0, repair=False)
-    assert model.definite_in(fmt) is model
-    with pytest.raises(ValueError, match="needed a positive semidefinite matrix"):
-        model.rounded(fmt)
-    with pytest.raises(ValueError, match="in which Q does not stay positive semidefinite"):
-        Run(model, fmt, Form.UD, ())
-
-
 def test_emulation_and_bound_of_a_raised_covariance_agree():
     """The bound belongs to the covariance that is stored."""
     fmt = FloatFormat(2, 24)
@@ -90,15 +78,6 @@ def test_emulation_and_bound_of_a_raised_covariance_agree():
     assert history.repairs == tuple(map(str, model.rounded(fmt).repairs))
     for form in (Form.INNOVATION, Form.UD):
         assert 0 < emulate(model, z, fmt, form, bounded=True).ratios().max() <= 1
-
-
-def test_answers_exist_for_every_precision_and_name_the_change():
-    """Without the change, a bound existed for some precisions and not for others."""
-    for model in MODELS[:10:3]:
-        found = required_precision(model, 50, 0.01, basis="bound", form="UD")
-        assert found.digits < 24
-        stored = model.definite_in(found.format).repairs
-        assert found.notes[: len(stored)] == tuple(map(str, stored))
 
 
 def test_factors_are_those_of_the_raised_covariance():
@@ -128,19 +107,6 @@ def test_each_covariance_is_raised_by_itself(letter):
     for name, factors in (("Q", run.letters["UQ"][0]), ("R", run.letters["UR"][0]), ("P0", run.P)):
         off = covariance_of_factors(run.exactly(factors)) - (given if name == letter else one)
         assert np.abs(off / np.multiply.outer(sizes, sizes)).max() <= 2 * run.repairs[0].shift + 24 * 2.0**-24
-
-
-ALIKE = LinearModel(np.eye(2), [[1, 0]], np.zeros((2, 2)), [[1]], [0, 0], [[1, 1], [1, 1]], "two states that are one")
-
-
-@pytest.mark.parametrize("form", ["innovation", "UD", "Potter", "Carlson"])
-def test_a_covariance_of_rank_one_has_positive_variances_in_every_form(form):
-    """Factors and square roots have a zero on their diagonal, which is not the variance of a state."""
-    z = np.linspace(-1, 1, 20).reshape(-1, 1)
-    found = emulate(ALIKE, z, FloatFormat(2, 24), form)
-    assert (found.indefinite, found.stopped) == (None, None)
-    assert np.abs(found.state).max() < 2.0**-20  # 20 steps, each with a few roundings of numbers below 1
-    assert 5 <= required_precision(ALIKE, z, 0.01, form=form).digits <= 9
 
 
 @pytest.mark.parametrize("form", [Form.UD, Form.POTTER, Form.CARLSON])

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
 from scipy import linalg, signal
 
-from gpbnb import BINARY16, FloatFormat, LinearSystem, required_precision
+from gpbnb import BINARY16, FloatFormat, LinearSystem
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters.sections import _filtered, scaled
-from gpbnb.filters.structures import STRUCTURES, reflections
+from gpbnb.filters.structures import STRUCTURES
 from gpbnb.wordlength.asked import Asked
 from gpbnb.wordlength.judges import judge_for
-from tests import plain_structures
 
 FORMATS = [
     FloatFormat(2, 11),
@@ -104,60 +102,6 @@ def test_scaled_sections_hand_on_numbers_within_one_and_beyond_half_of_it(form):
             reached.append(signal.sosfilt([[1, 0, 0, *rows[i, 3:]]], reached[0]))
         assert 1 / 2 < max(np.abs(each).sum() for each in reached) <= 1
     assert signal.sosfilt(rows, impulse) == pytest.approx(20**3 * signal.sosfilt(sos, impulse), rel=1e-9, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"Kd": "0.7", "leak": "0.9", "limits": ("-0.5", "0.7"), "back_calculation": "0.05"},
-        {"Kd": "-0.3", "integral_limits": ("-0.2", "0.3"), "limits": ("-0.6", 1)},
-    ],
-    ids=str,
-)
-def test_a_controller_without_rounding_is_its_formula(given):
-    settings = {"Kp": "0.8", "Ki": "0.1", "leak": 1, "integral_limits": None, "back": given.get("back_calculation")}
-    e = [Fraction(each) for each in np.round(np.random.default_rng(5).uniform(-64, 64, 80)) / 64]
-    found = LinearSystem.pid("0.8", "0.1", **given).outputs(np.array(e)[:, None])[:, 0]
-    expected = plain_structures.pid(settings | given, e, plain_structures.uniform(Fraction))
-    assert {min(expected), max(expected)} == {Fraction(each) for each in given["limits"]}
-    assert max(abs(sum(map(Fraction, y)) - exact) for y, exact in zip(found.tolist(), expected, strict=True)) < 1e-28
-
-
-def test_reflections_of_a_filter_of_second_order():
-    """For 1 + a1/z + a2/z²: k2 = a2, k1 = a1 / (1 + a2); for the taps, b less what the higher ones add."""
-    k, v = reflections([Fraction(1), Fraction(2), Fraction(3)], [Fraction(1), Fraction(1, 2), Fraction(1, 4)])
-    assert k == [Fraction(2, 5), Fraction(1, 4)]
-    assert v[2] == 3
-    assert v[1] == 2 - 3 * Fraction(1, 2)
-    assert v[0] == 1 - 3 * Fraction(1, 4) - v[1] * Fraction(2, 5)
-
-
-@pytest.mark.parametrize("basis", ["emulation", "bound"])
-def test_two_equal_sections_need_thirty_bits_at_once_and_twenty_in_a_row(basis):
-    """Low-pass filters at 440 Hz for 44.1 kHz with Q = 1, and an impulse of 100; a bound needs ten bits more."""
-    angle = 2 * math.pi * 440 / 44100
-    c, alpha = math.cos(angle), math.sin(angle) / 2
-    sos = np.array([[(1 - c) / 2, 1 - c, (1 - c) / 2, 1 + alpha, -2 * c, 1 - alpha]] * 2)
-    u = np.zeros((1000, 1))
-    u[0] = 100
-    whole = LinearSystem.from_coefficients(*signal.sos2tf(sos))
-    parts = LinearSystem.from_sections(sos)
-    found = [required_precision(each, u, 0.001, basis=basis).digits for each in (whole, parts)]
-    assert found == ([30, 20] if basis == "emulation" else [39, 30])
-
-
-@pytest.mark.parametrize("structure", STRUCTURES)
-def test_a_response_decays_to_zero(structure):
-    """After 2000 steps, 0.3**2000 is below the least float64 by far; the digits before are those of the recursion."""
-    system = LinearSystem.from_coefficients([1, "0.5"], [1, "-0.5", "0.06"], structure)  # poles 0.2 and 0.3
-    impulse = np.zeros((2000, 1))
-    impulse[0] = 100
-    for fmt in (None, FloatFormat(2, 24), FloatFormat(2, 24, "even"), FloatFormat(16, 6), FloatFormat(10, 7)):
-        found = system.outputs(impulse, fmt)[:, 0].sum(axis=1)
-        expected = [100 * (8 * 0.3**k - 7 * 0.2**k) for k in range(60)]
-        assert found[:60] == pytest.approx(expected, rel=1e-4)
-        assert abs(found[-1]) < 2.0**-700
-    assert required_precision(system, impulse, 0.001).digits < 24
 
 
 @pytest.mark.parametrize("order", [2, 3, 6, 8, 12])

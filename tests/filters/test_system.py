@@ -8,30 +8,10 @@ import numpy as np
 import pytest
 
 from gpbnb import required_precision
-from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
-from gpbnb.bounds.gains import filter_schedule
-from gpbnb.bounds.guarantee import from_schedule, limits
-from gpbnb.bounds.probable import probable_error
-from gpbnb.filters.program import recorded
-from gpbnb.filters.structures import LinearFilter
+from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.system import LinearSystem, is_stable
-
-SMALL = LinearSystem([["0.9", "0.2"], [0, "-0.5"]], [["0.1"], [1]], [[1, "0.3"]], [["0.25"]])
-U = np.random.default_rng(3).uniform(-1, 1, (80, 1))
-
-
-def test_bounds_hold_and_are_not_far_above():
-    """A bound proved for every input as large as these, against the errors of these."""
-    observed = dict(required_precision(SMALL, U, 1e-3).tried)
-    found = required_precision(SMALL, U, 1e-3, basis="bound")
-    bounded = dict(found.tried)
-    both = set(observed) & set(bounded)
-    assert len(both) >= 3
-    assert all(observed[t] <= bounded[t] <= 300 * observed[t] for t in both)
-    within = limits(measurement=float(np.abs(U).max()))
-    assert required_precision(SMALL, 1, 1e-3, basis="guarantee", within=within).tried == found.tried
 
 
 @pytest.mark.parametrize("basis", ["bound", "guarantee"])
@@ -56,16 +36,6 @@ def test_a_tolerance_that_float64_does_not_hold_is_not_exceeded():
         assert asked.digits == largest.digits + more
 
 
-def test_probable_errors_are_three_standard_deviations():
-    """Of x+ = x/2 + u: the peak gain is 2, and storing an input of at most 1 in 12 bits is off by at most 2**-13."""
-    system, fmt = LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 12)
-    found = from_schedule(
-        filter_schedule(system.as_filter(), fmt), limits(state=[2, 2], innovation=1, measurement=1), 1
-    )
-    ratios = dict(required_precision(system, 1, 1e-3, basis="probable", within=limits(measurement=1)).tried)
-    assert ratios[12] == pytest.approx((3 * probable_error(found)[1] + 2 * 2**-13) / 1e-3, rel=1e-3)
-
-
 @pytest.mark.parametrize("fmt", [None, FloatFormat(2, 24), FloatFormat(2, 53), FloatFormat(16, 6), FloatFormat(10, 8)])
 @pytest.mark.parametrize(
     ("C", "place"),
@@ -80,13 +50,6 @@ def test_an_overflow_names_output_and_step(C, place, fmt):
     assert np.isfinite(system.outputs([[0]] * (int(place[-1]) - 1), fmt)).all()
     with pytest.raises(OverflowError, match=rf"^{place}: got a (result|number) beyond the range of float64"):
         system.outputs([[0]] * 6, fmt)
-
-
-@pytest.mark.parametrize("fmt", [None, FloatFormat(2, 24), FloatFormat(10, 8), FixedFormat(3, 8)])
-def test_a_step_without_operations_delays(fmt):
-    program = recorded(lambda c, x, u: [u[0], x[0]], 2, 1, 0, p=1)
-    delay = LinearSystem.from_filter(LinearFilter(program, exact([])))
-    assert delay.outputs([[1], [2], [3]], fmt)[:, 0, 0].tolist() == [0, 1, 2]
 
 
 # -- stability -------------------------------------------------------------------------------------------------------
@@ -119,11 +82,3 @@ def companion(roots):
 )
 def test_stability_is_decided_exactly(roots, stable):
     assert is_stable(companion(roots)) == stable
-
-
-def test_a_system_is_unstable_as_stored_where_an_eigenvalue_is_too_large():
-    system = LinearSystem(companion(["0.99", "0.98"]), [[1], [0]])
-    stored = [FloatFormat(2, t).array(system.A) for t in range(2, 19)]
-    radii = [np.abs(np.linalg.eigvals(A.to_float())).max() for A in stored]
-    assert [is_stable(A.to_fractions()) for A in stored] == [radius < 1 - 1e-6 for radius in radii]
-    assert [not system.unstable(FloatFormat(2, t)) for t in range(2, 19)] == [radius < 1 - 1e-6 for radius in radii]

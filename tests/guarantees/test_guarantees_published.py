@@ -8,10 +8,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic.rational import exact
 from gpbnb.report.guarantees import certificates, comparison, survey, table
 from gpbnb.report.guarantees.comparison import error_coefficients
-from gpbnb.report.guarantees.published import dynamax_tracking, filterpy_fusion, fixif_longitudinal, px4_landing_target
+from gpbnb.report.guarantees.published import fixif_longitudinal
 from tests.oracles import floating
 
 
@@ -67,24 +66,6 @@ def test_a_row_comes_out_again(seed: int) -> None:
     assert survey.compute(seed) == row
 
 
-def test_the_noises_of_dynamax_s_tracking_are_independent() -> None:
-    """Its notebook has Q = 0.001 I and an initial covariance of 0.1 I."""
-    model, unit = dynamax_tracking(), np.eye(4, dtype=int)
-    assert (model.Q[0] == exact(unit) / 1000).all()
-    assert (exact(unit) / 10 == model.P0).all()
-    assert (model.R[0] == exact(np.eye(2, dtype=int))).all()
-
-
-def test_noises_of_filterpy_and_px4_are_those_of_their_time_steps() -> None:
-    """filterpy: white noise of an intensity of 0.02, R = 2². PX4: an acceleration of variance 10 that lasts a step."""
-    model, dt = filterpy_fusion(), Fraction(1, 10)
-    assert (model.Q[0] == Fraction(1, 50) * exact([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])).all()
-    assert (model.R[0, 0, 0], model.Phi[0, 0, 1]) == (2**2, dt)
-    model, dt = px4_landing_target(), Fraction(1, 50)
-    assert (model.Q[0] == 10 * exact([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])).all()
-    assert (model.R[0, 0, 0], model.Phi[0, 0, 1]) == (Fraction(5, 1000), dt)
-
-
 def test_every_certificate_of_the_book_is_stored_and_proved() -> None:
     rows = certificates.load()
     assert [row.name for row in rows] == list(certificates.guarantees())
@@ -112,8 +93,3 @@ def test_a_certificate_that_promises_too_much_is_not_proved() -> None:
     given = json.loads(certificates.tracker_guarantee().certificate())
     given["bound"] = [f"{Fraction(each) / 2}" for each in given["bound"]]
     assert certificates.verdict("half", json.dumps(given)).verdict.startswith("not proved: ")
-
-
-def test_every_filter_of_the_chapter_has_a_certificate() -> None:
-    assert {row.name for row in table.load()} <= certificates.guarantees().keys()
-    assert not certificates.guarantees().keys() & certificates.WITHOUT.keys()

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 import os
 import pty
 import stat
@@ -13,9 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from gpbnb.report.ledger import command, load_statements, select, table
+from gpbnb.report.ledger import command, load_statements
 from gpbnb.report.ledger.checking import Row
-from gpbnb.report.ledger.render import to_csv
 from gpbnb.report.ledger.stored import load_findings
 
 INVENTORY = load_statements()
@@ -75,16 +73,6 @@ def test_one_record_an_entry(ledger):
     assert done.returncode == 0
     assert done.stdout == ledger().stdout
     assert "zᵣ" in done.stdout.decode("utf-8")
-
-
-def test_formats(ledger):
-    part = stored(select(INVENTORY, "hung1984", "I"))
-    assert ledger(*CHOSEN).stdout.decode() == to_csv(part)
-    assert ledger(*CHOSEN, "--format", "markdown").stdout.decode() == table(part).markdown() + "\n"
-    found = json.loads(ledger(*CHOSEN, "--format", "json").stdout)
-    assert [item["agrees"] for item in found] == [row.finding.agrees for row in part]
-    text = ledger(*CHOSEN, "--format", "text").stdout.decode()
-    assert [line.split()[1] for line in text.splitlines()] == [row.statement.id for row in part]
 
 
 def test_output_file_is_replaced_as_a_whole(ledger, tmp_path):

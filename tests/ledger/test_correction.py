@@ -13,34 +13,6 @@ from gpbnb.report.ledger.corrections import intended
 from gpbnb.report.ledger.statements import statement
 
 
-def without_braces(latex):
-    """Remove each underbrace and its letter; return what is left and the letters."""
-    letters = []
-    while (start := latex.find(r"\underbrace{")) >= 0:
-        inside = start + len(r"\underbrace{")
-        depth, end = 1, inside
-        while depth:
-            depth += {"{": 1, "}": -1}.get(latex[end], 0)
-            end += 1
-        label = re.match(r"_\{\\text\{\((\w)\)\}\}", latex[end:])
-        letters.append(label[1])
-        latex = latex[:start] + latex[inside : end - 1] + latex[end + label.end() :]
-    return latex, letters
-
-
-@pytest.mark.parametrize(
-    ("shown", "marks", "letters"),
-    [
-        (statement(correction.RESULT), correction.PRINTED, "aaab"),
-        (intended(correction.RESULT), correction.CORRECTED, "ba"),
-    ],
-)
-def test_without_its_braces_the_formula_is_that_of_the_ledger(shown, marks, letters):
-    left, found = without_braces(correction.marked(shown.relation(), marks))
-    assert left == shown.relation().latex()
-    assert found == [*letters]
-
-
 def test_a_part_that_is_not_in_the_formula_cannot_be_marked():
     with pytest.raises(ValueError, match=r"got the parts \['zeta'\]; needed parts of"):
         correction.marked(statement(correction.RESULT).relation(), {"B": "b", "zeta": "a"})

@@ -3,9 +3,8 @@
 import pytest
 
 from gpbnb.report import ledger
-from gpbnb.report.ledger import legibility
-from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, compare
-from gpbnb.report.ledger.legibility import Damage, charged, load_legibility
+from gpbnb.report.ledger.finding import Verdict
+from gpbnb.report.ledger.legibility import load_legibility
 
 DAMAGES = load_legibility()
 
@@ -13,31 +12,6 @@ DAMAGES = load_legibility()
 @pytest.fixture(scope="module")
 def rows():
     return {row.statement.id: row for row in ledger.rows()}
-
-
-@pytest.fixture
-def damaged(monkeypatch):
-    """A statement a with a witness, and a statement b without one."""
-    found = {"a": Damage("a", "l", "c"), "b": Damage("b", "l")}
-    monkeypatch.setattr(legibility, "load_legibility", lambda: found)
-
-
-@pytest.mark.parametrize("verdict", DISAGREEMENTS)
-def test_a_witness_charges_the_scan(damaged, verdict):
-    author = compare(False, "1", verdict, "why", root="product")
-    found = charged("a", author)
-    assert (found.verdict, found.root) == (Verdict.OCR, "")
-    assert (found.recomputed, found.note, found.agrees) == ("1", "why", False)
-
-
-def test_without_a_witness_the_author_stays_charged(damaged):
-    author = compare(False, "1", Verdict.WRONG, "why")
-    assert charged("b", author) is author
-
-
-def test_a_statement_that_is_right_needs_nobody_to_charge(damaged):
-    for right in (compare(True, "1"), Finding("", None, Verdict.GIVEN, "a definition")):
-        assert charged("a", right) is right
 
 
 def test_each_damage_belongs_to_a_statement_and_each_witness_is_right(rows):

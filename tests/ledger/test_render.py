@@ -60,20 +60,6 @@ def rendered(markdown):
     return found
 
 
-def test_a_table_renders_with_its_math_and_prose_unharmed():
-    head, *body = rendered(table(ROWS).markdown())
-    assert [prose for _, prose in head] == ["Item", "Verdict", "Printed", "Recomputed", "Note"]
-    printed = ([r"\vert \tilde Q/Q\vert \le(n+m+1)\beta"], "")
-    assert body[0] == [
-        ([], "hung1984, II.6: eq (20)"),
-        ([], "misprint"),
-        printed,
-        ([r"(n+m-1)\beta"], ""),
-        ([], 'one "sign", as |(20)| of 1982'),
-    ]
-    assert [row[1][1] for row in body] == [*FINDINGS]
-
-
 @pytest.mark.parametrize(
     "prose", ["a*b*c", "u_j_k", "A~, b~_j ~~x~~", "[1] `x` <y> <https://z>", r"a\b", "#1 {x} |y| &lt;"]
 )

@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 import pytest
 
-from gpbnb.report.ledger import load_statements, select
+from gpbnb.report.ledger import load_statements
 from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.statements import DOCUMENTS, statement
 
@@ -29,26 +29,6 @@ def test_each_text_has_places_for_parts_of_its_form():
         assert markup_faults(entry.printed) == [], entry.id
 
 
-def sections(entries):
-    return list(dict.fromkeys((entry.document, entry.chapter, entry.section) for entry in entries))
-
-
-def test_select_by_each_filter():
-    for field, value in (("document", "hung1982"), ("chapter", "III")):
-        assert select(INVENTORY, **{field: value}) == tuple(e for e in INVENTORY if getattr(e, field) == value)
-    both = select(INVENTORY, document="hung1984", chapter="III")
-    assert both == tuple(e for e in INVENTORY if e.id.startswith("hung1984.III."))
-
-
-def test_select_sections_takes_what_is_below_but_not_what_begins_alike():
-    chosen = select(INVENTORY, "hung1984", "II", ["9", 1])
-    assert sections(chosen) == [("hung1984", "II", part) for part in ("1", "9", "9.1", "9.2")]
-    assert select(INVENTORY, "hung1984", "II", "9.1") == tuple(e for e in chosen if e.section == "9.1")
-    assert sections(select(INVENTORY, "hung1984", "II", "11")) == [
-        ("hung1984", "II", f"11{part}") for part in ("", ".1", ".2", ".3", ".4")
-    ]
-
-
 def markup_faults(printed):
     parts = printed.split("$")
     if len(parts) % 2 == 0:
@@ -69,9 +49,3 @@ def test_each_numbered_equation_has_its_entry(document, chapter):
     numbers = [int(place[2:]) for place in places if re.fullmatch(r"eq\d+", place)]
     forms_of_89 = [89] * ("eq89-first-form" in places and "eq89-factored-form" in places)
     assert sorted(numbers + forms_of_89) == list(range(1, 126))
-
-
-def test_no_entry_names_several_equations_or_examples():
-    named = re.compile(r"\beqs |\b[Ee]xamples |, ?[ab]\d|,.*,")
-    kinds = ("equation", "example")
-    assert [entry.id for entry in INVENTORY if entry.kind in kinds and named.search(entry.item)] == []

@@ -20,7 +20,7 @@ from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict
 from gpbnb.report.ledger.formula import Undefined, Words
-from gpbnb.report.ledger.statements import Statement, load_statements
+from gpbnb.report.ledger.statements import load_statements
 from gpbnb.report.ledger.stored import FILE, load_findings, to_table
 
 CHECKED = {key: checks for checks in TOPICS.values() for key in checks}
@@ -274,25 +274,3 @@ def test_each_statement_with_a_form_is_given_to_its_check():
     taken = {statement.id for statement in TAKEN}
     others = [statement for statement in STATEMENTS if statement.form and statement.id not in taken]
     assert {judged(statement).verdict for statement in others} == {Verdict.GIVEN, Verdict.UNVERIFIABLE}
-
-
-def sample(form):
-    return Statement("hung1984.II.x", "hung1984", "II", "1", "x", "equation", "{{1}}", form)
-
-
-def test_alterations_change_each_part():
-    forms = {other.form for _, other in altered(sample("x[k] <= -2*a**3 + b; total: 1.25 mas; verb: grows | shrinks"))}
-    for expected in (
-        "x[k + 1] <= -2 * a ** 3 + b",
-        "x[k] >= -2 * a ** 3 + b",
-        "x[k] == -2 * a ** 3 + b",
-        "x[k] < -2 * a ** 3 + b",
-        "x[k] <= -3 * a ** 3 + b",
-        "x[k] <= -2 * a ** (3 + 1) + b",
-        "x[k] <= -2 * a ** 3 - b",
-        "x[k] <= -2 * a ** 3",
-        "x[k] <= 2 * (-2 * a ** 3 + b)",
-    ):
-        assert any(form.startswith(f"{expected};") for form in forms), expected
-    assert any("total: 1.26 mas" in form for form in forms)
-    assert any("verb: shrinks | grows" in form for form in forms)

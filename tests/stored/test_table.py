@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from gpbnb.report.stored_table import Column, DamagedFileError, read, write
-from gpbnb.wordlength.numbers import plain_number
 
 COLUMNS = (
     Column("kind", "text", choices=("a", "b, c")),
@@ -76,11 +75,3 @@ def test_values_out_of_range_are_neither_written_nor_read(tmp_path, column, text
         read(path, [column], CURE)
     with pytest.raises(ValueError, match=f"row 1: got {column.name} = .*{fault}"):
         write(path, [column], [(text,)], {})
-
-
-@pytest.mark.parametrize("text", ["1_0", "٣", "", " 1", "1 ", "1e999", "-1e999", "0x1", "1e", ".", "--1", "infinity"])
-def test_what_is_no_plain_number(text):
-    with pytest.raises(ValueError, match="needed"):
-        plain_number(text)
-    assert Column("a").fault(text)
-    assert Column("a", "integer").fault(text)

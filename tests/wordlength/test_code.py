@@ -17,21 +17,15 @@ from gpbnb import (
     BINARY64,
     FixedFormat,
     FloatFormat,
-    Form,
     LinearModel,
     LinearSystem,
     WordFormats,
     emulate,
-    guarantee,
-    limits,
     write_code,
 )
-from gpbnb.bounds.system import output_errors
 from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.forms import WITH_PROGRAM
 from gpbnb.filters.run import Run
-from gpbnb.filters.settled import settled_filter, settled_gain
-from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.c_files import FLAGS
 from gpbnb.wordlength.c_integers import Integers, used_functions
 from gpbnb.wordlength.code import prepared
@@ -158,16 +152,6 @@ def fits(model, fmt, form):
         return False
 
 
-def test_the_ud_form_divides_by_no_factor_of_r_that_is_zero(tmp_path):
-    R = [["5/2048", "-13/4096"], ["-13/4096", "17/4096"]]
-    model = LinearModel([["0.9"]], [["1"], ["0.5"]], [["0.5"]], R, [0], [["1"]])
-    run = Run(model, FixedFormat(4, 12), Form.UD, ())
-    assert [each.letter for each in run.repairs] == ["R"]
-    assert (run.exactly(run.letters["UR"])[0].diagonal() > 0).all()
-    with pytest.raises(ValueError, match="in which R does not stay positive definite when its factors"):
-        write_code(replace(model, H=[["1"]], R=[["0.01"]]), FixedFormat(6, 4), tmp_path, form=Form.UD)
-
-
 @needs_compiler
 def test_a_zero_pivot_stops_the_code_in_the_step_that_stops_the_emulation(tmp_path):
     fmt = FixedFormat(4, 11, "down", "saturate")
@@ -191,25 +175,7 @@ def test_an_overflow_ends_the_code_in_the_step_that_ends_the_emulation(tmp_path)
         assert "_OVERFLOW = 3" in (tmp_path / "filter.h").read_text()
 
 
-@needs_compiler
-def test_a_zero_has_no_sign(tmp_path):
-    system = LinearSystem([["-0.5"]], [[0]], x0=[1])
-    write_code(system, BINARY32, tmp_path, inputs=np.zeros((400, 1)))
-    assert built(tmp_path)[0] == 0
-    assert (tmp_path / "filter_vectors.txt").read_text().splitlines()[-1].split()[-1] == "0x0p+0"
-
-
 # -- constant gain ---------------------------------------------------------------------------------------------------
-
-
-def test_a_constant_gain_is_that_of_the_riccati_equation():
-    model = models()["one state"]  # P = 0.9025 p + 0.25, p = P R / (P + R)
-    K = settled_gain(model)[0, 0]
-    V = K / (1 - K) / 2
-    assert abs(V - (Fraction("0.9025") * V / (2 * V + 1) + Fraction(1, 4))) < Fraction(1, 2**60)
-    filter_ = settled_filter(model)
-    z = np.ones((200, 1))
-    assert filter_.outputs(z)[-1, 0, 0] == pytest.approx(float(K / (1 - Fraction("0.95") * (1 - K))), rel=1e-12)
 
 
 # -- the header ------------------------------------------------------------------------------------------------------
@@ -218,28 +184,6 @@ def test_a_constant_gain_is_that_of_the_riccati_equation():
 def header(path):
     """The first comment of a header, in one line."""
     return " ".join(re.sub(r"^ \* ?", "", path.read_text().split("*/")[0], flags=re.M).split())
-
-
-def test_a_header_states_the_bound(tmp_path):
-    within = limits(measurement=1)
-    path = write_code(BIQUAD, BINARY32, tmp_path, within=within)[0]
-    (bound,) = output_errors(BIQUAD.system(), BINARY32, within.measurement)
-    assert f"each output stays within {bound:.3g} of that of the exact filter" in header(path)
-    path = write_code(models()["one state"], BINARY32, tmp_path, form="Joseph", within=limits(state=9, innovation=9))[0]
-    assert "known inputs" not in header(path)
-    found = guarantee(models()["one state"], BINARY32, limits(state=9, innovation=9), form=Form.JOSEPH)
-    assert f"rounding moves the estimates by at most {found.bound[0]:.3g}, for ever" in header(path)
-    path = write_code(LinearSystem.pid(1, "0.1"), BINARY32, tmp_path, within=limits(measurement=1))[0]
-    assert "of the exact filter, whose coefficients are not rounded, for 1000 steps, since the system as" in header(
-        path
-    )
-
-
-def test_a_name_cannot_end_a_comment(tmp_path):
-    named = FilterDesign([1], [1, "0.5"], name="x */ int y; /* \\\n ??/ ü")
-    text = write_code(named, BINARY32, tmp_path)[0].read_text()
-    assert text.count("*/") == text.count("/*")
-    assert "int y; / * \\ ? ?" not in text.split("*/")[1]
 
 
 # -- refusals --------------------------------------------------------------------------------------------------------
@@ -268,34 +212,6 @@ def test_two_filters_in_one_folder_do_not_share_a_name(tmp_path):
 
 
 # -- the command -----------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def asked(tmp_path):
-    """A command line for a low-pass section that starts with a step, and the folder for its code."""
-    model = tmp_path / "low-pass.toml"
-    model.write_text('b = ["0.1", "0.2", "0.1"]\na = [1, "-1.2", "0.5"]\nstructure = "direct form I"\n')
-    simulated = ["--simulate", "step", "--steps", "20", "--basis", "emulation"]
-    return [str(model), *simulated, "--code", str(tmp_path / "code")], tmp_path / "code"
-
-
-@pytest.mark.parametrize(
-    ("options", "fmt"),
-    [
-        (["--tolerance", "0.001"], "BINARY32"),
-        (["--tolerance", "1e-9"], "BINARY64"),
-        (["--tolerance", "0.01", "--format", "fixed 3.12"], "16 bits, 12 of them fraction"),
-    ],
-)
-def test_the_command_writes_code_in_the_format_that_meets_the_tolerance(options, fmt, asked, capsys):
-    arguments, folder = asked
-    assert main([*arguments, *options]) == 0
-    assert f"low-pass, direct form I, in {fmt}" in header(folder / "filter.h").replace("fixed point of ", "")
-    assert str(folder / "filter.c") in capsys.readouterr().out
-
-
-def test_a_number_of_steps_makes_as_many_test_vectors(tmp_path):
-    assert len(write_code(BIQUAD, BINARY32, tmp_path, inputs=9)[3].read_text().splitlines()) == 9
 
 
 def cmsis(system, fmt, folder):

@@ -21,7 +21,6 @@ from gpbnb import (
     write_code,
 )
 from gpbnb.wordlength.c_files import FLAGS
-from tests.step_functions import SYSTEMS
 
 SHORT = [
     FixedFormat(4, 11, rounding, "saturate") if i % 2 else FixedFormat(0, 15, rounding, "wrap")
@@ -147,14 +146,3 @@ def test_nonlinear_filters_have_the_digits_of_their_emulation(fmt, forms):
     assert [disagreement(beacon("extended", seen), fmt, form, z) for form in forms] == [""] * len(forms)
     assert disagreement(beacon("unscented", seen), fmt, None, z) == ""
     assert disagreement(beacon("extended", bearing, angles=[1]), BINARY32, "UD", z, exact=False) == ""
-
-
-def test_a_header_claims_no_bound(tmp_path):
-    text = write_code(SYSTEMS[0], BINARY32, tmp_path)[0].read_text()
-    assert "a PI controller with two clips, in BINARY32" in text
-    assert "bounds" not in text
-
-
-def test_a_divisor_that_is_a_number_needs_no_check(tmp_path):
-    always = NonlinearSystem(lambda fmt, x, u: (x / 3 + u, x), [1])
-    assert "STOPPED" not in write_code(always, BINARY32, tmp_path)[1].read_text()

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gpbnb import NonlinearModel, NonlinearSystem, emulate, read_model, required_precision
-from gpbnb.wordlength.own_code import where_raised
 
 CODE = """
 import numpy as np
@@ -68,12 +67,3 @@ def test_a_file_is_the_model_that_python_makes_of_its_functions(folder):
     assert found["filter"].f is not found["filter"].h
     assert required_precision(str(folder / "mean.toml"), Z, 0.01).met
     assert required_precision({"step": found["step"].step, "x0": [0]}, Z, 0.01).met
-
-
-def test_an_error_is_in_the_line_of_the_file_that_raised_it(folder):
-    (folder / "code" / "own.py").write_text(
-        "def inner(z):\n    return z[9]\n\ndef mean(fmt, z):\n    return inner(z)\n"
-    )
-    with pytest.raises(Exception, match="bounds") as found:
-        required_precision(str(folder / "mean.toml"), Z, 0.01)
-    assert where_raised(found.value).startswith("line 2 of ")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 
 import gpbnb
-from gpbnb import required_precision, survey_records
+from gpbnb import required_precision
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rational import exact
@@ -63,46 +62,6 @@ def test_the_smallest_precision_meets_the_tolerance_and_one_less_does_not(base, 
     assert str(found).endswith("of the tolerance, observed in 60 steps")
 
 
-def test_a_bar_for_those_who_wait(capsys):
-    required_precision(MODEL, Z, 1e-4)
-    survey_records(MODEL, [Z, Z], 1e-4, ["float32"])
-    assert capsys.readouterr().err == ""
-    found = required_precision(MODEL, Z, 1e-4, progress=True)
-    assert f"{len(found.tried)}run" in capsys.readouterr().err.replace(" ", "")
-    for kind in ("fixed", "blocks"):
-        required_precision(MODEL, Z, 1e-2, kind=kind, progress=True)
-        assert re.search(r"[1-9]\d*run", capsys.readouterr().err.replace(" ", ""))
-    survey_records(MODEL, [Z, Z], 1e-4, ["float32"], progress=True)
-    assert "2/2" in capsys.readouterr().err
-
-
-def test_the_bound_asks_for_more_digits_and_holds():
-    tolerance = 1e-4
-    by_bound = required_precision(MODEL, Z, tolerance, base=2, basis="bound")
-    by_emulation = required_precision(MODEL, Z, tolerance, base=2)
-    assert by_emulation.digits < by_bound.digits <= by_emulation.digits + 12
-    found = emulate(MODEL, Z, by_bound.format, bounded=True)
-    assert found.bounds.state.max() <= tolerance
-    assert np.abs(found.state).max() <= found.bounds.state.max()
-    assert str(by_bound).endswith("proved for this run of 60 steps")
-
-
-def test_a_survey_is_what_the_search_sees():
-    for basis in ("emulation", "bound"):
-        found = required_precision(MODEL, Z, (1e-4, math.inf), basis=basis)
-        digits = [t for t, _ in found.tried]
-        assert survey(MODEL, Z, (1e-4, math.inf), digits, basis=basis) == found.tried
-
-
-def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
-    """One state, R far below P: with few digits a variance comes out as zero, whatever the error of the state."""
-    given = LinearModel([[1]], [[1]], [[0]], [["1e-6"]], [1], [[1]])
-    found = required_precision(given, 3, 10.0, base=10, form=Form.HUNG)
-    t = found.digits
-    assert t > 5
-    assert all(math.isinf(ratio) for digits, ratio in found.tried if digits < t)
-
-
 @pytest.mark.parametrize(("form", "steps"), [("innovation", 300), ("UD", 300), ("symmetrized", 60)])
 def test_an_answer_holds_in_every_step(form, steps):
     """A constant-velocity tracker whose largest error in 15 bits falls between the steps of a logarithmic scale."""
@@ -126,30 +85,6 @@ def test_a_run_is_described_and_has_its_estimates():
     assert history.estimate.tolist() == gpbnb.emulate(MODEL, Z, FloatFormat(2, 12)).x.to_float()[[6, 29]].tolist()
 
 
-def test_a_seed_selects_the_random_roundings_of_a_run():
-    """The model and the measurements are rounded at random, too."""
-    formats = [FloatFormat(2, 9, Rounding.STOCHASTIC, seed=seed) for seed in (1, 1, 2)]
-    first, again, other = (emulate(MODEL, Z, fmt, "symmetrized").state for fmt in formats)
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-
-
-def squares(fmt, z):
-    return [x * x for x in z]
-
-
-@pytest.mark.parametrize("given", [LinearSystem([["0.9"]], [["0.1"]]), squares], ids=["system", "function"])
-def test_an_answer_with_random_rounding_comes_out_again(given):
-    z = np.round(np.sin(np.arange(8.0)), 3).reshape(-1, 1)
-    first, again = (required_precision(given, z, 1e-3, rounding="stochastic") for _ in range(2))
-    assert first == again
-
-
-def test_its_own_measurements_are_seeded():
-    assert required_precision(MODEL, 5, 1e-3, seed=1) == required_precision(MODEL, 5, 1e-3, seed=1)
-    assert required_precision(MODEL, 5, 1e-3, seed=1).tried != required_precision(MODEL, 5, 1e-3, seed=2).tried
-
-
 def test_an_answer_says_why_fewer_digits_were_refused():
     """A Q of rank one, which few bits make indefinite."""
     thin = Fraction("0.35") * np.array([[Fraction(1, 2500), Fraction(1, 50)], [Fraction(1, 50), Fraction(1)]])
@@ -164,37 +99,6 @@ def test_an_answer_says_why_fewer_digits_were_refused():
     finite = [digits for digits, ratio in ratios if math.isfinite(ratio)]
     assert finite == list(range(finite[0], 54, 3))
     assert required_precision(MODEL, Z, 1e-3).why == ""
-
-
-def test_the_precisions_of_processors_are_always_tried():
-    for base, processors in ((2, {24, 53}), (10, {7, 16}), (16, {6, 13})):
-        assert processors <= dict(required_precision(MODEL, Z, 1e-1, base=base).tried).keys()
-
-
-def in_other_units(model, states, measurements):
-    """The same filter with state i in units of 2**-states[i], and measurements likewise."""
-    x, y = (np.array([Fraction(2) ** power for power in powers]) for powers in (states, measurements))
-    return LinearModel(
-        model.Phi * np.multiply.outer(x, 1 / x),
-        model.H * np.multiply.outer(y, 1 / x),
-        model.Q * np.multiply.outer(x, x),
-        model.R * np.multiply.outer(y, y),
-        model.x0 * x,
-        model.P0 * np.multiply.outer(x, x),
-    )
-
-
-@pytest.mark.parametrize("form", [Form.INNOVATION, Form.UD])
-@pytest.mark.parametrize("basis", ["emulation", "bound"])
-def test_answers_do_not_depend_on_units(basis, form):
-    """Powers of two change no rounding, hence no answer: here a simulation in coarse steps did."""
-    other = in_other_units(MODEL, (-40, -43), (-35,))
-    tolerance = np.array([1e-4, 3e-4])
-    asked = {"basis": basis, "form": form}
-    first = required_precision(MODEL, STEPS, tolerance, **asked)
-    second = required_precision(other, STEPS, tolerance * 2.0 ** np.array([-40, -43]), **asked)
-    assert first.format is not None
-    assert first.tried == second.tried
 
 
 def test_a_missing_measurement_changes_nothing_but_the_prediction():

@@ -37,17 +37,6 @@ def test_a_filter_is_the_same_from_every_file_and_from_its_arrays(suffix, entrie
     assert np.array_equal(outputs(read_model(design)), expected)
 
 
-def test_a_kalman_filter_from_arrays_in_a_file(tmp_path):
-    given = {"Phi": [[0.5]], "H": [[1]], "Q": [[1]], "R": [[2]], "x0": [0], "P0": [[1]]}
-    np.savez(tmp_path / "walk.npz", **given)
-    io.savemat(tmp_path / "walk.mat", given)
-    for name in ("walk.npz", "walk.mat"):
-        found = read_model(tmp_path / name)
-        assert [getattr(found, key).ravel().tolist() for key in given] == [
-            np.ravel(each).tolist() for each in given.values()
-        ]
-
-
 def test_the_command_writes_a_run_and_keeps_quiet(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "walk.toml").write_text(WALK)

@@ -5,32 +5,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import BFLOAT16, FixedFormat, FloatFormat, LinearSystem, NonlinearModel, required_precision, survey_records
+from gpbnb import FloatFormat, required_precision
 from gpbnb.filters.simulation import simulated_measurements
 from gpbnb.report import examples
 from tests.surveying import survey
-
-Z = np.random.default_rng(3).standard_normal(200)
-
-
-def smoother(fmt, z):
-    old, new, x, estimates = fmt.array("0.9"), fmt.array("0.1"), fmt.array(0), []
-    for value in z:
-        estimates.append(x)
-        x = old * x + new * value
-    return estimates
-
-
-@pytest.mark.parametrize("base", [2, 10, 16])
-def test_a_function_gets_the_answer_of_the_same_linear_system(base):
-    system = LinearSystem([["0.9"]], [["0.1"]])
-    by_function = required_precision(smoother, Z, 1e-3, base=base)
-    by_system = required_precision(system, Z.reshape(-1, 1), 1e-3, base=base)
-    assert [digits for digits, _ in by_function.tried] == [digits for digits, _ in by_system.tried]
-    ratios = [[ratio for _, ratio in each.tried] for each in (by_function, by_system)]
-    assert np.allclose(*ratios, rtol=1e-9, atol=1e-9)
-    assert by_function.digits == by_system.digits
-    assert by_function.basis == "emulation"
 
 
 def test_a_kalman_filter_written_as_a_function_gets_the_answer_of_its_model():
@@ -60,32 +38,6 @@ def _tracked(fmt, z, model):
         x = ahead + K @ (value - H @ ahead)
         found.append(x)
     return np.stack(found)
-
-
-def test_a_function_without_inputs_and_several_outputs():
-    def rotation(fmt):
-        c, s, one = fmt.array("0.8"), fmt.array("0.6"), fmt.array([1, 0])
-        found = [one]
-        for _ in range(99):
-            x, y = found[-1]
-            found.append(np.stack([c * x - s * y, s * x + c * y]))
-        return np.stack(found)
-
-    both = required_precision(rotation, 100, 1e-3)
-    first = required_precision(rotation, 100, [1e-3, np.inf])
-    assert both.digits >= first.digits > 10
-
-
-def test_a_function_that_stops_in_few_digits():
-    """In three bits 0.57 and 0.42 round to 0.625 and 0.4375."""
-
-    def rest(fmt, z):
-        return [np.sqrt((1 - x) - y) for x, y in z]
-
-    assert survey(rest, [["0.57", "0.42"]], 1e-2, [3])[0][1] == np.inf
-    found = required_precision(rest, [["0.57", "0.42"]], 1e-2)
-    assert dict(found.tried)[found.digits] <= 1
-    assert found.digits > 3
 
 
 def muller(steps):
@@ -166,25 +118,3 @@ def test_a_precision_that_cannot_hold_a_whole_number_is_not_enough(function, z, 
     assert long < 1
     with pytest.raises(ValueError, match="got the operand 10; needed a number that"):
         FloatFormat(2, 2).array(1) / 10
-
-
-def test_a_whole_number_in_a_nonlinear_filter_lacks_digits_like_any_other():
-    """A beacon 1234 m away needs 10 bits."""
-    model = NonlinearModel(
-        lambda x: np.stack([x[0] + x[1] / 8, x[1]]),
-        None,
-        lambda x: np.stack([np.hypot(1234 - x[0], 777)]),
-        None,
-        Q=np.diag([0, 2**-10]),
-        R=[[4]],
-        x0=[0, 1],
-        P0=np.eye(2),
-    )
-    z = np.hypot(1234 - np.arange(1, 11) / 8, 777)[:, None]
-    found = required_precision(model, z, 10.0)
-    assert found.digits == 10
-    assert "in 9 bits the run is refused: a whole number that the format does not hold exactly at step 1" in str(found)
-    blocks = required_precision(model, z, 10.0, kind="blocks").format
-    assert blocks.state.precision >= 10
-    assert "inf" in str(survey_records(model, [z], 10.0, [BFLOAT16]))
-    assert required_precision(model, z, 10.0, kind="fixed", like=FixedFormat(22, 4)).met

@@ -23,7 +23,6 @@ from gpbnb import (
     guarantee,
     limit_cycles,
     limits,
-    read_model,
     required_precision,
     survey_records,
     write_code,
@@ -80,7 +79,6 @@ MODELS = {
 }
 READ = ("mapping", "path", "scipy")
 """What is read as one of the others; a few tasks show that each kind of task reads it."""
-FILTERS = ("filter", "driven", "cyclic", "extended", "unscented", "mapping", "path")
 
 
 def found(model, **options):
@@ -202,25 +200,3 @@ def test_a_task_works_or_names_its_way(task, tmp_path):
                 does(model, tmp_path / name)
         else:
             assert does(model, tmp_path / name), name
-
-
-def test_a_number_of_steps_simulates_a_filter_and_is_refused_with_the_way_for_others():
-    for name, model in MODELS.items():
-        if name in (*FILTERS, "smoother"):
-            assert required_precision(model, STEPS, 0.1).met
-        else:
-            with pytest.raises((ValueError, TypeError), match=r"needed (its )?inputs|needed f.fmt., or inputs"):
-                required_precision(model, STEPS, 0.1)
-
-
-def test_what_is_read_is_itself():
-    for name in ("filter", "driven", "cyclic", "extended", "system", "pid", "step"):
-        assert read_model(MODELS[name]) is MODELS[name]
-
-
-def test_most_cells_work():
-    needs = {task: [needs] if isinstance(needs, str) else needs for task, (needs, _) in TASKS.items()}
-    kinds = {name: kind_of(admitted(model)) for name, model in MODELS.items()}
-    refused = [1 for task, name in CELLS if any(kinds[name] in CANNOT.get(each, ()) for each in needs[task])]
-    assert len(CELLS) == 26 * 11 + 5 * 3
-    assert len(refused) < 0.4 * len(CELLS)

@@ -39,14 +39,6 @@ def largest_error(fraction, bits):
     return worst
 
 
-def test_the_integer_smoother_ends_three_below_its_step():
-    system = LinearSystem.smoother("1097/4096")
-    words = WordFormats(FixedFormat(15, 0, "floor"), FixedFormat(1, 14), FixedFormat(17, 14))
-    error = words_error(system, np.array(STEP, float).reshape(-1, 1), 1.0)(words).ratio
-    assert error == pytest.approx(float(largest_error(0, 13)))
-    assert largest_error(0, 13) > Fraction(29, 10)
-
-
 def test_the_smoother_needs_what_a_plain_loop_over_integers_needs():
     system, z = LinearSystem.smoother("1097/4096"), np.array(STEP, float).reshape(-1, 1)
     for tolerance in (3, 0.5):
@@ -84,9 +76,3 @@ def test_no_format_of_a_biquad_can_be_lowered(basis):
         ).ratio
         > 1
     )
-
-
-def test_a_sum_without_coefficients_has_words():
-    found = required_precision(LinearSystem.sum(running=True), [0.5, 0.25, 0.125], "1/100", kind="words")
-    assert found.met
-    assert found.format.data.fraction_bits == 3  # the data themselves, which nothing rounds

@@ -8,20 +8,6 @@ from scipy import signal
 
 from gpbnb import LinearSystem, required_precision
 
-LOW_PASS = LinearSystem.from_sections(signal.butter(2, 300, fs=48_000, output="sos"))
-
-
-@pytest.mark.parametrize("basis", ["emulation", "guarantee"])
-def test_coefficients_that_limit_a_filter_are_named(basis):
-    u = np.ones((600, 1))
-    found = required_precision(LOW_PASS, u, 1e-3, kind="fixed", basis=basis)
-    assert found.format is None
-    assert found.why.startswith("the coefficients limit the filter, whatever the fraction bits of the data: stored in")
-    assert "15 significant bits, they give 1" in found.why
-    enough = int(found.why.split(";")[1].split()[0])
-    assert required_precision(LOW_PASS, u, 1e-3, kind="fixed", basis=basis, coefficient_bits=enough).format is not None
-    assert required_precision(LOW_PASS, u, 1e-3, kind="fixed", basis=basis, coefficient_bits=enough - 1).format is None
-
 
 @pytest.mark.parametrize("basis", ["emulation", "guarantee"])
 def test_a_cascade_says_what_scaling_its_sections_saves(basis):

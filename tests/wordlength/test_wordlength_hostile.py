@@ -7,7 +7,7 @@ import os
 import pytest
 
 from gpbnb.wordlength.__main__ import main
-from gpbnb.wordlength.models import read_measurements, read_model
+from gpbnb.wordlength.models import read_model
 
 FILTER = {
     "Phi": "[[1, 0.1], [0, 1]]",
@@ -93,10 +93,3 @@ def test_a_report_may_replace_an_older_one_and_names_files_that_are_not_utf8(fol
         assert main(asked) == 0
     assert r"z\xff.csv" in (folder / "a.html").read_text(encoding="utf-8")
     assert r"z\\xff.csv" in (folder / "a.json").read_text(encoding="utf-8")
-
-
-def test_measurements_that_are_all_missing_leave_a_filter_at_zero(folder, capsys):
-    (folder / "z.csv").write_text('nan\n""\n', encoding="utf-8")
-    assert read_measurements("z.csv").shape == (2, 1)
-    assert main(["filter.toml", "--tolerance", "0.1", "--basis", "emulation", "--measurements", "z.csv"]) == 0
-    assert "observed in 2 steps" in capsys.readouterr().out

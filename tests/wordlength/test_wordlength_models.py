@@ -13,7 +13,7 @@ from filterpy.kalman import (
 )
 from scipy import signal
 
-from gpbnb.filters.model import LETTERS, LinearModel
+from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import reference_states
 from gpbnb.filters.system import LinearSystem
 from gpbnb.wordlength.models import read_model
@@ -85,13 +85,6 @@ def test_what_changes_the_estimates_is_refused_by_name(name, value, message):
     assert not np.allclose(different[2], different[3], rtol=1e-6)
     with pytest.raises(ValueError, match=f"^got a KalmanFilter with {message}"):
         read_model(given)
-
-
-def test_a_number_is_read_for_a_matrix_of_one_entry():
-    given = KalmanFilter(dim_x=1, dim_z=1)
-    given.F, given.H, given.Q, given.R, given.P, given.x = (np.array(k) for k in range(1, 7))
-    model = read_model(given)
-    assert [getattr(model, letter).item() for letter in LETTERS] == [1, 2, 3, 4, 6, 5]
 
 
 def test_inputs_are_used_or_refused():

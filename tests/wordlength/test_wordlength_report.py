@@ -6,22 +6,9 @@ import numpy as np
 import pytest
 
 from gpbnb import FixedFormat
-from gpbnb.filters.model import LinearModel
 from gpbnb.filters.poles import stored_response
-from gpbnb.wordlength.models import FilterSource, read_filter
+from gpbnb.wordlength.models import read_filter
 from gpbnb.wordlength.report import Question, study
-
-MODEL = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-
-
-def test_a_study_answers_for_each_form_and_tells_each_answer():
-    told: list[str] = []
-    question = Question(FilterSource(MODEL), 0.1, [[1], [2]], bases=("emulation",))
-    found = study(question, tell=told.append)
-    assert [found.entries[each] for each in ("kind", "source", "steps")] == ["Kalman filter", "given", 2]
-    forms = ["innovation, emulation", "Joseph, emulation", "UD, emulation"]
-    assert [each["label"] for each in found.entries["answers"]] == forms
-    assert told[:2] == ["innovation, emulation …", f"innovation, emulation: {found.answer}"]
 
 
 @pytest.mark.parametrize(

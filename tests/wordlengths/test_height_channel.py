@@ -7,13 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, NonlinearModel, emulate
-from gpbnb.filters.nonlinear_run import simulated
+from gpbnb import FloatFormat
 from gpbnb.filters.run import Run
 from gpbnb.report import examples
-from gpbnb.report.examples import turns
 from tests.oracles import Numbers, floating, transposed, unit
-from tests.step_functions import tracked_motion, tracked_sight
 
 COLLAPSE = 1791
 """The step that the book names."""
@@ -92,34 +89,3 @@ def test_the_height_channel_is_the_derivative_of_its_equations():
     assert corrected[4].tolist() == [0, 0, 0, 0, 1, 0, -1 / 128]
     q = np.array([math.cos(0.35), 0, 0, math.sin(0.35)])
     assert np.abs(np.asarray(model.P0[:4, :4], float) @ q).max() < 1e-16  # no variance along the quaternion
-
-
-def test_a_vehicle_is_tracked_behind_the_instrument():
-    """It is 2 km away, known to 1 km and 10 m/s at first, and followed by range, to 1 cm, and bearing, to 0.1 mrad."""
-    model = NonlinearModel(
-        tracked_motion,
-        None,
-        tracked_sight,
-        None,
-        Q=np.diag([0, 0, 2.0**-10, 2.0**-10]),
-        R=[["1e-4", 0], [0, "1e-8"]],
-        x0=[-2000, 600, 0, -30],
-        P0=np.diag([10**6, 10**6, 100, 100]),
-        angles=[1],
-    )
-    z = simulated(model, 40, seed=1)
-    assert np.ptp(z[:, 1]) > 6  # the bearing jumps by a whole turn
-    x = np.array([300.0, -400.0, 5.0, 6.0])
-    given = FloatFormat(2, 53).array(x)
-    assert tracked_motion(given).to_float().tolist() == [305, -394, 5, 6]
-    assert tracked_sight(given).to_float().tolist() == [500, math.atan2(-400, 300)]
-    found = emulate(model, z, FloatFormat(2, 40), form="Joseph")
-    distance = np.hypot(*found.x[-1, :2].to_float())
-    assert abs(distance - z[-1, 0]) < 0.1
-    assert found.largest.max() < 1e-4
-
-
-def test_the_first_turn_is_that_of_the_stated_rates() -> None:
-    """0, 0.1 and 0.3 rad/s over 10 ms: 1048.576 and 3145.728 units of 2**-20 rad, rounded, and halved."""
-    y, z = 1049 / 2**21, 3146 / 2**21
-    assert turns(1).tolist() == [[[0, 0, -y, -z], [0, 0, z, -y], [y, -z, 0, 0], [z, y, 0, 0]]]

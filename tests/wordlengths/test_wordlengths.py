@@ -26,31 +26,6 @@ Z = examples.tilt_measurements(300)
 # -- examples -----------------------------------------------------------------------------------------
 
 
-def test_the_models_are_what_their_docstrings_say():
-    assert (TILT.n, TILT.m) == (3, 2)
-    assert [unit for _, unit in examples.TILT_STATES] == ["°", "°/s", "°/s"]
-    assert math.sqrt(TILT.R[0, 0, 0]) == pytest.approx(0.05, rel=1e-15)
-    assert math.sqrt(TILT.R[0, 1, 1]) == 2
-    assert examples.tilt("1e-6").Q[0, 2, 2] == Fraction("1e-6")
-    assert examples.tracker("1000").x0[0] == 1000
-    assert examples.precise_tracker().R[0, 0, 0] == Fraction("1e-12")
-    for model in (examples.tracker(), examples.precise_tracker()):
-        t = model.Phi[0, 0, 1]  # between measurements; white noise of the acceleration, 0.1 m²/s³
-        assert model.Q[0].tolist() == [[t**3 / 30, t**2 / 20], [t**2 / 20, t / 10]]
-    Q, more = examples.altimeter().Q[0], examples.altimeter("1e-12").Q[0]
-    assert Q[0, 0] * Q[1, 1] == Q[0, 1] ** 2 > 0
-    assert Q[1, 1] == Fraction("0.35") ** 2 / 2500
-    assert (more - Q == np.diag([Fraction("1e-12")] * 3)).all()
-
-
-def test_normal_numbers_are_those_of_numpy():
-    for name, kind in (("binary16", np.float16), ("binary32", np.float32), ("binary64", np.float64)):
-        low, high = examples.NORMAL_RANGE[name]
-        info = np.finfo(kind)
-        assert 2.0**low == float(info.smallest_normal)
-        assert 2.0**high <= float(info.max) < 2 * 2.0**high
-
-
 # -- study --------------------------------------------------------------------------------------------
 
 
@@ -145,13 +120,3 @@ def test_units_of_powers_of_two_change_nothing():
 
 
 # -- figures ------------------------------------------------------------------------------------------
-
-
-def test_a_turn_multiplies_the_quaternion_by_its_half_angles():
-    # Hamilton's product of (a, b, c, d) and (0, x, y, z).
-    a, b, c, d = 0.5, -0.25, 0.75, 0.125
-    for turn in examples.turns(3):
-        x, y, z = turn[1:, 0]
-        product = [-b * x - c * y - d * z, a * x + c * z - d * y, a * y + d * x - b * z, a * z + b * y - c * x]
-        assert np.array_equal(turn @ [a, b, c, d], product)
-        assert z == round(0.3 * 0.01 * 2**20) / 2**21
