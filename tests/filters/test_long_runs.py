@@ -86,6 +86,15 @@ def impulse(steps):
     return z
 
 
+@pytest.mark.parametrize("options", [{}, {"base": 10}, {"basis": "bound", "base": 10}], ids=str)
+def test_silence_after_a_record_changes_no_answer(options):
+    """The errors are largest while the estimate is large, so that a short record has the same answer."""
+    long, short = (required_precision(DECAYING, impulse(steps), 1e-3, highest=12, **options) for steps in (MANY, 100))
+    assert long.met
+    assert long.format == short.format
+    assert dict(long.tried)[long.digits] == pytest.approx(dict(short.tried)[long.digits], rel=1e-9)
+
+
 def test_an_estimate_has_its_digits_until_it_becomes_zero():
     fmt = FloatFormat(2, 20)
     run = Run(DECAYING, fmt, "innovation", range(1, MANY + 1))

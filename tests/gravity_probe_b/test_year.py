@@ -26,8 +26,12 @@ def stored():
     return year.SWEEP.load().rows
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
-def test_a_slice_of_every_year_comes_out_digit_for_digit(case):
+# One precision of each base, rounding, form and model; `make verify-sweeps` takes a sample of all.
+KINDS = {(case.model, case.base, case.rounding, case.form): case for case in CASES}
+
+
+@pytest.mark.parametrize("case", KINDS.values(), ids=str)
+def test_a_slice_of_a_year_of_each_kind_comes_out_digit_for_digit(case):
     again = year.rows(case, steps=464)
     assert len(again) == 9
     lines = [line for line in stored() if line[:5] == again[0][:5]]

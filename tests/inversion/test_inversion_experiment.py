@@ -147,7 +147,6 @@ class TestKept:
         [
             ("variants", lambda c: c.family == "Kahan" and c.pivot and c.fmt == FMT),
             ("variants", lambda c: c.family == "Hilbert" and not c.pivot and c.fmt == FloatFormat(10, 9)),
-            ("random", lambda c: c.sizes == (11,) and c.fmt == FloatFormat(16, 6, CHOP)),
             ("random", lambda c: c.sizes == (14,) and c.fmt == FloatFormat(2, 11)),
         ],
     )

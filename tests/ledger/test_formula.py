@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import pytest
 import sympy as sp
 
@@ -13,6 +15,20 @@ def test_sums_and_products_may_end_at_a_symbol():
     n = sp.Symbol("n")
     assert sp.expand(Relation("Sum(j,(j,1,n))").value() - n * (n + 1) / 2) == 0
     assert sp.simplify(Relation("Prod(2*j,(j,1,n))").value() - 2**n * sp.factorial(n)) == 0
+
+
+@pytest.mark.parametrize(
+    ("form", "value"),
+    [
+        ("1 + 2 + ... + n", 15),
+        ("n*x[1] + (n-1)*x[2] + ... + 1*x[n]", 5 * 10 + 4 * 20 + 3 * 30 + 2 * 40 + 50),
+        ("[x[1], ..., x[n]]", [10, 20, 30, 40, 50]),
+        ("[0, n + 1, ..., 4, 3]", [0, 6, 5, 4, 3]),
+        ("[2, ..., 2 + 1]", [2, 3]),
+    ],
+)
+def test_dots_stand_for_the_members_between_their_neighbours(form, value):
+    assert Relation(form).value({"n": Fraction(5), "x": lambda i: 10 * i}, Fraction) == value
 
 
 # -- matrices with dots -------------------------------------------------------------------------------

@@ -64,7 +64,6 @@ def nonlinear(**options):
 MODELS = {
     "filter": LinearModel(**WALK),
     "driven": LinearModel(**WALK, B=[[1]], u=[[0.125]] * STEPS),
-    "cyclic": LinearModel(**WALK | {"R": [[[1]], [[2]]]}),
     "extended": nonlinear(),
     "unscented": nonlinear(method="unscented"),
     "system": LinearSystem([["0.9"]], [["0.1"]]),

@@ -46,7 +46,7 @@ def made(fmt: FloatFormat, pairs: list[tuple[int, int]]) -> FloatArray:
 
 # Few numbers at once, or one: a number beyond the range sends them all to the exact backend.
 @pytest.mark.parametrize("rounding", Rounding.documented())
-@pytest.mark.parametrize(("base", "precision"), COMPILED[::2])
+@pytest.mark.parametrize(("base", "precision"), [(2, 1), (2, 26), (10, 10), (16, 1)])
 def test_operations_at_the_edge_of_the_range_are_exact(base: int, precision: int, rounding: Rounding) -> None:
     fmt, random = FloatFormat(base, precision, rounding), Random(960)
     for count in 30 * [1] + 10 * [3]:
@@ -246,11 +246,8 @@ def test_a_product_without_range_checks_has_the_digits_of_the_exact_backend() ->
     assert all(map(np.array_equal, (a @ a).to_pairs(), (exact @ exact).to_pairs()))
 
 
-@pytest.mark.parametrize("fmt", [FloatFormat(10, 7), FloatFormat(16, 6)], ids=str)
-def test_the_first_operations_of_a_kind_are_exact_and_the_next_ones_compiled(
-    fmt: FloatFormat, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    load, used = backends._loops, []
+def test_the_first_operations_of_a_kind_are_exact_and_the_next_ones_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    fmt, load, used = FloatFormat(16, 6), backends._loops, []
     monkeypatch.setattr(backends, "LOOPS_AFTER", 1000)
     monkeypatch.setattr(backends, "_DONE", Counter())
     monkeypatch.setattr(backends, "_loops", lambda name: used.append(name) or load(name))
@@ -271,11 +268,7 @@ def test_the_first_operations_of_a_kind_are_exact_and_the_next_ones_compiled(
 
 
 @pytest.mark.parametrize("after", [0, 10**9], ids=["in loops", "before loops"])
-@pytest.mark.parametrize(
-    "fmt",
-    [BINARY32, FloatFormat(2, 60, emin=-30, emax=30), FloatFormat(10, 7, emin=-30, emax=30), FixedFormat(4, 11)],
-    ids=str,
-)
+@pytest.mark.parametrize("fmt", [BINARY32, FloatFormat(10, 7, emin=-30, emax=30), FixedFormat(4, 11)], ids=str)
 def test_an_overflow_is_named_with_the_place_of_the_first(
     fmt: Any, after: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
