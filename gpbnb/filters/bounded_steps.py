@@ -154,7 +154,7 @@ def _repetition(exact: dict[str, Array]) -> Lanes:
     """Return a step in double-double from a given state; it takes the arrays x, P, z, Phi, H, Q and R."""
     step = kalman_step(step_kind(Form.INNOVATION, exact, None))
     (x, P), (K, S) = step.after, step.results
-    given = [*step.states, *step.own, *step.cycles]
+    given = [*step.states, *step.inputs, *step.coefficients]
     return Lanes(step.rows, step.tape.sizes, step.tape.all_constants, given, [x, K, P, S])
 
 

@@ -173,15 +173,16 @@ class NonlinearSystem:
         after, n = returned.components[0], self.n
         p = len(after) - n
         program = Program(
-            tape.instructions.astype(np.int64),
-            tape.sizes,
-            np.append(np.arange(1, 1 + n), [-1] * p),
-            np.arange(1 + n, 1 + n + self.m),
-            np.array([*constants], dtype=np.int64),
-            after,
-            p,
-            (*entries("x", n), *entries("y", p)),
-            tuple(f"c{i}" for i in range(1, 1 + len(constants))),
+            tape,
+            tape.instructions,
+            tape.formats,
+            [np.append(np.arange(1, 1 + n), [-1] * p)],
+            [np.arange(1 + n, 1 + n + self.m)],
+            [np.array([*constants], dtype=np.int64)],
+            [after],
+            p=p,
+            state_names=(*entries("x", n), *entries("y", p)),
+            coefficient_names=tuple(f"c{i}" for i in range(1, 1 + len(constants))),
             calls=tape.calls,
         )
         coefficients = np.array([[*constants.values()]], dtype=object)

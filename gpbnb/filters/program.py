@@ -29,7 +29,7 @@ from gpbnb.arithmetic.algebra import algebra_of
 from gpbnb.arithmetic.interpreting import Call
 from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.machine import CODES, NAMES, OPERANDS, operands_of
-from gpbnb.arithmetic.tape import Tape, exact_result, known_truth
+from gpbnb.arithmetic.tape import Places, Tape, exact_result, known_truth
 from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.steps import corrected
 
@@ -46,30 +46,58 @@ _LIMITS = {1: AT_MOST, 4: AT_LEAST}
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Operations of one step."""
+    """Operations of one step, and the places of what it takes and gives.
 
-    rows: NDArray[np.int64]  # (o, 5), operations of the machine: a code, three operands and the place of the result
-    sizes: tuple[int, int]  # numbers of places, and of truth values
-    states: NDArray[np.int64]  # (n,), places; -1 for an output of the step before
-    inputs: NDArray[np.int64]  # (m,), places
-    coefficients: NDArray[np.int64]  # (c,), places
-    after: NDArray[np.int64]  # (n,), places of the next states; the last p are outputs, which no operation reads
-    p: int = 0  # number of outputs of the system
-    state_names: tuple[str, ...] = ()  # (n,), for generated code
+    Parameters
+    ----------
+    tape : on which they were recorded.
+    rows, formats : operations (o, 5) of the machine, each a code, three operands and the place of the result; and the
+        number of the format of each.
+    states, inputs, coefficients : places of arrays: of states, which are -1 for an output of the step before, of inputs
+        such as measurements, which follow each other, and of numbers of the model, each with a cycle.
+    after, results : places of the next states, the last p of which are outputs, and of the rest that a step gives.
+    definite : the truth value that holds while a covariance is definite.
+    late : places of states that are known to depend on the inputs, and of coefficients whose cycle is too long to wait
+        until they repeat, such as known inputs.
+    p : number of outputs of the system.
+    state_names, coefficient_names : for generated code.
+    stored : places of results stored even if only sums use them, outputs of sections.
+    calls : of functions between operations.
+    """
+
+    tape: Tape
+    rows: NDArray[Any]
+    formats: NDArray[np.int64]
+    states: Sequence[Places]
+    inputs: Sequence[Places]
+    coefficients: Sequence[Places]
+    after: Sequence[Places]
+    results: Sequence[Places] = ()
+    definite: int = 1
+    late: Sequence[Places] = ()
+    p: int = 0
+    state_names: tuple[str, ...] = ()
     coefficient_names: tuple[str, ...] = ()
-    stored: frozenset[int] = frozenset()  # places of results stored even if only sums use them: outputs of sections
-    calls: Sequence[Call] = ()  # of functions between operations
-    definite: int = 1  # the truth value that holds while a covariance is definite
+    stored: frozenset[int] = frozenset()
+    calls: Sequence[Call] = ()
 
     @property
     def n(self) -> int:
         """Number of states, with the outputs."""
-        return len(self.states)
+        return sum(each.size for each in self.states)
 
     @property
     def m(self) -> int:
         """Number of inputs."""
-        return len(self.inputs)
+        return sum(each.size for each in self.inputs)
+
+    def quantity(self, row: int) -> str:
+        """Name what an operation computes."""
+        found = ""
+        for begin, name in self.tape.labels:
+            if begin <= row:
+                found = name
+        return found
 
     # -- a linear program -----------------------------------------------------------------------------------
     # Its values are numbered: the n states, the m inputs, then the result of each operation.
@@ -78,12 +106,12 @@ class Program:
     def places(self) -> NDArray[np.int64]:
         """The place of each value."""
         results = self.rows[self.rows[:, 0] != CODES["compare"], 4]
-        return np.concatenate([self.states, self.inputs, results])
+        return flat([*self.states, *self.inputs, results])
 
     @cached_property
     def _values(self) -> NDArray[np.int64]:
         """The number of the value at each place; -1 for a coefficient."""
-        found = np.full(self.sizes[0], -1)
+        found = np.full(self.tape.sizes[0], -1)
         found[self.places] = np.arange(len(self.places))
         return found
 
@@ -93,8 +121,8 @@ class Program:
 
         MULTIPLY, AT_LEAST and AT_MOST take a coefficient and a value, ADD and SUBTRACT two values.
         """
-        number = np.full(self.sizes[0], -1)
-        number[self.coefficients] = np.arange(len(self.coefficients))
+        number, coefficients = np.full(self.tape.sizes[0], -1), flat(self.coefficients)
+        number[coefficients] = np.arange(len(coefficients))
         value, found, compared = self._values, list[tuple[int, int, int]](), dict[int, tuple[int, int, int]]()
         for code, a, b, c, out in self.rows.tolist():
             name = NAMES[code]
@@ -113,7 +141,7 @@ class Program:
     @cached_property
     def outputs(self) -> NDArray[np.int64]:
         """The values that become the states, all at once, (n,)."""
-        return self._values[self.after]
+        return self._values[flat(self.after)]
 
     @cached_property
     def _users(self) -> list[list[int]]:
@@ -167,6 +195,11 @@ class Program:
         return bool(np.isin(self.operations[:, 0], LINEAR).all())
 
 
+def flat(places: Sequence[Places]) -> NDArray[np.int64]:
+    """Return the places of some arrays, one after the other."""
+    return np.concatenate([np.zeros(0, np.int64), *(each.ravel() for each in places)])
+
+
 def values_of(code: int, a: int, b: int) -> tuple[int, ...]:
     """Return the values among the two operands of an operation of a linear program; the others are coefficients."""
     return (a, b) if code in (ADD, SUBTRACT) else (b,)
@@ -194,16 +227,17 @@ def recorded(
     x, u, c = np.split(np.arange(1, 1 + tape.inputs), [n, n + m])
     after = step(*map(TracedFormat(tape).made, (c, x, u)))
     return Program(
-        tape.instructions.astype(np.int64),
-        tape.sizes,
-        x,
-        u,
-        c,
-        np.array([_place(each) for each in after], dtype=np.int64),
-        p,
-        tuple(state_names),
-        tuple(coefficient_names),
-        frozenset(map(_place, stored)),
+        tape,
+        tape.instructions,
+        tape.formats,
+        [x],
+        [u],
+        [c],
+        [np.array([_place(each) for each in after], dtype=np.int64)],
+        p=p,
+        state_names=tuple(state_names),
+        coefficient_names=tuple(coefficient_names),
+        stored=frozenset(map(_place, stored)),
     )
 
 
@@ -252,9 +286,9 @@ def without_exact(program: Program, coefficients: NDArray[Any]) -> Program:
     The exact stored coefficients are (p, c), for each step of a cycle. No digit changes. Place 0 is the number zero. A
     result that nothing uses any more remains if it may leave the range, since its overflow ends a run of the step.
     """
-    zeros, ones = (program.coefficients[np.all(coefficients == each, axis=0)] for each in (0, 1))
+    zeros, ones = (flat(program.coefficients)[np.all(coefficients == each, axis=0)] for each in (0, 1))
     one = int(ones[0]) if len(ones) else -1
-    same, truth = np.arange(program.sizes[0]), np.arange(program.sizes[1])
+    same, truth = map(np.arange, program.tape.sizes)
     same[zeros], same[ones] = 0, one
     rows = program.rows.copy()
     kept, o = np.ones(len(rows), np.bool_), 0
@@ -280,20 +314,20 @@ def without_exact(program: Program, coefficients: NDArray[Any]) -> Program:
                 rows[o], kept[o] = (CODES["nonzero"], b, 0, 0, 0), True
         o += 1
     calls = [each._replace(operands=[same[places] for places in each.operands]) for each in program.calls]
-    after, definite = same[program.after], int(truth[program.definite])
-    used = [after, *(places for each in calls for places in each.operands)]
-    kept = _needed(rows, kept, used, definite, program.sizes)
+    after, definite = [same[each] for each in program.after], int(truth[program.definite])
+    used = flat([*after, *(places for each in calls for places in each.operands)])
+    kept = _needed(rows, kept, used, definite, program.tape.sizes)
     before = np.concatenate([[0], np.cumsum(kept)])
     skips = np.flatnonzero(rows[:, 0] == CODES["skip"])
     rows[skips, 2] = before[skips + 1 + rows[skips, 2]] - before[skips + 1]
     calls = [each._replace(at=int(before[each.at])) for each in calls]
-    return replace(program, rows=rows[kept], after=after, definite=definite, calls=calls)
+    return replace(program, rows=rows[kept], formats=program.formats[kept], after=after, definite=definite, calls=calls)
 
 
-def _needed(rows: Any, kept: Any, used: Sequence[Any], definite: int, sizes: tuple[int, int]) -> NDArray[np.bool_]:
+def _needed(rows: Any, kept: Any, used: Any, definite: int, sizes: tuple[int, int]) -> NDArray[np.bool_]:
     """Return which operations remain without those that choose or compare and whose result nothing uses."""
     numbers, truths = (np.zeros(size, np.bool_) for size in sizes)
-    numbers[np.concatenate(used)], truths[definite] = True, True
+    numbers[used], truths[definite] = True, True
     kept = kept.copy()
     for o in np.flatnonzero(kept)[::-1].tolist():
         code, *given, out = rows[o].tolist()

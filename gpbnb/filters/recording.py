@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -22,8 +23,8 @@ from gpbnb.arithmetic.rounding import Order
 from gpbnb.arithmetic.tape import MOST_OPERATIONS, Tape, UntraceableError
 from gpbnb.arithmetic.traced import TracedFormat
 from gpbnb.filters.forms import ROOTS, Form
-from gpbnb.filters.program import Program, entries
-from gpbnb.filters.stepping import DividedStep, RecordedStep, divided, record_step
+from gpbnb.filters.program import Program, entries, flat
+from gpbnb.filters.stepping import DividedStep, divided, record_step
 from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep, StepTaken
 
 
@@ -35,10 +36,10 @@ def system_step(program: Program, in_order: bool = False, whole: bool = False) -
     random numbers require, which each draws in turn. A stop names the number of the first output that needs the
     operation. The whole step also gives each of its values.
     """
-    rows, tape = program.rows, Tape(program.n + program.m + len(program.coefficients))
-    places = np.arange(program.sizes[0]), np.arange(program.sizes[1])
+    rows, tape, ends = program.rows, Tape(program.tape.inputs), flat(program.after)
+    places = tuple(map(np.arange, program.tape.sizes))
     groups = [np.array([o]) for o in range(len(rows))] if in_order else _independent(program)
-    computes = (rows[:, 4] == program.after[:, None]) & (rows[:, 0] != CODES["compare"])
+    computes = (rows[:, 4] == ends[:, None]) & (rows[:, 0] != CODES["compare"])
     computed_by = np.where(computes, np.arange(len(rows)), -1).max(axis=1, initial=-1)
     for group in groups:
         some, name = rows[group], NAMES[int(rows[group[0], 0])]
@@ -48,15 +49,17 @@ def system_step(program: Program, in_order: bool = False, whole: bool = False) -
         needing = np.argmax(computed_by >= group[:, None], axis=1).tolist()
         tape.labels += zip(range(len(tape.instructions), len(rows)), map(str, needing), strict=False)
         places[name == "compare"][some[:, 4]] = tape.record(name, *given)
-    after, results = [places[0][program.after]], [places[0][program.places]] * whole
-    of_step = [program.states], [program.inputs], [program.coefficients]
-    step = RecordedStep(tape, tape.instructions, tape.formats, *of_step, after, results, definite=1)
+    after, results = [places[0][ends]], [places[0][program.places]] * whole
+    step = replace(
+        program, tape=tape, rows=tape.instructions, formats=tape.formats, after=after, results=results, definite=1
+    )
     return divided(step, together=True)
 
 
 def _independent(program: Program) -> list[NDArray[np.int64]]:
     """Return rows of one code that do not need each other, in an order in which each follows those that it needs."""
-    numbers, truths, level = [0] * program.sizes[0], [0] * program.sizes[1], list[int]()
+    sizes, level = program.tape.sizes, list[int]()
+    numbers, truths = [0] * sizes[0], [0] * sizes[1]
     for code, *given, out in program.rows.tolist():
         taken = zip((numbers, truths), operands_of(code, *given), strict=True)
         level.append(1 + max(levels[place] for levels, places in taken for place in places))
@@ -116,14 +119,14 @@ def step_kind(
 def recorded_step(kind: StepKind, together: bool = False) -> DividedStep:
     """Return a step of a filter, divided into what depends on the measurements and what does not, unless together."""
     step = kalman_step(kind)
-    return divided(step._replace(results=step.results[:1]), together)
+    return divided(replace(step, results=step.results[:1]), together)
 
 
 def entries_taken(parts: DividedStep) -> list[NDArray[np.int64]]:
     """Return which entries of each matrix of the model the operations that depend on the measurements take."""
     rows = parts.rest.rows
     taken = rows[:, 1:4][takes_numbers(rows[:, 0])]
-    return [np.flatnonzero(np.isin(at, taken)) for at in parts.step.cycles]
+    return [np.flatnonzero(np.isin(at, taken)) for at in parts.step.coefficients]
 
 
 def linear_program(parts: DividedStep, letters: Iterable[str]) -> Program:
@@ -133,35 +136,34 @@ def linear_program(parts: DividedStep, letters: Iterable[str]) -> Program:
     """
     step, rest, shared = parts.step, parts.rest, parts.step.tape.sizes[0] + np.arange(len(parts.shared))
     names, taken = list[str](), list[NDArray[np.int64]]()
-    for letter, at, each in zip(letters, step.cycles, entries_taken(parts), strict=True):
+    for letter, at, each in zip(letters, step.coefficients, entries_taken(parts), strict=True):
         names += np.array(entries(letter, *at.shape))[each].tolist()
         taken.append(at.ravel()[each])
     gain = dict(zip(step.results[0].ravel().tolist(), entries("K", *step.results[0].shape), strict=True))
     names += [gain.get(each, f"c[{i}]") for i, each in enumerate(parts.shared.tolist())]
-    given = np.concatenate([rest.states, *step.own, *taken, shared])
-    number = np.zeros(step.tape.sizes[0] + len(shared), np.int64)
-    number[given] = np.arange(1, 1 + len(given))
-    zero = 1 + len(given)
-    number[rest.rows[:, 4]] = zero + np.arange(1, 1 + len(rest.rows))
-    rows, after = rest.rows.astype(np.int64), number[rest.after]
-    rows[:, 1:] = number[rows[:, 1:]]
-    for i in np.flatnonzero(after == 0).tolist():  # a state that becomes zero
-        after[i] = zero + len(rows) + 1
-        rows = np.concatenate([rows, [[CODES["multiply"], zero, 1 + i, 0, after[i]]]])
-    states, inputs, coefficients = np.split(np.arange(1, 1 + zero), np.cumsum([len(rest.states), step.own[0].size]))
+    given, n, m = flat([rest.states, *step.inputs, *taken, shared]), len(rest.states), step.inputs[0].size
+    tape, place = Tape(1 + len(given)), np.zeros(step.tape.sizes[0] + len(shared), np.int64)
+    place[given], zero = np.arange(1, 1 + len(given)), 1 + len(given)
+    for code, a, b, _, out in rest.rows.tolist():
+        place[out] = tape.record(NAMES[code], place[a], place[b])
+    after = place[rest.after]
+    for i in np.flatnonzero(after == 0):  # a state that becomes zero
+        after[i] = tape.record("multiply", np.array(zero), 1 + i)
+    states, inputs, coefficients = np.split(np.arange(1, 1 + zero), [n, n + m])
     return Program(
-        rows,
-        (1 + zero + len(rows), 2),
-        states,
-        inputs,
-        coefficients,
-        after,
+        tape,
+        tape.instructions,
+        tape.formats,
+        [states],
+        [inputs],
+        [coefficients],
+        [after],
         coefficient_names=(*names, "zero"),
     )
 
 
 @lru_cache(maxsize=64)
-def kalman_step(kind: StepKind) -> RecordedStep:
+def kalman_step(kind: StepKind) -> Program:
     """Record a step of a filter.
 
     Its states are x, P and, in the compensated form, the correction for the next step. Its results are the gain
@@ -183,8 +185,8 @@ def kalman_step(kind: StepKind) -> RecordedStep:
         raise ValueError(
             f"got a filter with n = {n} and m = {m}; needed a step of at most {tape.most} operations: about 100 states"
         ) from None
-    driven = (at for known, at in zip(kind.model, step.cycles, strict=True) if known.letter in "ubdB")
-    return step._replace(late=np.concatenate([each.ravel() for each in (*step.states[::2], *driven)]))
+    driven = (at for known, at in zip(kind.model, step.coefficients, strict=True) if known.letter in "ubdB")
+    return replace(step, late=[*step.states[::2], *driven])
 
 
 def _kalman_taken(
@@ -216,31 +218,28 @@ def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
     return filter_program(form, kalman_step(StepKind(form, n, m, tuple(unknown))), shapes, [])
 
 
-def filter_program(form: Form, step: RecordedStep, letters: Iterable[str], others: Sequence[int]) -> Program:
+def filter_program(form: Form, step: Program, letters: Iterable[str], others: Sequence[int]) -> Program:
     """Return a recorded step of a filter as a program whose states are those of :func:`program_states`.
 
     There is a letter for each of its cycles, which are matrices and, if there are any, the known inputs u. Coefficients
     are the entries of the matrices in this order, then those at other places, and 1.
     """
-    (x, P, *_), (z,), tape = step.states, step.own, step.tape
-    matrices = dict(zip(letters, step.cycles, strict=True))
+    (x, P, *_), (z,), tape = step.states, step.inputs, step.tape
+    matrices = dict(zip(letters, step.coefficients, strict=True))
     u = matrices.pop("u", np.zeros(0, np.int64))
     names = [each for letter, at in matrices.items() for each in entries(letter, *at.shape)]
     letter = "U" if form is Form.UD else "S" if form in ROOTS else "P"
     named = (np.array(entries(each, *at.shape)).reshape(1, *at.shape) for each, at in (("x", x), (letter, P)))
     ends = (each[None] for each in step.after[:2])
-    return Program(
-        tape.instructions.astype(np.int64),
-        tape.sizes,
-        program_states(form, x[None], P[None])[0],
-        np.concatenate([z, u]),
-        np.array([*(at for each in matrices.values() for at in each.ravel().tolist()), *others, tape.one]),
-        program_states(form, *ends)[0],
-        0,
-        tuple(program_states(form, *named)[0].tolist()),
-        (*names, *(f"c{i}" for i in range(len(others))), "one"),
+    return replace(
+        step,
+        states=[program_states(form, x[None], P[None])[0]],
+        inputs=[z, u],
+        coefficients=[*matrices.values(), np.array([*others, tape.one])],
+        after=[program_states(form, *ends)[0]],
+        state_names=tuple(program_states(form, *named)[0].tolist()),
+        coefficient_names=(*names, *(f"c{i}" for i in range(len(others))), "one"),
         calls=tape.calls,
-        definite=step.definite,
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,8 @@ from gpbnb.arithmetic.loop import steps_at_once
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.tape import FEW_OPERATIONS, Tape
 from gpbnb.arithmetic.traced import TracedFormat
+from gpbnb.filters.program import Program, flat
 from gpbnb.filters.stepping import (
-    RecordedStep,
     RunningStep,
     StepFunction,
     StepsTaken,
@@ -84,7 +85,7 @@ class RepeatedStep:
         """Return what the next step is given, with its own arrays."""
         return [*own, *(each[self.steps % len(each)] for each in self._cycles)]
 
-    def recorded(self, given: Sequence[FloatArray]) -> RecordedStep:
+    def recorded(self, given: Sequence[FloatArray]) -> Program:
         """Return the operations of a step in one format, whose numbers are not looked at.
 
         ValueError says why no tape can repeat the step.
@@ -106,9 +107,9 @@ class RepeatedStep:
         step = self._recorded(given, [formats.index(each.format) for each in (*self.states, *given)], alike)
         if isinstance(step, str):
             return None
-        tape, tables = step.tape, list(zip(step.cycles, self._cycles, strict=True))
+        tape, tables = step.tape, list(zip(step.coefficients, self._cycles, strict=True))
         changing = (places for places, table in tables if len(table) > 1)
-        once, each = tape.once_and_each(np.concatenate([at.ravel() for at in (*step.states, *step.own, *changing)]))
+        once, each = tape.once_and_each(flat([*step.states, *step.inputs, *changing]))
         few = len(formats) == 1 and steps * len(tape.instructions) < FEW_OPERATIONS
         exactly = few or not isinstance(formats[0].backend, Looped)
         numbers = OnIntegers(formats[0], tape.sizes) if exactly else Numbers(formats, tape.sizes)
@@ -122,12 +123,12 @@ class RepeatedStep:
             if isinstance(numbers, OnIntegers) or len(each) > 1:
                 return _OneByOne(step, numbers, cycles, each)
             rows, of_rows, _ = each[0]
-            parts = divided(step._replace(rows=rows.astype(np.int64), formats=of_rows))
+            parts = divided(replace(step, rows=rows.astype(np.int64), formats=of_rows))
             return RunningStep(parts, formats, cycles, held=numbers)
         except (ArithmeticError, ValueError, TypeError):
             return None
 
-    def _recorded(self, given: Sequence[FloatArray], numbers: Sequence[int], alike: bool) -> RecordedStep | str:
+    def _recorded(self, given: Sequence[FloatArray], numbers: Sequence[int], alike: bool) -> Program | str:
         """Record a step, twice; return why not, if it does what no tape repeats."""
         found, again = (self._recorded_once((*self.states, *given), numbers, alike) for _ in range(2))
         if isinstance(found, str) or isinstance(again, str):
@@ -136,7 +137,7 @@ class RepeatedStep:
             return "its functions depend on more than their arguments"
         return found
 
-    def _recorded_once(self, arrays: Sequence[FloatArray], numbers: Sequence[int], alike: bool) -> RecordedStep | str:
+    def _recorded_once(self, arrays: Sequence[FloatArray], numbers: Sequence[int], alike: bool) -> Program | str:
         tape = Tape(sum(each.size for each in arrays), one=True)
         tape.alike = alike
         formats = [TracedFormat(tape, i) for i in range(len(self._formats))]
@@ -179,14 +180,13 @@ class _OneByOne:
     """
 
     def __init__(
-        self, step: RecordedStep, numbers: Numbers | OnIntegers, cycles: Sequence[NDArray[Any]], each: list[Segment]
+        self, step: Program, numbers: Numbers | OnIntegers, cycles: Sequence[NDArray[Any]], each: list[Segment]
     ) -> None:
         self.numbers, self._step, self._each = numbers, step, numbers.ready(each)
         self._states_at, self._own_at, self._kept_at = (
-            np.concatenate([at.ravel() for at in places])
-            for places in (step.states, step.own, [*step.after, *step.results])
+            flat(places) for places in (step.states, step.inputs, [*step.after, *step.results])
         )
-        tables = ((at.ravel(), table) for at, table in zip(step.cycles, cycles, strict=True))
+        tables = ((at.ravel(), table) for at, table in zip(step.coefficients, cycles, strict=True))
         self._changing = [(at, table) for at, table in tables if len(table) > 1]
         #: The largest number of steps taken at once.
         self.longest = steps_at_once(len(self._kept_at), len(step.rows))

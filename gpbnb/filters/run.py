@@ -341,7 +341,7 @@ class Run(Progress):
 
     def _tables(self, parts: DividedStep) -> list[NDArray[Any]]:
         """Return the matrices of the model, (p, entries, ...), for the cycles of a step."""
-        cycles = zip(self.letters.values(), parts.step.cycles, strict=True)
+        cycles = zip(self.letters.values(), parts.step.coefficients, strict=True)
         return [each.reshape(len(each), at.size, *each.shape[1 + at.ndim :]) for each, at in cycles]
 
     def linear_program(self) -> Program:

@@ -17,52 +17,16 @@ from gpbnb.arithmetic.interpreting import Numbers
 from gpbnb.arithmetic.loop import Loop, steps_at_once
 from gpbnb.arithmetic.machine import CODES, OPERANDS, Fault, fault_of, takes_numbers
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.tape import TRUTHS, Places, Tape, depending, laid_out
+from gpbnb.arithmetic.tape import TRUTHS, Places, depending, laid_out
 from gpbnb.arithmetic.traced import TracedFormat, TracedTruth
+from gpbnb.filters.program import Program, flat
 from gpbnb.filters.steps import StepTaken
-
-NONE = np.zeros(0, np.int64)
-"""No places."""
 
 LARGEST_KEPT = 1 << 18
 """Most numbers that are kept of steps that repeat."""
 
 _GIVES_TRUTH = np.array([name in TRUTHS for name in CODES])
 _GIVES_NUMBER = np.array([name not in (*TRUTHS, "nonzero", "skip") for name in CODES])
-
-
-class RecordedStep(NamedTuple):
-    """A recorded step.
-
-    Parameters
-    ----------
-    tape : the tape. rows, formats : operations (o, 5) to repeat, and the number of the format of each.
-    states, own, cycles : places of the arrays that it takes: of states, of its own numbers, which follow each other,
-        and of those of which each step takes the next of a cycle.
-    after, results : places of the states after the step, and of the rest that it gives.
-    definite : a truth value.
-    late : places of states that are known to depend on the step's own numbers, and of cycles that are too long to wait
-        until they repeat, such as known inputs.
-    """
-
-    tape: Tape
-    rows: NDArray[Any]
-    formats: NDArray[np.int64]
-    states: Sequence[Places]
-    own: Sequence[Places]
-    cycles: Sequence[Places]
-    after: Sequence[Places]
-    results: Sequence[Places]
-    definite: int
-    late: Places = NONE
-
-    def quantity(self, row: int) -> str:
-        """Name what an operation computes."""
-        found = ""
-        for begin, name in self.tape.labels:
-            if begin <= row:
-                found = name
-        return found
 
 
 StepFunction = Callable[[Sequence[Any], tuple[Any, ...], Sequence[Any]], StepTaken]
@@ -83,7 +47,7 @@ def record_step(
     formats: Sequence[TracedFormat],
     arrays: Sequence[tuple[int, tuple[int, ...]]],
     ends: tuple[int, int],
-) -> tuple[RecordedStep, StepTaken]:
+) -> tuple[Program, StepTaken]:
     """Record a step on the tape of some formats; also return what it gives.
 
     Parameters
@@ -98,7 +62,7 @@ def record_step(
     definite = taken.definite
     holds = int(definite.components[0]) if isinstance(definite, TracedTruth) else int(bool(definite))
     given = places[:own], places[own:cycles], places[cycles:]
-    return RecordedStep(tape, tape.instructions, tape.formats, *given, after, results, holds), taken
+    return Program(tape, tape.instructions, tape.formats, *given, after, results, holds), taken
 
 
 class StepPart(NamedTuple):
@@ -131,13 +95,13 @@ class DividedStep(NamedTuple):
         other behind all others.
     """
 
-    step: RecordedStep
+    step: Program
     early: StepPart
     rest: StepPart
     shared: Places
 
 
-def divided(step: RecordedStep, together: bool = False) -> DividedStep:
+def divided(step: Program, together: bool = False) -> DividedStep:
     """Divide the operations of a step into those that depend on its own numbers and those that do not.
 
     Parameters
@@ -146,10 +110,11 @@ def divided(step: RecordedStep, together: bool = False) -> DividedStep:
     """
     rows, (values, truths) = step.rows, step.tape.sizes
     given, before = [*step.after, *step.results], list[bool]()
-    changes = [bool(np.isin(each, step.late).any()) for each in step.states]
+    known = flat(step.late)
+    changes = [bool(np.isin(each, known).any()) for each in step.states]
     while changes != before:
         before, marks = changes, (np.zeros(values, np.bool_), np.zeros(truths, np.bool_))
-        for places in (*step.own, step.late, *compress(step.states, changes)):
+        for places in (*step.inputs, known, *compress(step.states, changes)):
             marks[0][places] = True
         late = depending(rows, *marks)
         is_late = [bool(marks[0][each].any()) for each in given]
@@ -175,8 +140,7 @@ def divided(step: RecordedStep, together: bool = False) -> DividedStep:
     def part(own: bool, chosen: NDArray[np.int64]) -> StepPart:
         mine, gives = ([i for i, each in enumerate(some) if each == own] for some in (changes, is_late))
         states, after, kept = (
-            np.concatenate([NONE, *(each[i].ravel() for i in some)])
-            for each, some in ((step.states, mine), (step.after, mine), (given, gives))
+            flat([each[i] for i in some]) for each, some in ((step.states, mine), (step.after, mine), (given, gives))
         )
         part, truth = rows[chosen], step.definite if marks[1][step.definite] == own else 1
         if own:
@@ -282,7 +246,7 @@ class RunningStep:
         read = np.zeros(1 + max(len(self._rest.values), part.rows.max(initial=0)), np.bool_)
         for places in (part.rows[:, 1:4], part.after, part.kept):
             read[places] = True
-        given = ((each.ravel(), table) for each, table in zip(self._parts.step.cycles, cycles, strict=True))
+        given = ((each.ravel(), table) for each, table in zip(self._parts.step.coefficients, cycles, strict=True))
         return [(int(at[0]), table) for at, table in given if read[at].any()]
 
     def take(self, first: int, states: Sequence[NDArray[Any]], own: NDArray[Any]) -> StepsTaken:
@@ -301,7 +265,7 @@ class RunningStep:
         kept, definite, stop = self._early_steps(first, len(own), before)
         count, shared = len(kept), len(places)
         given = np.ascontiguousarray(own[:count].reshape(count, own.shape[1], *rest.values.shape[1:]))
-        at = next((int(each.ravel()[0]) for each in step.own if each.size), 0)
+        at = next((int(each.ravel()[0]) for each in step.inputs if each.size), 0)
         groups = [(at, given), (self._shared_at, kept[:, :shared])]
         found, held, row = rest.take(first, count, groups)
         stop = stop if row < 0 else self._stop(rest, of_rest, row)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.files import WRITTEN, is_written
+from gpbnb.filters.program import flat
 from gpbnb.wordlength.c_numbers import DIVISOR, RADICAND, CodeNumbers, Operation
 
 _ORDERS = ("0", "{} < {}", "{} == {}", "{} <= {}", "{} > {}", "{} != {}", "{} >= {}", "1")
@@ -126,8 +127,8 @@ class CodeSource:
         lines = [f"int status = {name}_OK;"] if step.may_be_indefinite else []
         if numbers.may_overflow and not numbers.floating:
             lines.append("int overflow = 0;")
-        taken = zip(program.states.tolist(), (f"state->{each}" for each in step.state_names), strict=False)
-        read = [*taken, *((place, f"input[{i}]") for i, place in enumerate(program.inputs.tolist()))]
+        taken = zip(flat(program.states).tolist(), (f"state->{each}" for each in step.state_names), strict=False)
+        read = [*taken, *((place, f"input[{i}]") for i, place in enumerate(flat(program.inputs).tolist()))]
         loads = [
             f"const {numbers.value} {step.variables[place]} = {text};" for place, text in read if place in step.used
         ]
@@ -136,9 +137,9 @@ class CodeSource:
         for each in step.operations:
             lines += self._statement(each)
         lines += self._ends()
-        for after, place in zip(step.state_names, program.after.tolist(), strict=False):
+        for after, place in zip(step.state_names, flat(program.after).tolist(), strict=False):
             lines.append(f"state->{after} = {numbers.stored(self._number(place))};")
-        for i, place in enumerate(program.after[program.n - program.p :].tolist()):
+        for i, place in enumerate(flat(program.after)[program.n - program.p :].tolist()):
             lines.append(f"output[{i}] = {numbers.stored(self._number(place))};")
         if self.period > 1:
             lines.append(f"state->phase = (state->phase + 1) % {self.period};")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.machine import CODES, NAMES, operands_of
-from gpbnb.filters.program import Program
+from gpbnb.filters.program import Program, flat
 from gpbnb.filters.word_formats import WordFormats
 from gpbnb.wordlength.c_integers import Integers, literal, modulus, used_functions, word_bits
 
@@ -117,13 +117,13 @@ class CodeStep:
     @cached_property
     def coefficient_names(self) -> list[str]:
         """Names of the coefficients in C; an entry of a matrix has its indices after underscores."""
-        names = self.program.coefficient_names or [f"c{i}" for i in range(len(self.program.coefficients))]
+        names = self.program.coefficient_names or [f"c{i}" for i in range(len(flat(self.program.coefficients)))]
         return ["_".join(re.findall(r"\w+", name)) for name in names]
 
     @cached_property
     def coefficient_at(self) -> dict[int, int]:
         """The number of the coefficient at each of their places."""
-        return {place: i for i, place in enumerate(self.program.coefficients.tolist())}
+        return {place: i for i, place in enumerate(flat(self.program.coefficients).tolist())}
 
     @cached_property
     def changing(self) -> set[int]:
@@ -134,13 +134,13 @@ class CodeStep:
     def variables(self) -> dict[int, str]:
         """Names of the other places: states, inputs, results."""
         results = [each.out for each in self.operations if each.gives_number]
-        places = [*self.program.states.tolist(), *self.program.inputs.tolist(), *results]
+        places = [*flat([*self.program.states, *self.program.inputs]).tolist(), *results]
         return {place: f"r{i}" for i, place in enumerate(places)}
 
     @cached_property
     def used(self) -> set[int]:
         """Places of the numbers that are used."""
-        return {*(place for each in self.operations for place in each.takes[0]), *self.program.after.tolist()}
+        return {*(place for each in self.operations for place in each.takes[0]), *flat(self.program.after).tolist()}
 
     @cached_property
     def truths_used(self) -> set[int]:
@@ -267,7 +267,7 @@ class CodeFloats:
     def finite(self) -> list[int]:
         """Places that must be finite: no operation and no state hides an infinity."""
         step = self.step
-        found = dict.fromkeys(step.program.after.tolist())
+        found = dict.fromkeys(flat(step.program.after).tolist())
         found |= dict.fromkeys(each.out for each in step.operations if each.gives_number and each.out not in step.used)
         for each in step.operations:
             if each.name in ("divide", "fmod", "remainder"):
@@ -352,7 +352,7 @@ class CodeWords:
     def _integer(self, coefficient: int, member: int = 0) -> tuple[int, int]:
         """Return the integer of a coefficient and its fraction bits."""
         value, fmt = self.step.coefficients[member, coefficient], self.words.coefficients
-        is_data = int(self.step.program.coefficients[coefficient]) in self._data
+        is_data = int(flat(self.step.program.coefficients)[coefficient]) in self._data
         if isinstance(fmt, int) and not is_data:
             point = int(value.denominator).bit_length() - 1
             return int(value * 2**point), point

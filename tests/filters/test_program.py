@@ -9,7 +9,7 @@ from gpbnb import FloatFormat
 from gpbnb.arithmetic.kernels.tags import CHOOSE, COMBINE, COMPARE
 from gpbnb.arithmetic.machine import NAMES, Memory, code_of, evaluate, operands_of, tables
 from gpbnb.arithmetic.tape import Tape
-from gpbnb.filters.program import Program, without_exact
+from gpbnb.filters.program import Program, flat, without_exact
 
 GIVEN, KNOWN = 3, 7
 
@@ -42,19 +42,22 @@ def drawn(rng):
             numbers.append(int(tape.record("choose", truth, changed, a)))
     states = np.arange(1, 1 + GIVEN)
     return Program(
-        tape.instructions.astype(np.int64), tape.sizes, states, states[:0], np.arange(1 + GIVEN, 1 + GIVEN + KNOWN),
-        np.array(numbers[-3:]), definite=(truths or [1])[-1],
+        tape, tape.instructions, tape.formats, [states], [], [np.arange(1 + GIVEN, 1 + GIVEN + KNOWN)],
+        [np.array(numbers[-3:])], definite=(truths or [1])[-1],
     )  # fmt: skip
 
 
 def run(program, x, c):
     kind, formats = tables([FloatFormat(2, 53, "even")])
-    values, truths = np.zeros((program.sizes[0], 1)), np.zeros((program.sizes[1], 1), np.uint8)
-    values[program.states, 0], values[program.coefficients, 0], truths[1] = x, c, 1
+    numbers, known = program.tape.sizes
+    values, truths = np.zeros((numbers, 1)), np.zeros((known, 1), np.uint8)
+    values[flat(program.states), 0], values[flat(program.coefficients), 0], truths[1] = x, c, 1
     rows = program.rows
     code = code_of(rows, np.zeros(len(rows), np.int64))
     done = evaluate(Memory(values, truths), kind, formats, code) if len(rows) else 0
-    return (values[program.after, 0].tolist(), bool(truths[program.definite, 0])) if done == len(rows) else "stops"
+    if done < len(rows):
+        return "stops"
+    return values[flat(program.after), 0].tolist(), bool(truths[program.definite, 0])
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -68,7 +71,7 @@ def test_what_is_left_gives_the_results_of_the_whole(seed):
             assert run(short, x, c) == whole
             stops += whole == "stops"
         shorter += len(short.rows) < len(program.rows)
-        used = {("number", place) for place in short.after} | {("truth", short.definite)}
+        used = {("number", place) for place in flat(short.after)} | {("truth", short.definite)}
         for code, *given, _ in short.rows.tolist():
             numbers, truths = operands_of(code, *given)
             used |= {("number", place) for place in numbers} | {("truth", place) for place in truths}

@@ -23,7 +23,7 @@ from gpbnb.bounds.guess import linear_steps
 from gpbnb.bounds.units import largest_errors, units
 from gpbnb.filters.opening import as_packed
 from gpbnb.filters.pairs import double_doubles_near
-from gpbnb.filters.program import MULTIPLY, SUBTRACT, Program, matrices_of, recorded
+from gpbnb.filters.program import MULTIPLY, SUBTRACT, Program, flat, matrices_of, recorded
 
 _BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
 
@@ -58,19 +58,19 @@ class _Lanes:
     """A program on the machine, with a candidate of a run in each lane; the format None is double-double."""
 
     def __init__(self, fmt: Any, program: Program, lanes: int) -> None:
-        self._program, self._numbers = program, Numbers([fmt], program.sizes, lanes)
-        self._code = Numbers.ready([Segment(program.rows, np.zeros(len(program.rows), np.int64), None)])
+        self._program, self._numbers = program, Numbers([fmt], program.tape.sizes, lanes)
+        self._code = Numbers.ready([Segment(program.rows, program.formats, None)])
 
     def take(self, coefficients: Any, states: Any, inputs: Any = ()) -> NDArray[Any]:
         """Return the results, (results, lanes, ...), from numbers (count, ...) or (count, lanes, ...)."""
         program = self._program
         given = (program.coefficients, coefficients), (program.states, states), (program.inputs, inputs)
         for places, numbers in given:
-            if len(places):
-                self._numbers.hold(places, numbers)
+            if len(numbers):
+                self._numbers.hold(flat(places), numbers)
         if not self._numbers.run(self._code):
             raise OverflowError(_BEYOND)
-        return self._numbers.at(program.after)
+        return self._numbers.at(flat(program.after))
 
 
 def _expected(n: int, m: int) -> Program:
