@@ -111,6 +111,8 @@ def step_kind(
         if parts:
             zeros, ones = zeros[..., 0], ones.all(axis=-1)
         entries = np.where(zeros.all(axis=0), 0, np.where(ones.all(axis=0), 1, 2)).astype(np.uint8)
+        if letter == "u":  # of another run, the known inputs are others
+            entries[:] = 2
         known.append(Known(letter, entries.shape, entries.tobytes()))
     return StepKind(form, n, m, tuple(known), one is not None, blocks, sums, not parts)
 
@@ -205,17 +207,6 @@ def _kalman_taken(
     sums = formats[number] if number >= 0 else None
     blocks = block_algebra([formats[i] for i in kind.blocks[:4]], fused, order, block, sums)
     return LinearStep(kind.form, blocks, known, tape.about).taken((x, P, *carried), z)
-
-
-def kalman_program(form: Form, shapes: dict[str, tuple[int, ...]]) -> Program:
-    """Return a whole step of a Kalman filter, whose states are those of :func:`program_states`.
-
-    Given are shapes of the matrices of the model by their letters, and of the known inputs u, which follow the
-    measurements. Coefficients are the entries of the matrices in this order, then 1.
-    """
-    m, n = shapes["H"]
-    unknown = (Known(letter, shape, bytes([2]) * math.prod(shape)) for letter, shape in shapes.items())
-    return filter_program(form, kalman_step(StepKind(form, n, m, tuple(unknown))), shapes, [])
 
 
 def filter_program(form: Form, step: Program, letters: Iterable[str], others: Sequence[int]) -> Program:

@@ -330,10 +330,11 @@ class Run(Progress):
 
     def _opened(self) -> RunningStep:
         """Load a step in the formats of the run."""
-        parts = self._recorded()
+        parts = self.recorded()
         return RunningStep(parts, self._formats()[0], self._tables(parts), self.records, self.tag)
 
-    def _recorded(self) -> DividedStep:
+    def recorded(self) -> DividedStep:
+        """Return the operations of a step, in which entries of the model that are always 0 or 1 are constants."""
         formats, blocks, sums = self._formats()
         kind = step_kind(self.form, self.letters, formats[0], blocks, sums)
         draws = any(each is not None and each.rounding is Rounding.STOCHASTIC for each in formats)
@@ -346,11 +347,11 @@ class Run(Progress):
 
     def linear_program(self) -> Program:
         """Return how a step computes the estimate from the measurements."""
-        return linear_program(self._recorded(), self.letters)
+        return linear_program(self.recorded(), self.letters)
 
     def coefficients(self) -> NDArray[Any]:
         """Return those of :meth:`linear_program` at the checkpoint steps reached so far, (c, entries, ...), packed."""
-        parts, at = self._recorded(), self.checkpoint_steps[: self.saved] - 1
+        parts, at = self.recorded(), self.checkpoint_steps[: self.saved] - 1
         tables = (table[at % len(table)] for table in self._tables(parts))
         of_model = [table[:, each] for table, each in zip(tables, entries_taken(parts), strict=True)]
         shared = self.kept()[-1].reshape(len(at), -1, *of_model[0].shape[2:])

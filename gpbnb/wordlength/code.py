@@ -37,7 +37,7 @@ from gpbnb.filters.nonlinear_run import opened, simulated
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
 from gpbnb.filters.program import without_exact
-from gpbnb.filters.recording import kalman_program, program_states
+from gpbnb.filters.recording import filter_program, program_states
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
 from gpbnb.filters.steps import HUNG_FORMS
@@ -332,9 +332,8 @@ def _of_filter(model: LinearModel | NonlinearModel, fmt: AnyFormat, form: Form |
 
 def _program(run: Run) -> tuple[Any, list[NDArray[Any]]]:
     """Return the operations of a step of a linear filter, and its coefficients but 1, each with its cycle."""
-    given = {letter: run.exactly(each) for letter, each in run.letters.items()}
-    program = kalman_program(run.form, {letter: each.shape[1:] for letter, each in given.items()})
-    return program, [each for letter, each in given.items() if letter != "u"]
+    members = [run.exactly(each) for letter, each in run.letters.items() if letter != "u"]
+    return filter_program(run.form, run.recorded().step, run.letters, []), members
 
 
 def _states(run: Any, form: Form, z: Any = ()) -> Iterator[NDArray[Any]]:
