@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 import gpbnb
-from gpbnb import BINARY64, BINARY128, IBM_704, IBM_HEX32, TF32, FixedFormat, FloatFormat
-from gpbnb.arithmetic.rounding import Rounding, rounding_named
+from gpbnb import BINARY64, BINARY128, IBM_704, IBM_HEX32, TF32, FixedFormat
 
 Q15 = FixedFormat(0, 15)
 NATIVE = {
@@ -74,14 +73,3 @@ def test_words_of_other_machines():
     assert Q15.array(["-1", "0.5", "-0.25"]).to_bits().tolist() == [0x8000, 0x4000, 0xE000]
     assert (Q15.smallest, Q15.largest, Q15.lowest) == (Fraction(1, 2**15), 1 - Fraction(1, 2**15), -1)
     assert Q15.from_bits([0x8000, 0x4000, 0xE000]).to_float().tolist() == [-1, 0.5, -0.25]
-
-
-@pytest.mark.parametrize(
-    ("name", "rounding"), [("floor", "DOWN"), ("CEIL", "UP"), ("ceiling", "UP"), ("truncate", "CHOP")]
-)
-def test_roundings_have_the_names_of_programming_languages(name, rounding):
-    assert rounding_named(name) is Rounding(name) is Rounding[rounding]
-    assert Rounding(rounding) is Rounding[rounding]
-    with pytest.raises(ValueError, match="got rounding 'towards'; needed a Rounding or one of 'nearest', 'chop', "):
-        Rounding("towards")
-    assert FloatFormat(2, 8, name).rounding is FixedFormat(2, 8, name).rounding is Rounding[rounding]

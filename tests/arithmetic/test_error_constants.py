@@ -8,24 +8,14 @@ from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
-import pytest
 
 from gpbnb.arithmetic.bounds import all_above, gamma
-from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of, max_norm, row_sum_norm
+from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm, row_sum_norm
 
 
 def matrices(seed, *shapes):
     rng = np.random.default_rng(seed)
     return [rng.integers(-9, 10, shape).astype(object) for shape in shapes]
-
-
-def test_an_inverse_is_exact():
-    a = exact([["0.1", "3", "-7"], ["2/3", 0, 1], [5, "1e-6", 4]])
-    inverse = inverse_of(a)
-    assert (a @ inverse == np.eye(3, dtype=int)).all()
-    assert (inverse @ a == np.eye(3, dtype=int)).all()
-    with pytest.raises(np.linalg.LinAlgError, match="singular"):
-        inverse_of([[1, 2], [2, 4]])
 
 
 def test_row_sums_go_with_21_and_are_the_least_that_do():

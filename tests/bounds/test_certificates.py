@@ -11,7 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache
 from operator import mul
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,6 @@ from test_openings import NINE, WITHIN, raised_while_factored
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, WordFormats
 from gpbnb.bounds import certificate, check
 from gpbnb.bounds import system as of_systems
-from gpbnb.bounds.certificate import proved
 from gpbnb.bounds.check import NotProvedError, prove
 from gpbnb.bounds.gains import filter_schedule
 from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
@@ -371,17 +370,6 @@ def test_a_gain_is_near_the_mean_of_two_where_its_covariance_lies_between_theirs
                 assert off <= far[i][j]
                 used += off > far[i][j] * Fraction("0.9")
     assert used > 10
-
-
-def test_a_running_sum_is_proved_for_its_steps() -> None:
-    """It keeps its errors, so only a number of steps has a bound."""
-    made = LinearSystem([["1"]], [["1"]]).as_filter()
-    found = from_schedule(filter_schedule(made, FloatFormat(2, 11)), limits(measurement=1.0), 50)
-    content = dict(json.loads(found.certificate()))
-    assert content["steps"] == 50
-    assert "after 50 steps" in prove(content)
-    scale_bound("0.99")(content)
-    assert "may exceed its bound" in refused(content)
 
 
 # -- the checker stands alone -----------------------------------------------------------------------------------------
@@ -812,21 +800,6 @@ def test_what_has_no_certificate_says_so() -> None:
     none = guarantee(small(), FloatFormat(2, 11, emin=-14, emax=15), limits(measurement=1e6))
     with pytest.raises(ValueError, match="no certificate"):
         none.certificate()
-
-
-def test_a_claim_that_is_too_small_is_raised_to_one_that_is_proved() -> None:
-    made, fmt = LinearSystem([["0.9", "0.2"], ["-0.2", "0.8"]], [[1], [0]], [[1, 0]]).as_filter(), FloatFormat(2, 20)
-    question = Recursion(made, np.array([1.0]), None)
-    near = question.guess(fmt)
-    small = near._replace(bound=near.bound / 3, state=near.state * [0.25, 1, 0.5])
-    found = proved(small, partial(question.certificate, fmt))
-    np.testing.assert_allclose(found.bound, near.bound, rtol=4e-3)  # a claim is raised by a little more than it needs
-
-
-@pytest.mark.parametrize("back", [0, 2**20 + 1])
-def test_steps_back_are_counted_before_anything_is_summed(back: int) -> None:
-    with pytest.raises(NotProvedError, match="no step back, or too many"):
-        prove(json.loads(original("section")) | {"back": back})
 
 
 def test_rows_that_are_rounded_down_lose_no_more_than_is_counted() -> None:

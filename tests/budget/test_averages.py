@@ -43,11 +43,6 @@ def test_correlated_factor_against_many_digits(h):
     assert theory.correlated_factor(h, 1.0) == pytest.approx(float(exact), rel=4e-15)
 
 
-def test_sources_are_counted():
-    assert derivation.N.is_integer
-    assert derivation.J.is_integer
-
-
 def test_the_factors_of_theory_are_those_of_the_derivation():
     constant, _, white, correlated = (step.right for step in derivation.averages())
     c = next(symbol for symbol in constant.free_symbols if symbol.name == "c")

@@ -20,10 +20,6 @@ CELLS = [
 ]
 
 
-def test_there_are_figures():
-    assert CELLS
-
-
 @pytest.mark.parametrize("cell", [pytest.param(cell, id=f"{page}-{number}") for page, number, cell in CELLS])
 def test_every_figure_of_the_book_was_judged_and_found_right(cell):
     """A figure of :func:`style.figure` warns in a notebook, on stderr, of each departure from the rule."""

@@ -98,59 +98,6 @@ def test_without_disturbance_the_bound_is_what_the_evaluation_may_err():
             assert bound.max() < 1e-20 * 1e8  # the scales of the model reach 1e3, squared 1e6
 
 
-def scalar_step(bound, q=0.0, T=0.0, d=0.0, P=1.0, R=1.0):
-    one = np.ones((1, 1))
-    S = one * (P + R)
-    K = one * P / S if S[0, 0] else one
-    return one_step(
-        bound,
-        StepModel(one, one, one * 0, one * R),
-        contraction.Repeated(K, S, np.ones(1), np.full(1, q), one * T),
-        contraction.EvaluationErrors(np.full(1, d), one * d, one * 0, np.zeros(1)),
-    )
-
-
-def test_errors_of_the_evaluation_enter():
-    start = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.zeros((1, 1)))
-    after = scalar_step(start, d=1e-9)
-    assert after.eta == pytest.approx(1e-9 / 0.5**0.5, rel=1e-6, abs=0)
-    assert after.zeta == pytest.approx(1e-9 / 0.5, rel=1e-6, abs=0)
-
-
-def test_what_a_singular_innovation_covariance_does_not_reach_has_no_error():
-    one, H, nothing = np.eye(2), np.array([[1.0, 0.0]]), np.zeros((1, 1))
-    model = StepModel(one, H, one, nothing)
-    off = contraction.evaluation_errors(model, np.ones(2), one, np.ones(1), H.T, nothing, UNIT)
-    assert off.gain.tolist() == [[np.inf], [0.0]]
-    assert off.q[0] == np.inf
-    assert 0 < off.q[1] < 1e-20
-
-
-@pytest.mark.parametrize("change", [{"q": np.nan}, {"T": np.inf}, {"d": np.nan}, {"R": -1.0}, {"P": np.nan}], ids=str)
-def test_nothing_known_is_infinite_and_stays_so(change):
-    start = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.zeros((1, 1)))
-    after = scalar_step(start, **change)
-    assert after.eta == after.zeta == np.inf
-    later = scalar_step(after)
-    assert later.eta == later.zeta == np.inf
-    assert np.all(contraction.state_error_bound(later) == np.inf)
-
-
-def test_a_covariance_that_is_far_off_gives_no_bound():
-    start = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.full((1, 1), 2.5))
-    assert scalar_step(start).eta == np.inf
-    nearer = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.full((1, 1), 1.5))
-    assert scalar_step(nearer).eta < np.inf
-
-
-def test_a_singular_start_is_weighted_all_the_same():
-    P = np.array([[1.0, 1.0], [1.0, 1.0]])
-    start = contraction.contraction_start(P, np.full(2, 1e-6), np.zeros((2, 2)))
-    assert start.eta < np.inf
-    assert np.all(contraction.state_error_bound(start) >= 1e-6)
-    assert np.all(np.linalg.matrix_rank(start.L) == 2)
-
-
 @pytest.mark.parametrize("alike", [False, True])
 def test_evaluation_errors_cover_what_float64_does(alike):
     """Also with two precise sensors that are alike, whose gain has the errors of an inverse."""

@@ -83,8 +83,3 @@ def test_a_cycle_is_its_members_one_after_the_other(name):
     assert np.array_equal(found, expected)
     assert np.any(found)
     assert np.isfinite(np.asarray(found, dtype=float)).all()
-
-
-@pytest.mark.parametrize("options", [{}, {"bounded": True}], ids=str)
-def test_pieces_of_a_run_go_on_in_the_cycles(options):
-    assert np.array_equal(in_pieces(MODEL, **options), in_pieces(MODEL, (), **options))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from fractions import Fraction
 
 import numpy as np
@@ -18,7 +17,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import simulated_measurements
-from gpbnb.filters.steps import FACTORED, covariance_of_factors
+from gpbnb.filters.steps import FACTORED
 
 STEPS = ("0.001", "0.005", "0.01", "0.02", "0.04", "0.05", "0.1", "0.2", "0.3", "0.7")
 FORMATS = (FloatFormat(2, 8), FloatFormat(2, 24), FloatFormat(2, 24, Rounding.CHOP), FloatFormat(10, 5))
@@ -78,35 +77,6 @@ def test_emulation_and_bound_of_a_raised_covariance_agree():
     assert history.repairs == tuple(map(str, model.rounded(fmt).repairs))
     for form in (Form.INNOVATION, Form.UD):
         assert 0 < emulate(model, z, fmt, form, bounded=True).ratios().max() <= 1
-
-
-def test_factors_are_those_of_the_raised_covariance():
-    for fmt, model in itertools.product(FORMATS, MODELS):
-        run, stored = Run(model, fmt, Form.UD, ()), model.definite_in(fmt)
-        if run.repairs != list(stored.repairs):
-            assert run.repairs[-1].letter == "Q"
-            found = covariance_of_factors(run.exactly(run.letters["UQ"])[0])
-            sizes = np.sqrt(np.diagonal(stored.Q[0]).astype(float))
-            off = (np.abs(found - stored.Q[0]) / np.multiply.outer(sizes, sizes)).astype(float)
-            assert 0 < off.max() <= 2 * run.repairs[-1].shift + 8 * model.n * float(fmt.unit_roundoff)
-            return
-    raise AssertionError("no factors were raised")
-
-
-@pytest.mark.parametrize("letter", ["Q", "R", "P0"])
-def test_each_covariance_is_raised_by_itself(letter):
-    """This one is definite in 24 bits, but its computed factors are not."""
-    fmt, one = FloatFormat(2, 24), np.eye(3, dtype=int)
-    given = exact([["4058.0002", "-176", "430"], ["-176", "4264.00001", "7812"], ["430", "7812", "14452.00002"]])
-    units = {"Phi": one, "H": one, "Q": one, "R": one, "x0": [0, 0, 0], "P0": one}
-    model = LinearModel(**(units | {letter: given}), repair=True)
-    assert model.rounded(fmt).repairs == ()
-    run = Run(model, fmt, Form.UD, ())
-    assert [each.letter for each in run.repairs] == [letter]
-    sizes = np.sqrt(np.diagonal(given).astype(float))
-    for name, factors in (("Q", run.letters["UQ"][0]), ("R", run.letters["UR"][0]), ("P0", run.P)):
-        off = covariance_of_factors(run.exactly(factors)) - (given if name == letter else one)
-        assert np.abs(off / np.multiply.outer(sizes, sizes)).max() <= 2 * run.repairs[0].shift + 24 * 2.0**-24
 
 
 @pytest.mark.parametrize("form", [Form.UD, Form.POTTER, Form.CARLSON])

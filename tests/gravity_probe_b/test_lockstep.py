@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.forms import Form
@@ -12,14 +11,6 @@ from gpbnb.filters.run import Run
 from gpbnb.report.gravity_probe_b import threshold
 from gpbnb.report.gravity_probe_b.threshold import FORMS, SimpleYear, YearCell, compute, rows
 from gpbnb.report.gravity_probe_b.year import MODELS, model
-from gpbnb.report.gravity_probe_b.year import simulation as year_simulation
-
-STEPS, COUNT = 300, 5
-
-
-@pytest.fixture(scope="module")
-def measured():
-    return np.stack([SimpleYear("absolute").simulation(record).measurements(STEPS) for record in range(COUNT)], axis=-1)
 
 
 def test_a_filter_that_stops_leaves_no_numbers():
@@ -36,11 +27,6 @@ def test_a_filter_that_stops_leaves_no_numbers():
 
 
 # -- the sweep ------------------------------------------------------------------------------------
-
-
-def test_record_0_is_the_year_of_one_record(measured):
-    assert (measured[:, :, 0] == year_simulation(MODELS[0]).measurements(STEPS)).all()
-    assert SimpleYear("deviation").simulation(0).start[2:4] == threshold.DEVIATION
 
 
 SMALL = YearCell("", "deviation", 2, "nearest", "hung", (20, 24), 3, 2)

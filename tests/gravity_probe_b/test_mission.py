@@ -13,15 +13,9 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import BLOCK
 from gpbnb.report.gravity_probe_b import mission, threshold
-from gpbnb.report.gravity_probe_b.mission import PARAMETERS, STATES, Mission
+from gpbnb.report.gravity_probe_b.mission import STATES, Mission
 
 YEAR = np.linspace(0, 3_153_600, 2001).astype(np.int64)
-
-
-def test_every_number_has_its_source():
-    assert len({each.name for each in PARAMETERS}) == len(PARAMETERS)
-    assert all(each.source for each in PARAMETERS)
-    assert sum(each.source.startswith("ours") for each in PARAMETERS) < len(PARAMETERS) * 2 / 3
 
 
 def test_noises_keep_the_variances_of_pointing_and_of_flicker():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from copy import copy
-from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -18,7 +17,7 @@ from gpbnb.filters.forms import WITH_PROGRAM, Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.guarantees import filters, scalar
-from gpbnb.report.guarantees.random_filters import DETERMINISTIC, KINDS, RANGES, Drawn, draw
+from gpbnb.report.guarantees.random_filters import DETERMINISTIC, KINDS, RANGES, draw
 from tests.oracles import EXACT, rounds
 from tests.plain_filters import Filter, Refused
 
@@ -74,10 +73,6 @@ def test_a_filter_in_integers_gives_the_digits_of_a_run():
     assert seen >= {*WITH_PROGRAM, *KINDS, *DETERMINISTIC, 2, 10, 16, *RANGES, 1, 3, 4}
 
 
-def test_a_first_gain_without_a_result_ends_the_run_there():
-    assert compared(draw(20261173), 3, np.random.default_rng(8)) == "stopped"
-
-
 # -- the survey -------------------------------------------------------------------------------------------------------
 
 
@@ -129,36 +124,6 @@ def test_errors_are_those_of_filters_without_the_package(seed):
             assert all(abs(e) <= b for e, b in zip(errors, found.bound, strict=True))
             compared_steps += 1
     assert compared_steps > 100
-
-
-def test_a_step_with_another_gain_than_the_guarantee_is_counted():
-    drawn = draw(3)
-    found = guarantee(drawn.model, drawn.fmt, drawn.within, form=drawn.form, most=filters.MOST, horizon=filters.STEPS)
-    assert filters.other_gains(drawn, found) == 0
-    others = found.schedule.packed.copy()
-    others[0, -1] += 1
-    assert filters.other_gains(drawn, replace(found, schedule=replace(found.schedule, packed=others))) == 1
-
-
-def test_a_run_counts_until_the_exact_filter_leaves_its_limits():
-    model = LinearModel(*(exact([[each]]) for each in ("1/2", 1, 1, 1)), exact([0]), exact([[1]]))
-    drawn = Drawn(
-        "plain",
-        model,
-        FloatFormat(2, 8),
-        Form.INNOVATION,
-        "all",
-        limits(state=2, innovation=3, measurement=4),
-        np.array([4.0]),
-    )
-    for z, true, steps in (
-        ([1, 1, 5, 1], [1, 1, 1, 1], 2),  # a measurement beyond 4
-        ([1, 1, 1, 1], [1, 3, 1, 1], 1),  # a state beyond 2
-        ([1, 1, -3, 1], [1, 1, 1, 1], 2),  # an innovation of -3.5
-        ([1, 1, 1, 1], [1, 1, 1, 1], 4),
-    ):
-        columns = (np.array(each, dtype=float)[:, None] for each in (true, z, z))
-        assert filters.first_outside(drawn, *columns) == steps
 
 
 def test_no_stored_run_exceeds_its_bound():

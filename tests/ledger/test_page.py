@@ -69,28 +69,6 @@ def test_text_is_escaped_and_a_chapter_named_in_a_note_is_linked():
     assert re.findall(r'<p class="(\w+)">', html) == ["printed", "corrected", "recomputed", "note"]
 
 
-def test_every_verdict_that_a_claim_can_have_has_an_outcome():
-    outcomes = {}
-    for verdict in (Verdict.VERIFIED, Verdict.UNVERIFIABLE, *DISAGREEMENTS):
-        agrees = {Verdict.VERIFIED: True, Verdict.UNVERIFIABLE: None}.get(verdict, False)
-        rows = [Row(statement, Finding("1", agrees, verdict, "why")) for statement in STATEMENTS]
-        html = ledger.claim_table(rows).html
-        found = re.findall(r'class="verdict [\w-]+">([^<]+)<', html)
-        assert len(found) == len(page.CLAIMS)
-        outcomes[verdict] = found[0]
-        assert set(found) == {found[0]}
-    assert outcomes == {
-        Verdict.VERIFIED: "replicated",
-        Verdict.MISPRINT: "replicated after correcting a misprint",
-        Verdict.OCR: "replicated after correcting the scan",
-        Verdict.INCONSISTENT: "corrected",
-        Verdict.WRONG: "refuted",
-        Verdict.NOT_REPRODUCED: "not reproducible",
-        Verdict.UNVERIFIABLE: "not reproducible",
-    }
-    assert Elements(html).cells[:3] == ["Claim", "Outcome", "What follows"]
-
-
 def test_select_topic():
     found = ledger.select_topic(ROWS, "rounding")
     assert [row.statement.id for row in found] == [s.id for s in STATEMENTS if TOPIC_OF[s.id] == "rounding"]

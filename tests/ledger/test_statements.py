@@ -3,8 +3,6 @@
 import re
 from dataclasses import asdict
 
-import pytest
-
 from gpbnb.report.ledger import load_statements
 from gpbnb.report.ledger.corrections import load_corrections
 from gpbnb.report.ledger.statements import DOCUMENTS, statement
@@ -40,12 +38,3 @@ def markup_faults(printed):
         faults += ["unpaired brace"] * (plain.count("{") != plain.count("}"))
         faults += ["a LaTeX comment"] * ("%" in math.replace(r"\%", ""))
     return faults
-
-
-@pytest.mark.parametrize(("document", "chapter"), [("hung1984", "II"), ("hung1982", "III")])
-def test_each_numbered_equation_has_its_entry(document, chapter):
-    """No entry holds several of them; (89) of 1982 has one for each of its two forms."""
-    places = [entry.id.removeprefix(f"{document}.{chapter}.") for entry in INVENTORY]
-    numbers = [int(place[2:]) for place in places if re.fullmatch(r"eq\d+", place)]
-    forms_of_89 = [89] * ("eq89-first-form" in places and "eq89-factored-form" in places)
-    assert sorted(numbers + forms_of_89) == list(range(1, 126))

@@ -82,11 +82,6 @@ def test_the_errors_of_elimination_change_the_given_matrix_and_their_sizes_bound
             assert (abs(sum(each.value for each in errors)) <= beta * run.sizes(right)).all()
 
 
-def test_a_row_of_back_substitution_has_the_weights_of_87_and_88():
-    for terms in range(5):
-        assert inversion.back_row_weights(terms) == (terms + 1, tuple(range(terms + 2, 2, -1)))
-
-
 def test_the_resultant_perturbations_belong_to_the_computed_inverse():
     printed = Statement(
         "hung1984.II.x", "hung1984", "II", "1", "x", "equation", "x", "A_hat*x_hat[j] == u[j] + deltab[j]"

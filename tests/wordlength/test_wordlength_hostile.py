@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
 from gpbnb.wordlength.__main__ import main
@@ -83,13 +81,3 @@ def test_a_value_of_a_wrong_type_is_refused_with_its_key(folder, capsys, entries
             message = refused(capsys, "model.toml", "--measurements", "z.csv")
             assert message.startswith("model.toml: "), kind
             assert key in message, kind
-
-
-def test_a_report_may_replace_an_older_one_and_names_files_that_are_not_utf8(folder, capsys):
-    name = os.fsdecode(b"z\xff.csv")
-    (folder / "z.csv").rename(name)
-    asked = ["filter.toml", "--tolerance", "0.1", "--basis", "emulation", "--measurements", name, "--report", "a.html"]
-    for _ in range(2):
-        assert main(asked) == 0
-    assert r"z\xff.csv" in (folder / "a.html").read_text(encoding="utf-8")
-    assert r"z\\xff.csv" in (folder / "a.json").read_text(encoding="utf-8")
