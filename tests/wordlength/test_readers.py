@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -75,3 +76,14 @@ def test_a_filter_of_opencv_begins_with_its_last_estimate():
     given.controlMatrix = np.ones((2, 1))
     with pytest.raises(ValueError, match="with a controlMatrix; needed none"):
         read_model(given)
+
+
+def test_functions_of_a_file_are_those_of_python_and_leave_its_path(tmp_path):
+    (tmp_path / "own.py").write_text("from constants import GAIN\n\ndef step(fmt, x, u):\n    return x + u / GAIN, x\n")
+    (tmp_path / "constants.py").write_text("GAIN = 8\n")
+    (tmp_path / "step.toml").write_text('step = "own.py:step"\nx0 = [0]\n')
+    before, found = [*sys.path], read_model(tmp_path / "step.toml")
+    assert sys.path == before
+    again = read_model({"step": found.step, "x0": [0]})
+    errors = [emulate(each, [0.3, 0.25], "Q3.12").errors.tolist() for each in (found, again)]
+    assert errors[0] == errors[1] != [[0.0], [0.0]]
