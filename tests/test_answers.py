@@ -12,6 +12,7 @@ shows what has changed.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import html
 import inspect
@@ -321,6 +322,7 @@ def names(section):
     return found | (public(import_module(section)) if section.startswith("gpbnb.") else {})
 
 
+@functools.cache
 def texts(stored):
     """For each section the calls, each with its stored text."""
     found, part = {}, []
