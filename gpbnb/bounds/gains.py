@@ -89,8 +89,8 @@ def periodic(k: NDArray[np.int64], first: int, period: int) -> NDArray[np.int64]
 def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Schedule:
     """Return a filter with fixed coefficients in a format, for :func:`gpbnb.bounds.guarantee.from_schedule`.
 
-    Its coefficients come from :meth:`~gpbnb.filters.system.LinearFilter.stored`, so they are fixed even if the format
-    rounds at random. Each operation is then off by less than a unit in the last place, as with directed rounding.
+    Its coefficients come from :meth:`~gpbnb.filters.structures.LinearFilter.stored`, so they are fixed even if the
+    format rounds at random. Each operation is then off by less than a unit in the last place, as when it rounds up.
     """
     if not made.program.is_linear:
         raise ValueError(f"got {made.name}, which limits its values; needed a linear filter for a schedule")
@@ -139,16 +139,15 @@ def schedule(
     tried = int(np.clip(WORK / model.n**3, 256, MOST)) if most is None else most
     most = MOST if most is None else most
     run, repeat, period = _emulated(replace(model, x0=nothing, steps=None), fmt, form, tried)
-    bad = run.stopped or run.indefinite
-    if run.stopped:
+    if run.indefinite:
+        end, why = run.indefinite, f"the computed covariance lost definiteness at step {run.indefinite}"
+    elif run.stopped:
+        end = run.stopped - 1
         why = f"the computed covariance became singular, or left the range of the backend, at step {run.stopped}"
-    elif run.indefinite:
-        why = f"the computed covariance lost definiteness at step {run.indefinite}"
-    elif repeat is None:
-        why = f"the computed gain did not settle within {run.steps} steps"
+    elif repeat is None or period is None:
+        end, why = run.steps, f"the computed gain did not settle within {run.steps} steps"
     else:
-        why = ""
-    end = max(bad - bool(run.stopped), 0) if bad else run.steps if repeat is None or period is None else repeat + period
+        end, why = repeat + period, ""
     if end == 0:
         raise ValueError(f"got {model.name} in {format_text(fmt)}; needed a first step that can be computed: {why}")
     if repeat is None or why:

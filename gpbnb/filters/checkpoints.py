@@ -97,7 +97,7 @@ class Progress(ABC):
                 found.given[i] = found.given[i].reshape(-1, *state.shape)
                 if len(found.definite):
                     state[:] = found.given[i][-1]
-            self.done(found.definite, *found.given)
+            self.done(found.definite, *found.given, *found.shared)
             resumes = found.stop is not None and found.stop.fault.overflows and unlimited
             if found.stop is not None and not (resumes and drop_decayed(states[0], *states[2:])):
                 self.stop(*fault(found.stop))

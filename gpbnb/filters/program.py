@@ -53,8 +53,8 @@ class Program:
     tape : on which they were recorded.
     rows, formats : operations (o, 5) of the machine, each a code, three operands and the place of the result; and the
         number of the format of each.
-    states, inputs, coefficients : places of arrays: of states, which are -1 for an output of the step before, of inputs
-        such as measurements, which follow each other, and of numbers of the model, each with a cycle.
+    states, inputs, coefficients : places of arrays: of states, which are -1 for those that no operation reads, of
+        inputs such as measurements, and of numbers of the model, each with a cycle.
     after, results : places of the next states, the last p of which are outputs, and of the rest that a step gives.
     definite : the truth value that holds while a covariance is definite.
     late : places of states that are known to depend on the inputs, and of coefficients whose cycle is too long to wait

@@ -1,8 +1,8 @@
 """A step of a linear filter as a program, recorded once from the step as it is written for arrays.
 
 :mod:`gpbnb.filters.steps` takes arrays of any kind, also arrays that record their operations, see
-:mod:`gpbnb.arithmetic.traced`. What does not depend on the measurements, the covariance and the gain, stands in a
-program of its own, which runs once for all records and whose results may repeat.
+:mod:`gpbnb.arithmetic.traced`. What does not depend on the measurements, the covariance and the gain, is a part of its
+own, which runs once for all records and whose results may repeat.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def step_kind(
         if parts:
             zeros, ones = zeros[..., 0], ones.all(axis=-1)
         entries = np.where(zeros.all(axis=0), 0, np.where(ones.all(axis=0), 1, 2)).astype(np.uint8)
-        if letter == "u":  # of another run, the known inputs are others
+        if letter == "u":  # generated code takes known inputs of any size
             entries[:] = 2
         known.append(Known(letter, entries.shape, entries.tobytes()))
     return StepKind(form, n, m, tuple(known), one is not None, blocks, sums, not parts)

@@ -165,7 +165,7 @@ class RepeatedStep:
         done = len(found.definite)
         if not done:
             return None
-        packed = zip(leaves(self._given), found.given, strict=False)
+        packed = zip(leaves(self._given), found.given, strict=True)
         arrays = (
             numbers.unpacked(each, (done, *leaf.shape), self._formats[leaf.format.number]) for leaf, each in packed
         )

@@ -346,7 +346,8 @@ class Run(Progress):
         return [each.reshape(len(each), at.size, *each.shape[1 + at.ndim :]) for each, at in cycles]
 
     def linear_program(self) -> Program:
-        """Return how a step computes the estimate from the measurements."""
+        """Return how a step computes the estimate from the measurements; ValueError with known inputs or offsets."""
+        self.model.refuse_inputs("its linear program")
         return linear_program(self.recorded(), self.letters)
 
     def coefficients(self) -> NDArray[Any]:
@@ -354,13 +355,15 @@ class Run(Progress):
         parts, at = self.recorded(), self.checkpoint_steps[: self.saved] - 1
         tables = (table[at % len(table)] for table in self._tables(parts))
         of_model = [table[:, each] for table, each in zip(tables, entries_taken(parts), strict=True)]
-        shared = self.kept()[-1].reshape(len(at), -1, *of_model[0].shape[2:])
-        zero = np.zeros((len(at), 1, *shared.shape[2:]), shared.dtype)
+        rows, first, tail = len(at), of_model[0], of_model[0].shape[2:]
+        shared, zero = (np.zeros_like(first, shape=(rows, count, *tail)) for count in (len(parts.shared), 1))
+        if rows:
+            shared[:] = self.kept()[-1].reshape(shared.shape)
         return np.concatenate([*of_model, shared, zero], axis=1)
 
     def _block(self, found: StepsTaken) -> Block:
         x, K, P = (
-            found.given[which].reshape(-1, *none.shape[1:]) for which, none in zip((0, -2, 1), self._none, strict=True)
+            found.given[which].reshape(-1, *none.shape[1:]) for which, none in zip((0, -1, 1), self._none, strict=True)
         )
         return Block(x, K, P, found.definite, found.stop)
 

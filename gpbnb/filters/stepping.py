@@ -165,14 +165,15 @@ class StepsTaken(NamedTuple):
 
     Parameters
     ----------
-    given : states, and the rest that a step gives, each (steps, entries, ...); of a divided step also what its second
-        part takes from the first.
+    given : states, and the rest that a step gives, each (steps, entries, ...).
     definite : (steps,).
+    shared : what the second part of a step takes from the first, (steps, entries, ...), if it has two parts.
     """
 
     given: list[NDArray[Any]]
     definite: NDArray[np.bool_]
     stop: Stop | None
+    shared: Sequence[NDArray[Any]] = ()
 
 
 class Repeats(Protocol):
@@ -277,8 +278,8 @@ class RunningStep:
         self._last = None  # the early part is ahead of the rest
         if done == count:
             self._last = kept[-1, shared : shared + len(of_early.after)] if done else before
-        all_results = [*(results[i] for i in range(len(sizes))), kept[:done, :shared]]
-        return StepsTaken(all_results, definite[:done] & held, stop)
+        whole = [results[i] for i in range(len(sizes))]
+        return StepsTaken(whole, definite[:done] & held, stop, [kept[:done, :shared]])
 
     def _early_steps(
         self, first: int, count: int, states: NDArray[Any]

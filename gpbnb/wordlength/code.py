@@ -1,8 +1,8 @@
 """C99 code of a filter that agrees with the emulation digit for digit: source, test vectors and a Makefile.
 
-The statements are those of the list of operations that is emulated and bounded, see :mod:`gpbnb.filters.program`:
-one for each operation, in the same order. So what is computed about a filter holds for
-the code, if the compiler keeps the order and rounds each operation, as C99 demands.
+The statements are those of the list of operations that is emulated, see :mod:`gpbnb.filters.program`: one for each
+operation, in the same order; bounds follow those that depend on the measurements. So what is computed about a filter
+holds for the code, if the compiler keeps the order and rounds each operation, as C99 demands.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from gpbnb.filters.nonlinear import NonlinearModel
 from gpbnb.filters.nonlinear_run import opened, simulated
 from gpbnb.filters.nonlinear_system import NonlinearSystem
 from gpbnb.filters.opening import stored_start
-from gpbnb.filters.program import without_exact
+from gpbnb.filters.program import Program, without_exact
 from gpbnb.filters.recording import filter_program, program_states
 from gpbnb.filters.run import Run
 from gpbnb.filters.settled import settled_filter
@@ -330,7 +330,7 @@ def _of_filter(model: LinearModel | NonlinearModel, fmt: AnyFormat, form: Form |
     )
 
 
-def _program(run: Run) -> tuple[Any, list[NDArray[Any]]]:
+def _program(run: Run) -> tuple[Program, list[NDArray[Any]]]:
     """Return the operations of a step of a linear filter, and its coefficients but 1, each with its cycle."""
     members = [run.exactly(each) for letter, each in run.letters.items() if letter != "u"]
     return filter_program(run.form, run.recorded().step, run.letters, []), members

@@ -283,7 +283,7 @@ def _sizes(system: LinearSystem, z: Any) -> NDArray[np.float64]:
     steps, at = RunningStep(system_step(made.program, whole=True), [BINARY64], [coefficients[None]]), 0
     sizes = np.zeros(len(made.program.places))
     while at < len(given):
-        (states, values, *_), _, stop = steps.take(at, [start], given[at : at + steps.longest])
+        (states, values), _, stop, _ = steps.take(at, [start], given[at : at + steps.longest])
         if stop is not None:
             raise OverflowError(f"the run without rounding: {system.beyond()}")
         start, at = states[-1], at + len(states)

@@ -75,7 +75,7 @@ def test_the_program_gives_the_digits_of_the_filter(form: Form, fmt: FloatFormat
     x, found = as_packed(fmt, given.x0), []
     for row, each in zip(given.rows(np.arange(steps)), z, strict=True):
         steps_of = RunningStep(system_step(given.program), [fmt], [given.packed[row][None]], tag=run.tag)
-        (states, *_), _, stop = steps_of.take(0, [x], as_packed(fmt, each[None]))
+        (states,), _, stop, _ = steps_of.take(0, [x], as_packed(fmt, each[None]))
         assert stop is None
         x = states[0].reshape(x.shape)
         found.append(x)
