@@ -329,7 +329,7 @@ def evaluate(memory: Memory, kind: Any, formats: Any, code: Any) -> int:
 def evaluated(memory: Memory, kind: Any, formats: Any, code: Any, far: bool = False) -> tuple[int, bool]:
     """Run operations as :func:`evaluate` does.
 
-    Also return whether numbers may then be too small or too large for quick computation; `far` says it of those before.
+    Also return whether a number may now be too small or too large for quick loops; `far` says so for the start.
     """
     done, once, given = 0, _loops().once, (formats.address, code.table.address, memory.table.address, memory.lanes)
     with contextlib.suppress(OverflowError, ZeroDivisionError):

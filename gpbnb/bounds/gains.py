@@ -89,8 +89,8 @@ def periodic(k: NDArray[np.int64], first: int, period: int) -> NDArray[np.int64]
 def filter_schedule(made: LinearFilter, fmt: FloatFormat | FixedFormat) -> Schedule:
     """Return a filter with fixed coefficients in a format, for :func:`gpbnb.bounds.guarantee.from_schedule`.
 
-    Its coefficients come from :meth:`~gpbnb.filters.structures.LinearFilter.stored`, so they are fixed even if the
-    format rounds at random. Each operation is then off by less than a unit in the last place, as when it rounds up.
+    Its coefficients are stored once, see :meth:`~gpbnb.filters.structures.LinearFilter.stored`, so they are fixed even
+    if the format rounds at random. The error of an operation is then less than a unit in the last place.
     """
     if not made.program.is_linear:
         raise ValueError(f"got {made.name}, which limits its values; needed a linear filter for a schedule")

@@ -68,7 +68,7 @@ def probable_output_errors(
 ) -> NDArray[np.float64]:
     """Estimate the error of each output, (p,): three deviations of roundings, and bounds of errors of storing.
 
-    Of words, only the format of the data is used: words with others are refused before.
+    Words must have one format for data, coefficients and sums; others are refused earlier.
     """
     fmt = fmt.data if isinstance(fmt, WordFormats) else fmt
     if cause := system.unstable(fmt):

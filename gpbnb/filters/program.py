@@ -46,16 +46,18 @@ _LIMITS = {1: AT_MOST, 4: AT_LEAST}
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Operations of one step, and the places of what it takes and gives.
+    """Operations of one step, with the places of its arguments and results.
 
     Parameters
     ----------
-    tape : on which they were recorded.
-    rows, formats : operations (o, 5) of the machine, each a code, three operands and the place of the result; and the
-        number of the format of each.
-    states, inputs, coefficients : places of arrays: of states, which are -1 for those that no operation reads, of
-        inputs such as measurements, and of numbers of the model, each with a cycle.
-    after, results : places of the next states, the last p of which are outputs, and of the rest that a step gives.
+    tape : the tape on which they were recorded. Its labels belong to the rows of the tape, not to other rows.
+    rows : (o, 5), operations of the machine: a code, three operands, and the place of the result.
+    formats : (o,), number of the format of each operation.
+    states : places of the arrays of states; -1 for a state that no operation reads.
+    inputs : places of the arrays of inputs, such as measurements.
+    coefficients : places of the arrays of the model, each with a cycle of its own.
+    after : places of the next states; the last p of them are outputs.
+    results : places of the other arrays that a step returns.
     definite : the truth value that holds while a covariance is definite.
     late : places of states that are known to depend on the inputs, and of coefficients whose cycle is too long to wait
         until they repeat, such as known inputs.

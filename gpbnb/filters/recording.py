@@ -32,9 +32,9 @@ from gpbnb.filters.steps import BlockAlgebra, BlockStorage, LinearStep, StepTake
 def system_step(program: Program, in_order: bool = False, whole: bool = False) -> DividedStep:
     """Return a step of a linear program; the cycle of its coefficients has one member.
 
-    Operations of one code that do not need each other run together, in half the time; `in_order` keeps all in order, as
-    random numbers require, which each draws in turn. A stop names the number of the first output that needs the
-    operation. The whole step also gives each of its values.
+    Independent operations of one code run together, which halves the time. With random rounding, `in_order` keeps the
+    order of the program, since each operation draws the next random number. A stop names the number of the first output
+    that needs the operation. With `whole`, the step also returns each of its values.
     """
     rows, tape, ends = program.rows, Tape(program.tape.inputs), flat(program.after)
     places = tuple(map(np.arange, program.tape.sizes))
@@ -134,7 +134,8 @@ def entries_taken(parts: DividedStep) -> list[NDArray[np.int64]]:
 def linear_program(parts: DividedStep, letters: Iterable[str]) -> Program:
     """Return the operations that depend on the measurements, whose matrices of the model are named by their letters.
 
-    Coefficients are the entries of the model that they take, what the other operations share with them, and zero.
+    Its coefficients are the entries of the model that these operations use, the results of other operations that they
+    use, and zero.
     """
     step, rest, shared = parts.step, parts.rest, parts.step.tape.sizes[0] + np.arange(len(parts.shared))
     names, taken = list[str](), list[NDArray[np.int64]]()
